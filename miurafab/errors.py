@@ -1,0 +1,76 @@
+"""Every error a user can meet is one sentence that names the thing and the way out.
+
+The tree (the exit code of the command line in brackets)::
+
+    MiurafabError
+    ├── InputError [2]          the input is wrong: a file, an option, a value
+    │   ├── UnitError           a length, angle or feed that cannot be read
+    │   ├── ProfileError        a machine or material profile, by file and key
+    │   ├── TargetError         a surface, profile curve or mesh that cannot be a target
+    │   ├── PatternError        a pattern file that cannot be read or made
+    │   ├── LayoutError         a pattern, bed and material that admit no layout
+    │   └── GcodeError          a G-code program that cannot be read or must not be sent
+    └── MachineError [3]        the machine, its port or its controller failed
+        ├── PortError           the port cannot be opened, or went away
+        ├── ControllerError     the controller answered an error or an alarm
+        └── JobStopped          the job ended early at somebody's wish
+
+Numerical failure is not here: a fit that does not converge is a result with advice.
+"""
+
+from __future__ import annotations
+
+
+class MiurafabError(Exception):
+    """A failure whose message is a complete sentence for the user.
+
+    ``exit_code`` is what the command line exits with.
+    """
+
+    exit_code = 2
+
+
+class InputError(MiurafabError):
+    """Something the user gave is wrong."""
+
+
+class UnitError(InputError):
+    """A quantity that cannot be read."""
+
+
+class ProfileError(InputError):
+    """A machine or material profile with a fault, named by file and key."""
+
+
+class TargetError(InputError):
+    """A surface, profile curve or mesh that cannot serve as a target."""
+
+
+class PatternError(InputError):
+    """A pattern file that cannot be read, or a pattern that cannot be built."""
+
+
+class LayoutError(InputError):
+    """A pattern that cannot be laid out on this bed with this material."""
+
+
+class GcodeError(InputError):
+    """A G-code program that cannot be read or must not be sent."""
+
+
+class MachineError(MiurafabError):
+    """The machine, its port or its controller failed."""
+
+    exit_code = 3
+
+
+class PortError(MachineError):
+    """The port cannot be opened, or went away."""
+
+
+class ControllerError(MachineError):
+    """The controller answered an error or went into alarm."""
+
+
+class JobStopped(MachineError):
+    """The job was ended early, with the beam off, at somebody's wish."""

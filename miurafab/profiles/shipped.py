@@ -1,0 +1,50 @@
+"""Where the files that come with miurafab are: machine profiles, materials, patterns.
+
+In a checkout they stand at the top level, where people edit them; in a wheel they lie in
+``miurafab/shipped``. The two are told apart by what is there, and nothing else may differ.
+"""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Literal
+
+from miurafab.errors import InputError, ProfileError
+
+Kind = Literal["firmware_profiles", "materials", "patterns"]
+_PACKAGE = Path(__file__).resolve().parent.parent
+_NOUN = {"firmware_profiles": "machine", "materials": "material", "patterns": "pattern"}
+
+
+def shipped_directory(kind: Kind) -> Path:
+    """The directory with the shipped files of one kind."""
+    inside = _PACKAGE / "shipped" / kind
+    return inside if inside.is_dir() else _PACKAGE.parent / kind
+
+
+def shipped_names(kind: Kind, suffix: str = ".toml") -> list[str]:
+    """The names (file stems) of the shipped files of one kind, sorted."""
+    return sorted(path.stem for path in shipped_directory(kind).glob(f"*{suffix}"))
+
+
+def find_file(
+    kind: Kind, name: str, suffix: str = ".toml", error: type[InputError] = ProfileError
+) -> Path:
+    """The file that a user means by ``name``: a path of their own, or a shipped name.
+
+    Raises ``error`` when there is neither, with the nearest names that exist.
+    """
+    own = Path(name)
+    if own.suffix == suffix or len(own.parts) > 1:
+        if own.is_file():
+            return own
+        raise error(f"{name} does not exist.")
+    shipped = shipped_directory(kind) / f"{name}{suffix}"
+    if shipped.is_file():
+        return shipped
+    names = shipped_names(kind, suffix)
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean '{near[0]}'" if near else f"there are {', '.join(names)}"
+    noun = _NOUN[kind]
+    raise error(f"'{name}' is not a known {noun}; {hint}, or give the path of a {suffix} file.")

@@ -1,0 +1,71 @@
+"""Quantities as people write them, turned into the floats that the inside computes with.
+
+Inside, everything is millimetres, seconds, radians and millimetres a minute for feeds
+(``feed_mm_min``). This is the only place that knows a unit's name.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+from miurafab.errors import UnitError
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s].*?)?\s*")
+
+# The inch is exactly 25.4 mm (international yard and pound agreement, 1959).
+_LENGTHS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, '"': 25.4}
+_ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0}
+_FEEDS = {"mm/min": 1.0, "mm/s": 60.0, "m/min": 1000.0, "in/min": 25.4, "in/s": 1524.0}
+_PRESSURES = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "gpa": 1e9}
+
+
+def _parse(text: str | float, units: dict[str, float], bare: str, what: str) -> float:
+    if isinstance(text, bool):
+        raise UnitError(f"{text!r} is not {what}; write a number with a unit such as {bare!r}.")
+    if isinstance(text, int | float):
+        value, unit = float(text), bare
+    else:
+        match = _QUANTITY.fullmatch(text)
+        if match is None:
+            raise UnitError(
+                f"{text!r} is not {what}; write a number with one of the units {_list(units)}."
+            )
+        value, unit = float(match.group(1)), (match.group(2) or bare)
+    factor = units.get(unit) if unit in units else units.get(unit.lower())
+    if factor is None:
+        raise UnitError(f"{text!r} is not {what}: the unit {unit!r} is not one of {_list(units)}.")
+    if not math.isfinite(value):
+        raise UnitError(f"{text!r} is not {what}: it is not a finite number.")
+    return value * factor
+
+
+def _list(units: dict[str, float]) -> str:
+    return ", ".join(units)
+
+
+def parse_length(text: str | float) -> float:
+    """A length in millimetres; a bare number is millimetres already.
+
+    Raises :class:`~miurafab.errors.UnitError` for anything else than a finite number
+    with a unit of length.
+
+    >>> parse_length("0.5in")
+    12.7
+    """
+    return _parse(text, _LENGTHS, "mm", "a length")
+
+
+def parse_angle(text: str | float) -> float:
+    """An angle in radians; a bare number is radians already. Raises ``UnitError``."""
+    return _parse(text, _ANGLES, "rad", "an angle")
+
+
+def parse_feed(text: str | float) -> float:
+    """A feed in millimetres a minute; a bare number is that already. Raises ``UnitError``."""
+    return _parse(text, _FEEDS, "mm/min", "a feed")
+
+
+def parse_pressure(text: str | float) -> float:
+    """A modulus or pressure in pascal; a bare number is pascal. Raises ``UnitError``."""
+    return _parse(text, _PRESSURES, "pa", "a modulus")
