@@ -30,7 +30,7 @@ class Perforation:
 
 @dataclass(frozen=True)
 class TabRule:
-    """Glue tabs: ``height`` in mm, and the ``inset`` kept from the borders of the facet under it."""
+    """Glue tabs: ``height`` in mm, and the ``inset`` kept from the borders of the glued facet."""
 
     height_mm: float
     inset_mm: float

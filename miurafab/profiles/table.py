@@ -164,6 +164,6 @@ class Table:
 
 
 def _plain_number(value: str | float) -> float:
-    if isinstance(value, str) or isinstance(value, bool):
+    if isinstance(value, str | bool):
         raise UnitError(f"{value!r} is not a plain number.")
     return float(value)
