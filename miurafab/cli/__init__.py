@@ -1,1 +1,46 @@
-"""The command line: one module a command, each of which calls one library function."""
+"""The command line: one module a command, each of which parses, calls one library function, prints.
+
+Exit codes: 0 done, 1 the answer is no, 2 bad input or usage, 3 the machine or port failed. An
+error is one sentence on standard error, and with ``--json`` an object ``{"error": ...}`` as well.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import NoReturn
+
+import typer
+
+from miurafab.cli import profiles
+from miurafab.cli.console import json_text
+from miurafab.errors import MiurafabError
+
+app = typer.Typer(
+    name="miurafab",
+    help="From a curved surface to a folded origami shell, cut on a real machine.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command("profiles")(profiles.profiles)
+app.command("materials")(profiles.materials)
+
+
+def main() -> NoReturn:
+    """Run the command line on ``sys.argv`` and exit."""
+    try:
+        app()
+    except MiurafabError as error:
+        _fail(str(error), type(error).__name__, error.exit_code)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        _fail(f"{where}{error.strerror or error}.", type(error).__name__, 2)
+    sys.exit(0)
+
+
+def _fail(sentence: str, kind: str, exit_code: int) -> NoReturn:
+    if "--json" in sys.argv:
+        sys.stdout.write(json_text({"error": sentence, "kind": kind}) + "\n")
+    sys.stderr.write(f"miurafab: {sentence}\n")
+    sys.exit(exit_code)
