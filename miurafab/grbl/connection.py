@@ -1,0 +1,207 @@
+"""The sending side of a GRBL wire, without the wire: bytes in, events out, and the books kept.
+
+:class:`Connection` is given what arrives and says what may be sent. It does no input or output
+and knows no clock, so the same object serves a serial port, a socket, a controller in memory
+and a test that cuts the stream into single bytes.
+
+The books: a line sent counts its bytes and its newline until the controller answers it. The sum
+never exceeds the controller's receive buffer: the profile's figure or, if smaller, the one in
+the controller's own ``[OPT:...]``. Realtime bytes are taken out of the stream by the receiving
+interrupt and never count. A line that makes the controller write its EEPROM travels alone,
+because the firmware loses what arrives while it writes (``eeprom.c`` blocks the interrupts).
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import replace
+
+from miurafab.gcode.job import SendLine
+from miurafab.grbl.events import (
+    Alarm,
+    Banner,
+    Closed,
+    Error,
+    Event,
+    Feedback,
+    Ok,
+    Options,
+    StatusReport,
+)
+from miurafab.grbl.replies import parse_reply
+from miurafab.grbl.states import KEEPS_ACCOUNT, TRANSITIONS, Input, State
+
+SOFT_RESET = b"\x18"
+STATUS_QUERY = b"?"
+FEED_HOLD = b"!"
+CYCLE_START = b"~"
+JOG_CANCEL = b"\x85"
+
+MAX_REPLY = 1024
+"""Bytes without a line end after which the stream is taken for noise; GRBL's longest report has
+about 160."""
+
+_WRITES_EEPROM = re.compile(
+    rb"^\$(?:\d+|N\d|RST|I)=|G0*10(?![\d.])|G0*28\.10*(?!\d)|G0*30\.10*(?!\d)", re.IGNORECASE
+)
+_DWELL = re.compile(rb"G0*4(?![\d.])", re.IGNORECASE)
+_DWELL_SECONDS = re.compile(rb"P([-+]?[\d.]+)", re.IGNORECASE)
+
+
+class ProtocolMisuse(RuntimeError):
+    """The program sent what the state of the connection does not allow: a fault of ours."""
+
+
+def writes_eeprom(data: bytes) -> bool:
+    """Whether a line (blanks removed) makes the controller write its EEPROM.
+
+    ``$N=``, ``$Nn=``, ``$RST=``, ``$I=``, and G10, G28.1, G30.1 anywhere in a block.
+    """
+    return _WRITES_EEPROM.search(data) is not None
+
+
+def dwell_seconds(data: bytes) -> float:
+    """How long a line (blanks removed) makes the controller wait: the P of a G4, or 0."""
+    if _DWELL.search(data) is None:
+        return 0.0
+    match = _DWELL_SECONDS.search(data)
+    try:
+        return float(match[1]) if match is not None else 0.0
+    except ValueError:
+        return 0.0
+
+
+class Connection:
+    """The state of one wire. ``rx_bytes`` is the usable receive buffer by the machine profile."""
+
+    def __init__(self, rx_bytes: int = 128) -> None:
+        self.rx_bytes = rx_bytes
+        self.state = State.OPENING
+        self.in_flight: deque[SendLine] = deque()
+        self.in_flight_bytes = 0
+        self._incoming = bytearray()
+        self._events: deque[Event] = deque()
+
+    # What we send
+
+    def may_send(self, line: SendLine) -> bool:
+        """Whether ``line`` may go now: allowed by the state, room for it, no EEPROM in the way."""
+        return (
+            _kind(line.data) in TRANSITIONS[self.state]
+            and self.in_flight_bytes + len(line.data) + 1 <= self.rx_bytes
+            and not (self.in_flight and (self.writing_eeprom or writes_eeprom(line.data)))
+        )
+
+    @property
+    def writing_eeprom(self) -> bool:
+        """Whether a line in flight makes the controller deaf; send no byte now but a reset."""
+        return len(self.in_flight) == 1 and writes_eeprom(self.in_flight[0].data)
+
+    def send_line(self, line: SendLine) -> bytes:
+        """The bytes of ``line`` for the wire, entered in the books.
+
+        Raises :class:`ProtocolMisuse` if :meth:`may_send` forbids it.
+        """
+        if not self.may_send(line):
+            raise ProtocolMisuse(
+                f"cannot send {line.data!r} in {self.state.name} with "
+                f"{self.in_flight_bytes} of {self.rx_bytes} bytes in flight"
+            )
+        self._enter(_kind(line.data))
+        self.in_flight.append(line)
+        self.in_flight_bytes += len(line.data) + 1
+        return line.data + b"\n"
+
+    def send_realtime(self, byte: bytes) -> bytes:
+        """One realtime byte for the wire; a soft reset voids the books.
+
+        Raises :class:`ProtocolMisuse` when the wire is closed.
+        """
+        if self.state is State.CLOSED:
+            raise ProtocolMisuse(f"cannot send {byte!r}: the wire is closed")
+        self._enter(Input.RESET if byte == SOFT_RESET else Input.REALTIME)
+        return byte
+
+    # What arrives
+
+    def receive_data(self, data: bytes) -> None:
+        """Take bytes as they came, in any chunks; ``b""`` says that the wire has ended.
+
+        The events are then had from :meth:`events`.
+        """
+        if self.state is State.CLOSED:
+            return
+        if not data:
+            self._take(Closed())
+            return
+        self._incoming += data
+        *lines, rest = self._incoming.split(b"\n")
+        if len(rest) > MAX_REPLY:
+            lines.append(rest)
+            rest = bytearray()
+        self._incoming = rest
+        for line in lines:
+            text = line.strip(b"\r\0").decode("ascii", "backslashreplace")
+            if text:
+                self._take(parse_reply(text))
+
+    def events(self) -> Iterator[Event]:
+        """The events that have become complete since the last call, in order."""
+        while self._events:
+            yield self._events.popleft()
+
+    def _take(self, event: Event) -> None:
+        if isinstance(event, Ok | Error):
+            if self.in_flight:
+                line = self.in_flight.popleft()
+                self.in_flight_bytes -= len(line.data) + 1
+                event = replace(event, line=line)
+                self._enter(Input.ANSWER)
+            else:
+                self._enter(Input.STRAY)
+        else:
+            if isinstance(event, Options) and event.rx_bytes is not None:
+                self.rx_bytes = min(self.rx_bytes, event.rx_bytes)
+            self._enter(_input(event))
+        self._events.append(event)
+
+    def _enter(self, item: Input) -> None:
+        self.state = TRANSITIONS[self.state][item]
+        if self.state not in KEEPS_ACCOUNT:
+            self.in_flight.clear()
+            self.in_flight_bytes = 0
+
+
+def _kind(data: bytes) -> Input:
+    """Whether a line is motion or a system command; a jog moves."""
+    if data.startswith(b"$") and data[1:2].upper() != b"J":
+        return Input.SYSTEM
+    return Input.MOTION
+
+
+_MESSAGES = {
+    "'$H'|'$X' to unlock": Input.LOCK,
+    "Caution: Unlocked": Input.UNLOCK,
+    "Sleeping": Input.SLEEP,
+    "Disabled": Input.RESTART,
+    "Restoring defaults": Input.RESTART,
+}
+_STATUS = {"Alarm": Input.LOCK, "Idle": Input.UNLOCK, "Sleep": Input.SLEEP}
+
+
+def _input(event: Event) -> Input:
+    match event:
+        case Banner():
+            return Input.BANNER
+        case Alarm():
+            return Input.ALARM
+        case Feedback(text):
+            return _MESSAGES.get(text, Input.TALK)
+        case StatusReport(state):
+            return _STATUS.get(state, Input.TALK)
+        case Closed():
+            return Input.END
+        case _:
+            return Input.TALK

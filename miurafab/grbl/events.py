@@ -1,0 +1,167 @@
+"""What a GRBL controller can say, one frozen value a line.
+
+The names of the fields are those of GRBL 1.1's interface description (``doc/markdown/
+interface.md`` of the firmware); positions are in the controller's reporting unit as it stands
+(millimetres unless ``$13=1``), feeds in mm/min, spindle speeds in S words.
+
+:mod:`miurafab.grbl.replies` turns a line into one of these; the connection fills in which sent
+line an :class:`Ok` or :class:`Error` answers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from miurafab.gcode.job import SendLine
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something the controller said."""
+
+
+@dataclass(frozen=True, slots=True)
+class Banner(Event):
+    """``Grbl 1.1h ['$' for help]``: the controller has just started, whatever was before."""
+
+    firmware: str
+    version: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ok(Event):
+    """``ok``: the oldest unanswered line was taken; ``line`` is that line, None for a stray."""
+
+    line: SendLine | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Error(Event):
+    """``error:20``: the oldest unanswered line was refused; ``line`` is None for a stray.
+
+    ``code`` is None where the firmware writes words instead (GRBL 0.9); ``text`` is what stood
+    behind the colon.
+    """
+
+    code: int | None
+    text: str
+    line: SendLine | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm(Event):
+    """``ALARM:1``: the controller stopped and will do nothing more until reset or unlocked."""
+
+    code: int | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class StatusReport(Event):
+    """``<Idle|MPos:0.000,0.000,0.000|FS:0,0>``; a field the report did not hold is None.
+
+    ``substate`` is the digit of ``Hold:0`` and ``Door:1``; ``planner_free`` and ``rx_free`` are
+    the two numbers of ``Bf``; ``overrides`` feed, rapid and spindle in percent; ``pins`` and
+    ``accessories`` the letters of ``Pn`` and ``A``.
+    """
+
+    state: str
+    substate: int | None = None
+    machine_position: tuple[float, ...] | None = None
+    work_position: tuple[float, ...] | None = None
+    work_offset: tuple[float, ...] | None = None
+    planner_free: int | None = None
+    rx_free: int | None = None
+    line_number: int | None = None
+    feed: float | None = None
+    speed: float | None = None
+    pins: str | None = None
+    overrides: tuple[int, ...] | None = None
+    accessories: str | None = None
+
+    @property
+    def beam_off(self) -> bool:
+        """Whether the report says that nothing drives the beam: S is 0 and no spindle is on.
+
+        A report without any S (``F:`` alone, firmware without a variable spindle) cannot say so.
+        """
+        spindle_on = self.accessories is not None and bool(set("SC") & set(self.accessories))
+        return self.speed == 0 and not spindle_on
+
+
+@dataclass(frozen=True, slots=True)
+class Setting(Event):
+    """``$110=6000.000``, one line of ``$$``; ``text`` is the value as the controller wrote it."""
+
+    number: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class StartupLine(Event):
+    """``$N0=G54``, one line of ``$N``."""
+
+    number: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class StartupResult(Event):
+    """``>G54:ok``: a startup line was run at the start, before anybody asked."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback(Event):
+    """``[MSG:Caution: Unlocked]``."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Version(Event):
+    """``[VER:1.1h.20190830:]``: the build's version and the owner's own text (``$I=``)."""
+
+    version: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Options(Event):
+    """``[OPT:V,15,128]``: compiled options, usable planner blocks and receive bytes.
+
+    A number that the firmware does not report is None.
+    """
+
+    flags: str
+    planner_blocks: int | None
+    rx_bytes: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class GCState(Event):
+    """``[GC:G0 G54 ... F0 S0]``: the modal words in force."""
+
+    words: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter(Event):
+    """One line of ``$#``: ``[G54:0.000,0.000,0.000]``, ``[TLO:0.000]``, ``[PRB:...:0]``."""
+
+    name: str
+    values: tuple[float, ...]
+    succeeded: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown(Event):
+    """A line that is none of the above: noise, or a firmware that speaks otherwise."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Closed(Event):
+    """The wire has ended; nothing will come any more."""

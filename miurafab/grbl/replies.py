@@ -1,0 +1,150 @@
+"""One line of a controller's talk, parsed to one event; what cannot be read is ``Unknown``.
+
+Parsing never raises: a line is believed only if the whole of it has the form, so that noise on
+the wire (``o\\x80k``, half a status report) becomes an :class:`~miurafab.grbl.events.Unknown`
+and can never pass for an ``ok``.
+
+The forms are those of GRBL 1.1 (``report.c``), which grblHAL and FluidNC keep and add to. The
+comma-separated status report of GRBL 0.9 (``<Idle,MPos:...,WPos:...>``) is read too.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+from miurafab.grbl.events import (
+    Alarm,
+    Banner,
+    Error,
+    Event,
+    Feedback,
+    GCState,
+    Ok,
+    Options,
+    Parameter,
+    Setting,
+    StartupLine,
+    StartupResult,
+    StatusReport,
+    Unknown,
+    Version,
+)
+
+_BANNER = re.compile(r"(grbl\w*) (\S+) \[.*\]", re.IGNORECASE)
+_ANSWER = re.compile(r"(error|ALARM): ?(.+)")
+_STATUS = re.compile(r"<([A-Z][A-Za-z]*)(?::(\d+))?((?:[|,][^|<>]*)*)>")
+_BRACKET = re.compile(r"\[(\w[\w.]*):(.*)\]")
+_SETTING = re.compile(r"\$(\d+)=([^()]*?)(?: *\(.*\))?")
+_STARTUP = re.compile(r"\$N(\d)=(.*)")
+_STARTUP_RESULT = re.compile(r">(.*):(?:ok|error:\d+)")
+_PARAMETERS = {*(f"G{n}" for n in (54, 55, 56, 57, 58, 59, 28, 30, 92)), "TLO", "PRB"}
+_PARAMETERS |= {"G59.1", "G59.2", "G59.3"}
+
+
+def parse_reply(text: str) -> Event:
+    """The event that one line says, its line end removed; never raises."""
+    if text == "ok":
+        return Ok()
+    for form, read in _FORMS:
+        match = form.fullmatch(text)
+        if match is not None:
+            try:
+                return read(match) or Unknown(text)
+            except ValueError:
+                return Unknown(text)
+    return Unknown(text)
+
+
+def _answer(match: re.Match[str]) -> Event:
+    kind, text = match[1], match[2]
+    code = int(text) if text.isascii() and text.isdigit() else None
+    return Error(code, text) if kind == "error" else Alarm(code, text)
+
+
+def _status(match: re.Match[str]) -> Event | None:
+    state, substate, body = match[1], match[2], match[3]
+    fields: dict[str, Any] = {}
+    parts = body[1:].split("|") if "|" in body else _fields_of_0_9(body[1:])
+    for part in parts:
+        name, colon, value = part.partition(":")
+        if part and not colon:
+            return None
+        reader = _FIELDS.get(name)
+        if reader is not None:
+            fields.update(reader(value))
+    return StatusReport(state, None if substate is None else int(substate), **fields)
+
+
+def _fields_of_0_9(body: str) -> list[str]:
+    """``MPos:1,2,3,WPos:4,5,6`` split before each name."""
+    return re.split(r",(?=[A-Za-z])", body) if body else []
+
+
+def _numbers(value: str) -> tuple[float, ...]:
+    numbers = tuple(float(item) for item in value.split(","))
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(value)
+    return numbers
+
+
+def _whole(value: str) -> tuple[int, ...]:
+    return tuple(int(item) for item in value.split(","))
+
+
+def _feed_and_speed(value: str) -> dict[str, Any]:
+    feed, speed = _numbers(value)[:2]
+    return {"feed": feed, "speed": speed}
+
+
+def _buffers(value: str) -> dict[str, Any]:
+    planner_free, rx_free = _whole(value)
+    return {"planner_free": planner_free, "rx_free": rx_free}
+
+
+_FIELDS: dict[str, Callable[[str], dict[str, Any]]] = {
+    "MPos": lambda value: {"machine_position": _numbers(value)},
+    "WPos": lambda value: {"work_position": _numbers(value)},
+    "WCO": lambda value: {"work_offset": _numbers(value)},
+    "Bf": _buffers,
+    "Ln": lambda value: {"line_number": int(value)},
+    "FS": _feed_and_speed,
+    "F": lambda value: {"feed": _numbers(value)[0]},
+    "Pn": lambda value: {"pins": value},
+    "Ov": lambda value: {"overrides": _whole(value)},
+    "A": lambda value: {"accessories": value},
+}
+
+
+def _bracket(match: re.Match[str]) -> Event | None:
+    tag, body = match[1], match[2]
+    if tag == "MSG":
+        return Feedback(body)
+    if tag == "VER":
+        version, _, text = body.partition(":")
+        return Version(version, text)
+    if tag == "OPT":
+        flags, *numbers = body.split(",")
+        planner_blocks, rx_bytes = ([int(n) for n in numbers[:2]] + [None, None])[:2]
+        return Options(flags, planner_blocks, rx_bytes)
+    if tag == "GC":
+        return GCState(tuple(body.split()))
+    if tag == "PRB":
+        values, _, flag = body.rpartition(":")
+        return Parameter(tag, _numbers(values), flag == "1")
+    if tag in _PARAMETERS:
+        return Parameter(tag, _numbers(body))
+    return None
+
+
+_FORMS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], Event | None]], ...] = (
+    (_STATUS, _status),
+    (_ANSWER, _answer),
+    (_BRACKET, _bracket),
+    (_SETTING, lambda match: Setting(int(match[1]), match[2])),
+    (_BANNER, lambda match: Banner(match[1], match[2])),
+    (_STARTUP, lambda match: StartupLine(int(match[1]), match[2])),
+    (_STARTUP_RESULT, lambda match: StartupResult(match[0][1:])),
+)
