@@ -1,0 +1,1 @@
+"""Plain geometry of grids, angles and distances; it knows no origami."""

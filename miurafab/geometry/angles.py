@@ -1,0 +1,53 @@
+"""Angles between edges at a vertex, and between facets at an edge."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def angle_between(a: Floats, b: Floats) -> Floats:
+    """The angles in [0, pi] between vectors ``a`` and ``b``, both (..., 3), radians.
+
+    atan2(|a x b|, a . b), which keeps its accuracy near 0 and pi, unlike arccos.
+    """
+    cross = np.linalg.norm(np.cross(a, b), axis=-1)
+    angle: Floats = np.arctan2(cross, np.einsum("...k,...k->...", a, b))
+    return angle
+
+
+def sector_angles(points: Floats, vertices: NDArray[np.int64], ring: NDArray[np.int64]) -> Floats:
+    """(I, 4) sector angles at ``vertices`` (I,) with neighbours ``ring`` (I, 4), radians.
+
+    Sector k lies between neighbour k and the next. ``points`` is (V, 3).
+    """
+    spokes = points[ring] - points[vertices][:, None, :]
+    return angle_between(spokes, np.roll(spokes, -1, axis=1))
+
+
+def facet_normals(points: Floats, faces: NDArray[np.int64]) -> Floats:
+    """(F, 3) unit normals of quads (F, 4) in ``points`` (V, 3), by the cross of the diagonals.
+
+    A degenerate facet has the normal NaN.
+    """
+    p = points[faces]
+    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit: Floats = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    return unit
+
+
+def fold_angles(points: Floats, edges: NDArray[np.int64], left: Floats, right: Floats) -> Floats:
+    """(E,) signed fold angles, valley positive, radians.
+
+    ``edges`` (E, 2) run from tail to head; ``left`` and ``right`` (E, 3) are the unit normals of
+    the facets on either side: rho = -atan2((left x right) . e, left . right), the FOLD 1.2
+    convention for counter-clockwise faces.
+    """
+    along = points[edges[:, 1]] - points[edges[:, 0]]
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    sine = np.einsum("ek,ek->e", np.cross(left, right), along)
+    angle: Floats = -np.arctan2(sine, np.einsum("ek,ek->e", left, right))
+    return angle

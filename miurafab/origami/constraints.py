@@ -1,0 +1,139 @@
+"""What makes a grid of points an origami, each condition with its sparse analytic Jacobian.
+
+Notation: x (V, 3) points; L the mean edge length, by which every residual is made dimensionless.
+
+planarity          c_f = det(p1 - p0, p2 - p0, p3 - p0) / L^3                for each facet
+developability     c_v = a0 + a1 + a2 + a3 - 2 pi                            interior vertices
+flat-foldability   c_v = a0 + a2 - pi    (Kawasaki, given developability)    interior vertices
+
+For a sector alpha at o between A = a - o and B = b - o, with n = A x B / |A x B|,
+
+    d alpha / d a = (A x n) / |A|^2,   d alpha / d b = (n x B) / |B|^2,   d alpha / d o = -(sum).
+
+(Dudte, Vouga, Tachi and Mahadevan, Nature Materials 15 (2016), Methods: the same three families.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from miurafab.geometry.angles import sector_angles
+from miurafab.geometry.quads import QuadGrid
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def planarity(points: Floats, faces: Ints, length: float) -> Floats:
+    """(F,) facet determinants over ``length`` cubed; ``points`` (V, 3), ``faces`` (F, 4)."""
+    a, b, c = _from_first_corner(points, faces)
+    residual: Floats = np.einsum("fk,fk->f", a, np.cross(b, c)) / length**3
+    return residual
+
+
+def developability(points: Floats, grid: QuadGrid) -> Floats:
+    """(I,) angle surplus at each interior vertex, radians."""
+    angles = sector_angles(points, grid.interior_vertices, grid.interior_neighbours)
+    surplus: Floats = angles.sum(axis=1) - 2 * np.pi
+    return surplus
+
+
+def flat_foldability(points: Floats, grid: QuadGrid) -> Floats:
+    """(I,) Kawasaki residual a0 + a2 - pi at each interior vertex, radians."""
+    angles = sector_angles(points, grid.interior_vertices, grid.interior_neighbours)
+    residual: Floats = angles[:, 0] + angles[:, 2] - np.pi
+    return residual
+
+
+def _from_first_corner(points: Floats, faces: Ints) -> tuple[Floats, Floats, Floats]:
+    p = points[faces]
+    return p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]
+
+
+@dataclass(frozen=True, eq=False)
+class OrigamiConstraints:
+    """All conditions on one grid stacked into c(x), with Jacobian J; x is (3V,) row-major.
+
+    ``length`` is the mean edge length, held constant. ``flat_foldable`` adds the Kawasaki rows.
+    Rows: planarity of the facets, developability, then flat-foldability of the interior vertices.
+    """
+
+    grid: QuadGrid
+    length: float
+    flat_foldable: bool = False
+
+    @cached_property
+    def _indices(self) -> tuple[Ints, Ints]:
+        """Row and column of every Jacobian entry, in the order in which values are computed."""
+        faces = self.grid.faces_vertices
+        spokes = np.concatenate(
+            [self.grid.interior_vertices[:, None], self.grid.interior_neighbours], axis=1
+        )
+        blocks = [(faces, 0), (spokes, len(faces))]
+        if self.flat_foldable:
+            blocks.append((spokes, len(faces) + len(spokes)))
+        rows, columns = [], []
+        for stencil, first in blocks:
+            row = first + np.arange(len(stencil), dtype=np.int64)
+            rows.append(np.repeat(row, stencil.shape[1] * 3))
+            columns.append((stencil[:, :, None] * 3 + np.arange(3)).reshape(-1))
+        return np.concatenate(rows), np.concatenate(columns)
+
+    @property
+    def count(self) -> int:
+        interior = (self.grid.columns - 2) * (self.grid.rows - 2)
+        facets = (self.grid.columns - 1) * (self.grid.rows - 1)
+        return facets + interior * (2 if self.flat_foldable else 1)
+
+    def __call__(self, x: Floats) -> tuple[Floats, sparse.csr_array]:
+        """c (m,) and J (m, 3V) at ``x`` (3V,)."""
+        points = x.reshape(-1, 3)
+        flat, flat_rows = self._planarity(points)
+        values, jacobian = [flat], [flat_rows.reshape(-1)]
+        angles, gradients = self._sectors(points)
+        if len(angles):
+            values.append(angles.sum(axis=1) - 2 * np.pi)
+            jacobian.append(_spoke_rows(gradients, (0, 1, 2, 3)))
+            if self.flat_foldable:
+                values.append(angles[:, 0] + angles[:, 2] - np.pi)
+                jacobian.append(_spoke_rows(gradients, (0, 2)))
+        rows, columns = self._indices
+        matrix = sparse.coo_array(
+            (np.concatenate(jacobian), (rows, columns)), shape=(self.count, len(x))
+        )
+        return np.concatenate(values), matrix.tocsr()
+
+    def _planarity(self, points: Floats) -> tuple[Floats, Floats]:
+        a, b, c = _from_first_corner(points, self.grid.faces_vertices)
+        bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
+        residual: Floats = np.einsum("fk,fk->f", a, bc) / self.length**3
+        gradient: Floats = np.stack([-(bc + ca + ab), bc, ca, ab], axis=1) / self.length**3
+        return residual, gradient
+
+    def _sectors(self, points: Floats) -> tuple[Floats, Floats]:
+        """Angles (I, 4) and gradients (I, 4, 2, 3): sector k to its first and second spoke."""
+        centre = points[self.grid.interior_vertices][:, None, :]
+        a = points[self.grid.interior_neighbours] - centre
+        b = np.roll(a, -1, axis=1)
+        cross = np.cross(a, b)
+        sine = np.linalg.norm(cross, axis=-1)
+        angles: Floats = np.arctan2(sine, np.einsum("nsk,nsk->ns", a, b))
+        n = cross / sine[..., None]
+        to_a = np.cross(a, n) / np.einsum("nsk,nsk->ns", a, a)[..., None]
+        to_b = np.cross(n, b) / np.einsum("nsk,nsk->ns", b, b)[..., None]
+        return angles, np.stack([to_a, to_b], axis=2)
+
+
+def _spoke_rows(gradients: Floats, sectors: tuple[int, ...]) -> Floats:
+    """Jacobian rows of a sum of sectors, over [centre, right, up, left, down] x 3, flat."""
+    rows = np.zeros((len(gradients), 5, 3))
+    for k in sectors:
+        rows[:, 1 + k] += gradients[:, k, 0]
+        rows[:, 1 + (k + 1) % 4] += gradients[:, k, 1]
+    rows[:, 0] = -rows[:, 1:].sum(axis=1)
+    return rows.reshape(-1)

@@ -1,0 +1,66 @@
+"""Generalized cylinders by direct construction: no solver, every constraint met by algebra.
+
+The profile is a zig-zag polyline P_j in the plane across the axis, with unit segments d_j in the
+directions theta_j. Columns are a step a apart along the axis, and alternate columns are pushed
+along v_j, the one vector by which neighbouring facets stay planar:
+
+    X_ij = (i a, P_j + h_i v_j),   v_j = (-1)^j (d_{j-1} + d_j) / sin(theta_{j-1} - theta_j)
+
+With h_i alternating between two values the sheet is developable, flat-foldable and folds rigidly
+(Zhou, Wang and You, Proc. R. Soc. A 471 (2015) 20150407; Dudte et al. 2016, Methods).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.origami.tessellation import Tessellation
+from miurafab.surfaces.analytic import GeneralizedCylinder
+
+Floats = NDArray[np.float64]
+
+
+def cylinder_over_polyline(profile: Floats, step: float, push: float, columns: int) -> Tessellation:
+    """The tessellation of ``columns`` x (n - 2) vertices over a zig-zag polyline.
+
+    ``profile`` (n, 2) are y and z of the polyline, the first and last point serving only for the
+    directions at the ends; columns are ``step`` apart and pushed by +-``push`` / 2.
+    """
+    segments = np.diff(profile, axis=0)
+    d = segments / np.linalg.norm(segments, axis=1, keepdims=True)
+    before, after = d[:-1], d[1:]
+    sine = before[:, 1] * after[:, 0] - before[:, 0] * after[:, 1]
+    sign = np.where(np.arange(len(sine)) % 2, -1.0, 1.0)
+    v = sign[:, None] * (before + after) / sine[:, None]
+    h = np.where(np.arange(columns) % 2, 0.5, -0.5) * push
+    yz = profile[1:-1, None, :] + h[None, :, None] * v[:, None, :]
+    x = (np.arange(columns) - (columns - 1) / 2) * step
+    x = np.broadcast_to(x[None, :, None], (*yz.shape[:2], 1))
+    return Tessellation(np.concatenate([x, yz], axis=-1))
+
+
+def cylinder_on(
+    surface: GeneralizedCylinder, columns: int, rows: int, amplitude: float, zigzag: float
+) -> Tessellation:
+    """The tessellation of ``columns`` x ``rows`` vertices on a generalized cylinder.
+
+    ``amplitude`` is the height of the corrugation over the row spacing, ``zigzag`` the zig-zag
+    over the column spacing. The zig-zag profile has its vertices evenly spaced along the curve,
+    half the height above and below it.
+    """
+    beyond = 1.0 / (rows - 1)
+    on_curve = surface.profile.evenly(rows + 2, -beyond, 1.0 + beyond)
+    tangent = np.gradient(on_curve, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+    spacing = float(np.linalg.norm(np.diff(on_curve, axis=0), axis=1).mean())
+    # the point before the first row is row -1, hence the shifted parity
+    side = np.where(np.arange(rows + 2) % 2, -0.5, 0.5)
+    profile = on_curve + side[:, None] * amplitude * spacing * normal
+    step = surface.domain.width / (columns - 1)
+    # On a plane |v_j| = 1 / sin(phi), phi the profile's slope, tan(phi) = amplitude.
+    push = zigzag * step * math.sin(math.atan(amplitude))
+    return cylinder_over_polyline(profile, step, push, columns)

@@ -1,0 +1,99 @@
+"""The first guess: a Miura corrugation laid on the target, good enough that projection converges.
+
+Symbols (grid index i along the rows, spacing S; j across, spacing L; H height, V zig-zag):
+
+    sigma = H / L,   tau = V / S
+    lambda_j^2 = 1 + sigma^2,   lambda_i^2 = 1 + tau^2 sigma^2 / (1 + sigma^2)
+
+are the stretches from the surface to the flat paper. Paper is flat, so lambda_i S and lambda_j L
+are made constant over the sheet: lambda_i = c_i max(S) / S, lambda_j = c_j max(L) / L.
+
+Curvature kappa_i along the rows cannot be absorbed within a cell; the upper layer slides over the
+lower one instead, by the angle psi,
+
+    d(tan psi) / ds = kappa_i lambda_i^2 / (lambda_i^2 - 1),
+
+integrated along i and centred. The vertices are then
+
+    X = P(u, v + (i mod 2 - 1/2) V) + (j mod 2 - 1/2) H (N + t tan psi).
+
+The choice of metric and ramp decides whether projection converges; both are this project's own.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.origami.tessellation import Tessellation
+from miurafab.surfaces.surface import TargetSurface, curvature_along_u, tangents, unit
+
+Floats = NDArray[np.float64]
+
+MAX_TAN_PSI = math.tan(math.radians(60))
+
+
+@dataclass(frozen=True)
+class Corrugation:
+    """The least ``amplitude`` (sigma) and ``zigzag`` (tau) anywhere on the sheet."""
+
+    amplitude: float
+    zigzag: float
+
+    @property
+    def stretch_across(self) -> float:
+        """c_j."""
+        return math.hypot(1.0, self.amplitude)
+
+    @property
+    def stretch_along(self) -> float:
+        """c_i."""
+        return math.sqrt(1 + (self.zigzag * self.amplitude) ** 2 / (1 + self.amplitude**2))
+
+    @classmethod
+    def from_stretches(cls, along: float, across: float) -> Corrugation:
+        """The corrugation with the stretches c_i = ``along`` and c_j = ``across``, both > 1."""
+        amplitude = math.sqrt(across**2 - 1)
+        return cls(amplitude, math.sqrt((along**2 - 1) * (1 + amplitude**2)) / amplitude)
+
+
+def seed(
+    surface: TargetSurface, columns: int, rows: int, corrugation: Corrugation
+) -> tuple[Tessellation, float]:
+    """The corrugation on ``surface`` with ``columns`` x ``rows`` vertices.
+
+    Returns it with the largest |tan psi| that the ramp asked for before it was clipped at
+    tan(60 degrees): above that, the target bends too much along its rows for one sheet.
+    """
+    domain = surface.domain
+    uv = domain.lattice(columns, rows)
+    du, dv = domain.width / (columns - 1), domain.height / (rows - 1)
+    along, across = tangents(surface, uv)
+    speed_v = np.linalg.norm(across, axis=-1)
+    t = unit(along)
+    spacing_i = np.linalg.norm(along, axis=-1) * du
+    # the distance between rows, not between neighbours: the parameter lines may be oblique
+    oblique = np.einsum("...k,...k->...", across, t)
+    spacing_j = np.sqrt(np.maximum(speed_v**2 - oblique**2, 1e-12 * speed_v**2)) * dv
+    lambda_i = corrugation.stretch_along * spacing_i.max() / spacing_i
+    lambda_j = corrugation.stretch_across * spacing_j.max() / spacing_j
+    sigma = np.sqrt(lambda_j**2 - 1)
+    tau = np.sqrt((lambda_i**2 - 1) * (1 + sigma**2)) / sigma
+
+    rate = curvature_along_u(surface, uv) * lambda_i**2 / (lambda_i**2 - 1) * spacing_i
+    ramp = np.concatenate(
+        [np.zeros((rows, 1)), np.cumsum((rate[:, 1:] + rate[:, :-1]) / 2, axis=1)], axis=1
+    )
+    ramp -= ramp[:, [columns // 2]] / 2 + ramp[:, [(columns - 1) // 2]] / 2
+    steepest = float(np.abs(ramp).max())
+    ramp = np.clip(ramp, -MAX_TAN_PSI, MAX_TAN_PSI)
+
+    i, j = np.arange(columns), np.arange(rows)
+    shifted = uv.copy()
+    shifted[..., 1] += ((i % 2) - 0.5)[None, :] * tau * spacing_i / speed_v
+    lift = ((j % 2) - 0.5)[:, None] * sigma * spacing_j
+    direction = surface.normal(shifted) + t * ramp[..., None]
+    return Tessellation(surface.point(shifted) + lift[..., None] * direction), steepest

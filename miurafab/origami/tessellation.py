@@ -1,0 +1,53 @@
+"""A tessellation: a regular grid of vertices, in folded form, that is or is to become an origami.
+
+Polylines of vertices with the same row index zig-zag along i; ridges and valleys alternate in j.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.geometry.quads import QuadGrid
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Tessellation:
+    """``points`` (rows, columns, 3) float64: vertex (i, j) is ``points[j, i]``."""
+
+    points: Floats
+
+    @property
+    def grid(self) -> QuadGrid:
+        """The topology."""
+        return QuadGrid(self.points.shape[1], self.points.shape[0])
+
+    @property
+    def vertices(self) -> Floats:
+        """(V, 3) the points in row-major order."""
+        return self.points.reshape(-1, 3)
+
+    @property
+    def facet_count(self) -> int:
+        return len(self.grid.faces_vertices)
+
+    @property
+    def edge_lengths(self) -> Floats:
+        """(E,) lengths in the order of ``grid.edges_vertices``."""
+        ends = self.vertices[self.grid.edges_vertices]
+        lengths: Floats = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return lengths
+
+    @property
+    def midsurface(self) -> Floats:
+        """(F, 3) the means of each facet's corners, on which the up and down of the rows cancel."""
+        middle: Floats = self.vertices[self.grid.faces_vertices].mean(axis=1)
+        return middle
+
+    def scaled(self, factor: float) -> Tessellation:
+        """The same tessellation, ``factor`` times as large."""
+        return Tessellation(self.points * factor)

@@ -1,0 +1,116 @@
+"""Unfolding: a developable tessellation laid flat without stretching, with its fold angles.
+
+The heading of each facet follows from its neighbour's by the corner angles at the side between
+them, up the first column and then along each row; the vertices follow by adding up sides. Both are
+plain sums of lengths and angles of the folded form, so rounding adds up and is never amplified
+(placing each row from the positions of the one before does amplify it, by 1e8 on a spiral of 20
+rows). The flat pattern is isometric as far as the sheet is developable and planar; the audit
+measures it afresh.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.geometry.angles import angle_between, facet_normals, fold_angles
+from miurafab.geometry.quads import QuadGrid
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.tessellation import Tessellation
+
+Floats = NDArray[np.float64]
+
+FLAT_ANGLE = 1e-9
+"""Fold angles below this many radians are flat: an edge that is there but need not be folded."""
+
+
+def unfold(
+    tessellation: Tessellation, *, scale: float = 1.0, target: dict[str, Any] | None = None
+) -> CreasePattern:
+    """The crease pattern of ``tessellation``, rows along x, in the first quadrant."""
+    grid = tessellation.grid
+    flat = _turned_upright(_develop(tessellation.points))
+    folded = tessellation.vertices
+    edges = grid.edges_vertices
+    angle = grid_fold_angles(folded, grid)
+    border = _border(grid)
+    assignment = np.where(angle > FLAT_ANGLE, "V", np.where(angle < -FLAT_ANGLE, "M", "F"))
+    return CreasePattern(
+        vertices_coords=flat.reshape(-1, 2),
+        edges_vertices=edges,
+        edges_assignment=np.where(border, "B", assignment),
+        edges_fold_angle=np.where(border, 0.0, angle),
+        faces_vertices=grid.faces_vertices,
+        folded_coords=folded,
+        grid=(grid.columns, grid.rows),
+        scale=scale,
+        target=target or {},
+    )
+
+
+def grid_fold_angles(points: Floats, grid: QuadGrid) -> Floats:
+    """(E,) signed fold angles of ``points`` (V, 3) in the order of the grid's edges; borders 0."""
+    normals = facet_normals(points, grid.faces_vertices).reshape(grid.rows - 1, grid.columns - 1, 3)
+    along = np.zeros((grid.rows, grid.columns - 1))
+    across = np.zeros((grid.rows - 1, grid.columns))
+    v = grid.vertices
+    edges = np.stack([v[1:-1, :-1].ravel(), v[1:-1, 1:].ravel()], axis=1)
+    # an edge along +i has the facet above (larger j) on its left, one along +j the facet before
+    along[1:-1] = fold_angles(
+        points, edges, normals[1:].reshape(-1, 3), normals[:-1].reshape(-1, 3)
+    ).reshape(along[1:-1].shape)
+    edges = np.stack([v[:-1, 1:-1].ravel(), v[1:, 1:-1].ravel()], axis=1)
+    across[:, 1:-1] = fold_angles(
+        points, edges, normals[:, :-1].reshape(-1, 3), normals[:, 1:].reshape(-1, 3)
+    ).reshape(across[:, 1:-1].shape)
+    return np.concatenate([along.ravel(), across.ravel()])
+
+
+def _border(grid: QuadGrid) -> NDArray[np.bool_]:
+    along = np.zeros((grid.rows, grid.columns - 1), dtype=bool)
+    across = np.zeros((grid.rows - 1, grid.columns), dtype=bool)
+    along[[0, -1]] = True
+    across[:, [0, -1]] = True
+    return np.concatenate([along.ravel(), across.ravel()])
+
+
+def _develop(points: Floats) -> Floats:
+    """(rows, columns, 2) flat positions of ``points`` (rows, columns, 3)."""
+    right = points[:, 1:] - points[:, :-1]
+    up = points[1:] - points[:-1]
+    # corner angles of each facet: lower left, lower right, upper left
+    left_corner = angle_between(right[:-1], up[:, :-1])
+    right_corner = angle_between(-right[:-1], up[:, 1:])
+    upper_corner = angle_between(right[1:], -up[:, :-1])
+
+    # the heading of each facet's lower side: up the first column, then along each row
+    rising = left_corner[:, 0] + upper_corner[:, 0] - np.pi
+    first = np.concatenate([[0.0], np.cumsum(rising[:-1])])
+    turning = np.pi - right_corner[:, :-1] - left_corner[:, 1:]
+    heading = first[:, None] + np.concatenate(
+        [np.zeros((len(first), 1)), np.cumsum(turning, axis=1)], axis=1
+    )
+    last_row = heading[-1] + left_corner[-1] + upper_corner[-1] - np.pi
+    along = np.linalg.norm(right, axis=2)[..., None] * _unit(np.vstack([heading, last_row]))
+    upward = heading[:, 0] + left_corner[:, 0]
+    across = np.linalg.norm(up[:, 0], axis=1)[:, None] * _unit(upward)
+    start = np.concatenate([np.zeros((1, 2)), np.cumsum(across, axis=0)])
+    steps = np.concatenate([np.zeros((len(start), 1, 2)), np.cumsum(along, axis=1)], axis=1)
+    flat: Floats = start[:, None, :] + steps
+    return flat
+
+
+def _unit(angle: Floats) -> Floats:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def _turned_upright(flat: Floats) -> Floats:
+    """The mean row direction along x, and the lower left of the bounding box at the origin."""
+    heading = flat[:, -1] - flat[:, 0]
+    mean = heading.sum(axis=0)
+    c, s = mean / np.linalg.norm(mean)
+    turned = flat @ np.array([[c, -s], [s, c]])
+    upright: Floats = turned - turned.reshape(-1, 2).min(axis=0)
+    return upright

@@ -1,0 +1,98 @@
+"""The named surfaces: each one formula over a parameter rectangle.
+
+Lengths are in the target's own unit; a fit scales them. Rows run along u, and u is, where there
+is a choice, the direction in which the surface bends less (the fit may turn it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from miurafab.surfaces.curves import ProfileCurve
+from miurafab.surfaces.surface import Domain, Floats, ParametricSurface
+
+
+@dataclass(frozen=True)
+class GeneralizedCylinder(ParametricSurface):
+    """A profile curve extruded along x: the surfaces that need no solver."""
+
+    profile: ProfileCurve = field(kw_only=True)
+
+
+def cylinder_over(profile: ProfileCurve, length: float) -> GeneralizedCylinder:
+    """``profile`` in the (y, z) plane, extruded over ``length`` along x."""
+
+    def position(u: Floats, v: Floats) -> Floats:
+        curve = profile.position(v)
+        return np.concatenate([np.broadcast_to(u[..., None], (*v.shape, 1)), curve], axis=-1)
+
+    domain = Domain(-length / 2, length / 2, 0.0, 1.0)
+    return GeneralizedCylinder(position, domain, profile=profile)
+
+
+def plane(width: float, height: float) -> ParametricSurface:
+    """A flat rectangle in z = 0."""
+    return _graph(width, height, lambda x, y: np.zeros_like(x))
+
+
+def hyperbolic_paraboloid(width: float, height: float, rise: float) -> ParametricSurface:
+    """z = rise * (2x/width) (2y/height): the ruled form, the corners at +-rise."""
+    return _graph(width, height, lambda x, y: rise * (2 * x / width) * (2 * y / height))
+
+
+def saddle(width: float, height: float, rise: float) -> ParametricSurface:
+    """z = rise * ((2x/width)^2 - (2y/height)^2)."""
+    return _graph(width, height, lambda x, y: rise * ((2 * x / width) ** 2 - (2 * y / height) ** 2))
+
+
+def paraboloid(width: float, height: float, rise: float) -> ParametricSurface:
+    """z = -rise * ((2x/width)^2 + (2y/height)^2): a bowl turned over."""
+    return _graph(
+        width, height, lambda x, y: -rise * ((2 * x / width) ** 2 + (2 * y / height) ** 2)
+    )
+
+
+def bump(width: float, height: float, rise: float, spread: float) -> ParametricSurface:
+    """A Gaussian bump z = rise * exp(-(x^2 + y^2) / spread^2)."""
+    return _graph(width, height, lambda x, y: rise * np.exp(-(x**2 + y**2) / spread**2))
+
+
+def sphere_patch(radius: float, width: float, height: float) -> ParametricSurface:
+    """The patch of ``width`` radians of longitude by ``height`` of latitude about the +z axis."""
+
+    def position(u: Floats, v: Floats) -> Floats:
+        x = np.cos(v) * np.sin(u)
+        return radius * np.stack([x, np.sin(v), np.cos(v) * np.cos(u)], axis=-1)
+
+    return ParametricSurface(position, Domain(-width / 2, width / 2, -height / 2, height / 2))
+
+
+def helicoid(radius: float, inner: float, pitch: float, turns: float) -> ParametricSurface:
+    """(r cos t, r sin t, pitch t / 2 pi), r from ``inner`` to ``radius`` along u."""
+    swing = 2 * np.pi * turns
+
+    def position(u: Floats, v: Floats) -> Floats:
+        return np.stack([u * np.cos(v), u * np.sin(v), pitch * v / (2 * np.pi)], axis=-1)
+
+    return ParametricSurface(position, Domain(inner, radius, -swing / 2, swing / 2))
+
+
+def revolution(profile: ProfileCurve, angle: float) -> ParametricSurface:
+    """``profile`` (r, z) turned through ``angle`` about z; rows run along the profile."""
+
+    def position(u: Floats, v: Floats) -> Floats:
+        curve = profile.position(u)
+        r, z = curve[..., 0], curve[..., 1]
+        return np.stack([r * np.cos(v), r * np.sin(v), z], axis=-1)
+
+    return ParametricSurface(position, Domain(0.0, 1.0, -angle / 2, angle / 2))
+
+
+def _graph(width: float, height: float, z: Callable[[Floats, Floats], Floats]) -> ParametricSurface:
+    def position(u: Floats, v: Floats) -> Floats:
+        return np.stack([u, v, z(u, v)], axis=-1)
+
+    return ParametricSurface(position, Domain(-width / 2, width / 2, -height / 2, height / 2))

@@ -1,0 +1,220 @@
+"""The targets a user can name, with their parameters, ranges and defaults.
+
+``hypar:height=0.5`` and a ``[target]`` table of a design file say the same thing; both end here.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from miurafab.errors import TargetError, UnitError
+from miurafab.surfaces import analytic, curves
+from miurafab.surfaces.surface import TargetSurface
+from miurafab.units import parse_angle
+
+FULL_TURN = 2 * math.pi
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a named surface; lengths in the target's own unit, angles in radians."""
+
+    default: float
+    low: float
+    high: float
+    meaning: str
+    is_angle: bool = False
+
+
+@dataclass(frozen=True)
+class NamedSurface:
+    """One entry of the catalogue. ``profile_axes`` names the axes of the curve that a design file
+    may give it, or is None where the surface takes none.
+    """
+
+    name: str
+    summary: str
+    parameters: Mapping[str, Parameter]
+    make: Callable[..., TargetSurface]
+    profile_axes: str | None = None
+
+
+def _length(default: float, meaning: str, low: float = 1e-6) -> Parameter:
+    return Parameter(default, low, 1e6, meaning)
+
+
+def _angle(default_deg: float, meaning: str, high_deg: float) -> Parameter:
+    return Parameter(math.radians(default_deg), 1e-3, math.radians(high_deg), meaning, True)
+
+
+def _signed(default: float, meaning: str) -> Parameter:
+    return Parameter(default, -1e6, 1e6, meaning)
+
+
+_SIDES = {"width": _length(2.0, "side along x"), "depth": _length(2.0, "side along y")}
+_VASE = ((0.55, 0.0), (0.8, 0.5), (0.72, 1.1), (0.5, 1.6), (0.58, 2.0))
+
+
+def _arc_cylinder(radius: float, angle: float, length: float, profile: Any = None) -> TargetSurface:
+    curve = curves.arc(radius, angle) if profile is None else curves.spline(profile)
+    return analytic.cylinder_over(curve, length)
+
+
+def _log_spiral(start: float, growth: float, turns: float, length: float) -> TargetSurface:
+    return analytic.cylinder_over(curves.log_spiral(start, growth, turns), length)
+
+
+def _revolution(angle: float, profile: Any = None) -> TargetSurface:
+    curve = curves.spline(_VASE if profile is None else profile)
+    if curve.evenly(400, -0.05, 1.05)[:, 0].min() <= 0:
+        raise TargetError("The profile of a revolution must keep off its axis (r > 0).")
+    return analytic.revolution(curve, angle)
+
+
+_ENTRIES = (
+    NamedSurface(
+        "plane",
+        "a flat rectangle: the regular Miura-ori",
+        _SIDES,
+        lambda width, depth: analytic.plane(width, depth),
+    ),
+    NamedSurface(
+        "cylinder",
+        "a profile curve extruded; by default a circular arc",
+        {
+            "radius": _length(1.0, "radius of the arc"),
+            "angle": _angle(120, "angle of the arc", 355),
+            "length": _length(1.5, "length of the extrusion"),
+        },
+        _arc_cylinder,
+        "y, z",
+    ),
+    NamedSurface(
+        "log-spiral",
+        "a logarithmic spiral extruded",
+        {
+            "start": _length(0.25, "radius at the inner end"),
+            "growth": Parameter(0.18, 1e-3, 2.0, "r grows by exp(growth) a radian"),
+            "turns": Parameter(1.25, 0.05, 10.0, "number of turns"),
+            "length": _length(1.5, "length of the extrusion"),
+        },
+        _log_spiral,
+    ),
+    NamedSurface(
+        "sphere",
+        "a patch of longitude by latitude of a sphere",
+        {
+            "radius": _length(1.0, "radius of the sphere"),
+            "width": _angle(80, "longitude covered", 350),
+            "height": _angle(80, "latitude covered", 170),
+        },
+        lambda radius, width, height: analytic.sphere_patch(radius, width, height),
+    ),
+    NamedSurface(
+        "hypar",
+        "a hyperbolic paraboloid z = height x y, ruled along x and y",
+        {**_SIDES, "height": _signed(0.5, "height of the corners over the centre")},
+        lambda width, depth, height: analytic.hyperbolic_paraboloid(width, depth, height),
+    ),
+    NamedSurface(
+        "saddle",
+        "a hyperbolic paraboloid z = height (x^2 - y^2)",
+        {**_SIDES, "height": _signed(0.4, "height of the middles of the sides")},
+        lambda width, depth, height: analytic.saddle(width, depth, height),
+    ),
+    NamedSurface(
+        "paraboloid",
+        "a bowl z = -height (x^2 + y^2)",
+        {**_SIDES, "height": _signed(0.3, "drop at the middles of the sides")},
+        lambda width, depth, height: analytic.paraboloid(width, depth, height),
+    ),
+    NamedSurface(
+        "bump",
+        "a Gaussian bump on a plane",
+        {
+            **_SIDES,
+            "height": _signed(0.4, "height of the bump"),
+            "spread": _length(0.7, "radius at which it falls to 1/e"),
+        },
+        lambda width, depth, height, spread: analytic.bump(width, depth, height, spread),
+    ),
+    NamedSurface(
+        "helicoid",
+        "a spiral ramp",
+        {
+            "radius": _length(1.0, "outer radius"),
+            "inner": Parameter(-1.0, -1e6, 1e6, "inner radius; negative reaches across the axis"),
+            "pitch": _length(3.0, "rise in one turn"),
+            "turns": Parameter(0.5, 0.02, 20.0, "number of turns"),
+        },
+        lambda radius, inner, pitch, turns: analytic.helicoid(radius, inner, pitch, turns),
+    ),
+    NamedSurface(
+        "revolution",
+        "a profile curve turned about the z axis; by default a vase",
+        {"angle": _angle(120, "angle turned through", 350)},
+        _revolution,
+        "r, z",
+    ),
+)
+
+CATALOGUE: Mapping[str, NamedSurface] = {entry.name: entry for entry in _ENTRIES}
+
+
+def make_surface(name: str, given: Mapping[str, Any]) -> tuple[TargetSurface, dict[str, Any]]:
+    """The named surface and its complete parameters, defaults filled in.
+
+    ``given`` maps parameter names to numbers or texts with a unit; ``profile`` is a list of points.
+    Raises :class:`~miurafab.errors.TargetError` naming the surface or parameter and what is
+    accepted.
+    """
+    entry = CATALOGUE.get(name)
+    if entry is None:
+        near = difflib.get_close_matches(name, CATALOGUE, n=1)
+        hint = f"did you mean '{near[0]}'" if near else f"there are {', '.join(CATALOGUE)}"
+        raise TargetError(f"'{name}' is not a known surface; {hint}, or give a .toml or mesh file.")
+    values: dict[str, Any] = {key: p.default for key, p in entry.parameters.items()}
+    for key, text in given.items():
+        if key == "profile" and entry.profile_axes is not None:
+            values["profile"] = text
+            continue
+        if key not in entry.parameters:
+            known = ", ".join(entry.parameters)
+            raise TargetError(f"The surface '{name}' has no parameter '{key}'; it has {known}.")
+        values[key] = _value(name, key, text, entry.parameters[key])
+    surface = entry.make(**values)
+    if name == "helicoid" and values["inner"] >= values["radius"]:
+        raise TargetError("The helicoid's 'inner' must be smaller than its 'radius'.")
+    return surface, values
+
+
+def parse_target(text: str) -> tuple[str, dict[str, str]]:
+    """``name:key=value,key=value`` as a name and its parameters. Raises ``TargetError``."""
+    name, _, rest = text.partition(":")
+    parameters = {}
+    for part in filter(None, rest.split(",")):
+        key, equals, value = part.partition("=")
+        if not equals or not value.strip():
+            raise TargetError(f"'{part}' in '{text}' is not of the form parameter=value.")
+        parameters[key.strip()] = value.strip()
+    return name.strip(), parameters
+
+
+def _value(surface: str, key: str, text: Any, parameter: Parameter) -> float:
+    try:
+        value = parse_angle(text) if parameter.is_angle else float(text)
+    except (UnitError, ValueError, TypeError):
+        kind = "an angle such as 80deg" if parameter.is_angle else "a number"
+        raise TargetError(
+            f"The parameter '{key}' of '{surface}' is {text!r}, not {kind}."
+        ) from None
+    if not parameter.low <= value <= parameter.high:
+        raise TargetError(
+            f"The parameter '{key}' of '{surface}' is {value:g}; it must lie between "
+            f"{parameter.low:g} and {parameter.high:g}."
+        )
+    return value

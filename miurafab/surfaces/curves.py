@@ -1,0 +1,82 @@
+"""Profile curves: the plane curves that cylinders are extruded over and revolutions turned from.
+
+A curve is a map from a parameter in [0, 1] to the plane, smooth a little beyond both ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from miurafab.errors import TargetError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ProfileCurve:
+    """A plane curve; ``position`` maps parameters (...) in [0, 1] to points (..., 2)."""
+
+    position: Callable[[Floats], Floats]
+
+    def evenly(self, count: int, start: float = 0.0, stop: float = 1.0) -> Floats:
+        """``count`` points equally spaced by arc length from ``start`` to ``stop``, (count, 2)."""
+        dense = np.linspace(start, stop, max(2000, 20 * count))
+        points = self.position(dense)
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        at = np.interp(np.linspace(0.0, along[-1], count), along, dense)
+        return self.position(at)
+
+
+def arc(radius: float, angle: float) -> ProfileCurve:
+    """A circular arc, symmetric about the second axis and bulging towards it."""
+
+    def position(t: Floats) -> Floats:
+        phi = (t - 0.5) * angle
+        return np.stack([radius * np.sin(phi), radius * (np.cos(phi) - 1.0)], axis=-1)
+
+    return ProfileCurve(position)
+
+
+def log_spiral(start: float, growth: float, turns: float) -> ProfileCurve:
+    """r = start * exp(growth * phi) over ``turns`` turns, walked at constant speed."""
+    swing = 2 * np.pi * turns
+    rate = np.expm1(growth * swing)
+
+    def position(t: Floats) -> Floats:
+        phi = np.log1p(np.maximum(t * rate, -0.5)) / growth
+        radius = start * np.exp(growth * phi)
+        return np.stack([radius * np.cos(phi), radius * np.sin(phi)], axis=-1)
+
+    return ProfileCurve(position)
+
+
+def spline(points: Sequence[Sequence[float]]) -> ProfileCurve:
+    """The cubic spline through ``points`` (n, 2), parameterised by chord length.
+
+    Raises :class:`~miurafab.errors.TargetError` for fewer than two points, or two equal ones.
+    """
+    try:
+        given = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise TargetError("A profile must be a list of [x, y] points.") from None
+    if given.ndim != 2 or given.shape[1] != 2 or len(given) < 2:
+        raise TargetError("A profile must be a list of two or more [x, y] points.")
+    if not np.isfinite(given).all():
+        raise TargetError("A profile point is not a finite number.")
+    chords = np.linalg.norm(np.diff(given, axis=0), axis=1)
+    if (chords == 0).any():
+        where = int(np.argmin(chords))
+        raise TargetError(f"The profile points {where} and {where + 1} are the same point.")
+    along = np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum()
+    through = CubicSpline(along, given)
+
+    def position(t: Floats) -> Floats:
+        points_at: Floats = through(t)
+        return points_at
+
+    return ProfileCurve(position)
