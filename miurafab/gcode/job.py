@@ -18,8 +18,8 @@ from miurafab.errors import GcodeError
 
 _LINE_ENDS = re.compile(r"\r\n|\n|\r")
 _LINES = re.compile(r"([^\r\n]*)(?:\r\n|\n|\r|$)")
-COMMENTS = re.compile(r"\([^)]*\)?|;.*", re.DOTALL)
-"""A comment as the controller sees it: ``(...)`` up to the line's end if unclosed, or ``;...``."""
+# As the controller sees them: "(" up to ")" or the line's end, or ";" to the line's end.
+_COMMENTS = re.compile(r"\([^)]*\)?|;.*", re.DOTALL)
 _FORBIDDEN = re.compile(r"[^!-~]|[!?~]")
 _REALTIME = {"!": "the feed hold", "?": "the status query", "~": "the cycle start"}
 
@@ -66,21 +66,26 @@ def prepare_lines(name: str, lines: Iterable[str], line_chars: int = 79) -> Iter
     and line, at a realtime character, a character outside printable ASCII, or a line too long.
     """
     for number, line in enumerate(lines, 1):
-        code = line.rstrip("\r\n")
-        if "(" in code or ";" in code:
-            code = COMMENTS.sub("", code)
-        code = code.replace(" ", "").replace("\t", "")
-        if not code:
-            continue
-        bad = _FORBIDDEN.search(code)
-        if bad is not None:
-            raise GcodeError(f"{name}, line {number}: {_complaint(bad[0])}.")
+        code = bare_code(name, number, line)
         if len(code) > line_chars:
             raise GcodeError(
                 f"{name}, line {number}: {len(code)} characters without comments and blanks are "
                 f"more than the controller's {line_chars}; split the line."
             )
-        yield SendLine(number, code.encode("ascii"))
+        if code:
+            yield SendLine(number, code.encode("ascii"))
+
+
+def bare_code(name: str, number: int, line: str) -> str:
+    """``line`` without comments and blanks; raises ``GcodeError`` at a character not to be sent."""
+    code = line.rstrip("\r\n")
+    if "(" in code or ";" in code:
+        code = _COMMENTS.sub("", code)
+    code = code.replace(" ", "").replace("\t", "")
+    bad = _FORBIDDEN.search(code)
+    if bad is not None:
+        raise GcodeError(f"{name}, line {number}: {_complaint(bad[0])}.")
+    return code
 
 
 def _complaint(character: str) -> str:

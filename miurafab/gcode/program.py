@@ -1,122 +1,168 @@
-"""A G-code program read back: flat arrays of what the machine would do, line by line.
-
-Legend: n moves, e events, L lines sent; positions in mm in the frame of the first line (machine
-position 0, no offsets), feeds in mm/min, power in S words, dwell in seconds.
-"""
+"""A job read back to a :class:`~miurafab.gcode.moves.Program`, as the controller would run it."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from miurafab.gcode.job import Job
+from miurafab.errors import GcodeError
+from miurafab.gcode.execution import (
+    Dwell,
+    Line,
+    Pause,
+    Probe,
+    ProgramEnd,
+    Store,
+    execute,
+)
+from miurafab.gcode.faults import BlockFault
+from miurafab.gcode.job import Job, bare_code
+from miurafab.gcode.moves import (
+    DWELL,
+    END,
+    FEED,
+    PAUSE,
+    RAPID,
+    SYNC,
+    Context,
+    Program,
+    Strokes,
+    strokes,
+)
+from miurafab.gcode.parser import ModalState, parse_block
 
-RAPID, FEED = 0, 1
-"""Values of :attr:`Program.motion`."""
-BEAM_OFF, BEAM_M3, BEAM_M4 = 0, 3, 4
-"""Values of :attr:`Program.spindle`."""
-SYNC, DWELL, PAUSE, END = 0, 1, 2, 3
-"""Values of :attr:`Program.event_kind`: the motion stops and (DWELL) waits, (PAUSE) waits for
-somebody, (END) the program ends."""
+__all__ = ["Context", "Program", "Strokes", "parse_program", "strokes"]
 
-
-@dataclass(frozen=True)
-class Context:
-    """What the comments before a move said: ``(sheet NAME)``, ``(patch LABEL)``,
-    ``(operation NAME)``; each empty if never said.
-    """
-
-    sheet: str = ""
-    patch: str = ""
-    operation: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Program:
-    """What a job does.
-
-    Per move, in order: ``start`` and ``end`` (n, 3) float64 mm; ``motion`` (n,) int8, RAPID or
-    FEED; ``feed_mm_min`` (n,) float64, 0 for rapids; ``power`` (n,) float64, the S in force;
-    ``spindle`` (n,) int8, BEAM_OFF, BEAM_M3 or BEAM_M4; ``line`` (n,) int64, 1-based in the
-    file; ``context`` (n,) int64 into ``contexts``. Arcs are chords.
-
-    Per event: ``event_move`` (e,) int64, the number of moves made before it; ``event_kind`` (e,)
-    int8; ``event_seconds`` (e,) float64; ``event_line`` (e,) int64.
-
-    ``line_number`` and ``line_bytes`` (L,) int64: the lines that are sent, newline counted.
-    """
-
-    name: str
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
-    motion: NDArray[np.int8]
-    feed_mm_min: NDArray[np.float64]
-    power: NDArray[np.float64]
-    spindle: NDArray[np.int8]
-    line: NDArray[np.int64]
-    context: NDArray[np.int64]
-    contexts: tuple[Context, ...]
-    event_move: NDArray[np.int64]
-    event_kind: NDArray[np.int8]
-    event_seconds: NDArray[np.float64]
-    event_line: NDArray[np.int64]
-    line_number: NDArray[np.int64]
-    line_bytes: NDArray[np.int64]
-
-    def __len__(self) -> int:
-        return len(self.motion)
-
-    @property
-    def beam_on(self) -> NDArray[np.bool_]:
-        """(n,) whether a move burns in laser mode: a feed move, armed, with S above 0."""
-        return (self.motion == FEED) & (self.spindle != BEAM_OFF) & (self.power > 0)
-
-    @property
-    def lengths(self) -> NDArray[np.float64]:
-        """(n,) lengths of the moves in mm."""
-        return np.asarray(np.linalg.norm(self.end - self.start, axis=1), dtype=np.float64)
+_COMMENT = re.compile(r"\s*\(\s*(sheet|patch|operation)\s+([^()]*?)\s*\)\s*")
 
 
-@dataclass(frozen=True, eq=False)
-class Strokes:
-    """S polylines burnt, N points in all.
-
-    ``points`` (N, 3) float64 mm; ``offsets`` (S + 1,) int64, stroke s being
-    ``points[offsets[s]:offsets[s + 1]]``; ``first_move`` and ``last_move`` (S,) int64, its moves
-    in the program, both included; ``context`` (S,) int64 into ``contexts``.
-    """
-
-    points: NDArray[np.float64]
-    offsets: NDArray[np.int64]
-    first_move: NDArray[np.int64]
-    last_move: NDArray[np.int64]
-    context: NDArray[np.int64]
-    contexts: tuple[Context, ...]
-
-    def __len__(self) -> int:
-        return len(self.context)
-
-    def stroke(self, index: int) -> NDArray[np.float64]:
-        """(k, 3) points of one stroke."""
-        return self.points[self.offsets[index] : self.offsets[index + 1]]
-
-    def context_of(self, index: int) -> Context:
-        """The sheet, patch and operation of one stroke."""
-        return self.contexts[self.context[index]]
+@dataclass(frozen=True, slots=True)
+class _ReaderRules:
+    laser: bool
+    arc_tolerance: float
+    mist: bool = True
+    single_precision: bool = False
 
 
-def parse_program(job: Job, *, arc_tolerance_mm: float = 0.002) -> Program:
+def parse_program(job: Job, *, laser: bool = True, arc_tolerance_mm: float = 0.002) -> Program:
     """Read ``job`` back as the controller would run it from power-up, at machine position 0.
 
+    ``laser`` is the controller's laser mode ($32), which darkens G0 and lets S change in motion.
     Arcs become chords that stay within ``arc_tolerance_mm`` of the arc ($12). Raises
     :class:`~miurafab.errors.GcodeError` naming file and line for what the controller would
-    refuse.
+    refuse, and for a ``$`` command, which is no part of a program.
     """
-    raise NotImplementedError
+    return _Reader(_ReaderRules(laser, arc_tolerance_mm)).read(job)
 
 
-def strokes(program: Program) -> Strokes:
-    """Consecutive moves with the beam on, joined while sheet, patch and operation stay."""
-    raise NotImplementedError
+class _Reader:
+    def __init__(self, rules: _ReaderRules) -> None:
+        self.rules = rules
+        self.state = ModalState()
+        self.stored: list[Sequence[float]] = [(0.0, 0.0, 0.0)] * 8
+        self.at: Sequence[float] = (0.0, 0.0, 0.0)
+        self.contexts: dict[Context, int] = {Context(): 0}
+        self.context = Context()
+        self.moves: list[tuple[float, ...]] = []
+        self.events: list[tuple[float, ...]] = []
+        self.sent: list[tuple[int, int]] = []
+
+    def read(self, job: Job) -> Program:
+        for number, line in enumerate(job.iter_lines(), 1):
+            code = bare_code(job.name, number, line)
+            if code:
+                self.sent.append((number, len(code) + 1))
+                self._line(job.name, number, code.upper().replace("/", ""))
+            elif "(" in line:
+                self._comment(line)
+        return self._program(job.name)
+
+    def _comment(self, line: str) -> None:
+        match = _COMMENT.fullmatch(line)
+        if match is not None:
+            kept = {"sheet": self.context.sheet, "patch": self.context.patch}
+            kept["operation"] = self.context.operation
+            self.context = Context(**{**kept, match[1]: match[2]})
+
+    def _line(self, name: str, number: int, code: str) -> None:
+        if code.startswith("$"):
+            raise GcodeError(
+                f"{name}, line {number}: {code!r} is a command to the controller and no part of "
+                "a program; remove it."
+            )
+        try:
+            block = parse_block(code, self.state, self.stored.__getitem__, self.rules)
+        except BlockFault as fault:
+            raise GcodeError(f"{name}, line {number}: {fault} (error:{fault.code}).") from None
+        for action in execute(block, self.state, self.rules):
+            if isinstance(action, Line):
+                self._move(action, number)
+            elif isinstance(action, Probe):
+                self._event(SYNC, number)
+                self._move(action.line, number)
+                self._event(SYNC, number)
+                self.state.position = list(action.line.target)
+            elif isinstance(action, Dwell):
+                self._event(DWELL, number, action.seconds)
+            elif isinstance(action, Pause):
+                self._event(PAUSE, number)
+            elif isinstance(action, ProgramEnd):
+                self.state.coord_system = list(self.stored[0])
+                self._event(END, number)
+            else:
+                if isinstance(action, Store):
+                    self.stored[action.index] = tuple(action.values)
+                self._event(SYNC, number)
+
+    def _move(self, line: Line, number: int) -> None:
+        target = tuple(line.target)
+        start, self.at = self.at, target
+        if target == start:
+            return
+        feed = line.feed
+        if line.rapid:
+            feed = 0.0
+        elif line.inverse_time:
+            feed *= sum((b - a) ** 2 for a, b in zip(start, target, strict=True)) ** 0.5
+        context = self.contexts.setdefault(self.context, len(self.contexts))
+        self.moves.append(
+            (
+                *start,
+                *target,
+                RAPID if line.rapid else FEED,
+                feed,
+                line.speed if line.spindle else 0.0,
+                line.spindle,
+                number,
+                context,
+            )
+        )
+
+    def _event(self, kind: int, number: int, seconds: float = 0.0) -> None:
+        self.events.append((len(self.moves), kind, seconds, number))
+
+    def _program(self, name: str) -> Program:
+        moves = np.array(self.moves, dtype=np.float64).reshape(-1, 12)
+        events = np.array(self.events, dtype=np.float64).reshape(-1, 4)
+        sent = np.array(self.sent, dtype=np.int64).reshape(-1, 2)
+        return Program(
+            name=name,
+            start=moves[:, 0:3].copy(),
+            end=moves[:, 3:6].copy(),
+            motion=moves[:, 6].astype(np.int8),
+            feed_mm_min=moves[:, 7].copy(),
+            power=moves[:, 8].copy(),
+            spindle=moves[:, 9].astype(np.int8),
+            line=moves[:, 10].astype(np.int64),
+            context=moves[:, 11].astype(np.int64),
+            contexts=tuple(self.contexts),
+            event_move=events[:, 0].astype(np.int64),
+            event_kind=events[:, 1].astype(np.int8),
+            event_seconds=events[:, 2].copy(),
+            event_line=events[:, 3].astype(np.int64),
+            line_number=sent[:, 0].copy(),
+            line_bytes=sent[:, 1].copy(),
+        )

@@ -1,0 +1,86 @@
+"""Arcs as the chords that the controller makes of them.
+
+An arc of angle phi and radius r becomes n chords, n such that the middle of a chord stays within
+the tolerance t of the arc: a chord of angle a leaves it by the sagitta r (1 - cos(a/2)) = t, so
+its half length is sqrt(t (2 r - t)), and n = floor(phi r / 2 / sqrt(t (2 r - t)))
+(``motion_control.c``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from miurafab.gcode.numbers import to_unsigned
+
+_FULL_TURN_WITHIN = 5e-7
+"""rad; an arc ending this near its start is a full circle (``config.h``)."""
+
+
+def centre_from_radius(
+    x: float, y: float, radius: float, clockwise: bool
+) -> tuple[float, float] | None:
+    """The centre, seen from the start, of the arc to (``x``, ``y``); None if none has ``radius``.
+
+    Without a chord there is no centre, and the firmware computes with a NaN; so does this.
+
+    The centre lies on the perpendicular bisector of the chord of length d, at the distance
+    h = sqrt(r^2 - d^2/4): centre = (x, y)/2 + h (-y, x)/d for a counterclockwise arc of less
+    than half a turn. A negative radius asks for the longer arc.
+    """
+    chord_sqr = x * x + y * y
+    height_sqr = 4.0 * radius * radius - chord_sqr
+    if height_sqr < 0.0:
+        return None
+    side = math.sqrt(height_sqr / chord_sqr) if chord_sqr else math.nan
+    if clockwise != (radius < 0.0):
+        side = -side
+    return 0.5 * (x - y * side), 0.5 * (y + x * side)
+
+
+def arc_chords(
+    start: Sequence[float],
+    end: Sequence[float],
+    centre: Sequence[float],
+    radius: float,
+    plane: tuple[int, int, int],
+    clockwise: bool,
+    tolerance: float,
+) -> tuple[int, list[list[float]]]:
+    """How many chords the arc has, and their end points in order; the last is ``end`` itself.
+
+    An arc too short for a chord counts none, and is the straight line to its end.
+
+    ``centre`` is relative to ``start``; ``plane`` gives the arc's two axes and the axis along
+    which a helix climbs; ``tolerance`` in mm.
+    """
+    first, second, normal = plane
+    x0, y0 = start[first] + centre[first], start[second] + centre[second]
+    rx, ry = -centre[first], -centre[second]
+    tx, ty = end[first] - x0, end[second] - y0
+    angle = math.atan2(rx * ty - ry * tx, rx * tx + ry * ty)
+    if clockwise and angle >= -_FULL_TURN_WITHIN:
+        angle -= 2.0 * math.pi
+    elif not clockwise and angle <= _FULL_TURN_WITHIN:
+        angle += 2.0 * math.pi
+    count = chord_count(angle, radius, tolerance)
+    climb = (end[normal] - start[normal]) / max(count, 1)
+    ends = []
+    for index in range(1, count):
+        turn = angle * index / count
+        cosine, sine = math.cos(turn), math.sin(turn)
+        point = list(end)
+        point[first] = x0 + rx * cosine - ry * sine
+        point[second] = y0 + rx * sine + ry * cosine
+        point[normal] = start[normal] + climb * index
+        ends.append(point)
+    ends.append(list(end))
+    return count, ends
+
+
+def chord_count(angle: float, radius: float, tolerance: float) -> int:
+    """How many chords an arc of ``angle`` (rad) gets, none counting as a single line."""
+    half_chord_sqr = tolerance * (2.0 * radius - tolerance)
+    if not half_chord_sqr > 0.0:
+        return 0
+    return to_unsigned(abs(0.5 * angle * radius) / math.sqrt(half_chord_sqr)) & 0xFFFF

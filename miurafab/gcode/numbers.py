@@ -1,0 +1,49 @@
+"""Numbers as the firmware reads and keeps them: 32-bit floats from at most eight digits.
+
+An 8-bit controller takes the digits of a word as one integer, drops what comes after the eighth,
+and scales by hundredths and tenths in single precision (``nuts_bolts.c``). The virtual
+controller must round as it does; a program that is only read back uses plain ``float``.
+"""
+
+from __future__ import annotations
+
+from ctypes import c_float
+
+_DIGITS = 8
+
+
+def single(value: float) -> float:
+    """``value`` rounded to the nearest 32-bit float; beyond the range, infinity."""
+    return float(c_float(value).value)
+
+
+def read_single(text: str) -> float:
+    """The value that the firmware reads from ``text``: a sign, digits, at most one point."""
+    whole, _, fraction = text.lstrip("+-").partition(".")
+    digits = whole + fraction
+    value = single(float(int(digits[:_DIGITS])))
+    shift = len(whole) - min(len(digits), _DIGITS)
+    if value:
+        while shift <= -2:
+            value = single(value * single(0.01))
+            shift += 2
+        if shift == -1:
+            value = single(value * single(0.1))
+        for _ in range(shift):
+            value = single(value * 10.0)
+    return -value if text.startswith("-") else value
+
+
+def whole_byte(value: float) -> int:
+    """What is left when the firmware puts ``trunc(value)`` into one byte."""
+    return to_unsigned(value) & 0xFF
+
+
+def to_unsigned(value: float) -> int:
+    """``value`` cast to 32 unsigned bits: negative numbers wrap, what does not fit gives 0.
+
+    Source: avr-libc ``fixunssfsi``.
+    """
+    if value != value or abs(value) >= 2.0**32:
+        return 0
+    return int(value) & 0xFFFFFFFF

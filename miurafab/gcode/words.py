@@ -1,0 +1,172 @@
+"""A line split into words, and the table of the G and M words that GRBL knows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import lru_cache
+
+from miurafab.gcode import faults
+from miurafab.gcode.faults import BlockFault
+from miurafab.gcode.numbers import read_single, single, to_unsigned
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+_WORD = re.compile(rf"([A-Z])({_NUMBER})", re.ASCII)
+_LINE = re.compile(rf"(?:[A-Z]{_NUMBER})*", re.ASCII)
+
+
+def split_words(line: str) -> Iterator[tuple[str, str]]:
+    """The (letter, number) pairs of ``line``, which has no comments, blanks or lower case.
+
+    Raises :class:`BlockFault` where the line stops being words, after the words before it.
+    """
+    if _LINE.fullmatch(line):
+        yield from _WORD.findall(line)
+        return
+    end = 0
+    while (match := _WORD.match(line, end)) is not None:
+        yield match[1], match[2]
+        end = match.end()
+    bad = line[end]
+    if "A" <= bad <= "Z":
+        raise BlockFault(faults.NUMBER_EXPECTED, bad)
+    raise BlockFault(faults.LETTER_EXPECTED, repr(bad))
+
+
+class Group(IntEnum):
+    """The modal groups (NIST RS274/NGC, table 4): one word of each in a line."""
+
+    NON_MODAL = 0
+    MOTION = 1
+    PLANE = 2
+    DISTANCE = 3
+    ARC_DISTANCE = 4
+    FEED_MODE = 5
+    UNITS = 6
+    CUTTER = 7
+    TOOL_LENGTH = 8
+    OFFSET = 9
+    PATH = 10
+    STOP = 11
+    SPINDLE = 12
+    COOLANT = 13
+
+
+class Claim(IntEnum):
+    """What a command wants the axis words for."""
+
+    NONE = 0
+    NON_MODAL = 1
+    MOTION = 2
+    TOOL_LENGTH = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A G or M word: the mode it sets (``slot`` to ``value``; no slot: no effect) and its claim."""
+
+    group: Group
+    slot: str = ""
+    value: int = 0
+    claim: Claim = Claim.NONE
+
+
+DWELL, SET_OFFSET, GO_G28, GO_G30, MACHINE, SHIFT = 4, 10, 28, 30, 53, 92
+STORE_G28, STORE_G30, UNSHIFT = 281, 301, 921
+SEEK, LINEAR, CLOCKWISE, COUNTERCLOCKWISE, NO_MOTION = 0, 1, 2, 3, 80
+PROBES = (140, 141, 142, 143)
+"""G38.2 to G38.5 as motion modes."""
+FLOOD, MIST = 1, 2
+
+
+def _g_table() -> dict[tuple[int, int], Command]:
+    table = {
+        (10, 0): Command(Group.NON_MODAL, "action", SET_OFFSET, Claim.NON_MODAL),
+        (28, 0): Command(Group.NON_MODAL, "action", GO_G28, Claim.NON_MODAL),
+        (30, 0): Command(Group.NON_MODAL, "action", GO_G30, Claim.NON_MODAL),
+        (92, 0): Command(Group.NON_MODAL, "action", SHIFT, Claim.NON_MODAL),
+        (28, 10): Command(Group.NON_MODAL, "action", STORE_G28),
+        (30, 10): Command(Group.NON_MODAL, "action", STORE_G30),
+        (92, 10): Command(Group.NON_MODAL, "action", UNSHIFT),
+        (4, 0): Command(Group.NON_MODAL, "action", DWELL),
+        (53, 0): Command(Group.NON_MODAL, "action", MACHINE),
+        (80, 0): Command(Group.MOTION, "motion", NO_MOTION),
+        (91, 10): Command(Group.ARC_DISTANCE),
+        (40, 0): Command(Group.CUTTER),
+        (61, 0): Command(Group.PATH),
+        (43, 10): Command(Group.TOOL_LENGTH, "tool_length", 1, Claim.TOOL_LENGTH),
+    }
+    for number in (SEEK, LINEAR, CLOCKWISE, COUNTERCLOCKWISE):
+        table[number, 0] = Command(Group.MOTION, "motion", number, Claim.MOTION)
+    for index, probe in enumerate(PROBES):
+        table[38, 20 + 10 * index] = Command(Group.MOTION, "motion", probe, Claim.MOTION)
+    for slot, group, first, count in (
+        ("plane", Group.PLANE, 17, 3),
+        ("distance", Group.DISTANCE, 90, 2),
+        ("offset", Group.OFFSET, 54, 6),
+    ):
+        for index in range(count):
+            table[first + index, 0] = Command(group, slot, index)
+    for slot, group, last in (("inverse_time", Group.FEED_MODE, 94), ("inches", Group.UNITS, 21)):
+        for value in range(2):
+            table[last - value, 0] = Command(group, slot, value)
+    return table
+
+
+_G = _g_table()
+_M = {
+    0: Command(Group.STOP, "stop", 1),
+    1: Command(Group.STOP),
+    2: Command(Group.STOP, "stop", 2),
+    30: Command(Group.STOP, "stop", 30),
+    3: Command(Group.SPINDLE, "spindle", 3),
+    4: Command(Group.SPINDLE, "spindle", 4),
+    5: Command(Group.SPINDLE, "spindle", 0),
+    7: Command(Group.COOLANT, "coolant", MIST),
+    8: Command(Group.COOLANT, "coolant", FLOOD),
+    9: Command(Group.COOLANT, "coolant", 0),
+}
+_CLAIMING = {0, 1, 2, 3, 38, 43, 49}
+"""G words that claim the axis words whatever stands after their point."""
+_POINTED = {28, 30, 38, 43, 61, 90, 91, 92}
+"""G words some of whose pointed forms exist, so that the others are unknown and not fractions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spelling:
+    """One spelling of a G or M word: its command or the fault it is, and whether it claims axes."""
+
+    command: Command | None
+    fault: int
+    claims: bool
+
+
+@lru_cache(maxsize=4096)
+def look_up(letter: str, number: str, mist: bool) -> Spelling:
+    """What the word means; M7 exists only if the firmware has ``mist`` compiled in.
+
+    The fraction is taken in hundredths as the firmware does, in single precision (``gcode.c``).
+    """
+    value = read_single(number)
+    whole = to_unsigned(value) & 0xFF
+    hundredths = _round_half_away(single(100.0 * single(value - whole))) & 0xFFFF
+    if letter == "M":
+        if hundredths:
+            return Spelling(None, faults.NOT_WHOLE, False)
+        known = _M.get(whole) if mist or whole != 7 else None
+        return Spelling(known, faults.UNSUPPORTED, False)
+    if whole == 49:
+        return Spelling(Command(Group.TOOL_LENGTH, "tool_length", 0, Claim.TOOL_LENGTH), 0, True)
+    command = _G.get((whole, hundredths))
+    if command is not None:
+        return Spelling(command, 0, command.claim is not Claim.NONE)
+    pointless = (whole, 0) in _G and whole not in _POINTED
+    fault = faults.NOT_WHOLE if pointless else faults.UNSUPPORTED
+    return Spelling(None, fault, whole in _CLAIMING)
+
+
+def _round_half_away(value: float) -> int:
+    magnitude = int(abs(value) + 0.5)
+    return -magnitude if value < 0 else magnitude
