@@ -11,7 +11,7 @@ from typing import NoReturn
 
 import typer
 
-from miurafab.cli import profiles
+from miurafab.cli import check, fit, profiles, surfaces
 from miurafab.cli.console import json_text
 from miurafab.errors import MiurafabError
 
@@ -23,6 +23,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+app.command("surfaces")(surfaces.surfaces)
+app.command("fit")(fit.fit)
+app.command("check")(check.check)
 app.command("profiles")(profiles.profiles)
 app.command("materials")(profiles.materials)
 

@@ -11,7 +11,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import rich.box
 import rich.console
@@ -78,7 +78,8 @@ class Console:
         )
         for index, column in enumerate(columns):
             numeric = all(isinstance(row[index], int | float) for row in rows)
-            table.add_column(column, justify="right" if numeric and rows else "left")
+            justify: Literal["left", "right"] = "right" if numeric and rows else "left"
+            table.add_column(column, justify=justify, overflow="fold")
         for row in rows:
             table.add_row(*(readable(value) for value in row))
         self._out.print(table)

@@ -5,7 +5,8 @@ meets everything asked is the answer. The order:
 
 1. both directions of the rows, the one along which the normal turns less first, with growing
    stretch along the rows (1.3, 1.6, 2, 2.6), straight from the seed;
-2. the same bent step by step from flat to the full target, carrying the solution along.
+2. the same bent step by step from flat to the full target, carrying the solution along;
+3. the seeds of the first way shaken a little at random, by the request's ``seed``.
 
 Exact flat-foldability is appended to a developable solution. Whatever happens, the result says what
 was tried and, if nothing served, what to change.
@@ -13,6 +14,7 @@ was tried and, if nothing served, what to change.
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
@@ -40,6 +42,8 @@ STRETCH_ACROSS = 1.3
 BEND_STEPS = 12
 STEP_CAP = 0.25
 """The farthest that a coordinate moves in one step, in mean edge lengths."""
+SHAKE = 0.03
+"""The standard deviation of a random attempt's coordinates, in mean edge lengths."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class FitRequest:
     ``amplitude`` and ``zigzag`` the corrugation (height over row spacing, zig-zag over column
     spacing), None for automatic; ``flat_foldable`` the largest allowed |pi - a1 - a3| in radians, 0
     for exact, None for off; ``min_edge_mm`` and ``max_deviation_mm`` (of the mid-surface) are
-    limits. ``target`` describes the surface in the pattern file.
+    limits; ``seed`` decides the random attempts. ``target`` describes the surface in the file.
     """
 
     surface: TargetSurface
@@ -62,6 +66,7 @@ class FitRequest:
     flat_foldable: float | None = None
     min_edge_mm: float | None = None
     max_deviation_mm: float | None = None
+    seed: int = 0
     target: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -187,9 +192,9 @@ def fit(request: FitRequest, on_progress: Callable[[float, str], None] | None = 
 def _advice_when_stalled(attempts: list[Attempt]) -> str:
     residual = min(a.residual for a in attempts)
     return (
-        f"No exact sheet was found in {len(attempts)} attempts (best residual {residual:.1e}): the "
-        "target bends too much for one sheet of this pattern. Ask for more --facets, raise --zigzag "
-        "and --amplitude, drop --flat-foldable, or take a smaller part of the target."
+        f"No exact sheet was found in {len(attempts)} attempts (best residual {residual:.1e}): "
+        "the target bends too much for one sheet of this pattern. Ask for more --facets, raise "
+        "--zigzag and --amplitude, drop --flat-foldable, or take a smaller part of the target."
     )
 
 
@@ -201,7 +206,12 @@ class _Plan:
     corrugation: Corrugation
 
     def describe(self) -> str:
-        how = {"direct": "direct construction", "seed": "seed", "bent": "bending step by step"}
+        how = {
+            "direct": "direct construction",
+            "seed": "seed",
+            "bent": "bending step by step",
+            "shaken": "seed shaken",
+        }
         return f"{how[self.way]}, rows along {self.rows_along}"
 
     def run(self, request: FitRequest) -> _Candidate | Attempt:
@@ -216,11 +226,13 @@ class _Plan:
             )
             return self._candidate(request, sheet, 0)
         columns, rows = request.columns + 1, request.rows + 1
-        if self.way == "seed":
-            start, _ = seed(self.surface, columns, rows, self.corrugation)
-            solution = _solve(start, flat_foldable=False)
-        else:
+        if self.way == "bent":
             solution = _bend(self.surface, columns, rows, self.corrugation)
+        else:
+            start, _ = seed(self.surface, columns, rows, self.corrugation)
+            if self.way == "shaken":
+                start = _shaken(start, request.seed)
+            solution = _solve(start, flat_foldable=False)
         iterations = solution.iterations
         sheet = Tessellation(solution.x.reshape(rows, columns, 3))
         if solution.converged and request.flat_foldable is not None:
@@ -265,7 +277,7 @@ def _plans(request: FitRequest) -> Iterator[_Plan]:
         return
     oriented = [(request.surface, "u"), (Swapped(request.surface), "v")]
     oriented.sort(key=lambda pair: _turning(pair[0]))
-    for way in ("seed", "bent"):
+    for way in ("seed", "bent", "shaken"):
         for surface, name in oriented:
             for corrugation in corrugations:
                 yield _Plan(way, surface, name, corrugation)
@@ -301,7 +313,7 @@ def _bend(surface: TargetSurface, columns: int, rows: int, corrugation: Corrugat
     bends = np.linspace(0.0, 1.0, BEND_STEPS + 1)
     solution = _solve(seed(Bent(surface, 0.0), columns, rows, corrugation)[0], False)
     iterations = solution.iterations
-    for before, after in zip(bends[:-1], bends[1:], strict=True):
+    for before, after in itertools.pairwise(bends):
         offset = solution.x.reshape(rows, columns, 3) - Bent(surface, before).point(uv)
         local = np.linalg.solve(_frame(Bent(surface, before), uv), offset[..., None])
         carried = Bent(surface, after).point(uv)
@@ -318,6 +330,12 @@ def _bend(surface: TargetSurface, columns: int, rows: int, corrugation: Corrugat
 def _frame(surface: TargetSurface, uv: Floats) -> Floats:
     along, across = tangents(surface, uv)
     return np.stack([along, across, surface.normal(uv)], axis=-1)
+
+
+def _shaken(start: Tessellation, seed_number: int) -> Tessellation:
+    random = np.random.default_rng(seed_number)
+    amount = SHAKE * float(start.edge_lengths.mean())
+    return Tessellation(start.points + random.normal(scale=amount, size=start.points.shape))
 
 
 def _worst_kawasaki(sheet: Tessellation) -> float:

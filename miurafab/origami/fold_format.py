@@ -190,7 +190,7 @@ def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> N
     flat_folded = np.select([assignment == "M", assignment == "V"], [-180.0, 180.0], 0.0)
     given = document.get("edges_foldAngle")
     if given is None:
-        return np.radians(flat_folded)
+        return np.asarray(np.radians(flat_folded))
     if not isinstance(given, list) or len(given) != len(assignment):
         raise PatternError("'edges_foldAngle' does not have one angle for each edge.")
     try:
@@ -210,7 +210,7 @@ def _folded(
         if isinstance(frame, dict) and "foldedForm" in (frame.get("frame_classes") or []):
             unit = frame.get("frame_unit")
             own = _UNITS_MM.get(unit, factor) if isinstance(unit, str) else factor
-            points = _coordinates(frame, "vertices_coords") * own
+            points: NDArray[np.float64] = _coordinates(frame, "vertices_coords") * own
             if points.shape[1] == 2:
                 points = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
             if len(points) != vertices:

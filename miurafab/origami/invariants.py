@@ -40,7 +40,7 @@ def corner_ring(pattern: CreasePattern, points: Floats) -> CornerRing:
     after = np.where(slot + 1 < sizes, slot + 1, 0)
     before = np.where(slot > 0, slot - 1, sizes - 1)
     real = faces >= 0
-    here = points[faces]
+    here: Floats = points[faces]
     to_next = points[np.take_along_axis(faces, after, axis=1)] - here
     to_previous = points[np.take_along_axis(faces, before, axis=1)] - here
     angle = np.where(real, angle_between(to_next, to_previous), 0.0)
@@ -73,8 +73,7 @@ def angle_surplus(ring: CornerRing, vertices: Ints) -> Floats:
     """(I,) sum of the sector angles minus 2 pi at ``vertices``, radians: developability."""
     real = ring.vertex >= 0
     total = np.bincount(ring.vertex[real], ring.angle[real], minlength=int(vertices.max()) + 1)
-    surplus: Floats = total[vertices] - 2 * np.pi
-    return surplus
+    return np.asarray(total[vertices] - 2 * np.pi, dtype=np.float64)
 
 
 def kawasaki_residual(ring: CornerRing, vertices: Ints) -> Floats:

@@ -144,21 +144,32 @@ class Table:
             raise self.fault(key, f"must be a table [{key}], not {value!r}")
         return Table(value, f"{self.where} [{key}]", self._error)
 
+    def scalar(self, key: str) -> str:
+        """A text or a plain number, in its written form, for a parser further on."""
+        value = self._take(key, _REQUIRED)
+        if isinstance(value, bool) or not isinstance(value, str | int | float):
+            raise self.fault(key, f"is {value!r}, not a text or a number")
+        return str(value)
+
     def rest(self) -> dict[str, Any]:
         """Whatever is left, taken as it stands (for free-form tables)."""
         left = {k: v for k, v in self._values.items() if k not in self._asked}
         self._asked.extend(left)
         return left
 
-    def finish(self) -> None:
-        """Refuse every key that nobody took, by name, with the nearest one that exists."""
+    def finish(self, known: Sequence[str] = ()) -> None:
+        """Refuse every key that nobody took, by name, with the nearest one that exists.
+
+        ``known`` are keys that the caller would have taken had they been there.
+        """
+        keys = {*self._asked, *known}
         for key in self._values:
             if key not in self._asked:
-                near = difflib.get_close_matches(key, self._asked, n=1)
+                near = difflib.get_close_matches(key, keys, n=1)
                 hint = (
                     f"did you mean '{near[0]}'"
                     if near
-                    else f"known keys are {', '.join(sorted(self._asked))}"
+                    else f"known keys are {', '.join(sorted(keys))}"
                 )
                 raise self.fault(key, f"is not a known key; {hint}")
 

@@ -1,0 +1,36 @@
+"""``miurafab check``: recompute every invariant of a pattern from its file alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.origami.audit import audit
+from miurafab.workflow.design import load_pattern
+
+
+def check(
+    file: Annotated[Path, typer.Argument(help="The FOLD file.")],
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Recompute every invariant of a pattern from its file alone; exit 1 if one fails."""
+    console = Console(as_json, quiet)
+    pattern, surface, missing = load_pattern(file)
+    if missing is not None:
+        console.remark(f"Distances are left out: {missing}.")
+    result = audit(pattern, surface)
+    report = result.report()
+
+    def show() -> None:
+        hidden = {"findings", "advice", "iterations"}
+        console.facts({key: value for key, value in report.items() if key not in hidden})
+        for finding in result.findings:
+            console.line(f"{finding.code}: {finding.message}")
+
+    console.answer(report, show)
+    if not result.valid:
+        raise typer.Exit(1)

@@ -1,0 +1,83 @@
+"""``miurafab fit``: fit a tessellation to a target, write the pattern and the report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from miurafab.cli.console import Console, JsonOption, QuietOption, json_text
+from miurafab.origami.fit import fit as fit_request
+from miurafab.workflow.design import design, save_pattern
+
+TargetArgument = Annotated[
+    str,
+    typer.Argument(help="A named surface (hypar:height=0.5), a design .toml, or a mesh file."),
+]
+
+
+def fit(
+    target: TargetArgument,
+    out: Annotated[Path, typer.Option("-o", "--out", help="The FOLD file to write.")],
+    facets: Annotated[
+        str | None, typer.Option(help="Facets as COLUMNSxROWS [default: 20x20].")
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            help="Longest side of the folded bounding box "
+            "[default: 200mm; a mesh keeps its file's size]."
+        ),
+    ] = None,
+    amplitude: Annotated[
+        str | None,
+        typer.Option(help="Height of the corrugation over the row spacing [default: automatic]."),
+    ] = None,
+    zigzag: Annotated[
+        str | None, typer.Option(help="Zig-zag over the column spacing [default: automatic].")
+    ] = None,
+    min_edge: Annotated[str | None, typer.Option(help="The shortest edge allowed.")] = None,
+    max_deviation: Annotated[
+        str | None, typer.Option(help="The farthest the mid-surface may lie from the target.")
+    ] = None,
+    flat_foldable: Annotated[
+        str | None, typer.Option(help="exact, off, or a limit on |pi - a1 - a3| [default: off].")
+    ] = None,
+    rigid: Annotated[
+        bool, typer.Option("--rigid", help="The same as --flat-foldable exact.")
+    ] = False,
+    seed: Annotated[
+        str | None, typer.Option(help="Seed of the random attempts [default: 0].")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Also write the report to this JSON file.")
+    ] = None,
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Fit a generalized Miura-ori to a target surface."""
+    console = Console(as_json, quiet)
+    wanted = design(
+        target,
+        facets=facets,
+        size=size,
+        amplitude=amplitude,
+        zigzag=zigzag,
+        min_edge=min_edge,
+        max_deviation=max_deviation,
+        flat_foldable="exact" if rigid else flat_foldable,
+        seed=seed,
+    )
+    with console.progress("fitting") as progress:
+        result = fit_request(wanted.request, progress)
+    answer = result.report()
+    if result.pattern is not None:
+        save_pattern(result.pattern, out, wanted.title)
+        answer["file"] = str(out)
+    if report is not None:
+        report.write_text(json_text(answer) + "\n", encoding="utf-8", newline="\n")
+    shown = {key: value for key, value in answer.items() if key != "attempts" and value != ""}
+    console.answer(answer, lambda: console.facts(shown))
+    if result.status != "converged":
+        raise typer.Exit(1)

@@ -1,0 +1,52 @@
+"""``miurafab surfaces``: the built-in targets, their parameters and defaults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.surfaces.catalogue import CATALOGUE, Parameter
+
+
+def surfaces(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
+    """List the built-in targets with their parameters and defaults."""
+    console = Console(as_json, quiet)
+    answer = {
+        "surfaces": [
+            {
+                "name": entry.name,
+                "summary": entry.summary,
+                "profile": entry.profile_axes,
+                "parameters": {
+                    key: {
+                        "default": parameter.default,
+                        "low": parameter.low,
+                        "high": parameter.high,
+                        "unit": "rad" if parameter.is_angle else "",
+                        "meaning": parameter.meaning,
+                    }
+                    for key, parameter in entry.parameters.items()
+                },
+            }
+            for entry in CATALOGUE.values()
+        ]
+    }
+
+    def show() -> None:
+        rows = [
+            (entry.name, entry.summary, _defaults(entry.parameters)) for entry in CATALOGUE.values()
+        ]
+        console.rows(("name", "what it is", "parameters and defaults"), rows)
+        console.line("Give parameters after a colon: miurafab fit hypar:height=0.5 -o hypar.fold")
+
+    console.answer(answer, show)
+
+
+def _defaults(parameters: Mapping[str, Parameter]) -> str:
+    parts = []
+    for key, parameter in parameters.items():
+        value = parameter.default
+        text = f"{math.degrees(value):g}deg" if parameter.is_angle else f"{value:g}"
+        parts.append(f"{key}={text}")
+    return ",".join(parts)

@@ -1,0 +1,196 @@
+"""From what a user names to what the fit is asked: TARGET, design files, and back from a pattern.
+
+A TARGET is a named surface with parameters (``hypar:height=0.5``), a design file (.toml) or a mesh
+file. A design file says the same as the options of ``miurafab fit``, and options override it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from miurafab.errors import InputError, PatternError, TargetError
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.fit import FitRequest
+from miurafab.origami.fold_format import read_fold, write_fold
+from miurafab.profiles import Table, find_file, read_toml
+from miurafab.surfaces.catalogue import make_surface, parse_target
+from miurafab.surfaces.mesh import MESH_SUFFIXES, load_mesh
+from miurafab.surfaces.surface import TargetSurface
+from miurafab.units import parse_angle, parse_length
+
+DEFAULT_FACETS = "20x20"
+DEFAULT_SIZE_MM = 200.0
+"""The longest side of a named surface's folded form; a mesh keeps the size of its file."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """A request with a title, and the machine and material that its file names, if any."""
+
+    request: FitRequest
+    title: str
+    machine: str | None = None
+    material: str | None = None
+
+
+def parse_facets(text: str) -> tuple[int, int]:
+    """``COLSxROWS`` as two whole numbers. Raises ``InputError``."""
+    columns, cross, rows = text.lower().replace("×", "x").partition("x")
+    if not cross or not columns.strip().isdigit() or not rows.strip().isdigit():
+        raise InputError(f"--facets is '{text}'; write columns x rows, such as 20x20.")
+    return int(columns), int(rows)
+
+
+def parse_flat_foldable(text: str) -> float | None:
+    """``exact``, ``off`` or an angle as the limit in radians. Raises ``InputError``."""
+    if text == "exact":
+        return 0.0
+    return None if text == "off" else parse_angle(text)
+
+
+def design(target: str, **options: str | None) -> Design:
+    """What TARGET asks for. ``options`` are those of ``miurafab fit`` in their written form
+    (``facets="20x20"``, ``size="250mm"``, ``flat_foldable="exact"``); None leaves one unset.
+
+    Raises :class:`~miurafab.errors.TargetError` or ``InputError`` for whatever cannot be read.
+    """
+    given: dict[str, str | None] = {key: text for key, text in options.items() if text is not None}
+    suffix = Path(target).suffix.lower()
+    if suffix == ".toml":
+        return _from_file(find_file("patterns", target, error=TargetError), given)
+    if suffix in MESH_SUFFIXES:
+        surface, description = _mesh(Path(target))
+        own_size: dict[str, str | None] = {"size": None}
+        return Design(_request(surface, description, own_size | given), Path(target).stem)
+    if suffix and os.sep in target:
+        raise TargetError(
+            f"'{target}' cannot be a target: known files are .toml, {', '.join(MESH_SUFFIXES)}."
+        )
+    name, parameters = parse_target(target)
+    surface, values = make_surface(name, parameters)
+    return Design(_request(surface, {"surface": name, "parameters": values}, given), name)
+
+
+_OPTIONS = (
+    "facets",
+    "size",
+    "amplitude",
+    "zigzag",
+    "flat_foldable",
+    "min_edge",
+    "max_deviation",
+    "seed",
+)
+
+
+def _from_file(path: Path, given: Mapping[str, str | None]) -> Design:
+    table = Table(read_toml(path, TargetError), path.name, TargetError)
+    title = table.text("title", path.stem)
+    written = {key: table.scalar(key) for key in _OPTIONS if table.has(key)}
+    target = table.table("target")
+    layout = table.table("layout", {})
+    machine = layout.text("machine") if layout.has("machine") else None
+    material = layout.text("material") if layout.has("material") else None
+    layout.finish()
+    table.finish(known=_OPTIONS)
+    defaults: dict[str, str | None] = {}
+    if target.has("mesh"):
+        surface, description = _mesh(path.parent / target.text("mesh"))
+        target.finish()
+        defaults["size"] = None
+    else:
+        name = target.text("surface")
+        surface, values = make_surface(name, target.rest())
+        description = {"surface": name, "parameters": values}
+    try:
+        request = _request(surface, description, defaults | written | dict(given))
+    except InputError as fault:
+        raise TargetError(f"{path.name}: {fault}") from None
+    return Design(request, title, machine, material)
+
+
+def _mesh(path: Path) -> tuple[TargetSurface, dict[str, Any]]:
+    surface, sha256 = load_mesh(path)
+    return surface, {"mesh": str(path.resolve()), "sha256": sha256}
+
+
+def _request(
+    surface: TargetSurface, description: dict[str, Any], given: Mapping[str, str | None]
+) -> FitRequest:
+    unknown = set(given) - set(_OPTIONS)
+    if unknown:
+        raise InputError(f"'{sorted(unknown)[0]}' is not an option of a fit.")
+    columns, rows = parse_facets(given.get("facets") or DEFAULT_FACETS)
+    size = given["size"] if "size" in given else str(DEFAULT_SIZE_MM)
+    return FitRequest(
+        surface=surface,
+        columns=columns,
+        rows=rows,
+        size_mm=None if size is None else parse_length(size),
+        amplitude=_number("amplitude", given),
+        zigzag=_number("zigzag", given),
+        flat_foldable=parse_flat_foldable(given.get("flat_foldable") or "off"),
+        min_edge_mm=_length("min_edge", given),
+        max_deviation_mm=_length("max_deviation", given),
+        seed=_whole("seed", given),
+        target=description,
+    )
+
+
+def _number(key: str, given: Mapping[str, str | None]) -> float | None:
+    text = given.get(key)
+    if text is None:
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"--{key} is '{text}', not a number.") from None
+
+
+def _whole(key: str, given: Mapping[str, str | None]) -> int:
+    text = given.get(key) or "0"
+    if not text.isdigit():
+        raise InputError(f"--{key} is '{text}', not a whole number from 0 up.")
+    return int(text)
+
+
+def _length(key: str, given: Mapping[str, str | None]) -> float | None:
+    text = given.get(key)
+    return None if text is None else parse_length(text)
+
+
+def save_pattern(pattern: CreasePattern, path: Path, title: str = "") -> None:
+    """Write a FOLD file; a mesh target is named relative to it, so that both can move together."""
+    target = dict(pattern.target)
+    if "mesh" in target:
+        target["mesh"] = Path(os.path.relpath(target["mesh"], path.resolve().parent)).as_posix()
+    write_fold(replace(pattern, target=target), path, title)
+
+
+def load_pattern(path: Path) -> tuple[CreasePattern, TargetSurface | None, str | None]:
+    """The pattern in a FOLD file, its target, and why the target is not there if it is not.
+
+    A pattern without a target is a pattern from another program; a mesh that has moved away or
+    changed since is a remark and not an error.
+    """
+    pattern = read_fold(path)
+    target = pattern.target
+    if not target:
+        return pattern, None, None
+    if "mesh" in target:
+        mesh = path.parent / str(target["mesh"])
+        if not mesh.is_file():
+            return pattern, None, f"the target mesh {mesh} is not there"
+        if hashlib.sha256(mesh.read_bytes()).hexdigest() != target.get("sha256"):
+            return pattern, None, f"the target mesh {mesh} has changed since the fit"
+        return pattern, load_mesh(mesh)[0], None
+    parameters = target.get("parameters", {})
+    if not isinstance(target.get("surface"), str) or not isinstance(parameters, dict):
+        raise PatternError(f"{path}: 'miurafab:target' names neither a surface nor a mesh.")
+    surface, _ = make_surface(target["surface"], parameters)
+    return pattern, surface, None
