@@ -1,7 +1,7 @@
-"""The ``$`` settings of a controller: their names and units, a dump read, two sets compared.
+"""The ``$`` settings of a controller: what ``$$`` says, a saved dump, two sets compared.
 
-Numbers, names and units are those of GRBL 1.1 (``settings.h``, ``doc/csv/setting_codes_en_US.csv``
-of the firmware); other firmware keeps them and adds its own, which are carried without a name.
+Names and units are those of GRBL 1.1 (:mod:`miurafab.grbl.codes`); other firmware keeps these
+numbers and adds its own, which are carried without a name.
 """
 
 from __future__ import annotations
@@ -12,56 +12,50 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from miurafab.errors import ProfileError
+from miurafab.grbl.codes import setting_codes
 from miurafab.grbl.events import Setting
 from miurafab.grbl.replies import parse_reply
+from miurafab.profiles import MachineProfile
+
+_LASER_MODE_IS_32 = ("grbl-1.1", "grblhal")
 
 
-@dataclass(frozen=True, slots=True)
-class Meaning:
-    """What one setting is: a ``name`` for messages and its ``unit`` (empty for plain numbers)."""
+def profile_settings(machine: MachineProfile) -> dict[int, float]:
+    """What a job for ``machine`` expects of its controller.
 
-    name: str
-    unit: str = ""
+    The profile's own ``settings``, and what its tool implies where the firmware keeps the S
+    range in ``$30`` and ``$31`` and laser mode in ``$32`` (GRBL 1.1, grblHAL).
+    """
+    implied: dict[int, float] = {}
+    if machine.dialect in _LASER_MODE_IS_32:
+        tool = machine.tool
+        implied = {30: tool.s_max, 31: tool.s_min, 32: 1.0 if tool.kind == "laser" else 0.0}
+    return implied | machine.settings
 
 
-def _axes(name: str, unit: str, first: int) -> dict[int, Meaning]:
-    return {first + i: Meaning(f"{axis} {name}", unit) for i, axis in enumerate("XYZ")}
+def virtual_settings(machine: MachineProfile) -> dict[int, float]:
+    """The settings that make a virtual controller this machine.
 
-
-MEANINGS: Mapping[int, Meaning] = {
-    0: Meaning("step pulse", "µs"),
-    1: Meaning("step idle delay", "ms"),
-    2: Meaning("step pulse invert mask"),
-    3: Meaning("step direction invert mask"),
-    4: Meaning("step enable invert"),
-    5: Meaning("limit pins invert"),
-    6: Meaning("probe pin invert"),
-    10: Meaning("status report mask"),
-    11: Meaning("junction deviation", "mm"),
-    12: Meaning("arc tolerance", "mm"),
-    13: Meaning("report in inches"),
-    20: Meaning("soft limits"),
-    21: Meaning("hard limits"),
-    22: Meaning("homing cycle"),
-    23: Meaning("homing direction invert mask"),
-    24: Meaning("homing locate feed", "mm/min"),
-    25: Meaning("homing search feed", "mm/min"),
-    26: Meaning("homing switch debounce", "ms"),
-    27: Meaning("homing pull-off", "mm"),
-    30: Meaning("largest S value"),
-    31: Meaning("smallest S value"),
-    32: Meaning("laser mode"),
-    **_axes("steps", "steps/mm", 100),
-    **_axes("maximum rate", "mm/min", 110),
-    **_axes("acceleration", "mm/s²", 120),
-    **_axes("travel", "mm", 130),
-}
+    What :func:`profile_settings` expects, and the bed and the motion where the profile does not
+    give them as settings.
+    """
+    bed, motion = machine.bed, machine.motion
+    pairs = {
+        11: motion.junction_deviation_mm,
+        110: motion.max_rate_mm_min[0],
+        111: motion.max_rate_mm_min[1],
+        120: motion.acceleration_mm_s2[0],
+        121: motion.acceleration_mm_s2[1],
+        130: bed.width_mm,
+        131: bed.height_mm,
+    }
+    return pairs | profile_settings(machine)
 
 
 def describe(number: int) -> str:
     """``$110 (X maximum rate)``, or the bare number of a setting that GRBL 1.1 does not know."""
-    meaning = MEANINGS.get(number)
-    return f"${number}" if meaning is None else f"${number} ({meaning.name})"
+    code = setting_codes().get(number)
+    return f"${number}" if code is None else f"${number} ({code.name})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +67,8 @@ class Difference:
     actual: float | None
 
     def __str__(self) -> str:
-        unit = MEANINGS[self.number].unit if self.number in MEANINGS else ""
-        tail = f" {unit}" if unit else ""
+        code = setting_codes().get(self.number)
+        tail = f" {code.unit}" if code is not None and code.unit else ""
         found = "missing" if self.actual is None else f"{self.actual:g}{tail}"
         return f"{describe(self.number)} is {found} instead of {self.expected:g}{tail}"
 

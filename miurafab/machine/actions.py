@@ -1,0 +1,161 @@
+"""What one does with a machine besides cutting: look at it, home it, unlock it, move it.
+
+Each function opens the port, greets the controller, does one thing and closes the port. Those
+that move the machine reset it first on every way out but success, as the sender does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from miurafab.errors import ControllerError, InputError, JobStopped
+from miurafab.grbl.connection import Connection
+from miurafab.grbl.events import Options, StatusReport, Version
+from miurafab.grbl.settings import Settings
+from miurafab.machine.session import Session
+from miurafab.machine.signals import StopSignals
+from miurafab.machine.transport import open_port
+
+BAUD = 115_200
+"""What nearly every GRBL board speaks."""
+HOMING_S = 180.0
+"""How long homing may take; GRBL answers nothing meanwhile, not even a status query."""
+_POLL_S = 0.1
+
+
+@dataclass(frozen=True)
+class MachineInfo:
+    """What a controller says of itself; a figure that it does not report is None.
+
+    ``position`` and ``machine_position`` are in mm, ``state`` as in its status report.
+    """
+
+    port: str
+    firmware: str
+    version: str
+    build: str | None
+    options: str | None
+    planner_blocks: int | None
+    rx_bytes: int | None
+    state: str
+    position: tuple[float, ...] | None
+    machine_position: tuple[float, ...] | None
+    beam_off: bool
+
+
+@contextmanager
+def conversation(
+    port: str,
+    *,
+    baud: int = BAUD,
+    settings: Mapping[int, float] | None = None,
+    moves: bool = False,
+) -> Iterator[Session]:
+    """A session with the controller at ``port``, greeted; closed at the end.
+
+    ``settings`` are those of the controller in memory if ``port`` is ``virtual``. With ``moves``
+    the controller is reset if the block ends by an exception. Raises
+    :class:`~miurafab.errors.JobStopped` for Ctrl-C, SIGTERM and SIGHUP, and what
+    :meth:`~miurafab.machine.session.Session.greet` raises.
+    """
+    with StopSignals() as signals:
+        transport = open_port(port, baud, settings)
+        signals.at_once = transport.blocks
+        session = Session(transport, Connection(), check=signals.check)
+        at_risk = False
+        try:
+            session.greet()
+            at_risk = moves
+            yield session
+            at_risk = False
+        except KeyboardInterrupt:
+            raise JobStopped(f"Stopped by {signals.reason}.") from None
+        finally:
+            signals.hold()
+            if at_risk:
+                session.stop()
+            session.close()
+
+
+def machine_info(
+    port: str, *, baud: int = BAUD, settings: Mapping[int, float] | None = None
+) -> MachineInfo:
+    """What the controller at ``port`` is and how it stands; moves and changes nothing."""
+    with conversation(port, baud=baud, settings=settings) as session:
+        banner = session.banner
+        status = session.wait_status()
+        said = session.command("$I")
+        version = next((event for event in said if isinstance(event, Version)), None)
+        options = next((event for event in said if isinstance(event, Options)), None)
+        return MachineInfo(
+            port=port,
+            firmware=banner.firmware,
+            version=banner.version,
+            build=version.version if version else None,
+            options=options.flags if options else None,
+            planner_blocks=options.planner_blocks if options else None,
+            rx_bytes=options.rx_bytes if options else None,
+            state=status.state,
+            position=session.position,
+            machine_position=status.machine_position,
+            beam_off=status.beam_off,
+        )
+
+
+def read_settings(
+    port: str, *, baud: int = BAUD, settings: Mapping[int, float] | None = None
+) -> Settings:
+    """What the controller answers to ``$$``."""
+    with conversation(port, baud=baud, settings=settings) as session:
+        return Settings.from_events(session.command("$$"))
+
+
+def unlock(
+    port: str, *, baud: int = BAUD, settings: Mapping[int, float] | None = None
+) -> StatusReport:
+    """Open the lock that an alarm left (``$X``); the machine must be where it thinks it is."""
+    with conversation(port, baud=baud, settings=settings) as session:
+        session.command("$X")
+        return session.wait_status()
+
+
+def home(
+    port: str, *, baud: int = BAUD, settings: Mapping[int, float] | None = None
+) -> StatusReport:
+    """Run the homing cycle (``$H``) and wait for its end."""
+    with conversation(port, baud=baud, settings=settings, moves=True) as session:
+        session.command("$H", HOMING_S)
+        return session.wait_status()
+
+
+def jog(
+    port: str,
+    *,
+    x: float | None = None,
+    y: float | None = None,
+    feed_mm_min: float = 1000.0,
+    absolute: bool = False,
+    baud: int = BAUD,
+    settings: Mapping[int, float] | None = None,
+) -> StatusReport:
+    """Move by ``x`` and ``y`` mm (``absolute``: to them, in work coordinates), beam off; waits.
+
+    Raises :class:`~miurafab.errors.InputError` if neither is given,
+    :class:`~miurafab.errors.ControllerError` if the controller refuses, as for a target outside
+    its soft limits.
+    """
+    words = "".join(f"{a}{v:.3f}" for a, v in (("X", x), ("Y", y)) if v is not None)
+    if not words:
+        raise InputError("A jog needs a distance along X, along Y, or both.")
+    mode = "G90" if absolute else "G91"
+    with conversation(port, baud=baud, settings=settings, moves=True) as session:
+        session.command(f"$J=G21{mode}{words}F{feed_mm_min:g}")
+        while True:
+            status = session.wait_status()
+            if status.state == "Idle":
+                return status
+            if status.state != "Jog":
+                raise ControllerError(f"The jog ended in state {status.state}.")
+            session.pause(_POLL_S)

@@ -1,0 +1,135 @@
+"""What of a job the controller has taken, on disk while it runs, so that a job can be resumed.
+
+The journal is a file of JSON objects, one a line; each run of a job appends its own. First a
+header: ``schema``, ``job``, ``sha256`` of the program's text, ``machine``, ``port``, ``lines``.
+Then, four times a second of the wire's clock at most, ``{"taken": n, "line": k, "seconds": t}``:
+n lines were acknowledged, the last of them line k of the file. At the end ``{"ended": how,
+"why": sentence}``, how being ``done``, ``stopped`` or ``failed``.
+
+What it says was taken, was taken; a little more may have been when a run ends without a last
+word (power loss). *Taken* is not *burnt*: the planner and the receive buffer still held lines.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from miurafab.errors import InputError
+from miurafab.gcode.job import Job
+from miurafab.machine.durable import DurableFile
+
+SCHEMA = "miurafab-journal/1"
+_PERIOD = 0.25  # s between two records
+
+
+class Journal:
+    """The journal of one run, open for writing.
+
+    Raises :class:`~miurafab.errors.InputError` if ``path`` cannot be written.
+    """
+
+    def __init__(self, path: Path, job: Job, machine: str, port: str, lines: int) -> None:
+        header = {
+            "schema": SCHEMA,
+            "job": job.name,
+            "sha256": job_digest(job),
+            "machine": machine,
+            "port": port,
+            "lines": lines,
+        }
+        # The blank line parts this run from what a power loss may have torn.
+        self._file = DurableFile(path, "journal", b"\n" + _record(header), append=True)
+        self._due = 0.0
+        self._pending: dict[str, Any] | None = None
+
+    def taken(self, count: int, line: int, seconds: float) -> None:
+        """Note that ``count`` lines were acknowledged, the last being ``line`` of the file."""
+        self._pending = {"taken": count, "line": line, "seconds": round(seconds, 3)}
+        if seconds >= self._due:
+            self._due = seconds + _PERIOD
+            self._flush()
+
+    def _flush(self) -> None:
+        if self._pending is not None:
+            self._file.append(_record(self._pending))
+            self._pending = None
+
+    def ended(self, how: str, why: str) -> None:
+        """Note the run's last word."""
+        self._flush()
+        self._file.append(_record({"ended": how, "why": why}))
+
+    def check(self) -> None:
+        """Raise :class:`~miurafab.errors.MachineError` if something could not be written."""
+        self._file.check()
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._file.close()
+
+
+@dataclass(frozen=True)
+class JournalRun:
+    """One run as the journal tells it.
+
+    ``taken`` lines were acknowledged for certain, the last being ``line`` of the file (0: none);
+    ``ended`` is None when the run broke off without a last word.
+    """
+
+    job: str
+    sha256: str
+    machine: str
+    port: str
+    lines: int
+    taken: int = 0
+    line: int = 0
+    seconds: float = 0.0
+    ended: str | None = None
+    why: str | None = None
+
+
+def read_journal(path: Path) -> list[JournalRun]:
+    """All runs in the journal, in order; a torn line ends what is known of its run.
+
+    Raises :class:`~miurafab.errors.InputError` if the file cannot be read or holds no run.
+    """
+    try:
+        text = path.read_text("utf-8", errors="replace")
+    except OSError as fault:
+        raise InputError(f"The journal {path} cannot be read: {fault.strerror}.") from None
+    runs: list[dict[str, Any]] = []
+    for line in text.splitlines():
+        record = _parse(line)
+        if record.get("schema") == SCHEMA:
+            del record["schema"]
+            runs.append(record)
+        elif runs:
+            runs[-1].update(record)
+    try:
+        found = [JournalRun(**run) for run in runs]
+    except TypeError as fault:
+        raise InputError(f"{path} is not a journal of this version: {fault}.") from None
+    if not found:
+        raise InputError(f"{path} is not a journal: it holds no run with schema {SCHEMA!r}.")
+    return found
+
+
+def job_digest(job: Job) -> str:
+    """The SHA-256 of the job's text, in hexadecimal."""
+    return hashlib.sha256(job.text.encode("utf-8")).hexdigest()
+
+
+def _record(values: dict[str, Any]) -> bytes:
+    return json.dumps(values, ensure_ascii=False).encode("utf-8") + b"\n"
+
+
+def _parse(line: str) -> dict[str, Any]:
+    try:
+        record = json.loads(line)
+    except json.JSONDecodeError:
+        return {}
+    return record if isinstance(record, dict) else {}

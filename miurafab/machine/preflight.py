@@ -1,0 +1,182 @@
+"""What must be true before the beam may be on: one named check for each way to ruin a sheet.
+
+Every check has a name, says in one sentence what differs, and can be overridden by that name
+(``force``). The checks of the job alone come before any port is opened; those of the controller
+before a line of the job is sent. Nothing here changes anything: no setting is written, no lock
+is opened.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from miurafab.errors import ControllerError, GcodeError, InputError, MiurafabError
+from miurafab.gcode.job import SendLine
+from miurafab.gcode.program import Program
+from miurafab.grbl.events import StatusReport
+from miurafab.grbl.settings import Settings, profile_settings
+from miurafab.profiles import MachineProfile
+
+CHECKS = {
+    "m3": "the job arms the laser with M4, which goes dark whenever motion stops",
+    "program": "the job is a program that GRBL 1.1 would run without an error",
+    "bounds": "every move of the job lies on the bed",
+    "power": "no S word is above the machine's largest",
+    "idle": "the controller is idle",
+    "beam": "the beam is off",
+    "laser-mode": "laser mode ($32) suits the tool",
+    "s-range": "the controller's S range ($30, $31) is the profile's",
+    "settings": "the other settings are those of the profile",
+    "travel": "the job lies within the soft limits, from where the machine stands",
+}
+"""The names of the checks, and what each asserts."""
+
+_TOLERANCE = 1e-3  # mm; G-code is written with three decimals
+_M3 = re.compile(rb"M0*3(?:\.0*)?(?![\d.])", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A check that failed: its ``name``, and the ``error`` that says what differs."""
+
+    name: str
+    error: MiurafabError
+
+
+def raise_findings(findings: Iterable[Finding], force: frozenset[str]) -> tuple[str, ...]:
+    """Raise the first finding that is not forced; returns the sentences of the forced ones."""
+    forced = []
+    for finding in findings:
+        sentence = str(finding.error)
+        if finding.name not in force:
+            raise type(finding.error)(
+                f"{sentence.rstrip('.')} (check '{finding.name}'; to cut all the same, force it)."
+            )
+        forced.append(sentence)
+    return tuple(forced)
+
+
+def require_known(force: frozenset[str]) -> None:
+    """Raise :class:`~miurafab.errors.InputError` for a name that is no check."""
+    for name in sorted(force - CHECKS.keys()):
+        raise InputError(f"'{name}' is not a check that can be forced; {', '.join(CHECKS)} are.")
+
+
+def check_lines(
+    name: str, lines: Iterable[SendLine], machine: MachineProfile, *, allow_m3: bool
+) -> tuple[int, list[Finding]]:
+    """How many lines there are, and the check ``m3`` over them.
+
+    Raises what ``lines`` raises: a line that cannot be sent is never let through.
+    """
+    findings: list[Finding] = []
+    count = 0
+    for line in lines:
+        count += 1
+        if not findings and not allow_m3 and machine.tool.kind == "laser" and _M3.search(line.data):
+            error = GcodeError(
+                f"{name}, line {line.number} arms the laser with M3, which keeps the beam on, "
+                "standing still, if the link to the machine is lost; use M4, or allow M3 "
+                "explicitly and stay beside the machine"
+            )
+            findings.append(Finding("m3", error))
+    return count, findings
+
+
+def check_program(program: Program, machine: MachineProfile) -> Iterator[Finding]:
+    """The checks ``bounds`` and ``power``, which need no controller."""
+    yield from _bounds(program, machine)
+    too_much = program.power > machine.tool.s_max
+    if too_much.any():
+        index = int(np.argmax(too_much))
+        yield Finding(
+            "power",
+            GcodeError(
+                f"{program.name}, line {program.line[index]} asks for S{program.power[index]:g}, "
+                f"more than the {machine.tool.s_max} that is full power on {machine.name}"
+            ),
+        )
+
+
+def _bounds(program: Program, machine: MachineProfile) -> Iterator[Finding]:
+    size = np.array([machine.bed.width_mm, machine.bed.height_mm])
+    ends = program.end[:, :2]
+    outside = ((ends < -_TOLERANCE) | (ends > size + _TOLERANCE)).any(axis=1)
+    if outside.any():
+        index = int(np.argmax(outside))
+        x, y = ends[index]
+        yield Finding(
+            "bounds",
+            GcodeError(
+                f"{program.name}, line {program.line[index]} moves to X{x:g} Y{y:g}, off the bed "
+                f"of {machine.name} ({size[0]:g} x {size[1]:g} mm)"
+            ),
+        )
+
+
+def check_status(status: StatusReport) -> Iterator[Finding]:
+    """The checks ``idle`` and ``beam``."""
+    if status.state != "Idle":
+        yield Finding(
+            "idle",
+            ControllerError(
+                f"The controller is in state {status.state}, not Idle; wait until it is done, or "
+                "look at the machine, then home or unlock it"
+            ),
+        )
+    if status.speed is not None and not status.beam_off:
+        yield Finding(
+            "beam",
+            ControllerError(
+                f"The controller reports the beam on (S{status.speed:g}) before the job has begun; "
+                "switch the laser off and reset the controller"
+            ),
+        )
+
+
+def check_settings(machine: MachineProfile, settings: Settings) -> Iterator[Finding]:
+    """The checks ``laser-mode``, ``s-range`` and ``settings``."""
+    expected = profile_settings(machine)
+    names = {30: "s-range", 31: "s-range", 32: "laser-mode"}
+    for name in ("laser-mode", "s-range", "settings"):
+        wanted = {n: v for n, v in expected.items() if names.get(n, "settings") == name}
+        differences = settings.differences(wanted)
+        if differences:
+            listed = ", ".join(map(str, differences))
+            yield Finding(
+                name,
+                ControllerError(
+                    f"The controller is not set up as {machine.name} says: {listed}; set it so, or "
+                    "choose the profile of this machine"
+                ),
+            )
+
+
+def check_travel(
+    program: Program, settings: Settings, work_offset: tuple[float, ...] | None
+) -> Iterator[Finding]:
+    """The check ``travel``: with soft limits, GRBL's machine coordinates run from -travel to 0
+    (``limits.c``). ``work_offset`` is what the controller adds to the job's coordinates.
+    """
+    values = settings.values
+    if not values.get(20) or not len(program):
+        return
+    offset = np.array((work_offset or (0.0, 0.0))[:2])
+    travel = np.array([values.get(130, np.inf), values.get(131, np.inf)])
+    ends = program.end[:, :2] + offset
+    outside = ((ends < -travel - _TOLERANCE) | (ends > _TOLERANCE)).any(axis=1)
+    if outside.any():
+        index = int(np.argmax(outside))
+        x, y = ends[index]
+        yield Finding(
+            "travel",
+            ControllerError(
+                f"{program.name}, line {program.line[index]} would move the machine to X{x:.3f} "
+                f"Y{y:.3f} in its own coordinates, past its soft limits ($20); home it and set the "
+                "work origin so that the sheet lies within the travel"
+            ),
+        )

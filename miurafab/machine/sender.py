@@ -1,0 +1,378 @@
+"""A job sent to a machine, from the opening of the port to the last move, safe on every way out.
+
+The way through: the job is checked by itself; the port is opened and the controller greeted,
+asked and checked; the journal and the transcript are proved to be writable; the lines are
+streamed; the job is done when every line was acknowledged *and* a status report that was asked
+for after the last acknowledgement says Idle.
+
+Every other way out - a refused line, an alarm, a reset, silence, a full disk, Ctrl-C, SIGTERM, an
+exception in somebody's progress callback - resets the controller before anything else happens,
+asks it whether the beam is off, and puts the answer into the sentence that the user reads. The
+one exception is a refused line: the controller still obeys then, and a feed hold before the
+reset lets the machine keep its position. An ``M5`` is never relied on: it would wait in the
+controller's queue behind up to seconds of burning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+from miurafab.errors import (
+    ControllerError,
+    GcodeError,
+    InputError,
+    JobStopped,
+    MachineError,
+    MiurafabError,
+)
+from miurafab.gcode.job import Job, prepare_lines
+from miurafab.gcode.program import Program, parse_program
+from miurafab.grbl.connection import Connection
+from miurafab.grbl.events import Error, Event, Ok, StatusReport
+from miurafab.grbl.settings import Settings, virtual_settings
+from miurafab.grbl.streamer import LineRefused, Refusal, Streamer
+from miurafab.machine.journal import Journal
+from miurafab.machine.preflight import (
+    Finding,
+    check_lines,
+    check_program,
+    check_settings,
+    check_status,
+    check_travel,
+    raise_findings,
+    require_known,
+)
+from miurafab.machine.session import ANSWER_S, Session
+from miurafab.machine.signals import StopSignals
+from miurafab.machine.transcript import Transcript
+from miurafab.machine.transport import Transport, open_port
+from miurafab.profiles import MachineProfile
+
+_POLL_S = 0.2  # between status queries while lines flow
+_END_POLL_S = 0.1  # and when only the last moves are awaited
+_GRBL = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc")
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Where a running job is; ``position`` in work coordinates, ``in_flight`` in bytes."""
+
+    lines_acknowledged: int
+    lines_total: int
+    seconds_elapsed: float
+    state: str
+    position: tuple[float, ...] | None
+    in_flight: int
+
+
+@dataclass(frozen=True)
+class StreamResult:
+    """A job that is done: every line acknowledged, the machine idle.
+
+    ``seconds`` on the wire's clock from the first line to Idle; ``errors`` the refused lines of a
+    run in check mode (a real run ends at the first); ``remarks`` what was forced, and what went
+    wrong without harm.
+    """
+
+    lines: int
+    seconds: float
+    errors: tuple[Refusal, ...]
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A job that passed the checks which need no controller.
+
+    ``program`` is None where it could not be read and that was forced or is left to check mode;
+    ``remarks`` say what was forced.
+    """
+
+    job: Job
+    machine: MachineProfile
+    lines: int
+    program: Program | None
+    force: frozenset[str]
+    check_mode: bool
+    remarks: tuple[str, ...]
+
+
+def stream_job(
+    job: Job,
+    machine: MachineProfile,
+    port: str,
+    *,
+    journal_path: Path | None = None,
+    transcript_path: Path | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+    force: frozenset[str] = frozenset(),
+    allow_m3: bool = False,
+    check_mode: bool = False,
+    virtual_speed: float | None = None,
+) -> StreamResult:
+    """Send ``job`` to ``machine`` at ``port`` and wait until it is done.
+
+    ``port`` is a device, a pyserial URL, or ``virtual`` for a controller in memory set up as the
+    profile says, as fast as the computer allows or at ``virtual_speed`` times real time.
+    ``on_progress`` is called about five times a second. ``force`` names checks to override
+    (:data:`~miurafab.machine.preflight.CHECKS`). With ``check_mode`` the controller only reads
+    the job (``$C``): nothing moves, and refused lines are gathered in the result.
+
+    Raises :class:`~miurafab.errors.InputError` for a job or option at fault,
+    :class:`~miurafab.errors.PortError` and :class:`~miurafab.errors.ControllerError` for what the
+    machine did, :class:`~miurafab.errors.JobStopped` after Ctrl-C, SIGTERM or SIGHUP. Whichever
+    it is, the controller was reset if a line of the job had been sent.
+    """
+    plan = plan_job(job, machine, force=force, allow_m3=allow_m3, check_mode=check_mode)
+    with StopSignals() as signals:
+        transport = open_port(
+            port, machine.controller.baud, virtual_settings(machine), virtual_speed
+        )
+        signals.at_once = transport.blocks
+        return deliver(
+            plan,
+            transport,
+            signals,
+            journal_path=journal_path,
+            transcript_path=transcript_path,
+            on_progress=on_progress,
+        )
+
+
+def plan_job(
+    job: Job,
+    machine: MachineProfile,
+    *,
+    force: frozenset[str] = frozenset(),
+    allow_m3: bool = False,
+    check_mode: bool = False,
+) -> Plan:
+    """Check ``job`` by itself; raises :class:`~miurafab.errors.InputError` for what is wrong."""
+    require_known(force)
+    if machine.dialect not in _GRBL:
+        raise InputError(
+            f"{machine.name} speaks {machine.dialect}, which cannot be streamed; choose a profile "
+            f"with one of the dialects {', '.join(_GRBL)}."
+        )
+    lines = prepare_lines(job.name, job.iter_lines(), machine.controller.line_chars)
+    count, findings = check_lines(job.name, lines, machine, allow_m3=allow_m3 or check_mode)
+    program: Program | None = None
+    try:
+        program = parse_program(job)
+    except GcodeError as error:
+        # In check mode the controller itself is asked what it thinks of every line.
+        if not check_mode:
+            findings.append(Finding("program", error))
+    else:
+        findings.extend(check_program(program, machine))
+    remarks = raise_findings(findings, force)
+    return Plan(job, machine, count, program, force, check_mode, remarks)
+
+
+def deliver(
+    plan: Plan,
+    transport: Transport,
+    signals: StopSignals,
+    *,
+    journal_path: Path | None = None,
+    transcript_path: Path | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> StreamResult:
+    """Send a planned job over an open wire and close it; see :func:`stream_job`."""
+    job, machine = plan.job, plan.machine
+    with ExitStack() as at_end:
+        at_end.callback(transport.close)
+        transcript = journal = None
+        if transcript_path is not None:
+            transcript = Transcript(transcript_path, f"{job.name} to {transport.name}")
+            at_end.callback(transcript.close)
+        if journal_path is not None:
+            journal = Journal(journal_path, job, machine.name, transport.name, plan.lines)
+            at_end.callback(journal.close)
+        connection = Connection(machine.controller.rx_bytes)
+        session = Session(transport, connection, transcript, signals.check)
+        delivery = _Delivery(plan, session, transcript, journal, on_progress)
+        # A signal between an exception and its handling would skip the handling, not this.
+        at_end.callback(delivery.make_safe)
+        try:
+            return delivery.run()
+        except KeyboardInterrupt:
+            signals.hold()
+            delivery.end(JobStopped(f"{job.name} was stopped by {signals.reason}."))
+        except MiurafabError as error:
+            signals.hold()
+            delivery.end(error)
+        finally:
+            signals.hold()
+
+
+class _Delivery:
+    """One job on its way over one session."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        session: Session,
+        transcript: Transcript | None,
+        journal: Journal | None,
+        on_progress: Callable[[Progress], None] | None,
+    ) -> None:
+        self._plan = plan
+        self._session = session
+        self._records = [record for record in (transcript, journal) if record is not None]
+        self._journal = journal
+        self._on_progress = on_progress
+        self._at_risk = False  # whether the controller may hold lines of the job
+        self._begin = 0.0
+        self._streamer = Streamer(
+            session.connection,
+            plan.job.name,
+            prepare_lines(plan.job.name, plan.job.iter_lines(), plan.machine.controller.line_chars),
+            send_response=plan.machine.controller.streaming == "send-response",
+            collect_refusals=plan.check_mode,
+        )
+
+    # The way through
+
+    def run(self) -> StreamResult:
+        remarks = self._plan.remarks + self._meet()
+        session, streamer = self._session, self._streamer
+        self._at_risk = True
+        if self._plan.check_mode:
+            session.command("$C")
+        self._begin = session.now()
+        self._stream()
+        seconds = session.now() - self._begin
+        if self._plan.check_mode:
+            session.stop()
+        self._at_risk = False
+        if self._journal is not None:
+            self._journal.ended("done", f"{streamer.acknowledged} lines acknowledged, then idle")
+        remarks += self._close_records()
+        return StreamResult(streamer.acknowledged, seconds, tuple(streamer.refusals), remarks)
+
+    def _close_records(self) -> tuple[str, ...]:
+        """Finish the files; a fault now does not undo the job, so it is a remark."""
+        remarks = []
+        for record in self._records:
+            record.close()
+            try:
+                record.check()
+            except MachineError as error:
+                remarks.append(str(error))
+        return tuple(remarks)
+
+    def _meet(self) -> tuple[str, ...]:
+        """Greet the controller and make all checks that need it; the sentences forced."""
+        plan, session = self._plan, self._session
+        session.greet()
+        remarks = raise_findings(check_status(session.wait_status()), plan.force)
+        session.command("$I")
+        settings = Settings.from_events(session.command("$$"))
+        findings = list(check_settings(plan.machine, settings))
+        if plan.program is not None:
+            findings.extend(check_travel(plan.program, settings, session.work_offset))
+        return remarks + raise_findings(findings, plan.force)
+
+    def _stream(self) -> None:
+        session, streamer = self._session, self._streamer
+        poll_at = answered = session.now()
+        asked_last = False  # whether a status was asked for after the last acknowledgement
+        while True:
+            if not session.connection.in_flight:
+                answered = session.now()
+            data = streamer.pull()
+            if data:
+                session.write(data)
+            if streamer.finished and not asked_last and not session.awaits_status:
+                asked_last = session.ask_status()
+                poll_at = session.now() + _END_POLL_S
+            elif session.now() >= poll_at:
+                session.ask_status()
+                poll_at = session.now() + (_END_POLL_S if streamer.finished else _POLL_S)
+            events = session.receive(poll_at - session.now())
+            for event in events:
+                streamer.take(event)
+                if isinstance(event, Ok | Error):
+                    answered = session.now()
+                elif isinstance(event, StatusReport):
+                    self._report(event)
+                    if asked_last and event.state in ("Idle", "Check"):
+                        return
+                    self._watch_for_loss(event, answered)
+            self._after(events)
+
+    def _after(self, events: list[Event]) -> None:
+        session, streamer = self._session, self._streamer
+        if not events and session.now() - session.heard > ANSWER_S:
+            raise ControllerError(
+                f"The controller has said nothing for {ANSWER_S:g} s, not even to status queries, "
+                f"{streamer.where}."
+            )
+        if self._journal is not None and streamer.last is not None and events:
+            seconds = session.now() - self._begin
+            self._journal.taken(streamer.acknowledged, streamer.last.number, seconds)
+        for record in self._records:
+            record.check()
+
+    def _watch_for_loss(self, report: StatusReport, answered: float) -> None:
+        """A controller that idles while it owes an answer never got the line whole."""
+        owed = self._session.connection.in_flight
+        patience = ANSWER_S + self._streamer.dwell_in_flight
+        if owed and report.state == "Idle" and self._session.now() - answered > patience:
+            raise ControllerError(
+                f"The controller is idle but has not answered line {owed[0].number} of "
+                f"{self._plan.job.name} for {patience:g} s: bytes were lost on the way, so look at "
+                "the cable and the baud rate."
+            )
+
+    def _report(self, status: StatusReport) -> None:
+        if self._on_progress is not None:
+            session, streamer = self._session, self._streamer
+            self._on_progress(
+                Progress(
+                    streamer.acknowledged,
+                    self._plan.lines,
+                    session.now() - self._begin,
+                    status.state,
+                    session.position,
+                    session.connection.in_flight_bytes,
+                )
+            )
+
+    # The other ways out
+
+    def end(self, error: MiurafabError) -> NoReturn:
+        """Stop the machine if it is at risk, and raise ``error`` with what became of it."""
+        sentence = str(error)
+        if self._at_risk:
+            gently = isinstance(error, LineRefused)
+            off = self._session.hold_and_stop() if gently else self._session.stop()
+            self._at_risk = False
+            count = self._streamer.acknowledged
+            outcome = (
+                "the controller was reset and reports the beam off"
+                if off
+                else "the controller did not confirm that the beam is off, so switch the laser off "
+                "at the machine"
+            )
+            sentence = (
+                f"{sentence.rstrip('.')}; {count} of {self._plan.lines} lines were acknowledged, "
+                f"and {outcome}."
+            )
+        elif isinstance(error, JobStopped):
+            sentence = f"{sentence.rstrip('.')} before a line of it was sent."
+        if self._journal is not None:
+            how = "stopped" if isinstance(error, JobStopped) else "failed"
+            self._journal.ended(how, sentence)
+        raise type(error)(sentence) from None
+
+    def make_safe(self) -> None:
+        """Stop the machine if nothing else has: the last line of defence, on every way out."""
+        if self._at_risk:
+            self._at_risk = False
+            self._session.stop()

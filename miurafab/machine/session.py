@@ -1,0 +1,295 @@
+"""One conversation with one controller: greet it, ask it, stop it.
+
+The session joins the three things that must agree - the wire, the books of the connection and
+the transcript - and adds the one that they lack: time. What waits has a limit, and silence is an
+error with a sentence. Times are those of the wire's own clock, so a session with a controller in
+memory needs no real second.
+
+Stopping is the one thing that must always work. :meth:`Session.stop` puts a soft reset on the
+wire before it does anything else and repeats it until a banner proves that it was heard (a
+controller that writes its EEPROM is deaf for a moment); then it asks for a status report, since
+only the controller can say that the beam is off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from miurafab.errors import ControllerError, PortError
+from miurafab.gcode.job import SendLine
+from miurafab.grbl.connection import FEED_HOLD, SOFT_RESET, STATUS_QUERY, Connection
+from miurafab.grbl.events import Alarm, Banner, Error, Event, Ok, StatusReport
+from miurafab.grbl.states import State
+from miurafab.grbl.streamer import alarm_words, error_words
+from miurafab.machine.transcript import Transcript
+from miurafab.machine.transport import Transport
+
+BANNER_S = 2.5
+"""How long a board that resets when its port opens may take to speak (boot loader: 1 to 2 s)."""
+ANSWER_S = 3.0
+"""How long a living controller may be silent when it was asked something."""
+_RESET_S = 0.8  # from a soft reset to its banner
+_RESETS = 3
+_HOLD_S = 1.0  # to come to rest from full speed before the reset that ends a refused job
+_ASK_AGAIN_S = 1.0  # a status query that noise swallowed is asked again
+_BUSY = ("Run", "Jog", "Home", "Hold", "Door")
+
+
+class Session:
+    """A conversation over ``transport``; mutable, for one thread.
+
+    ``check`` is called before every read: it raises what should interrupt the conversation.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        connection: Connection,
+        transcript: Transcript | None = None,
+        check: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.connection = connection
+        self.banner = Banner("", "")
+        self.status: StatusReport | None = None
+        self.work_offset: tuple[float, ...] | None = None
+        self.heard = 0.0
+        self._transport = transport
+        self._transcript = transcript
+        self._check = check
+        self._asked_at: float | None = None
+        self._start = transport.now()
+
+    def now(self) -> float:
+        """Seconds on the wire's clock since the session began."""
+        return self._transport.now() - self._start
+
+    @property
+    def name(self) -> str:
+        """How messages call the port."""
+        return self._transport.name
+
+    @property
+    def position(self) -> tuple[float, ...] | None:
+        """The work position by the last status report that gave one."""
+        status = self.status
+        if status is None:
+            return None
+        if status.work_position is not None:
+            return status.work_position
+        if status.machine_position is None:
+            return None
+        offset = self.work_offset or (0.0,) * len(status.machine_position)
+        return tuple(m - o for m, o in zip(status.machine_position, offset, strict=False))
+
+    # The wire
+
+    def write(self, data: bytes) -> None:
+        """Send bytes that the connection gave out."""
+        self._transport.write(data)
+        if self._transcript is not None:
+            self._transcript.sent(self.now(), data)
+
+    def receive(self, timeout: float) -> list[Event]:
+        """The events that arrive within ``timeout``; returns as soon as there are bytes.
+
+        Raises :class:`~miurafab.errors.PortError` when the port goes away.
+        """
+        self._check()
+        data = self._transport.read(max(0.0, timeout))
+        if not data:
+            return []
+        self.heard = self.now()
+        if self._transcript is not None:
+            self._transcript.came(self.heard, data)
+        self.connection.receive_data(data)
+        events = list(self.connection.events())
+        for event in events:
+            if isinstance(event, StatusReport):
+                self.status = event
+                self.work_offset = event.work_offset or self.work_offset
+                self._asked_at = None
+            elif isinstance(event, Banner):
+                self.banner = event
+                self._asked_at = None
+        return events
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass on the wire's clock, taking in what is said meanwhile."""
+        end = self.now() + seconds
+        while self.now() < end:
+            self.receive(end - self.now())
+
+    def ask_status(self) -> bool:
+        """Send a status query, unless one is unanswered or the controller is deaf just now."""
+        if self.connection.writing_eeprom:
+            return False
+        if self._asked_at is not None and self.now() < self._asked_at + _ASK_AGAIN_S:
+            return False
+        self._asked_at = self.now()
+        self.write(self.connection.send_realtime(STATUS_QUERY))
+        return True
+
+    @property
+    def awaits_status(self) -> bool:
+        """Whether a status query is unanswered."""
+        return self._asked_at is not None
+
+    # Questions
+
+    def wait_status(self, timeout: float = ANSWER_S) -> StatusReport:
+        """A status report that answers a query sent now.
+
+        Raises :class:`~miurafab.errors.ControllerError` after ``timeout`` seconds of silence.
+        """
+        report = self._fresh_status(timeout)
+        if report is None:
+            raise ControllerError(
+                f"The controller at {self.name} did not answer a status query within "
+                f"{timeout:g} s; check its power and the cable, then try again."
+            )
+        return report
+
+    def _fresh_status(self, timeout: float) -> StatusReport | None:
+        end = self.now() + timeout
+        asked = False
+        while self.now() < end:
+            asked = self.ask_status() or asked
+            for event in self.receive(min(end - self.now(), _ASK_AGAIN_S)):
+                if isinstance(event, StatusReport) and asked:
+                    return event
+        return None
+
+    def command(self, text: str, timeout: float = ANSWER_S) -> list[Event]:
+        """Send one line, wait for its ``ok``, and return what was said up to it.
+
+        Raises :class:`~miurafab.errors.ControllerError` for ``error:``, an alarm, an unexpected
+        reset, or ``timeout`` seconds without an answer.
+        """
+        self._require_ready(text)
+        self.write(self.connection.send_line(SendLine(0, text.encode("ascii"))))
+        said: list[Event] = []
+        end = self.now() + timeout
+        while self.now() < end:
+            for event in self.receive(end - self.now()):
+                match event:
+                    case Ok():
+                        return said
+                    case Error():
+                        raise ControllerError(
+                            f"The controller refused '{text}': {error_words(event)}."
+                        )
+                    case Alarm():
+                        raise ControllerError(
+                            f"The controller stopped at '{text}': {alarm_words(event)}."
+                        )
+                    case Banner():
+                        raise ControllerError(f"The controller restarted at '{text}'.")
+                    case _:
+                        said.append(event)
+        raise ControllerError(
+            f"The controller at {self.name} did not answer '{text}' within {timeout:g} s."
+        )
+
+    def _require_ready(self, text: str) -> None:
+        if self.connection.may_send(SendLine(0, text.encode("ascii"))):
+            return
+        if self.connection.state is State.LOCKED:
+            raise ControllerError(
+                f"The controller is locked after an alarm or before homing, so '{text}' was not "
+                "sent; look at the machine, then home or unlock it."
+            )
+        raise ControllerError(
+            f"The controller is not ready for '{text}' (it is {self.connection.state.name.lower()}"
+            "); reset it first."
+        )
+
+    # Beginning and end
+
+    def greet(self) -> None:
+        """Wait for the controller's banner, or bring it about, and learn whether it is locked.
+
+        A board that does not reset when its port opens is asked for its state; if it is at
+        work, :class:`~miurafab.errors.ControllerError` says so and nothing is disturbed, else a
+        soft reset (which keeps the position) makes it speak. Raises
+        :class:`~miurafab.errors.PortError` if nothing that speaks GRBL answers.
+        """
+        banner = self._wait_banner(BANNER_S)
+        if banner is None:
+            report = self._fresh_status(1.0)
+            if report is not None and report.state in _BUSY:
+                raise ControllerError(
+                    f"The controller at {self.name} is at work ({report.state}) on something it "
+                    "was sent before; wait until it is done, or reset it."
+                )
+            self._asked_at = None
+            self.write(self.connection.send_realtime(SOFT_RESET))
+            banner = self._wait_banner(BANNER_S)
+        if banner is None:
+            raise PortError(
+                f"Nothing that speaks GRBL answers at {self.name}; check the port, the baud rate "
+                "of the machine profile and the machine's power."
+            )
+        self.wait_status()
+
+    def _wait_banner(self, timeout: float) -> Banner | None:
+        end = self.now() + timeout
+        while self.now() < end:
+            for event in self.receive(end - self.now()):
+                if isinstance(event, Banner):
+                    return event
+        return None
+
+    def stop(self) -> bool:
+        """Reset the controller now; whether it then reported that the beam is off.
+
+        The reset is the first thing on the wire. Never raises for the machine's sake: a wire
+        that is gone is an answer too (False).
+        """
+        try:
+            for _ in range(_RESETS):
+                self._reset_now()
+                if self._wait_banner(_RESET_S) is not None:
+                    break
+            else:
+                return False
+            report = self._fresh_status(ANSWER_S)
+        except PortError:
+            return False
+        return report is not None and report.beam_off
+
+    def hold_and_stop(self) -> bool:
+        """Let the motion come to rest before the reset, so that the position is not lost.
+
+        For a job whose controller still obeys; the feed hold is the first thing on the wire.
+        """
+        try:
+            self._transport.write_now(self.connection.send_realtime(FEED_HOLD))
+            if self._transcript is not None:
+                self._transcript.sent(self.now(), FEED_HOLD)
+            end = self.now() + _HOLD_S
+            at_rest = False
+            while not at_rest and self.now() < end:
+                report = self._fresh_status(end - self.now())
+                at_rest = report is not None and _at_rest(report)
+        except PortError:
+            return False
+        return self.stop()
+
+    def _reset_now(self) -> None:
+        if self.connection.state is State.CLOSED:
+            raise PortError(f"The port {self.name} is closed.")
+        self._transport.write_now(self.connection.send_realtime(SOFT_RESET))
+        self._asked_at = None
+        if self._transcript is not None:
+            self._transcript.sent(self.now(), SOFT_RESET)
+
+    def close(self) -> None:
+        """Release the port."""
+        self._transport.close()
+
+
+def _at_rest(report: StatusReport) -> bool:
+    """Whether the axes stand: not running, and a feed hold has come to its end (``Hold:0``)."""
+    if report.state == "Hold":
+        return report.substate == 0
+    return report.state not in ("Run", "Jog", "Home")

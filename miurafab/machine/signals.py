@@ -1,0 +1,77 @@
+"""Ctrl-C, a kill and a closed terminal, each turned into one exception, once.
+
+While a job runs, the first of SIGINT, SIGTERM, SIGHUP (SIGBREAK on Windows) raises
+``KeyboardInterrupt`` wherever the program is, so that the reset is on the wire within
+milliseconds. Those that follow are ignored: the stopping itself, which takes a second, must not
+be stopped.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, TracebackType
+from typing import Any
+
+_WORDS = {
+    "SIGINT": "Ctrl-C",
+    "SIGTERM": "a request to terminate (SIGTERM)",
+    "SIGHUP": "the closing of the terminal (SIGHUP)",
+    "SIGBREAK": "Ctrl-Break",
+}
+
+
+class StopSignals:
+    """``with StopSignals() as signals``; in another thread than the main one it does nothing.
+
+    With ``at_once`` false the handler raises nothing, and only :meth:`check` does: for a wire
+    whose reads must not be torn (the controller in memory).
+    """
+
+    def __init__(self) -> None:
+        self.at_once = True
+        self._caught: str | None = None
+        self._raised = False
+        self._old: dict[int, Any] = {}
+
+    @property
+    def reason(self) -> str:
+        """What stopped the job, in words."""
+        return _WORDS.get(self._caught or "SIGINT", "a signal")
+
+    def check(self) -> None:
+        """Raise ``KeyboardInterrupt`` for a signal that has not been raised yet.
+
+        One that fell into code where Python drops exceptions (a finaliser) is raised here.
+        """
+        if self._caught is not None and not self._raised:
+            self._raised = True
+            raise KeyboardInterrupt
+
+    def hold(self) -> None:
+        """From now on ignore every signal: the job is being stopped."""
+        self._raised = True
+
+    def __enter__(self) -> StopSignals:
+        if threading.current_thread() is threading.main_thread():
+            for name in _WORDS:
+                number = getattr(signal, name, None)
+                # A program started with nohup ignores SIGHUP on purpose.
+                if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+                    self._old[number] = signal.signal(number, self._handle)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        for number, handler in self._old.items():
+            signal.signal(number, handler)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self._caught is None:
+            self._caught = signal.Signals(number).name
+        if self.at_once:
+            self.check()

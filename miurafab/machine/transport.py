@@ -1,0 +1,207 @@
+"""The wire: the one place that opens a port, and the only home of pyserial.
+
+A transport moves bytes and tells the time by its own clock, no more. There are two: a serial
+port or pyserial URL in real time, and a controller in memory, whose time passes only while
+somebody reads. Whoever holds a transport cannot tell them apart, so what is tested against
+the one holds for the other.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import time
+from collections.abc import Iterator, Mapping
+from typing import Protocol
+
+import serial
+import serial.tools.list_ports
+
+from miurafab.errors import PortError
+from miurafab.grbl.virtual import VirtualGrbl
+
+VIRTUAL = "virtual"
+"""The port name of the controller in memory."""
+
+_SLICE = 0.01  # s; pyserial on Windows cannot be interrupted by Ctrl-C within one read
+_WRITE_TIMEOUT = 1.0  # s; far beyond the 90 ms that a full 1024-byte buffer takes at 115200 baud
+
+
+class Transport(Protocol):
+    """A wire to one controller; every method but ``now`` raises ``PortError`` once it is gone.
+
+    ``name`` is how messages call it. ``blocks`` says whether a read waits in real time and may
+    be interrupted by a signal at any point without harm.
+    """
+
+    name: str
+    blocks: bool
+
+    def write(self, data: bytes) -> None:
+        """Hand all of ``data`` to the wire."""
+
+    def write_now(self, data: bytes) -> None:
+        """Send ``data`` before anything that was handed over and has not left yet."""
+
+    def read(self, timeout: float) -> bytes:
+        """What has arrived; waits up to ``timeout`` seconds for a first byte."""
+
+    def now(self) -> float:
+        """Seconds on the clock of this wire, from an arbitrary start."""
+
+    def close(self) -> None:
+        """Release the port; does nothing the second time."""
+
+
+class SerialTransport:
+    """A serial device (``/dev/ttyUSB0``, ``COM3``) or pyserial URL, locked for this process.
+
+    The lock is advisory between programs that ask for it (``flock``); Windows locks by itself.
+    Raises :class:`~miurafab.errors.PortError` if the port cannot be opened.
+    """
+
+    blocks = True
+
+    def __init__(self, port: str, baud: int) -> None:
+        self.name = port
+        try:
+            self._serial = serial.serial_for_url(
+                port, baudrate=baud, timeout=_SLICE, write_timeout=_WRITE_TIMEOUT, exclusive=True
+            )
+        except (serial.SerialException, OSError, ValueError) as fault:
+            raise PortError(_why_not_opened(port, fault)) from None
+        self._reduce_latency()
+
+    def _reduce_latency(self) -> None:
+        """Ask the driver to hand over each byte at once (FTDI chips else collect for 16 ms)."""
+        set_mode = getattr(self._serial, "set_low_latency_mode", None)
+        if set_mode is not None:
+            with contextlib.suppress(OSError, ValueError, NotImplementedError):
+                set_mode(True)
+
+    def write(self, data: bytes) -> None:
+        """Hand all of ``data`` to the driver."""
+        with self._gone():
+            self._serial.write(data)
+
+    def write_now(self, data: bytes) -> None:
+        """Drop what the driver has not sent yet, then send ``data``."""
+        with self._gone():
+            self._serial.reset_output_buffer()
+            self._serial.write(data)
+
+    def read(self, timeout: float) -> bytes:
+        """What has arrived; waits up to ``timeout`` seconds for a first byte."""
+        end = self.now() + timeout
+        with self._gone():
+            while True:
+                data: bytes = self._serial.read(max(1, self._serial.in_waiting))
+                if data or self.now() >= end:
+                    return data
+
+    def now(self) -> float:
+        """The monotonic clock."""
+        return time.monotonic()
+
+    def close(self) -> None:
+        """Release the port."""
+        with contextlib.suppress(serial.SerialException, OSError):
+            self._serial.close()
+
+    @contextlib.contextmanager
+    def _gone(self) -> Iterator[None]:
+        try:
+            yield
+        except (serial.SerialException, OSError, TypeError) as fault:
+            # TypeError: pyserial on a descriptor that another thread or an unplug took away.
+            raise PortError(
+                f"The port {self.name} went away ({fault}); is the cable in and the power on?"
+            ) from None
+
+
+class VirtualTransport:
+    """A controller in memory, as fast as the computer allows or at ``speed`` times real time."""
+
+    name = VIRTUAL
+    blocks = False
+
+    def __init__(self, device: VirtualGrbl, speed: float | None = None) -> None:
+        self.device = device
+        self._speed = speed
+        self._start = time.monotonic()
+
+    def write(self, data: bytes) -> None:
+        """Hand ``data`` to the controller."""
+        self.device.receive(data)
+
+    def write_now(self, data: bytes) -> None:
+        """Hand ``data`` to the controller."""
+        self.device.receive(data)
+
+    def read(self, timeout: float) -> bytes:
+        """Let the controller's time pass until it speaks, ``timeout`` seconds at most."""
+        device = self.device
+        end = device.now + timeout
+        while True:
+            output = device.take_output()
+            left = end - device.now
+            if output or left <= 0:
+                self._keep_pace()
+                return output
+            upcoming = device.next_event_in()
+            device.advance(left if upcoming is None else min(left, max(upcoming, 1e-6)))
+
+    def _keep_pace(self) -> None:
+        if self._speed is not None:
+            ahead = self.device.now / self._speed - (time.monotonic() - self._start)
+            if ahead > 0:
+                time.sleep(ahead)
+
+    def now(self) -> float:
+        """The controller's clock."""
+        return self.device.now
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+def open_port(
+    port: str,
+    baud: int,
+    settings: Mapping[int, float] | None = None,
+    speed: float | None = None,
+) -> Transport:
+    """The wire to ``port``: a device, a pyserial URL, or ``virtual``.
+
+    The controller in memory has ``settings`` over the stock ones and runs as fast as the
+    computer allows, or at ``speed`` times real time; the others ignore both. Raises
+    :class:`~miurafab.errors.PortError` saying why a port cannot be opened.
+    """
+    if port == VIRTUAL:
+        return VirtualTransport(VirtualGrbl(settings, baud=baud), speed)
+    return SerialTransport(port, baud)
+
+
+def list_ports() -> list[tuple[str, str]]:
+    """The serial ports of this computer: device names and what the system says they are."""
+    ports = serial.tools.list_ports.comports()
+    return sorted((port.device, port.description or "") for port in ports)
+
+
+def _why_not_opened(port: str, fault: Exception) -> str:
+    number = getattr(fault, "errno", None)
+    text = str(fault)
+    if number in (errno.EAGAIN, errno.EWOULDBLOCK, errno.EBUSY) or "lock port" in text:
+        return f"The port {port} is in use by another program; close that program first."
+    if number == errno.EACCES or "Access is denied" in text:
+        return (
+            f"The port {port} may not be opened by this user, or another program has it; on Linux "
+            "add yourself to its group with 'sudo usermod -a -G dialout $USER' and log in again."
+        )
+    if number == errno.ENOENT or "FileNotFoundError" in text:
+        known = ", ".join(name for name, _ in list_ports())
+        there = f"there are {known}" if known else "no serial port was found on this computer"
+        return f"The port {port} does not exist; {there}, and '{VIRTUAL}' needs no machine."
+    if number == errno.ECONNREFUSED or "Connection refused" in text:
+        return f"Nothing listens at {port}; start it there or correct the address."
+    return f"The port {port} cannot be opened: {text.rstrip('.')}."

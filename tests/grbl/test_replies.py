@@ -1,0 +1,133 @@
+"""Replies parsed: each form, its near misses, and the transcripts' own forms."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from miurafab.grbl.events import (
+    Alarm,
+    Banner,
+    Error,
+    Event,
+    Feedback,
+    GCState,
+    Ok,
+    Options,
+    Parameter,
+    Setting,
+    StartupLine,
+    StartupResult,
+    StatusReport,
+    Unknown,
+    Version,
+)
+from miurafab.grbl.replies import parse_reply
+
+FULL = StatusReport(
+    state="Hold",
+    substate=1,
+    work_position=(1.5, -2.0, 0.0),
+    planner_free=15,
+    rx_free=128,
+    line_number=99,
+    feed=500.0,
+    speed=8000.0,
+    pins="XY",
+    work_offset=(10.0, 0.0, 0.0),
+    overrides=(120, 100, 90),
+    accessories="SFM",
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "event"),
+    [
+        ("ok", Ok()),
+        ("error:20", Error(20, "20")),
+        ("error: Bad number format", Error(None, "Bad number format")),
+        ("ALARM:3", Alarm(3, "3")),
+        ("Grbl 1.1h ['$' for help]", Banner("Grbl", "1.1h")),
+        ("GrblHAL 1.1f ['$' or '$HELP' for help]", Banner("GrblHAL", "1.1f")),
+        ("Grbl 3.7 [FluidNC v3.7.4 (wifi) '$' for help]", Banner("Grbl", "3.7")),
+        ("[MSG:Caution: Unlocked]", Feedback("Caution: Unlocked")),
+        ("[VER:1.1h.20190830:my laser]", Version("1.1h.20190830", "my laser")),
+        ("[OPT:V,15,128]", Options("V", 15, 128)),
+        ("[OPT:VL]", Options("VL", None, None)),
+        ("[OPT:VNMSL,35,1024,3,0]", Options("VNMSL", 35, 1024)),
+        ("[GC:G0 G54 M5 F0 S0]", GCState(("G0", "G54", "M5", "F0", "S0"))),
+        ("[G54:1.000,2.000,0.000]", Parameter("G54", (1.0, 2.0, 0.0))),
+        ("[TLO:0.500]", Parameter("TLO", (0.5,))),
+        ("[PRB:0.500,0.000,0.000:1]", Parameter("PRB", (0.5, 0.0, 0.0), True)),
+        ("$110=6000.000", Setting(110, "6000.000")),
+        ("$0=10 (step pulse, usec)", Setting(0, "10")),
+        ("$N0=G54", StartupLine(0, "G54")),
+        (">G54:ok", StartupResult("G54:ok")),
+        (
+            "<Sleep|MPos:0.000,0.000,0.000|FS:0,0>",
+            StatusReport("Sleep", machine_position=(0.0, 0.0, 0.0), feed=0.0, speed=0.0),
+        ),
+        (
+            "<Hold:1|WPos:1.500,-2.000,0.000|Bf:15,128|Ln:99|FS:500,8000|Pn:XY"
+            "|WCO:10.000,0.000,0.000|Ov:120,100,90|A:SFM>",
+            FULL,
+        ),
+        (
+            "<Run,MPos:1.000,0.000,0.000,WPos:0.000,0.000,0.000>",
+            StatusReport("Run", machine_position=(1.0, 0.0, 0.0), work_position=(0.0, 0.0, 0.0)),
+        ),
+        ("<Idle|MPos:1,2|F:300|New:1>", StatusReport("Idle", machine_position=(1, 2), feed=300)),
+    ],
+)
+def test_each_form(text: str, event: Event) -> None:
+    assert parse_reply(text) == event
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "ook",
+        "ok ",
+        "okok",
+        "OK",
+        "xok",
+        "error",
+        "<Idle|MPos:1,2,x|FS:0,0>",
+        "<Idle|MPos:1,2,3",
+        "<Idle|FS>",
+        "<|MPos:0,0,0>",
+        "<Idle|MPos:1,nan,2>",
+        "<Idle|FS:1>",
+        "<Idle|Bf:15>",
+        "[OPT:V,a,b]",
+        "[XYZ:1]",
+        "$=1",
+        "Grbl",
+    ],
+)
+def test_near_misses_are_unknown(text: str) -> None:
+    assert parse_reply(text) == Unknown(text)
+
+
+@given(st.text())
+@settings(max_examples=300)
+def test_parsing_never_raises(text: str) -> None:
+    assert isinstance(parse_reply(text), Event)
+
+
+@pytest.mark.parametrize(
+    ("text", "off"),
+    [
+        ("<Idle|MPos:0,0,0|FS:0,0>", True),
+        ("<Idle|MPos:0,0,0|FS:0,1>", False),
+        ("<Idle|MPos:0,0,0|FS:0,0|A:F>", True),
+        ("<Idle|MPos:0,0,0|FS:0,0|A:SF>", False),
+        ("<Idle|MPos:0,0,0|F:0>", False),
+    ],
+)
+def test_beam_off_is_claimed_only_when_said(text: str, off: bool) -> None:
+    report = parse_reply(text)
+    assert isinstance(report, StatusReport)
+    assert report.beam_off is off
