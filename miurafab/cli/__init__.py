@@ -11,7 +11,7 @@ from typing import NoReturn
 
 import typer
 
-from miurafab.cli import check, fit, profiles, surfaces
+from miurafab.cli import check, doctor, fit, profiles, surfaces
 from miurafab.cli.console import json_text
 from miurafab.errors import MiurafabError
 
@@ -28,6 +28,7 @@ app.command("fit")(fit.fit)
 app.command("check")(check.check)
 app.command("profiles")(profiles.profiles)
 app.command("materials")(profiles.materials)
+app.command("doctor")(doctor.doctor)
 
 
 def main() -> NoReturn:

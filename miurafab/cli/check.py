@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
+import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.origami.audit import audit
-from miurafab.workflow.design import load_pattern
 
 
 def check(
@@ -19,10 +18,10 @@ def check(
 ) -> None:
     """Recompute every invariant of a pattern from its file alone; exit 1 if one fails."""
     console = Console(as_json, quiet)
-    pattern, surface, missing = load_pattern(file)
+    pattern, surface, missing = miurafab.load_pattern(file)
     if missing is not None:
         console.remark(f"Distances are left out: {missing}.")
-    result = audit(pattern, surface)
+    result = miurafab.check(pattern, surface)
     report = result.report()
 
     def show() -> None:

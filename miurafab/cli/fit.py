@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
+import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption, json_text
-from miurafab.origami.fit import fit as fit_request
-from miurafab.workflow.design import design, save_pattern
 
 TargetArgument = Annotated[
     str,
@@ -58,7 +57,7 @@ def fit(
 ) -> None:
     """Fit a generalized Miura-ori to a target surface."""
     console = Console(as_json, quiet)
-    wanted = design(
+    wanted = miurafab.design(
         target,
         facets=facets,
         size=size,
@@ -70,10 +69,10 @@ def fit(
         seed=seed,
     )
     with console.progress("fitting") as progress:
-        result = fit_request(wanted.request, progress)
+        result = miurafab.fit(wanted.request, progress)
     answer = result.report()
     if result.pattern is not None:
-        save_pattern(result.pattern, out, wanted.title)
+        miurafab.save_pattern(result.pattern, out, wanted.title)
         answer["file"] = str(out)
     if report is not None:
         report.write_text(json_text(answer) + "\n", encoding="utf-8", newline="\n")

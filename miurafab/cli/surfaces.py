@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.surfaces.catalogue import CATALOGUE, Parameter
+
+if TYPE_CHECKING:
+    from miurafab.surfaces.catalogue import Parameter
 
 
 def surfaces(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
     """List the built-in targets with their parameters and defaults."""
+    from miurafab.surfaces.catalogue import CATALOGUE
+
     console = Console(as_json, quiet)
     answer = {
         "surfaces": [

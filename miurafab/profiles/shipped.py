@@ -31,15 +31,17 @@ def shipped_names(kind: Kind, suffix: str = ".toml") -> list[str]:
 def find_file(
     kind: Kind, name: str, suffix: str = ".toml", error: type[InputError] = ProfileError
 ) -> Path:
-    """The file that a user means by ``name``: a path of their own, or a shipped name.
+    """The file that a user means by ``name``: a path of their own, or a shipped name, which may be
+    written with or without the ``suffix``.
 
     Raises ``error`` when there is neither, with the nearest names that exist.
     """
     own = Path(name)
-    if own.suffix == suffix or len(own.parts) > 1:
-        if own.is_file():
-            return own
+    if own.is_file():
+        return own
+    if len(own.parts) > 1:
         raise error(f"{name} does not exist.")
+    name = name.removesuffix(suffix)
     shipped = shipped_directory(kind) / f"{name}{suffix}"
     if shipped.is_file():
         return shipped

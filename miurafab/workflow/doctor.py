@@ -1,0 +1,93 @@
+"""What would stop a job on this computer, looked at without sending a byte to any machine."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import shutil
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from miurafab import __version__
+from miurafab.errors import ProfileError
+from miurafab.machine.transport import list_ports
+from miurafab.profiles import load_machine, load_material, shipped_names
+
+DEPENDENCIES = ("numpy", "scipy", "shapely", "trimesh", "svgwrite", "pyserial", "pillow")
+ROOM_NEEDED_MB = 100
+"""Free disk below which drawings, journal and transcript of a large job may not fit."""
+
+
+@dataclass(frozen=True)
+class Port:
+    """A serial port of this computer; ``trouble`` says why it cannot be used, if so."""
+
+    device: str
+    description: str
+    trouble: str | None
+
+
+@dataclass(frozen=True)
+class Examination:
+    """Versions by name, the ports, and the problems, one sentence each."""
+
+    versions: dict[str, str]
+    ports: tuple[Port, ...]
+    problems: tuple[str, ...]
+
+    def answer(self) -> dict[str, Any]:
+        """The same, ready for JSON."""
+        return {
+            "versions": self.versions,
+            "ports": [asdict(port) for port in self.ports],
+            "problems": list(self.problems),
+        }
+
+
+def examine() -> Examination:
+    """Look at the installation, the ports, the shipped profiles, and the free disk."""
+    versions = {
+        "miurafab": __version__,
+        "python": f"{platform.python_version()} on {platform.system()} {platform.machine()}",
+    }
+    problems = []
+    for name in DEPENDENCIES:
+        try:
+            versions[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            versions[name] = "missing"
+            problems.append(f"{name} is not installed; run pip install miurafab again.")
+    ports = tuple(Port(device, text, _trouble(device)) for device, text in list_ports())
+    problems.extend(f"{port.device}: {port.trouble}." for port in ports if port.trouble)
+    problems.extend(_profile_problems())
+    free = shutil.disk_usage(Path.cwd()).free // 1_000_000
+    if free < ROOM_NEEDED_MB:
+        problems.append(f"Only {free} MB are free on this disk; a job needs {ROOM_NEEDED_MB} MB.")
+    return Examination(versions, ports, tuple(problems))
+
+
+def _trouble(device: str) -> str | None:
+    path = Path(device)
+    if not path.exists() or os.access(path, os.R_OK | os.W_OK):
+        return None
+    return (
+        "you may not open it; join the group that owns it "
+        f"(on Linux: sudo usermod -aG dialout {os.environ.get('USER', 'NAME')}, then log in again)"
+    )
+
+
+def _profile_problems() -> list[str]:
+    problems = []
+    for name in shipped_names("firmware_profiles"):
+        try:
+            load_machine(name)
+        except ProfileError as fault:
+            problems.append(str(fault))
+    for name in shipped_names("materials"):
+        try:
+            load_material(name)
+        except ProfileError as fault:
+            problems.append(str(fault))
+    return problems

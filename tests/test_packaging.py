@@ -1,0 +1,62 @@
+"""The wheel carries the shipped files and finds them, as the checkout does."""
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+KINDS = ("firmware_profiles", "materials", "patterns")
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """The wheel, unpacked as an installer would."""
+    folder = tmp_path_factory.mktemp("wheel")
+    subprocess.run(
+        [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", folder, ROOT],
+        check=True,
+        capture_output=True,
+    )
+    (wheel,) = folder.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder / "site")
+    return folder / "site"
+
+
+def test_the_wheel_holds_what_the_checkout_holds(installed):
+    for kind in KINDS:
+        shipped = {p.name: p.read_bytes() for p in (ROOT / kind).iterdir() if p.is_file()}
+        carried = installed / "miurafab" / "shipped" / kind
+        assert shipped
+        assert {p.name: p.read_bytes() for p in carried.iterdir()} == shipped
+    assert (installed / "miurafab" / "py.typed").exists()
+
+
+@pytest.mark.parametrize("place", ["wheel", "checkout"])
+def test_shipped_files_are_found(installed, tmp_path, place):
+    """From an empty folder, so that nothing is found by accident."""
+    path = installed if place == "wheel" else ROOT
+    code = (
+        "import miurafab, json; from miurafab.profiles import *;"
+        "from miurafab.workflow.design import design;"
+        "print(json.dumps([miurafab.__file__, load_machine('grbl-laser-400').title,"
+        "load_material('card-250').title, design('hypar.toml').title]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(path)},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    file, machine, material, pattern = json.loads(done.stdout)
+    assert Path(file).is_relative_to(path)
+    assert machine
+    assert material
+    assert pattern == "Hyperbolic paraboloid"
