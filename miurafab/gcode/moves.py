@@ -44,9 +44,11 @@ class Program:
     ``contexts``. Arcs are chords; a move that goes nowhere is left out.
 
     Per event: ``event_move`` (e,) int64, the number of moves made before it; ``event_kind`` (e,)
-    int8; ``event_seconds`` (e,) float64; ``event_line`` (e,) int64.
+    int8; ``event_seconds`` (e,) float64; ``event_power`` (e,) float64, the S that burns from it
+    on while nothing moves, NaN for as before; ``event_line`` (e,) int64.
 
-    ``line_number`` and ``line_bytes`` (L,) int64: the lines that are sent, newline counted.
+    Per line sent: ``line_number``, ``line_bytes`` with the newline, ``line_words`` and
+    ``line_points`` (decimal points), all (L,) int64.
     """
 
     name: str
@@ -62,9 +64,12 @@ class Program:
     event_move: NDArray[np.int64]
     event_kind: NDArray[np.int8]
     event_seconds: NDArray[np.float64]
+    event_power: NDArray[np.float64]
     event_line: NDArray[np.int64]
     line_number: NDArray[np.int64]
     line_bytes: NDArray[np.int64]
+    line_words: NDArray[np.int64]
+    line_points: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.motion)

@@ -15,12 +15,16 @@ from miurafab.gcode.execution import (
     Pause,
     Probe,
     ProgramEnd,
+    SpindleSync,
     Store,
     execute,
 )
 from miurafab.gcode.faults import BlockFault
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.moves import (
+    BEAM_M3,
+    BEAM_M4,
+    BEAM_OFF,
     DWELL,
     END,
     FEED,
@@ -37,6 +41,7 @@ from miurafab.gcode.parser import ModalState, parse_block
 __all__ = ["Context", "Program", "Strokes", "parse_program", "strokes"]
 
 _COMMENT = re.compile(r"\s*\(\s*(sheet|patch|operation)\s+([^()]*?)\s*\)\s*")
+_NO_LETTERS = str.maketrans("", "", "0123456789.+-")
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,14 +73,16 @@ class _Reader:
         self.context = Context()
         self.moves: list[tuple[float, ...]] = []
         self.events: list[tuple[float, ...]] = []
-        self.sent: list[tuple[int, int]] = []
+        self.sent: list[tuple[int, ...]] = []
 
     def read(self, job: Job) -> Program:
         for number, line in enumerate(job.iter_lines(), 1):
             code = bare_code(job.name, number, line)
             if code:
-                self.sent.append((number, len(code) + 1))
-                self._line(job.name, number, code.upper().replace("/", ""))
+                code = code.upper()
+                words = len(code.translate(_NO_LETTERS))
+                self.sent.append((number, len(code) + 1, words, code.count(".")))
+                self._line(job.name, number, code.replace("/", ""))
             elif "(" in line:
                 self._comment(line)
         return self._program(job.name)
@@ -106,12 +113,16 @@ class _Reader:
                 self._event(SYNC, number)
                 self.state.position = list(action.line.target)
             elif isinstance(action, Dwell):
-                self._event(DWELL, number, action.seconds)
+                self._event(DWELL, number, seconds=action.seconds)
             elif isinstance(action, Pause):
                 self._event(PAUSE, number)
             elif isinstance(action, ProgramEnd):
                 self.state.coord_system = list(self.stored[0])
-                self._event(END, number)
+                self._event(END, number, power=0.0)
+            elif isinstance(action, SpindleSync):
+                still = action.spindle == BEAM_M4 and self.rules.laser
+                dark = still or action.spindle == BEAM_OFF
+                self._event(SYNC, number, power=0.0 if dark else action.speed)
             else:
                 if isinstance(action, Store):
                     self.stored[action.index] = tuple(action.values)
@@ -121,6 +132,8 @@ class _Reader:
         target = tuple(line.target)
         start, self.at = self.at, target
         if target == start:
+            if self.rules.laser and line.spindle == BEAM_M3:
+                self._event(SYNC, number, power=line.speed)
             return
         feed = line.feed
         if line.rapid:
@@ -141,13 +154,15 @@ class _Reader:
             )
         )
 
-    def _event(self, kind: int, number: int, seconds: float = 0.0) -> None:
-        self.events.append((len(self.moves), kind, seconds, number))
+    def _event(
+        self, kind: int, number: int, *, seconds: float = 0.0, power: float = np.nan
+    ) -> None:
+        self.events.append((len(self.moves), kind, seconds, power, number))
 
     def _program(self, name: str) -> Program:
         moves = np.array(self.moves, dtype=np.float64).reshape(-1, 12)
-        events = np.array(self.events, dtype=np.float64).reshape(-1, 4)
-        sent = np.array(self.sent, dtype=np.int64).reshape(-1, 2)
+        events = np.array(self.events, dtype=np.float64).reshape(-1, 5)
+        sent = np.array(self.sent, dtype=np.int64).reshape(-1, 4)
         return Program(
             name=name,
             start=moves[:, 0:3].copy(),
@@ -162,7 +177,10 @@ class _Reader:
             event_move=events[:, 0].astype(np.int64),
             event_kind=events[:, 1].astype(np.int8),
             event_seconds=events[:, 2].copy(),
-            event_line=events[:, 3].astype(np.int64),
+            event_power=events[:, 3].copy(),
+            event_line=events[:, 4].astype(np.int64),
             line_number=sent[:, 0].copy(),
             line_bytes=sent[:, 1].copy(),
+            line_words=sent[:, 2].copy(),
+            line_points=sent[:, 3].copy(),
         )

@@ -1,0 +1,294 @@
+"""How long a program takes: the firmware's own main loop, run over it without the bytes.
+
+The same planner, segment generator and stepper that move the virtual controller are driven here
+line by line: a line arrives when the wire and the receive buffer let it, is parsed, its moves are
+planned when there is room, segments are prepared whenever the main program gets to it, and a
+synchronisation waits for all motion to end. So the estimate knows what makes short dashes slow:
+the processor, the wire, and each stop.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.gcode.moves import DWELL, RAPID, Program
+from miurafab.motion import cpu
+from miurafab.motion.parameters import Link, MotionParameters
+from miurafab.motion.planner import Planner
+from miurafab.motion.segments import Segment, SegmentGenerator
+from miurafab.motion.stepper import Processor, Stepper
+
+_OK_BYTES = 4
+_DWELL_STEP = 0.05
+_FOREVER = 1 << 62
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """``seconds`` from the first step to the end of the last move or dwell;
+    ``beam_on_seconds`` of them burning, moving or not; ``start`` and ``end`` (n,) float64, when
+    each move of the program is made, in s from the first step.
+    """
+
+    seconds: float
+    beam_on_seconds: float
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+
+
+def estimate(program: Program, parameters: MotionParameters, link: Link | None = None) -> Estimate:
+    """The time that ``program`` takes on a machine with ``parameters`` behind ``link``.
+
+    ``link`` None is GRBL's usual one: 115200 baud, 1 ms, 128 bytes.
+    """
+    run = _Run(program, parameters, link or Link())
+    run.lines()
+    return run.result()
+
+
+class _Wire:
+    """When each line has arrived, under character counting."""
+
+    def __init__(self, link: Link) -> None:
+        self.byte = 10.0 * cpu.CLOCK / link.baud
+        self.latency = link.latency * cpu.CLOCK
+        self.room = link.rx_bytes
+        self.unanswered: deque[tuple[int, float]] = deque()
+        self.free = 0.0
+        self.out_free = 0.0
+
+    def arrival(self, size: int) -> int:
+        """The cycle at which the next line's last byte is in, its ``size`` counted."""
+        start = self.free
+        while self.room < size and self.unanswered:
+            freed, seen = self.unanswered.popleft()
+            self.room += freed
+            start = max(start, seen)
+        self.room -= size
+        self.free = start + size * self.byte
+        return math.ceil(self.free)
+
+    def answer(self, now: int, size: int) -> None:
+        """The line of ``size`` bytes was answered at ``now``."""
+        self.out_free = max(self.out_free, now) + _OK_BYTES * self.byte
+        self.unanswered.append((size, self.out_free + self.latency))
+
+
+class _Run:
+    def __init__(self, program: Program, parameters: MotionParameters, link: Link) -> None:
+        self.program = program
+        self.laser = parameters.laser
+        self.planner = Planner(parameters)
+        self.planner.position = tuple(
+            round(x * k)
+            for x, k in zip(
+                program.start[0] if len(program) else (0.0, 0.0, 0.0),
+                parameters.steps_per_mm,
+                strict=True,
+            )
+        )
+        self.generator = SegmentGenerator(self.planner, _burns)
+        self.stepper = Stepper()
+        self.stepper.idle_lock = round((parameters.idle_lock or 0.0) * cpu.CLOCK)
+        self.stepper.on_segment = self._segment
+        self.processor = Processor(self.stepper)
+        self.wire = _Wire(link)
+        self.now = 0
+        self.cycling = False
+        self.began = [-1] * len(program)
+        self.ended = [-1] * len(program)
+        self.moving = -1
+        self.burning = False
+        self.burning_since = 0
+        self.burnt = 0
+        self.last_end = 0
+
+    def lines(self) -> None:
+        program = self.program
+        moves = list(
+            zip(
+                program.end.tolist(),
+                (program.feed_mm_min / 60.0).tolist(),
+                (program.motion == RAPID).tolist(),
+                program.spindle.tolist(),
+                program.power.tolist(),
+                range(len(program)),
+                strict=True,
+            )
+        )
+        events = list(
+            zip(
+                program.event_kind.tolist(),
+                program.event_seconds.tolist(),
+                program.event_power.tolist(),
+                strict=True,
+            )
+        )
+        steps = _in_line_order(program)
+        for size, words, points, todo in zip(
+            program.line_bytes.tolist(),
+            program.line_words.tolist(),
+            program.line_points.tolist(),
+            steps,
+            strict=True,
+        ):
+            self._receive(size)
+            self._work(cpu.LINE_FIXED + cpu.words_cost(words, size - 1, points) + cpu.REALTIME)
+            for index in todo:
+                if index >= 0:
+                    self._line(*moves[index])
+                else:
+                    self._event(*events[~index])
+            self._work(_OK_BYTES * cpu.ANSWER_BYTE)
+            self.wire.answer(self.now, size)
+        self._synchronize()
+
+    def _receive(self, size: int) -> None:
+        arrival = self.wire.arrival(size)
+        if arrival <= self.now:
+            self._work(size * cpu.CHARACTER)
+            return
+        while True:
+            self._start()
+            self._realtime()
+            if arrival <= self.now:
+                break
+            self._wait(arrival)
+        self._work(cpu.CHARACTER)
+
+    def _line(
+        self, end: list[float], feed: float, rapid: bool, spindle: int, power: float, tag: int
+    ) -> None:
+        while True:
+            self._realtime()
+            if not self.planner.full:
+                break
+            self._start()
+            self._realtime()
+            if self.planner.full:
+                self._wait(_FOREVER)
+        move = self.planner.append(
+            end, feed, rapid=rapid, spindle=spindle, speed_word=power, tag=tag
+        )
+        self._work(0)
+        if move is None and self.laser and spindle == 3:
+            self._synchronize()
+            self._beam(self.now, power > 0.0)
+
+    def _event(self, kind: int, seconds: float, power: float) -> None:
+        self._synchronize()
+        if kind == DWELL:
+            rounds = math.ceil(seconds / _DWELL_STEP - 1e-9)
+            self.now = self.processor.run(self.now, round(rounds * _DWELL_STEP * cpu.CLOCK))
+            self.last_end = self.now
+        if power == power:
+            self._beam(self.now, power > 0.0)
+
+    def _synchronize(self) -> None:
+        self._start()
+        while True:
+            self._realtime()
+            if not self.planner.moves and not self.cycling:
+                return
+            self._start()
+            self._wait(_FOREVER)
+
+    def _start(self) -> None:
+        if not self.cycling and self.planner.moves:
+            self.cycling = True
+            self._prepare()
+            self.stepper.wake(self.now)
+
+    def _realtime(self) -> None:
+        if self.stepper.stopped:
+            self.stepper.stopped = False
+            self.cycling = False
+        elif self.cycling:
+            self._prepare()
+
+    def _prepare(self) -> None:
+        stepper, generator = self.stepper, self.generator
+        while stepper.room:
+            segment = generator.next()
+            if segment is None:
+                return
+            self._work(0)
+            stepper.queue.append(segment)
+
+    def _wait(self, until: int) -> None:
+        change = self.stepper.next_change()
+        if change is not None and change <= until:
+            self.now = max(self.now, change)
+            self.stepper.run_to(self.now)
+        elif until < _FOREVER:
+            self.now = max(self.now, until)
+
+    def _work(self, cycles: int) -> None:
+        """Do ``cycles`` of work, and what planner and generator had to do since last time."""
+        cycles += self.planner.cycles + self.generator.cycles
+        self.planner.cycles = self.generator.cycles = 0
+        if cycles:
+            self.now = self.processor.run(self.now, cycles)
+
+    def _segment(self, now: int, segment: Segment | None) -> None:
+        """The stepper takes up ``segment``, or has settled."""
+        if segment is None:
+            if self.stepper_followed:
+                self._beam(now, False)
+            return
+        tag = segment.move.tag
+        if tag != self.moving:
+            self.moving = tag
+            self.began[tag] = now
+        self.ended[tag] = self.last_end = now + segment.cycles
+        self.stepper_followed = segment.follows
+        self._beam(now, segment.power > 0)
+
+    stepper_followed = False
+
+    def _beam(self, now: int, burning: bool) -> None:
+        if burning and not self.burning:
+            self.burning_since = now
+        elif self.burning and not burning:
+            self.burnt += now - self.burning_since
+        self.burning = burning
+
+    def result(self) -> Estimate:
+        self._beam(self.now, False)
+        start = np.array(self.began, dtype=np.float64)
+        end = np.array(self.ended, dtype=np.float64)
+        made = start >= 0.0
+        first = start[made].min(initial=float(self.last_end)) if made.any() else 0.0
+        # A move too short for a motor step takes no time: it happens where the one before ended.
+        before = np.maximum.accumulate(np.where(made, end, first))
+        start = np.where(made, start, before)
+        end = np.where(made, end, before)
+        return Estimate(
+            seconds=(self.last_end - first) / cpu.CLOCK,
+            beam_on_seconds=self.burnt / cpu.CLOCK,
+            start=(start - first) / cpu.CLOCK,
+            end=(end - first) / cpu.CLOCK,
+        )
+
+
+def _burns(word: float | None) -> int:
+    return 1 if word else 0
+
+
+def _in_line_order(program: Program) -> list[list[int]]:
+    """What each line sent does, in order: move indices, and events as their bitwise complement."""
+    move_key = np.stack([program.line, np.arange(len(program)), np.ones(len(program))])
+    count = len(program.event_line)
+    event_key = np.stack([program.event_line, program.event_move, np.zeros(count)])
+    lines, places, kinds = np.concatenate([event_key, move_key], axis=1).astype(np.int64)
+    values = np.concatenate([~np.arange(count), np.arange(len(program))])
+    order = np.lexsort((kinds, places, lines))
+    bounds = np.searchsorted(lines[order], program.line_number)
+    tail = np.append(bounds[1:], len(order))
+    done = values[order].tolist()
+    return [done[a:b] for a, b in zip(bounds.tolist(), tail.tolist(), strict=True)]

@@ -1,0 +1,80 @@
+"""What the motion of a machine depends on: its axes, its controller, and the wire to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from miurafab.profiles import MachineProfile
+
+Triple = tuple[float, float, float]
+_COMMON_STEPS = 80.0
+"""steps/mm of a belt with 2 mm pitch, 20 teeth and 1/16 steps, the usual laser frame."""
+
+
+@dataclass(frozen=True)
+class MotionParameters:
+    """The settings that shape motion, by axis X, Y, Z where there are three.
+
+    ``steps_per_mm`` ($100-$102); ``max_rate_mm_min`` ($110-$112); ``acceleration`` in mm/s²
+    ($120-$122); ``junction_deviation`` and ``arc_tolerance`` in mm ($11, $12); ``idle_lock`` in s,
+    how long the motors are held after each stop before the controller goes on, or None if they
+    are held for ever without waiting ($1); ``laser`` mode ($32); ``s_max``, ``s_min`` ($30, $31).
+    """
+
+    steps_per_mm: Triple
+    max_rate_mm_min: Triple
+    acceleration: Triple
+    junction_deviation: float
+    arc_tolerance: float
+    idle_lock: float | None
+    laser: bool
+    s_max: float
+    s_min: float
+
+    @classmethod
+    def from_settings(cls, settings: Mapping[int, float]) -> MotionParameters:
+        """The parameters among all ``$`` settings; raises KeyError for a number missing."""
+        return cls(
+            steps_per_mm=_triple(settings, 100),
+            max_rate_mm_min=_triple(settings, 110),
+            acceleration=_triple(settings, 120),
+            junction_deviation=settings[11],
+            arc_tolerance=settings[12],
+            idle_lock=None if settings[1] == 255 else settings[1] * 1e-3,
+            laser=bool(settings[32]),
+            s_max=settings[30],
+            s_min=settings[31],
+        )
+
+    @classmethod
+    def from_profile(cls, profile: MachineProfile) -> MotionParameters:
+        """The parameters of a machine profile; its ``settings`` win over its motion table.
+
+        A profile says nothing of Z, which a sheet does not need: Z is taken as X.
+        """
+        motion = profile.motion
+        rate_x, rate_y = motion.max_rate_mm_min
+        acceleration_x, acceleration_y = motion.acceleration_mm_s2
+        settings = {1: 25.0, 12: 0.002, 11: motion.junction_deviation_mm}
+        settings |= dict.fromkeys((100, 101, 102), _COMMON_STEPS)
+        settings |= {110: rate_x, 111: rate_y, 112: rate_x}
+        settings |= {120: acceleration_x, 121: acceleration_y, 122: acceleration_x}
+        settings |= {30: profile.tool.s_max, 31: profile.tool.s_min}
+        settings |= {32: float(profile.tool.kind == "laser")}
+        return cls.from_settings(settings | profile.settings)
+
+
+@dataclass(frozen=True)
+class Link:
+    """The wire: ``baud`` (10 bits a byte), the host's ``latency`` in s from the controller's
+    answer to its next byte, and the controller's ``rx_bytes``.
+    """
+
+    baud: int = 115_200
+    latency: float = 1e-3
+    rx_bytes: int = 128
+
+
+def _triple(settings: Mapping[int, float], first: int) -> Triple:
+    return settings[first], settings[first + 1], settings[first + 2]

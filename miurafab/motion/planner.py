@@ -1,0 +1,258 @@
+"""The look-ahead: how fast each of the next fifteen moves may be entered.
+
+Between two moves of unit directions u and v the speed is bounded by a circle through the corner
+that leaves it by the junction deviation d: with t the angle between -u and v,
+w^2 = a d sin(t/2) / (1 - sin(t/2)) (``planner.c``; S. K. Jeon's cornering note of 2011). Under
+that bound, entry speeds e_i obey, with a_i and l_i the moves' accelerations and lengths,
+
+    backward   e_i^2 <= e_{i+1}^2 + 2 a_i l_i      (every move can still brake, the last to a stop)
+    forward    e_{i+1}^2 <= e_i^2 + 2 a_i l_i      (no move can speed up more than it has room for)
+
+A new move only touches what the last passes left open, which :attr:`Planner.planned` marks.
+
+Legend: ``_sqr`` squared speeds in (mm/s)^2, speeds in mm/s, lengths in mm, counts in motor steps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from miurafab.motion import cpu
+from miurafab.motion.parameters import MotionParameters
+
+CAPACITY = 15
+"""Moves that can be planned ahead: 16 slots of which one stays free (``planner.h``)."""
+_STRAIGHT = 0.999999
+_UNLIMITED = 1e38
+_SLOWEST = 1.0 / 60.0
+"""mm/s; no move is planned slower (``config.h``, 1 mm/min)."""
+_LEAST_ACCELERATION = 1e-6
+"""mm/s²; the firmware divides by a zero $120, this keeps the arithmetic finite."""
+
+
+class Move:
+    """One planned line.
+
+    ``origin`` and ``steps`` (signed) per axis in motor steps, ``events`` the largest of them;
+    ``length`` is what of it is still to be prepared; ``rate`` the programmed speed and
+    ``rapid_rate`` the fastest in this direction; ``speed_word`` and ``spindle`` are its S and its
+    0, 3 or 4; ``steady`` moves ignore the feed override; ``tag`` is the caller's.
+    """
+
+    __slots__ = (
+        "acceleration", "entry_sqr", "events", "junction_sqr", "length", "limit_sqr", "origin",
+        "rapid", "rapid_rate", "rate", "speed_word", "spindle", "steady", "steps", "tag",
+    )  # fmt: skip
+
+    def __init__(self) -> None:
+        self.origin: tuple[int, ...] = (0, 0, 0)
+        self.steps: tuple[int, ...] = (0, 0, 0)
+        self.events = self.spindle = self.tag = 0
+        self.length = self.acceleration = self.rate = self.rapid_rate = self.speed_word = 0.0
+        self.entry_sqr = self.limit_sqr = self.junction_sqr = 0.0
+        self.rapid = self.steady = False
+
+
+class Planner:
+    """The queue of planned moves and the speeds at their joints.
+
+    ``position`` is where the last move ends, in motor steps. ``on_replan`` is called when the
+    move being executed gets a new exit speed. ``cycles`` adds up the processor's work.
+    """
+
+    def __init__(self, parameters: MotionParameters) -> None:
+        self.parameters = parameters
+        self.on_replan: Callable[[], None] = lambda: None
+        self.feed_override = 100
+        self.rapid_override = 100
+        self.cycles = 0
+        self.reset((0, 0, 0))
+
+    def reset(self, position: Sequence[int]) -> None:
+        """Forget all moves and stand at ``position`` (motor steps)."""
+        self.moves: list[Move] = []
+        self.planned = 0
+        self.position: tuple[int, ...] = tuple(position)
+        self._direction = (0.0, 0.0, 0.0)
+        self._last_nominal = 0.0
+
+    @property
+    def full(self) -> bool:
+        """Whether no further move fits."""
+        return len(self.moves) >= CAPACITY
+
+    def nominal_speed(self, move: Move) -> float:
+        """The speed ``move`` is meant to have under the overrides."""
+        speed = move.rate
+        if move.rapid:
+            speed *= 0.01 * self.rapid_override
+        else:
+            if not move.steady:
+                speed *= 0.01 * self.feed_override
+            speed = min(speed, move.rapid_rate)
+        return max(speed, _SLOWEST)
+
+    def make(
+        self,
+        target: Sequence[float],
+        feed: float,
+        *,
+        rapid: bool = False,
+        inverse_time: bool = False,
+        steady: bool = False,
+        origin: Sequence[int] | None = None,
+    ) -> tuple[Move, tuple[float, float, float], tuple[int, ...]] | None:
+        """A move to ``target`` (mm) at ``feed`` (mm/s, or 1/s), its direction and its end.
+
+        None if it is shorter than half a motor step. ``origin`` other than :attr:`position` is
+        for the system's own motion.
+        """
+        parameters = self.parameters
+        start = self.position if origin is None else tuple(origin)
+        self.cycles += cpu.PLAN_LINE
+        steps_per_mm = parameters.steps_per_mm
+        end = tuple(to_steps(t, k) for t, k in zip(target, steps_per_mm, strict=True))
+        steps = tuple(b - a for a, b in zip(start, end, strict=True))
+        events = max(map(abs, steps))
+        if events == 0:
+            return None
+        x, y, z = (n / k if k else 0.0 for n, k in zip(steps, steps_per_mm, strict=True))
+        length = math.sqrt(x * x + y * y + z * z)
+        direction = (x / length, y / length, z / length)
+        move = Move()
+        move.origin, move.steps, move.events = start, steps, events
+        move.length = length
+        move.acceleration = max(along(parameters.acceleration, direction), _LEAST_ACCELERATION)
+        move.rapid_rate = along(parameters.max_rate_mm_min, direction) / 60.0
+        move.rapid, move.steady = rapid, steady
+        move.rate = move.rapid_rate if rapid else feed * length if inverse_time else feed
+        return move, direction, end
+
+    def append(
+        self,
+        target: Sequence[float],
+        feed: float,
+        *,
+        rapid: bool = False,
+        inverse_time: bool = False,
+        steady: bool = False,
+        spindle: int = 0,
+        speed_word: float = 0.0,
+        tag: int = 0,
+    ) -> Move | None:
+        """Plan a line to ``target`` (mm) at ``feed`` (mm/s, or 1/s with ``inverse_time``).
+
+        Returns None if it is shorter than half a motor step. There must be room for it.
+        """
+        made = self.make(target, feed, rapid=rapid, inverse_time=inverse_time, steady=steady)
+        if made is None:
+            return None
+        move, direction, end = made
+        move.spindle, move.speed_word, move.tag = spindle, speed_word, tag
+        if self.moves:
+            move.junction_sqr = self._junction_sqr(direction)
+        nominal = self.nominal_speed(move)
+        self._limit(move, nominal, self._last_nominal)
+        self._last_nominal = nominal
+        self._direction = direction
+        self.position = end
+        self.moves.append(move)
+        self._plan()
+        return move
+
+    def discard(self) -> None:
+        """The first move is fully prepared and leaves the queue."""
+        del self.moves[0]
+        if self.planned:
+            self.planned -= 1
+
+    def restart(self) -> None:
+        """Plan all moves anew from the speed that the first has now (after a stop, an override)."""
+        self.on_replan()
+        self.planned = 0
+        self._plan()
+
+    def override(self, feed: int, rapid: int) -> None:
+        """Take new overrides in percent for all moves, and plan anew."""
+        self.feed_override, self.rapid_override = feed, rapid
+        last = _UNLIMITED
+        for move in self.moves:
+            nominal = self.nominal_speed(move)
+            self._limit(move, nominal, last)
+            last = nominal
+        self._last_nominal = last
+        self.restart()
+
+    def exit_sqr(self) -> float:
+        """The squared speed at the end of the first move."""
+        return self.moves[1].entry_sqr if len(self.moves) > 1 else 0.0
+
+    @staticmethod
+    def _limit(move: Move, nominal: float, before: float) -> None:
+        slower = min(nominal, before)
+        move.limit_sqr = min(slower * slower, move.junction_sqr)
+
+    def _junction_sqr(self, direction: tuple[float, float, float]) -> float:
+        ux, uy, uz = self._direction
+        vx, vy, vz = direction
+        cosine = -(ux * vx + uy * vy + uz * vz)
+        if cosine > _STRAIGHT:
+            return 0.0
+        if cosine < -_STRAIGHT:
+            return _UNLIMITED
+        self.cycles += cpu.PLAN_CORNER
+        x, y, z = vx - ux, vy - uy, vz - uz
+        length = math.sqrt(x * x + y * y + z * z)
+        parameters = self.parameters
+        acceleration = along(parameters.acceleration, (x / length, y / length, z / length))
+        half_sine = math.sqrt(0.5 * (1.0 - cosine))
+        return max(
+            0.0, acceleration * parameters.junction_deviation * half_sine / (1.0 - half_sine)
+        )
+
+    def _plan(self) -> None:
+        moves, planned = self.moves, self.planned
+        last = len(moves) - 1
+        if last <= planned:
+            return
+        move = moves[last]
+        move.entry_sqr = exit_sqr = min(move.limit_sqr, 2.0 * move.acceleration * move.length)
+        if planned == 0:
+            self.on_replan()
+        for index in range(last - 1, planned, -1):
+            move = moves[index]
+            if move.entry_sqr != move.limit_sqr:
+                reach = exit_sqr + 2.0 * move.acceleration * move.length
+                move.entry_sqr = min(reach, move.limit_sqr)
+            exit_sqr = move.entry_sqr
+        rising = 0
+        move = moves[planned]
+        for index in range(planned + 1, last + 1):
+            after = moves[index]
+            if move.entry_sqr < after.entry_sqr:
+                rising += 1
+                reach = move.entry_sqr + 2.0 * move.acceleration * move.length
+                if reach < after.entry_sqr:
+                    after.entry_sqr = reach
+                    self.planned = index
+            if after.entry_sqr == after.limit_sqr:
+                self.planned = index
+            move = after
+        self.cycles += (
+            cpu.PLAN_NEWEST
+            + (last - planned - 1) * cpu.PLAN_BACKWARD
+            + (last - planned) * cpu.PLAN_FORWARD
+            + rising * cpu.PLAN_FORWARD_RISING
+        )
+
+
+def to_steps(value: float, steps_per_mm: float) -> int:
+    """``value`` in mm as motor steps, rounded half away from zero."""
+    steps = value * steps_per_mm
+    return int(steps + 0.5) if steps >= 0.0 else -int(0.5 - steps)
+
+
+def along(limits: Sequence[float], direction: Sequence[float]) -> float:
+    """The largest value along ``direction`` that keeps each axis within its limit."""
+    return min(limit / abs(part) for limit, part in zip(limits, direction, strict=True) if part)

@@ -1,0 +1,145 @@
+"""The stepper interrupt in time, and the main program that it steals time from.
+
+Time is counted in processor cycles. Segments run one after another; while one runs, each of its
+ticks takes :data:`~miurafab.motion.cpu.STEP_TICK` cycles from the main program, so that work of
+w cycles lasts w / (1 - tick / period). When the queue runs dry the interrupt stops the motors and
+holds them for the idle lock time before it returns: the main program stands still for that long
+at every stop (``st_go_idle`` in ``stepper.c``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from miurafab.motion import cpu
+from miurafab.motion.planner import Move
+from miurafab.motion.segments import MICRO, QUEUE, Segment
+
+_LEAST_SHARE = 0.05
+"""Of the processor, left to the main program however fast the steps come."""
+
+
+class Stepper:
+    """The running segments.
+
+    ``queue`` holds them, the running one first; ``began`` is the cycle at which it began. After
+    the last one the stepper is ``settling`` until the cycle given there, and then ``stopped``
+    until somebody takes note and clears it. ``on_segment`` is told each segment as it begins,
+    and None when motion has settled.
+    """
+
+    def __init__(self) -> None:
+        self.idle_lock = 0
+        self.on_segment: Callable[[int, Segment | None], None] = lambda _now, _segment: None
+        self.halt()
+
+    def halt(self) -> None:
+        """Stop dead and forget all segments."""
+        self.queue: list[Segment] = []
+        self.running = False
+        self.settling: int | None = None
+        self.stopped = False
+        self.began = 0
+
+    @property
+    def room(self) -> bool:
+        """Whether another segment fits."""
+        return len(self.queue) < QUEUE
+
+    @property
+    def share(self) -> float:
+        """The part of the processor that is left to the main program now, 0 to 1."""
+        if self.running:
+            return max(1.0 - cpu.STEP_TICK / max(self.queue[0].period, 1), _LEAST_SHARE)
+        return 0.0 if self.settling is not None else 1.0
+
+    def wake(self, now: int) -> None:
+        """Start stepping at ``now`` unless it is under way."""
+        if not self.running:
+            self.running = True
+            self._begin(now)
+
+    def next_change(self) -> int | None:
+        """The cycle at which the running segment, or the settling, ends."""
+        if self.running:
+            return self.began + self.queue[0].cycles
+        return self.settling
+
+    def run_to(self, now: int) -> None:
+        """Let everything end that ends by ``now``."""
+        while self.running:
+            end = self.began + self.queue[0].cycles
+            if end > now:
+                return
+            del self.queue[0]
+            self._begin(end)
+        if self.settling is not None and self.settling <= now:
+            settled, self.settling = self.settling, None
+            self.stopped = True
+            self.on_segment(settled, None)
+
+    def _begin(self, now: int) -> None:
+        if self.queue:
+            self.began = now
+            self.on_segment(now, self.queue[0])
+        else:
+            self.running = False
+            self.settling = now + self.idle_lock
+
+    def progress(self, now: int) -> tuple[Move, int] | None:
+        """The move being stepped at ``now`` and how far it is, in micro-steps; None at rest."""
+        if not self.running:
+            return None
+        segment = self.queue[0]
+        ticks = min((now - self.began) // max(segment.period, 1) + 1, segment.ticks)
+        return segment.move, segment.done + ticks * segment.stride
+
+
+class Processor:
+    """Work of the main program under way beside a :class:`Stepper`."""
+
+    def __init__(self, stepper: Stepper) -> None:
+        self.stepper = stepper
+        self._left = 0.0
+        self._since = 0
+
+    def start(self, now: int, cycles: float) -> None:
+        """Begin work of ``cycles`` at ``now``."""
+        self._left, self._since = cycles, now
+
+    def finish(self) -> int | None:
+        """When it is done if the stepper changes nothing before; None while it stands still."""
+        share = self.stepper.share
+        return self._since + math.ceil(self._left / share) if share else None
+
+    def note(self, now: int) -> None:
+        """Account for the work done by ``now``; to be called just before the stepper changes."""
+        self._left = max(self._left - (now - self._since) * self.stepper.share, 0.0)
+        self._since = now
+
+    def run(self, now: int, cycles: float) -> int:
+        """Do work of ``cycles`` from ``now``, stepping on beside it: when it is done."""
+        stepper = self.stepper
+        self.start(now, cycles)
+        while True:
+            done, change = self.finish(), stepper.next_change()
+            if done is not None and (change is None or done < change):
+                return done
+            if change is not None:
+                self.note(change)
+                stepper.run_to(change)
+
+
+def steps_taken(move: Move, micro: int) -> tuple[int, ...]:
+    """The motor position on ``move`` after ``micro`` micro-steps: Bresenham's line, closed.
+
+    Each axis adds its steps to a counter that starts at half the largest count and steps when
+    it passes the whole, so after m ticks it made ceil((events/2 + m steps / 8) / events) - 1.
+    """
+    whole = 2 * MICRO * move.events
+    return tuple(
+        start
+        + (1 if n >= 0 else -1) * (-(-(MICRO * move.events + 2 * micro * abs(n)) // whole) - 1)
+        for start, n in zip(move.origin, move.steps, strict=True)
+    )
