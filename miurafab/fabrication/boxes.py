@@ -1,0 +1,122 @@
+"""How an outline is turned to fit a rectangle: support values and rotated boxes.
+
+A set of points fits a rectangle of width w and height h, turned by -θ, when its extents along
+u(θ) = (cos θ, sin θ) and v(θ) = (-sin θ, cos θ) are at most w and h. Two tools answer that:
+
+- *support values*: the largest p·u over the points, for a fixed fan of directions u. The support
+  values of a union are the maxima of those of its parts, so the boxes of all unions that a search
+  meets are maxima of a few arrays. The fan samples the angle: it can miss a fit, never invent one.
+- :func:`best_turn`: exact for one convex hull. Between two angles at which a side of the hull is
+  flush with the box, the supporting corners are fixed, the extents are d·u(θ) and g·v(θ), and the
+  larger excess over the rectangle is smallest at an end of the interval or where both excesses are
+  equal: (d_x - g_y) cos θ + (d_y + g_x) sin θ = w - h. All such angles are tried.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+TOLERANCE = 1e-9
+"""How far, in mm, an extent may exceed the rectangle by rounding."""
+
+
+def fan(turns: int) -> NDArray[np.float64]:
+    """(4 * turns, 2) unit directions: ``turns`` of them in the first quadrant, then each turned
+    by 90, 180 and 270 degrees.
+    """
+    angle = np.arange(turns) * (np.pi / 2 / turns)
+    first = np.column_stack([np.cos(angle), np.sin(angle)])
+    second = np.column_stack([-first[:, 1], first[:, 0]])
+    return np.concatenate([first, second, -first, -second])
+
+
+def support(
+    polygons: NDArray[np.float64], present: NDArray[np.bool_], directions: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """(N, D) support values in mm of N polygons of up to k corners.
+
+    ``polygons`` (N, k, 2), ``present`` (N, k) whether a corner is real, the first ones first;
+    ``directions`` (D, 2) of :func:`fan`, the second half opposite to the first. A polygon
+    without corners has support -inf, which is neutral in a union. Single precision keeps the
+    search in the cache; its rounding is what :func:`fits` sets aside.
+    """
+    values = np.full((len(directions), len(polygons)), -np.inf, dtype=np.float32)
+    filled = np.where(present[..., None], polygons, polygons[:, :1])
+    x, y = (np.ascontiguousarray(filled[..., axis].T) for axis in (0, 1))
+    real = present.any(axis=1)
+    half = len(directions) // 2
+    for column, (u, v) in enumerate(directions[:half]):
+        along = x * u + y * v
+        values[column, real] = along.max(axis=0)[real]
+        values[column + half, real] = -along.min(axis=0)[real]
+    return np.ascontiguousarray(values.T)
+
+
+def fits(values: NDArray[np.float32], width: float, height: float) -> NDArray[np.bool_]:
+    """(...,) whether shapes with support ``values`` (..., 4 * turns) fit the rectangle.
+
+    The sizes in mm; a shape may lie along or across. Extents are compared with
+    room for the rounding of the single precision values.
+    """
+    quarter = values.shape[-1] // 4
+    along = values[..., :quarter] + values[..., 2 * quarter : 3 * quarter]
+    across = values[..., quarter : 2 * quarter] + values[..., 3 * quarter :]
+    long, short = max(width, height) - 0.005, min(width, height) - 0.005
+    found: NDArray[np.bool_] = (
+        (np.maximum(along, across) <= long) & (np.minimum(along, across) <= short)
+    ).any(axis=-1)
+    return found
+
+
+def box_of(points: NDArray[np.float64]) -> tuple[float, float]:
+    """The longer and the shorter side in mm of the smallest box around ``points`` (n, 2)."""
+    _, sizes = _turns(points, 0.0, 0.0)
+    best = int(np.argmin(sizes.prod(axis=1)))
+    return float(sizes[best].max()), float(sizes[best].min())
+
+
+def best_turn(points: NDArray[np.float64], width: float, height: float) -> float | None:
+    """The angle θ in radians, -π/2 < θ <= π/2, whose turn by -θ fits ``points`` (n, 2) into the
+    rectangle with the smallest box, or None if no angle fits. Exact up to :data:`TOLERANCE`.
+    """
+    angles, sizes = _turns(points, width, height)
+    fit = (sizes[:, 0] <= width + TOLERANCE) & (sizes[:, 1] <= height + TOLERANCE)
+    if not fit.any():
+        return None
+    angles, area = angles[fit], sizes[fit].prod(axis=1)
+    # Of boxes equal up to rounding the least turned one is taken, so that rounding decides nothing.
+    equal = area <= area.min() * (1 + 1e-9) + TOLERANCE
+    angles = np.where(angles > np.pi / 2, angles - np.pi, angles)[equal]
+    return float(angles[np.lexsort((angles, np.round(np.abs(angles), 9)))[0]])
+
+
+def _turns(points: NDArray[Any], width: float, height: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Candidate angles (A,) in [0, π) and the extents (A, 2) along u and v at each."""
+    hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(points)))
+    sides = np.diff(hull, axis=0) if len(hull) > 1 else np.array([[1.0, 0.0]])
+    flush = np.arctan2(sides[:, 1], sides[:, 0])
+    ends = np.unique(np.concatenate([flush, flush + np.pi / 2, [0.0]]) % np.pi)
+    middle = (ends + np.append(ends[1:], np.pi)) / 2
+    d, g = _spans(hull, middle), _spans(hull, middle + np.pi / 2)
+    a, b = d[:, 0] - g[:, 1], d[:, 1] + g[:, 0]
+    size = np.hypot(a, b)
+    level = np.divide(width - height, size, out=np.full_like(size, 2.0), where=size > 0)
+    swing = np.arccos(np.clip(level, -1.0, 1.0))
+    real = np.abs(level) <= 1
+    peak = np.arctan2(b, a)
+    equal = np.concatenate([(peak + swing)[real], (peak - swing)[real]]) % np.pi
+    angles = np.unique(np.concatenate([ends, equal]))
+    u = np.column_stack([np.cos(angles), np.sin(angles)])
+    v = np.column_stack([-u[:, 1], u[:, 0]])
+    return angles, np.column_stack([np.ptp(hull @ u.T, axis=0), np.ptp(hull @ v.T, axis=0)])
+
+
+def _spans(hull: NDArray[Any], angles: NDArray[Any]) -> NDArray[Any]:
+    """(A, 2) from the least to the greatest hull corner along each angle."""
+    along = hull @ np.stack([np.cos(angles), np.sin(angles)])
+    spans: NDArray[Any] = hull[along.argmax(axis=0)] - hull[along.argmin(axis=0)]
+    return spans

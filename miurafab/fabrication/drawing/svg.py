@@ -1,0 +1,166 @@
+"""Drawings as SVG: sheets for the machine, and a picture of the pattern for people.
+
+A sheet is drawn true to scale: width and height in mm and a viewBox in mm, so that importers need
+not guess a resolution. SVG's y runs downwards and the sheet's upwards, so y is flipped about the
+sheet. Each operation is a layer of its own, in the colour that LightBurn maps to a layer of its
+own (palette entries 00 to 03), and every dash is a segment of its own: importers cut a dashed
+line style through.
+
+This is the only home of svgwrite. Its validation is off: it costs more than the drawing.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import svgwrite
+from numpy.typing import NDArray
+
+from miurafab.fabrication.sheets import Layout
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import OPERATIONS
+
+COLOURS = {
+    "engrave": "#000000",
+    "score": "#00E000",
+    "perforate": "#0000FF",
+    "cut": "#FF0000",
+}
+
+_INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
+_HAIRLINE = 0.1
+_PICTURE = 1200
+"""The width of a picture in pixels."""
+
+_CREASES = {
+    "M": ("mountain", "#c8372d"),
+    "V": ("valley", "#2a5fb0"),
+    "F": ("flat", "#b5b5b5"),
+    "U": ("unassigned", "#8a6d3b"),
+    "J": ("join", "#b5b5b5"),
+    "C": ("cut", "#222222"),
+    "B": ("border", "#222222"),
+}
+_TINTS = ("#f6e7c8", "#dbe8d2", "#d5e3ee", "#ecd9de", "#e4ddec", "#f0e0d0", "#d6e6e3", "#eeeacb")
+
+
+def sheet_svg(toolpath: Toolpath) -> str:
+    """The strokes of one sheet, true to scale, a layer an operation, in the order they are made.
+
+    The strokes of one crease are subpaths of one path, and so is the lettering of one patch.
+    """
+    width, height = toolpath.width_mm, toolpath.height_mm
+    drawing = _drawing(width, height, (f"{_short(width)}mm", f"{_short(height)}mm"))
+    drawing.attribs["xmlns:inkscape"] = _INKSCAPE
+    drawing.set_desc(title=toolpath.sheet)
+    paths = _path_data(toolpath, height)
+    same = (np.diff(toolpath.edge) == 0) & (np.diff(toolpath.patch) == 0)
+    same &= toolpath.operation[1:] != OPERATIONS.index("cut")
+    together = np.concatenate([[0], np.cumsum(~same)])
+    for operation, name in enumerate(OPERATIONS):
+        layer = drawing.g(id=name, fill="none", stroke=COLOURS[name], stroke_width=_HAIRLINE)
+        layer.attribs["inkscape:groupmode"] = "layer"
+        layer.attribs["inkscape:label"] = name
+        strokes = np.flatnonzero(toolpath.operation == operation)
+        for run in np.split(strokes, np.flatnonzero(np.diff(together[strokes])) + 1):
+            layer.add(drawing.path(d="".join(paths[s] for s in run.tolist())))
+        drawing.add(layer)
+    return _text(drawing)
+
+
+def pattern_svg(pattern: CreasePattern, layout: Layout | None = None) -> str:
+    """A picture of the flat pattern: mountains red, valleys blue, border black.
+
+    With a ``layout`` the patches are tinted, and their names stand in them.
+    """
+    points = pattern.vertices_coords * np.array([1.0, -1.0])
+    low, high = points.min(axis=0), points.max(axis=0)
+    span = float(np.max(high - low))
+    margin = 0.02 * span
+    line = span / 600
+    points = points - low + margin
+    width, height = high - low + 2 * margin
+    drawing = _drawing(width, height, (_PICTURE, _short(_PICTURE * height / width)))
+    drawing.add(drawing.rect((0, 0), (_short(width), _short(height)), fill="#ffffff"))
+    _add_facets(drawing, pattern, points, layout)
+    for letter, (name, colour) in _CREASES.items():
+        edges = np.flatnonzero(pattern.edges_assignment == letter)
+        if not len(edges):
+            continue
+        ends = points[pattern.edges_vertices[edges]]
+        data = [
+            f"M{_short(x0)} {_short(y0)}L{_short(x1)} {_short(y1)}"
+            for (x0, y0), (x1, y1) in ends.tolist()
+        ]
+        weight = line * (1.8 if letter in "BC" else 1.0)
+        style = {"fill": "none", "stroke": colour, "stroke_linecap": "round"}
+        drawing.add(drawing.path(d="".join(data), id=name, stroke_width=_short(weight), **style))
+    if layout is not None:
+        _add_names(drawing, pattern, points, layout)
+    return _text(drawing)
+
+
+def _add_facets(
+    drawing: svgwrite.Drawing,
+    pattern: CreasePattern,
+    points: NDArray[np.float64],
+    layout: Layout | None,
+) -> None:
+    groups = [np.arange(len(pattern.faces_vertices))]
+    if layout is not None:
+        groups = [patch.faces for patch in layout.patches]
+    for number, faces in enumerate(groups):
+        tint = _TINTS[number % len(_TINTS)]
+        data = []
+        for corners in pattern.faces_vertices[faces].tolist():
+            ring = [points[v] for v in corners if v >= 0]
+            data.append("M" + "L".join(f"{_short(x)} {_short(y)}" for x, y in ring) + "Z")
+        hair = {"stroke": tint, "stroke_width": _short(np.ptp(points) / 3000)}
+        drawing.add(drawing.path(d="".join(data), fill=tint, **hair))
+
+
+def _add_names(
+    drawing: svgwrite.Drawing,
+    pattern: CreasePattern,
+    points: NDArray[np.float64],
+    layout: Layout,
+) -> None:
+    size = np.ptp(points, axis=0).max() / 30
+    group = drawing.g(
+        font_family="sans-serif", font_size=_short(size), text_anchor="middle", fill="#222222"
+    )
+    for patch in layout.patches:
+        corners = pattern.faces_vertices[patch.faces]
+        x, y = points[corners[corners >= 0]].mean(axis=0)
+        group.add(drawing.text(patch.label, insert=(_short(x), _short(y + 0.35 * size))))
+    drawing.add(group)
+
+
+def _drawing(width: float, height: float, size: tuple[str | int, str | int]) -> svgwrite.Drawing:
+    return svgwrite.Drawing(
+        size=size, viewBox=f"0 0 {_short(width)} {_short(height)}", debug=False, profile="full"
+    )
+
+
+def _path_data(toolpath: Toolpath, height: float) -> list[str]:
+    """The path data of every stroke; a closed one ends in Z."""
+    words = [f"{_short(x)} {_short(height - y)}" for x, y in toolpath.points.tolist()]
+    found = []
+    offsets = toolpath.offsets.tolist()
+    for begin, end in pairwise(offsets):
+        closed = end - begin > 3 and words[begin] == words[end - 1]
+        body = "L".join(words[begin : end - 1] if closed else words[begin:end])
+        found.append(f"M{body}Z" if closed else f"M{body}")
+    return found
+
+
+def _short(value: float) -> str:
+    """A number with at most four decimals: a tenth of a micrometre."""
+    text = f"{value:.4f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def _text(drawing: svgwrite.Drawing) -> str:
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + str(drawing.tostring()) + "\n"

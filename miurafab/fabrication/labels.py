@@ -1,0 +1,189 @@
+"""Where patch names and tab numbers are engraved: inside a facet, clear of every crease and cut.
+
+A text of height s and width s·w, centred on c and running along u, lies inside a convex polygon
+with at least the clearance to its sides if for each side, with inward normal n at distance d of c,
+
+    s (w |n·u| + |n·v|) / 2 <= d - clearance,
+
+v being u turned by a right angle. So the largest s is the least of the quotients, and a text that
+would be too small to read is left out. For a polygon that is not convex the same rule is stricter
+than needed.
+
+The number of a tab stands on the tab, and once more on the facet it is glued to, at the place that
+the tab will cover.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from miurafab.fabrication.lettering import text_strokes, text_width
+from miurafab.fabrication.tabs import TabRegions
+from miurafab.origami.crease_pattern import CreasePattern
+
+CLEARANCE_MM = 0.5
+"""Kept between a text and any crease or cut (judged: three kerfs)."""
+
+NAME_MM = (1.5, 5.0)
+"""Least and greatest height of a patch name in mm (judged)."""
+
+NUMBER_MM = (1.2, 3.0)
+"""Least and greatest height of a tab number in mm (judged)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A text on a patch, its ``strokes`` (n, 2) in mm in the pattern's plane."""
+
+    patch: int
+    text: str
+    strokes: tuple[NDArray[np.float64], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Spots:
+    """N convex places: the greatest height in mm of a text of given proportions on ``centre``
+    (N, 2) running along ``along`` (N, 2) is :meth:`height`.
+    """
+
+    centre: NDArray[np.float64]
+    along: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    depth: NDArray[np.float64]
+
+    def height(self, width: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N,) for texts of ``width`` (N,) over height; negative if the centre is too near."""
+        along = np.abs(np.einsum("nki,ni->nk", self.normal, self.along))
+        across = np.abs(
+            self.normal[..., 1] * self.along[:, None, 0]
+            - self.normal[..., 0] * self.along[:, None, 1]
+        )
+        taken = (width[:, None] * along + across) / 2
+        found: NDArray[np.float64] = (self.depth / np.maximum(taken, 1e-12)).min(axis=1)
+        return found
+
+
+def place_texts(
+    pattern: CreasePattern,
+    face_patch: NDArray[np.int64],
+    names: Sequence[str],
+    tabs: TabRegions,
+    numbers: NDArray[np.int64],
+    turns: NDArray[np.float64],
+) -> tuple[list[Text], int]:
+    """The texts of all patches, and how many found no place.
+
+    ``face_patch`` (F,) the patch of each facet, ``names`` of the P patches, ``numbers`` (N,) those
+    of the ``tabs``, ``turns`` (P,) the angle by which each patch is turned later: texts are
+    engraved so that they can be read then.
+    """
+    texts, left_out = _tab_numbers(face_patch, tabs, numbers, turns)
+    spots = _facet_spots(pattern, turns[face_patch])
+    width = np.array([text_width(name) for name in names])
+    height = np.minimum(spots.height(width[face_patch]), NAME_MM[1])
+    glued = np.zeros(len(face_patch), dtype=bool)
+    glued[tabs.mate_face] = True
+    for patch, name in enumerate(names):
+        faces = np.flatnonzero((face_patch == patch) & (height >= NAME_MM[0]))
+        middle = spots.centre[face_patch == patch].mean(axis=0)
+        far = np.linalg.norm(spots.centre[faces] - middle, axis=1)
+        best = np.lexsort((far, -np.round(height[faces], 3), glued[faces]))
+        for face in faces[best].tolist():
+            centre, along, size = spots.centre[face], spots.along[face], float(height[face])
+            under = np.flatnonzero(tabs.mate_face == face)
+            box = shapely.Polygon(_box(centre, along, size, float(width[patch])))
+            if not any(box.intersects(shapely.Polygon(tabs.polygon(tab))) for tab in under):
+                texts.append(_written(patch, name, centre, along, size))
+                break
+        else:
+            left_out += 1
+    return texts, left_out
+
+
+def _tab_numbers(
+    face_patch: NDArray[np.int64],
+    tabs: TabRegions,
+    numbers: NDArray[np.int64],
+    turns: NDArray[np.float64],
+) -> tuple[list[Text], int]:
+    """Each tab's number on the tab and on the facet under it, and how many have no room."""
+    texts: list[Text] = []
+    left_out = 0
+    if not len(tabs):
+        return texts, left_out
+    base = tabs.points[:, 1] - tabs.points[:, 0]
+    words = [str(number) for number in numbers.tolist()]
+    width = np.array([text_width(word) for word in words])
+    for faces in (tabs.own_face, tabs.mate_face):
+        patch = face_patch[faces]
+        spots = _spots(tabs.points, tabs.present, _upright(base, turns[patch]))
+        height = np.minimum(spots.height(width), NUMBER_MM[1])
+        room = height >= NUMBER_MM[0]
+        left_out += int((~room).sum())
+        for tab in np.flatnonzero(room).tolist():
+            centre, along = spots.centre[tab], spots.along[tab]
+            texts.append(_written(int(patch[tab]), words[tab], centre, along, float(height[tab])))
+    return texts, left_out
+
+
+def _facet_spots(pattern: CreasePattern, turns: NDArray[np.float64]) -> _Spots:
+    """A place in each facet, along its longest side."""
+    corners = pattern.faces_vertices
+    points = pattern.vertices_coords[corners]
+    ends = pattern.vertices_coords[pattern.edges_vertices[pattern.faces_edges]]
+    side = ends[:, :, 1] - ends[:, :, 0]
+    # Sides equal up to rounding: the first one, so that rounding decides nothing.
+    length = np.where(corners >= 0, np.round(np.linalg.norm(side, axis=2), 6), -1.0)
+    longest = side[np.arange(len(corners)), length.argmax(axis=1)]
+    return _spots(points, corners >= 0, _upright(longest, turns))
+
+
+def _spots(
+    points: NDArray[np.float64], present: NDArray[np.bool_], along: NDArray[np.float64]
+) -> _Spots:
+    count = present.sum(axis=1)[:, None]
+    slot = np.arange(points.shape[1])
+    following = np.where(slot + 1 < count, slot + 1, 0)
+    step = np.take_along_axis(points, following[..., None], axis=1) - points
+    size = np.linalg.norm(step, axis=2)
+    step /= np.where(size > 0, size, 1.0)[..., None]
+    normal = np.stack([-step[..., 1], step[..., 0]], axis=-1)
+    centre = np.where(present[..., None], points, 0.0).sum(axis=1) / count
+    depth = np.einsum("nki,nki->nk", normal, centre[:, None] - points) - CLEARANCE_MM
+    return _Spots(centre, along, normal, np.where(present, depth, np.inf))
+
+
+def _upright(along: NDArray[np.float64], turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The unit directions of ``along`` (N, 2), each reversed if, turned by ``turns`` (N,), its
+    text would run to the left, or downwards where it runs up or down.
+    """
+    along = along / np.linalg.norm(along, axis=1)[:, None]
+    right = np.cos(turns) * along[:, 0] - np.sin(turns) * along[:, 1]
+    up = np.sin(turns) * along[:, 0] + np.cos(turns) * along[:, 1]
+    wrong = (right < -1e-6) | ((np.abs(right) <= 1e-6) & (up < 0))
+    return np.where(wrong[:, None], -along, along)
+
+
+def _box(
+    centre: NDArray[np.float64], along: NDArray[np.float64], height: float, width: float
+) -> NDArray[np.float64]:
+    across = np.array([-along[1], along[0]])
+    half = np.array([[-width, -1.0], [width, -1.0], [width, 1.0], [-width, 1.0]]) * height / 2
+    box: NDArray[np.float64] = centre + half @ np.stack([along, across])
+    return box
+
+
+def _written(
+    patch: int,
+    text: str,
+    centre: NDArray[np.float64],
+    along: NDArray[np.float64],
+    height: float,
+) -> Text:
+    frame = height * np.stack([along, np.array([-along[1], along[0]])])
+    return Text(patch, text, tuple(centre + stroke @ frame for stroke in text_strokes(text)))

@@ -1,0 +1,125 @@
+"""``layout.json``: a layout written down, and read back, so that others can rely on it.
+
+The schema is ``miurafab-layout/1``: machine, material, sheets with placements, patches with
+outlines and tabs in the patch frame, and totals. Lengths are mm, rotations degrees,
+counter-clockwise; lists of points are [[x, y], ...] and closed curves do not repeat their first
+point. Toolpaths are not in it: they are in the drawings and the G-code.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import LayoutError
+from miurafab.fabrication.sheets import Layout, Patch, Placement, Sheet, Totals
+from miurafab.fabrication.tabs import Tab
+
+SCHEMA = "miurafab-layout/1"
+
+
+def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
+    """The text of ``layout.json``; ``pattern_file`` and its SHA-256 tell which pattern it is of."""
+    document = {
+        "schema": SCHEMA,
+        "pattern": {"file": pattern_file, "sha256": pattern_sha256},
+        "machine": layout.machine,
+        "material": layout.material,
+        "sheets": [dataclasses.asdict(sheet) for sheet in layout.sheets],
+        "patches": [_patch_table(patch) for patch in layout.patches],
+        "totals": dataclasses.asdict(layout.totals),
+        "untabbed": list(layout.untabbed),
+        "unlettered": layout.unlettered,
+    }
+    return json.dumps(document, separators=(",", ":")) + "\n"
+
+
+def read_layout(text: str) -> Layout:
+    """The layout written in ``text``, without toolpaths.
+
+    Raises :class:`~miurafab.errors.LayoutError` if it is not a layout of this schema.
+    """
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as fault:
+        raise LayoutError(f"The layout is not valid JSON: {fault}.") from None
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if schema != SCHEMA:
+        raise LayoutError(f"The layout's schema is {schema!r}; this version reads '{SCHEMA}'.")
+    try:
+        return Layout(
+            machine=str(document["machine"]),
+            material=str(document["material"]),
+            patches=tuple(_patch(table) for table in document["patches"]),
+            sheets=tuple(_sheet(table) for table in document["sheets"]),
+            totals=Totals(**document["totals"]),
+            untabbed=tuple(document.get("untabbed", ())),
+            unlettered=document.get("unlettered", 0),
+        )
+    except KeyError as fault:
+        raise LayoutError(f"The layout lacks {fault}.") from None
+    except (TypeError, ValueError) as fault:
+        raise LayoutError(f"The layout cannot be read: {fault}.") from None
+
+
+def _patch_table(patch: Patch) -> dict[str, Any]:
+    return {
+        "id": patch.id,
+        "label": patch.label,
+        "faces": patch.faces.tolist(),
+        "outline_mm": patch.outline_mm.tolist(),
+        "waste_mm": [ring.tolist() for ring in patch.waste_mm],
+        "origin_mm": list(patch.origin_mm),
+        "rotation_deg": patch.rotation_deg,
+        "tabs": [
+            {
+                "number": tab.number,
+                "edge": tab.edge,
+                "mate_patch": tab.mate_patch,
+                "polygon_mm": tab.polygon_mm.tolist(),
+            }
+            for tab in patch.tabs
+        ],
+    }
+
+
+def _patch(table: dict[str, Any]) -> Patch:
+    x, y = table["origin_mm"]
+    return Patch(
+        id=int(table["id"]),
+        label=str(table["label"]),
+        faces=np.array(table["faces"], dtype=np.int64),
+        outline_mm=_points(table["outline_mm"]),
+        waste_mm=tuple(_points(ring) for ring in table.get("waste_mm", ())),
+        origin_mm=(float(x), float(y)),
+        rotation_deg=float(table["rotation_deg"]),
+        tabs=tuple(
+            Tab(
+                number=int(tab["number"]),
+                edge=int(tab["edge"]),
+                mate_patch=int(tab["mate_patch"]),
+                polygon_mm=_points(tab["polygon_mm"]),
+            )
+            for tab in table["tabs"]
+        ),
+    )
+
+
+def _sheet(table: dict[str, Any]) -> Sheet:
+    return Sheet(
+        name=str(table["name"]),
+        width_mm=float(table["width_mm"]),
+        height_mm=float(table["height_mm"]),
+        placements=tuple(Placement(**placement) for placement in table["placements"]),
+    )
+
+
+def _points(values: list[list[float]]) -> NDArray[np.float64]:
+    points = np.array(values, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError("a list of points is not a list of pairs")
+    return points

@@ -1,0 +1,168 @@
+"""The order of the strokes on a sheet: what loosens the sheet comes last, and little travel.
+
+Operations follow each other as in :data:`~miurafab.profiles.OPERATIONS`: engrave, score,
+perforate, cut. Within one:
+
+- creases go by the postman's route (:mod:`~miurafab.fabrication.routing`), the dashes of a crease
+  in turn, in the direction of the route;
+- lettering goes text by text, each time to the nearest one that is left;
+- cuts within patches go first, then rings around waste, then the outlines, each time to the
+  nearest one left; a closed stroke is begun at its nearest point.
+
+The strokes are the same before and after, but for their direction and where a closed one begins.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.fabrication.routing import find_route
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.profiles import OPERATIONS
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Strokes:
+    """A toolpath in no order, with what its order depends on.
+
+    ``group`` (S,) int64: strokes of one crease or one text, which are consecutive and stay
+    together, share it. ``rank`` (S,) int64: of the strokes of one operation a lower rank goes
+    first.
+    """
+
+    toolpath: Toolpath
+    group: NDArray[np.int64]
+    rank: NDArray[np.int64]
+
+
+def order_strokes(strokes: Strokes, edges_vertices: NDArray[np.int64]) -> Toolpath:
+    """The toolpath of ``strokes`` in order. ``edges_vertices`` (E, 2) of the pattern tells which
+    creases meet; a crease's strokes run from its first vertex to its second.
+    """
+    raw = strokes.toolpath
+    order = _Order(
+        np.empty(0, dtype=np.int64), np.empty(0, dtype=bool), np.empty(0, dtype=np.int64)
+    )
+    here = np.zeros(2)
+    for operation, name in enumerate(OPERATIONS):
+        for rank in np.unique(strokes.rank[raw.operation == operation]).tolist():
+            chosen = np.flatnonzero((raw.operation == operation) & (strokes.rank == rank))
+            if name in ("score", "perforate"):
+                part = _creases(raw, chosen, strokes.group[chosen], edges_vertices, here)
+            else:
+                part = _nearest(raw, chosen, strokes.group[chosen], here)
+            order = _Order(
+                np.concatenate([order.stroke, part.stroke]),
+                np.concatenate([order.backwards, part.backwards]),
+                np.concatenate([order.begin, part.begin]),
+            )
+            here = _arranged(raw, part).points[-1]
+    return _arranged(raw, order)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Order:
+    """The strokes in turn, whether each is made backwards, and at which point a closed one is
+    begun.
+    """
+
+    stroke: NDArray[np.int64]
+    backwards: NDArray[np.bool_]
+    begin: NDArray[np.int64]
+
+
+def _arranged(raw: Toolpath, order: _Order) -> Toolpath:
+    """The strokes of ``raw`` in ``order``."""
+    first, count = raw.offsets[order.stroke], np.diff(raw.offsets)[order.stroke]
+    offsets = np.concatenate([[0], np.cumsum(count)])
+    step = np.arange(offsets[-1]) - np.repeat(offsets[:-1], count)
+    n, back = np.repeat(count, count), np.repeat(order.backwards, count)
+    begin = np.repeat(order.begin, count)
+    within = np.where(back, n - 1 - step, step)
+    within = np.where(begin > 0, (begin + step) % np.maximum(n - 1, 1), within)
+    return dataclasses.replace(
+        raw,
+        points=raw.points[np.repeat(first, count) + within],
+        offsets=offsets,
+        operation=raw.operation[order.stroke],
+        patch=raw.patch[order.stroke],
+        edge=raw.edge[order.stroke],
+    )
+
+
+def _groups(group: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where each run of equal ``group`` begins, and how long it is."""
+    begin = np.flatnonzero(np.diff(group, prepend=group[:1] - 1))
+    return begin, np.diff(np.append(begin, len(group)))
+
+
+def _unrolled(
+    begin: NDArray[np.int64], count: NDArray[np.int64], backwards: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """The members of runs, each run forwards or backwards."""
+    step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    back = np.repeat(backwards, count)
+    return np.repeat(begin, count) + np.where(back, np.repeat(count, count) - 1 - step, step)
+
+
+def _creases(
+    raw: Toolpath,
+    chosen: NDArray[np.int64],
+    group: NDArray[np.int64],
+    edges_vertices: NDArray[np.int64],
+    here: NDArray[np.float64],
+) -> _Order:
+    begin, count = _groups(group)
+    ends = np.stack([raw.starts[chosen[begin]], raw.ends[chosen[begin + count - 1]]], axis=1)
+    # The same pattern vertex is another node on another patch.
+    vertex = edges_vertices[raw.edge[chosen[begin]]]
+    key = raw.patch[chosen[begin]][:, None] * (edges_vertices.max() + 1) + vertex
+    nodes, node = np.unique(key, return_inverse=True)
+    node = node.reshape(-1, 2)
+    total = np.zeros((len(nodes), 2))
+    np.add.at(total, node.ravel(), ends.reshape(-1, 2))
+    positions = total / np.bincount(node.ravel())[:, None]
+    route = find_route(node[:, 0], node[:, 1], positions, here)
+    member = _unrolled(begin[route.order], count[route.order], route.backwards)
+    back = np.repeat(route.backwards, count[route.order])
+    return _Order(chosen[member], back, np.zeros(len(member), dtype=np.int64))
+
+
+def _nearest(
+    raw: Toolpath, chosen: NDArray[np.int64], group: NDArray[np.int64], here: NDArray[np.float64]
+) -> _Order:
+    """Groups by the nearest entry: the beginning of a text, either end of an open stroke on its
+    own, and any corner of a closed one.
+    """
+    begin, count = _groups(group)
+    entries, exits, item, back, corner = [], [], [], [], []
+    for k, (at, strokes) in enumerate(zip(begin.tolist(), count.tolist(), strict=True)):
+        first, last = raw.stroke(int(chosen[at])), raw.stroke(int(chosen[at + strokes - 1]))
+        cut = strokes == 1 and raw.operation[chosen[at]] == OPERATIONS.index("cut")
+        if cut and np.array_equal(first[0], first[-1]):
+            ways = [(point, point, False, n) for n, point in enumerate(first[:-1])]
+        else:
+            ways = [(first[0], last[-1], False, 0)]
+            ways += [(first[-1], first[0], True, 0)] if cut else []
+        for entry, leave, backwards, n in ways:
+            entries.append(entry)
+            exits.append(leave)
+            item.append(k)
+            back.append(backwards)
+            corner.append(n)
+    points, leaves, owner = np.array(entries), np.array(exits), np.array(item)
+    left = np.ones(len(points), dtype=bool)
+    taken = []
+    for _ in range(len(begin)):
+        way = np.where(left, np.hypot(*(points - here).T), np.inf)
+        at = int(np.argmin(way))
+        taken.append(at)
+        left[owner == owner[at]] = False
+        here = leaves[at]
+    which = owner[taken]
+    member = _unrolled(begin[which], count[which], np.zeros(len(which), dtype=bool))
+    reverse = np.repeat(np.array(back)[taken], count[which])
+    return _Order(chosen[member], reverse, np.repeat(np.array(corner)[taken], count[which]))

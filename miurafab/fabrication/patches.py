@@ -1,0 +1,256 @@
+"""The pattern split into patches: connected pieces without holes that fit the bed with their tabs.
+
+A pattern that fits is one patch. Otherwise a grid of facets is cut into bands and runs
+(:mod:`~miurafab.fabrication.bands`), and any other mesh is grown into regions
+(:mod:`~miurafab.fabrication.growing`). A flat pattern may overlap itself; a patch may not, and
+one that does is grown again in halves until none does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from miurafab.errors import LayoutError
+from miurafab.fabrication.bands import GridShape, split_grid
+from miurafab.fabrication.boxes import best_turn, box_of, fan, fits, support
+from miurafab.fabrication.growing import grow_patches, is_disk
+from miurafab.fabrication.tabs import TabRegions, tab_regions
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import Material
+
+_TURNS = 30
+"""Angles in a right angle at which boxes are tried: steps of 3 degrees."""
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """The closed boundary of a patch, counter-clockwise: pattern vertex i is followed by pattern
+    edge i. ``vertices`` and ``edges`` (n,) int64.
+    """
+
+    vertices: NDArray[np.int64]
+    edges: NDArray[np.int64]
+
+
+def split(
+    pattern: CreasePattern, width: float, height: float, material: Material
+) -> NDArray[np.int64]:
+    """(F,) the patch of each facet, from 0, so that each fits ``width`` x ``height`` mm.
+
+    Tabs are counted in, and stand on the patch with the lower number. Raises
+    :class:`~miurafab.errors.LayoutError` naming the facet if one is not a simple polygon or does
+    not fit alone.
+    """
+    check_facets(pattern)
+    faces = len(pattern.faces_vertices)
+    whole = np.zeros(faces, dtype=np.int64)
+    if _fits_whole(pattern, width, height):
+        return whole
+    directions = fan(_TURNS)
+    corners = pattern.faces_vertices
+    body = support(pattern.vertices_coords[corners], corners >= 0, directions)
+    inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+    cells = _cells(pattern)
+    if cells is None:
+        # Which patch is the lower one is not known yet: every tab that may stand is counted in.
+        edges = np.concatenate([inner, inner])
+        sides = np.repeat([0, 1], len(inner))
+    else:
+        place = _places(cells)[pattern.edges_faces[inner]]
+        edges, sides = inner, (place[:, 0] < place[:, 1]).astype(np.int64)
+    tabs = tab_regions(pattern, edges, sides, material)
+    tab_values = support(tabs.points, tabs.present, directions)
+    reach = body.copy()
+    np.maximum.at(reach, tabs.own_face, tab_values)
+    _check_alone(pattern, ~fits(reach, width, height), tabs, width, height)
+
+    if cells is None:
+        found = grow_patches(pattern, reach, width, height)
+    else:
+        shape = _grid_shape(pattern, cells, body, tabs, tab_values)
+        found = np.empty(faces, dtype=np.int64)
+        for patch, (r0, r1, c0, c1) in enumerate(split_grid(shape, width, height)):
+            found[cells[r0:r1, c0:c1]] = patch
+    return _without_overlaps(pattern, found, reach, width, height)
+
+
+def boundaries(pattern: CreasePattern, face_patch: NDArray[np.int64]) -> list[Boundary]:
+    """The boundary of each patch of the split ``face_patch`` (F,), by patch id.
+
+    Each begins at its lowest-numbered edge.
+    """
+    face, corner = np.nonzero(pattern.faces_vertices >= 0)
+    edge = pattern.faces_edges[face, corner]
+    tail = pattern.faces_vertices[face, corner]
+    sides = pattern.edges_faces[edge]
+    other = np.where(sides[:, 0] == face, sides[:, 1], sides[:, 0])
+    patch = face_patch[face]
+    border = np.flatnonzero((other < 0) | (face_patch[other] != patch))
+    border = border[np.lexsort((edge[border], patch[border]))]
+    patch, edge, tail = patch[border], edge[border], tail[border]
+    head = pattern.edges_vertices[edge].sum(axis=1) - tail
+    vertices = len(pattern.vertices_coords)
+    keys = patch * vertices + tail
+    order = np.argsort(keys)
+    following = order[np.searchsorted(keys, patch * vertices + head, sorter=order)].tolist()
+    found = []
+    starts = np.searchsorted(patch, np.arange(int(face_patch.max(initial=-1)) + 1))
+    for start in starts.tolist():
+        steps = [start]
+        while following[steps[-1]] != start:
+            steps.append(following[steps[-1]])
+        found.append(Boundary(tail[steps], edge[steps]))
+    return found
+
+
+def check_facets(pattern: CreasePattern) -> None:
+    """Raise :class:`~miurafab.errors.LayoutError` unless every facet is a simple polygon,
+    counter-clockwise in the flat pattern, and every edge belongs to one.
+    """
+    if not len(pattern.faces_vertices):
+        raise LayoutError("The pattern has no facets; there is nothing to lay out.")
+    loose = np.flatnonzero((pattern.edges_faces < 0).all(axis=1))
+    if len(loose):
+        raise LayoutError(f"Edge {loose[0]} of the pattern belongs to no facet; remove it.")
+    real = pattern.faces_vertices >= 0
+    count = real.sum(axis=1)
+    for corners in np.unique(count):
+        faces = np.flatnonzero(count == corners)
+        points = pattern.vertices_coords[pattern.faces_vertices[faces, :corners]]
+        x, y = points[..., 0], points[..., 1]
+        doubled = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+        bad = doubled <= 0
+        if corners >= 3:
+            bad |= ~shapely.is_valid(shapely.polygons(points))
+        if bad.any():
+            raise LayoutError(
+                f"Facet {faces[bad][0]} is not a simple counter-clockwise polygon in the flat "
+                "pattern; run a check on the pattern before laying it out."
+            )
+
+
+def _fits_whole(pattern: CreasePattern, width: float, height: float) -> bool:
+    faces = np.arange(len(pattern.faces_vertices))
+    used = np.unique(pattern.faces_vertices[pattern.faces_vertices >= 0])
+    if best_turn(pattern.vertices_coords[used], width, height) is None:
+        return False
+    return is_disk(pattern, faces) and not len(_overlapping(pattern, np.zeros_like(faces)))
+
+
+def _cells(pattern: CreasePattern) -> NDArray[np.int64] | None:
+    """(R, C) the facet in each cell of the grid, or None if the facets are not those of a grid."""
+    if pattern.grid is None:
+        return None
+    columns, rows = pattern.grid
+    faces = pattern.faces_vertices
+    if len(faces) != (columns - 1) * (rows - 1) or faces.shape[1] != 4:
+        return None
+    low = faces.min(axis=1)
+    cell = np.column_stack([low, low + 1, low + columns, low + columns + 1])
+    row, column = np.divmod(low, columns)
+    regular = (np.sort(faces, axis=1) == cell).all(axis=1) & (column < columns - 1)
+    if not regular.all() or (row >= rows - 1).any() or len(np.unique(low)) != len(faces):
+        return None
+    cells = np.empty((rows - 1, columns - 1), dtype=np.int64)
+    cells[row, column] = np.arange(len(faces))
+    return cells
+
+
+def _places(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(F,) the position of each facet in the flattened ``cells``."""
+    place = np.empty(cells.size, dtype=np.int64)
+    place[cells.ravel()] = np.arange(cells.size)
+    return place
+
+
+def _grid_shape(
+    pattern: CreasePattern,
+    cells: NDArray[np.int64],
+    body: NDArray[np.float32],
+    tabs: TabRegions,
+    tab_values: NDArray[np.float32],
+) -> GridShape:
+    """What the split of the grid needs; ``tabs`` stand on the lower one of two facets."""
+    rows, columns = cells.shape
+    place = _places(cells)
+    own = place[tabs.own_face]
+    upward = place[tabs.mate_face] != own + 1 if columns > 1 else np.ones(len(own), dtype=bool)
+    ends = pattern.vertices_coords[pattern.edges_vertices[tabs.edge]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+    def standing(which: NDArray[np.bool_]) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        values = np.full((cells.size, body.shape[1]), -np.inf, dtype=np.float32)
+        values[own[which]] = tab_values[which]
+        sides = np.zeros(cells.size)
+        sides[own[which]] = length[which]
+        return by_column(values), sides.reshape(rows, columns).T.copy()
+
+    def by_column(values: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.ascontiguousarray(values.reshape(rows, columns, -1).swapaxes(0, 1))
+
+    right, right_mm = standing(~upward)
+    top, top_mm = standing(upward)
+    return GridShape(by_column(body[cells.ravel()]), right, top, right_mm, top_mm)
+
+
+def _check_alone(
+    pattern: CreasePattern,
+    doubtful: NDArray[np.bool_],
+    tabs: TabRegions,
+    width: float,
+    height: float,
+) -> None:
+    """Raise a LayoutError for the first ``doubtful`` (F,) facet that does not fit at any angle."""
+    for face in np.flatnonzero(doubtful).tolist():
+        corners = pattern.faces_vertices[face]
+        facet = pattern.vertices_coords[corners[corners >= 0]]
+        standing = np.flatnonzero(tabs.own_face == face)
+        points = np.concatenate([facet, *(tabs.polygon(i) for i in standing)])
+        if best_turn(points, width, height) is not None:
+            continue
+        long, short = box_of(points)
+        with_tabs = "" if best_turn(facet, width, height) is None else " with its tabs"
+        if not with_tabs:
+            long, short = box_of(facet)
+        raise LayoutError(
+            f"Facet {face} measures {long:.1f} mm x {short:.1f} mm{with_tabs} and does not fit the "
+            f"usable bed of {width:.1f} mm x {height:.1f} mm; make the pattern smaller, use more "
+            "facets, or take a larger bed."
+        )
+
+
+def _overlapping(pattern: CreasePattern, face_patch: NDArray[np.int64]) -> list[int]:
+    """The patches whose boundary crosses or touches itself in the plane.
+
+    Facets are counter-clockwise, so a patch is an immersed disk, and it overlaps itself only if
+    its boundary is not a simple closed curve.
+    """
+    rings = [pattern.vertices_coords[b.vertices] for b in boundaries(pattern, face_patch)]
+    valid = shapely.is_valid(np.array([shapely.Polygon(ring) for ring in rings]))
+    return np.flatnonzero(~valid).tolist()
+
+
+def _without_overlaps(
+    pattern: CreasePattern,
+    face_patch: NDArray[np.int64],
+    reach: NDArray[np.float32],
+    width: float,
+    height: float,
+) -> NDArray[np.int64]:
+    """The split with every patch that overlaps itself grown again in halves, ids from 0."""
+    while True:
+        bad = _overlapping(pattern, face_patch)
+        if not bad:
+            return face_patch
+        # Ids are spread to make room for the parts, so that neighbours keep their order.
+        face_patch = face_patch * len(face_patch)
+        for patch in bad:
+            faces = np.flatnonzero(face_patch == patch * len(face_patch))
+            half = (len(faces) + 1) // 2
+            parts = grow_patches(pattern, reach, width, height, faces, half)
+            face_patch[faces] += parts[faces]
+        face_patch = np.unique(face_patch, return_inverse=True)[1].astype(np.int64)

@@ -1,0 +1,265 @@
+"""Sheets: a pattern laid out for a machine and a material, ready to be drawn and posted.
+
+:func:`lay_out` is the one way from a :class:`~miurafab.origami.crease_pattern.CreasePattern` to a
+:class:`Layout`: split into pieces, turned to their smallest box, nested, lettered, and ordered.
+Each piece is moved twice: from the pattern to its own frame, in which its box begins at the
+origin, and from there to its sheet. A point p of the pattern lies on the sheet at
+
+    R(placement) (R(patch) (p - origin)) + (x, y).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from miurafab.errors import LayoutError
+from miurafab.fabrication.boxes import best_turn
+from miurafab.fabrication.labels import place_texts
+from miurafab.fabrication.nesting import Slot, Stock, nest, turned
+from miurafab.fabrication.ordering import order_strokes
+from miurafab.fabrication.pieces import Piece, Pieces, make_pieces
+from miurafab.fabrication.strokes import Motion, sheet_strokes
+from miurafab.fabrication.tabs import Tab
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import MachineProfile, Material
+
+_DIGITS = 6
+"""Decimals of mm that a layout keeps, so that what is written is what was computed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """One piece, in its own frame. ``faces`` (n,) int64 index the pattern's facets.
+
+    ``outline_mm`` (m, 2) is the cut line with tabs, kerf included, counter-clockwise, and
+    ``waste_mm`` further closed cut lines inside it, around enclosed waste; there rarely are any.
+    A point p of the pattern is R(``rotation_deg``) (p - ``origin_mm``) in this frame.
+    """
+
+    id: int
+    label: str
+    faces: NDArray[np.int64]
+    outline_mm: NDArray[np.float64]
+    waste_mm: tuple[NDArray[np.float64], ...]
+    origin_mm: tuple[float, float]
+    rotation_deg: float
+    tabs: tuple[Tab, ...]
+
+    def from_pattern(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """``points`` (n, 2) of the pattern in the patch frame."""
+        return turned(points - self.origin_mm, self.rotation_deg)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where a patch lies on its sheet: turned about the origin of its frame, then moved."""
+
+    patch: int
+    x_mm: float
+    y_mm: float
+    rotation_deg: float
+
+    def from_patch(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """``points`` (n, 2) of the patch frame on the sheet."""
+        shift = np.array([self.x_mm, self.y_mm])
+        moved: NDArray[np.float64] = turned(points, self.rotation_deg) + shift
+        return moved
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A sheet as large as the machine's bed, and what lies on it."""
+
+    name: str
+    width_mm: float
+    height_mm: float
+    placements: tuple[Placement, ...]
+
+
+@dataclass(frozen=True)
+class Totals:
+    """Sums over a layout. ``seam_mm`` is the length of all seams, ``density`` the area of the
+    patches over that of the usable beds; ``seconds`` is None until somebody estimates it.
+    """
+
+    patches: int
+    sheets: int
+    seam_mm: float
+    tabs: int
+    density: float
+    cut_mm: float
+    perforated_mm: float
+    travel_mm: float
+    seconds: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A pattern on sheets. ``toolpaths`` holds one for each sheet, and none if the layout was
+    read from a file.
+
+    ``untabbed`` are the pattern edges of seams on which no tab could stand, and
+    ``unlettered`` is how many names and numbers found no room; both are for the assembly.
+    """
+
+    machine: str
+    material: str
+    patches: tuple[Patch, ...]
+    sheets: tuple[Sheet, ...]
+    totals: Totals
+    untabbed: tuple[int, ...] = ()
+    unlettered: int = 0
+    toolpaths: tuple[Toolpath, ...] = ()
+
+
+def lay_out(
+    pattern: CreasePattern, machine: MachineProfile, material: Material, *, gap_mm: float = 2.0
+) -> Layout:
+    """The pattern laid out on sheets of the machine's bed, with ``gap_mm`` between patches.
+
+    Deterministic. Raises :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed, or
+    is not a simple polygon, or the material's dashes cannot be drawn.
+    """
+    bed = machine.bed
+    width, height = bed.width_mm - 2 * bed.margin_mm, bed.height_mm - 2 * bed.margin_mm
+    pieces = make_pieces(pattern, width, height, material)
+    numbers = _numbers(pieces)
+    patches = tuple(
+        _patch(number, piece, pieces, numbers, (width, height))
+        for number, piece in enumerate(pieces.pieces)
+    )
+    slots = nest(
+        [patch.outline_mm for patch in patches], Stock(width, height, gap_mm, (0, 90, 180, 270))
+    )
+    placements = [
+        Placement(
+            patch=patch.id,
+            x_mm=round(slot.x_mm + bed.margin_mm, _DIGITS),
+            y_mm=round(slot.y_mm + bed.margin_mm, _DIGITS),
+            rotation_deg=float(slot.rotation_deg),
+        )
+        for patch, slot in zip(patches, slots, strict=True)
+    ]
+    sheets = _sheets(placements, slots, bed.width_mm, bed.height_mm)
+    motion = _motion(patches, placements, slots)
+    turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
+    names = [patch.label for patch in patches]
+    texts, unlettered = place_texts(pattern, pieces.face_patch, names, pieces.tabs, numbers, turns)
+    described = [(sheet.name, sheet.width_mm, sheet.height_mm) for sheet in sheets]
+    strokes = sheet_strokes(pattern, pieces, texts, motion, material, described)
+    toolpaths = tuple(order_strokes(each, pattern.edges_vertices) for each in strokes)
+    return Layout(
+        machine=machine.name,
+        material=material.name,
+        patches=patches,
+        sheets=sheets,
+        totals=_totals(pattern, pieces, patches, toolpaths, width * height),
+        untabbed=tuple(pieces.untabbed.tolist()),
+        unlettered=unlettered,
+        toolpaths=toolpaths,
+    )
+
+
+def _numbers(pieces: Pieces) -> NDArray[np.int64]:
+    """The number of each tab, from 1, patch by patch along the outline."""
+    numbers = np.empty(len(pieces.tabs), dtype=np.int64)
+    order = np.concatenate([piece.tabs for piece in pieces.pieces])
+    numbers[order] = np.arange(1, len(order) + 1)
+    return numbers
+
+
+def _patch(
+    number: int,
+    piece: Piece,
+    pieces: Pieces,
+    numbers: NDArray[np.int64],
+    size: tuple[float, float],
+) -> Patch:
+    line = piece.cut_lines[0]
+    angle = best_turn(line, *size)
+    if angle is None:
+        raise LayoutError(f"Patch {number} with its tabs does not fit the bed at any angle.")
+    rotation = round(-math.degrees(angle), 9)
+    low = turned(line, rotation).min(axis=0)
+    origin = np.round(turned(low, -rotation), _DIGITS)
+
+    def framed(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.round(turned(points - origin, rotation), _DIGITS)
+
+    tabs = pieces.tabs
+    return Patch(
+        id=number,
+        label=f"P{number + 1}",
+        faces=piece.faces,
+        outline_mm=framed(line),
+        waste_mm=tuple(framed(ring) for ring in piece.cut_lines[1:]),
+        origin_mm=(float(origin[0]), float(origin[1])),
+        rotation_deg=rotation,
+        tabs=tuple(
+            Tab(
+                number=int(numbers[tab]),
+                edge=int(tabs.edge[tab]),
+                mate_patch=int(pieces.face_patch[tabs.mate_face[tab]]),
+                polygon_mm=framed(tabs.polygon(tab)),
+            )
+            for tab in piece.tabs.tolist()
+        ),
+    )
+
+
+def _sheets(
+    placements: list[Placement], slots: list[Slot], width: float, height: float
+) -> tuple[Sheet, ...]:
+    count = max(slot.sheet for slot in slots) + 1
+    on_sheet: list[list[Placement]] = [[] for _ in range(count)]
+    for placement, slot in zip(placements, slots, strict=True):
+        on_sheet[slot.sheet].append(placement)
+    return tuple(
+        Sheet(f"sheet-{number:02d}", width, height, tuple(placed))
+        for number, placed in enumerate(on_sheet, start=1)
+    )
+
+
+def _motion(patches: tuple[Patch, ...], placements: list[Placement], slots: list[Slot]) -> Motion:
+    """The way of each patch from the pattern to its sheet, in one step."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    moved = np.array(
+        [
+            placement.from_patch(patch.from_pattern(corners + np.array(patch.origin_mm)))
+            for patch, placement in zip(patches, placements, strict=True)
+        ]
+    )
+    matrix = np.stack([moved[:, 1] - moved[:, 0], moved[:, 2] - moved[:, 0]], axis=2)
+    origins = np.array([patch.origin_mm for patch in patches])
+    shift = moved[:, 0] - np.einsum("nij,nj->ni", matrix, origins)
+    return Motion(matrix, shift, np.array([slot.sheet for slot in slots]))
+
+
+def _totals(
+    pattern: CreasePattern,
+    pieces: Pieces,
+    patches: tuple[Patch, ...],
+    toolpaths: tuple[Toolpath, ...],
+    usable: float,
+) -> Totals:
+    faces = pattern.edges_faces
+    seam = (faces >= 0).all(axis=1)
+    seam &= pieces.face_patch[faces[:, 0]] != pieces.face_patch[faces[:, 1]]
+    ends = pattern.vertices_coords[pattern.edges_vertices[seam]]
+    area = sum(shapely.Polygon(patch.outline_mm).area for patch in patches)
+    return Totals(
+        patches=len(patches),
+        sheets=len(toolpaths),
+        seam_mm=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()),
+        tabs=len(pieces.tabs),
+        density=float(area / (len(toolpaths) * usable)),
+        cut_mm=sum(toolpath.length_of("cut") for toolpath in toolpaths),
+        perforated_mm=sum(toolpath.length_of("perforate") for toolpath in toolpaths),
+        travel_mm=sum(toolpath.travel_mm for toolpath in toolpaths),
+    )

@@ -1,0 +1,258 @@
+"""Glue tabs: each is a piece of the facet that it will be glued to.
+
+The paper is continuous across a seam, so the tab on seam edge e of patch A, glued to facet g of
+patch B, is drawn where g itself lies in the flat pattern. It is the set of points x of g with
+
+    0 <= d_e(x) <= height,    d_k(x) >= inset  for every other side k of g,
+    d_k(x) - d_e(x) >= inset |n_k - n_e|  for every other side k of g that bears a tab too,
+
+where d_k is the distance from the line of side k, inwards, and n_k its inward normal. The last
+line splits g on the bisector of its two seam edges. So a tab touches nothing but its own seam
+edge, in the flat pattern and, after folding, inside g; it crosses no crease of g because g has
+none. For a facet that is not convex the region is smaller than it might be, and still right.
+
+The base of a tab is the piece of e that it stands on, and its fold; the rest of e is cut.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import Material
+
+MIN_BASE_MM = 1.0
+"""A tab with a shorter base is not worth its cut (judged)."""
+
+MIN_AREA_MM2 = 2.0
+"""A tab with less glue area does not hold (judged)."""
+
+_NO_LIMIT = -1e12
+"""Below every p·n in mm; finite, so that differences of depths stay numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tab:
+    """A tab of one patch. ``number`` is engraved on both sides of the seam; ``edge`` is the pattern
+    edge of the seam, ``mate_patch`` the id of the patch it is glued to, and ``polygon_mm`` (n, 2)
+    its outline in the patch frame, counter-clockwise, the first side being the base.
+    """
+
+    number: int
+    edge: int
+    mate_patch: int
+    polygon_mm: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TabRegions:
+    """N tabs in the pattern's plane: on ``edge`` (N,) of facet ``own_face`` (N,), glued to
+    ``mate_face`` (N,). ``points`` (N, m, 2) in mm, counter-clockwise, the first side being the
+    base; of each only the first ``count`` (N,) corners are real, none if there is no region.
+    """
+
+    edge: NDArray[np.int64]
+    own_face: NDArray[np.int64]
+    mate_face: NDArray[np.int64]
+    points: NDArray[np.float64]
+    count: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.edge)
+
+    def polygon(self, index: int | np.integer) -> NDArray[np.float64]:
+        """(n, 2) corners of one tab."""
+        return self.points[index, : self.count[index]]
+
+    def take(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> TabRegions:
+        """The tabs that ``which`` picks."""
+        return TabRegions(
+            self.edge[which],
+            self.own_face[which],
+            self.mate_face[which],
+            self.points[which],
+            self.count[which],
+        )
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """(N, m) which corners are real."""
+        found: NDArray[np.bool_] = np.arange(self.points.shape[1]) < self.count[:, None]
+        return found
+
+    @property
+    def areas(self) -> NDArray[np.float64]:
+        """(N,) glue areas in mm²."""
+        ahead = np.where(self.present[..., None], self.points, self.points[:, :1])
+        x, y = (ahead - self.points[:, :1]).transpose(2, 0, 1)
+        doubled = x[:, :-1] * y[:, 1:] - x[:, 1:] * y[:, :-1]
+        area: NDArray[np.float64] = doubled.sum(axis=1) / 2
+        return area
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """(N,) which are long and large enough to hold."""
+        base = np.linalg.norm(self.points[:, 1] - self.points[:, 0], axis=1)
+        enough = np.logical_and(base >= MIN_BASE_MM, self.areas >= MIN_AREA_MM2)
+        found: NDArray[np.bool_] = enough & (self.count >= 3)
+        return found
+
+
+def inset_of(material: Material) -> float:
+    """The inset in mm that tabs of ``material`` keep: at least so much that the cuts on both
+    sides of a notch stay apart.
+    """
+    return max(material.tabs.inset_mm, material.kerf_mm + 0.05)
+
+
+def tab_regions(
+    pattern: CreasePattern,
+    edges: NDArray[np.int64],
+    sides: NDArray[np.int64],
+    material: Material,
+    bearing: NDArray[np.bool_] | None = None,
+) -> TabRegions:
+    """The tabs on ``edges`` (N,), each glued to the facet ``edges_faces[edge, side]``.
+
+    ``bearing`` (F, k) tells which sides of each facet have a tab glued inside them, and so share
+    the facet; without it every tab is computed as if alone, which only makes it larger.
+    """
+    mate = pattern.edges_faces[edges, sides]
+    ends = pattern.vertices_coords[pattern.edges_vertices[edges]]
+    a = ends[np.arange(len(edges)), sides]
+    b = ends[np.arange(len(edges)), 1 - sides]
+    along = b - a
+    length = np.linalg.norm(along, axis=1)
+    along /= np.where(length > 0, length, 1.0)[:, None]
+    frame = np.stack([along, np.column_stack([-along[:, 1], along[:, 0]])], axis=1)
+
+    corners = pattern.faces_vertices[mate]
+    real = corners >= 0
+    following = np.roll(corners, -1, axis=1)
+    last = real & ~np.roll(np.pad(real, ((0, 0), (0, 1))), -1, axis=1)[:, :-1]
+    following = np.where(last, corners[:, :1], following)
+    local = np.einsum("nij,nkj->nki", frame, pattern.vertices_coords[corners] - a[:, None])
+    ahead = np.einsum("nij,nkj->nki", frame, pattern.vertices_coords[following] - a[:, None])
+    step = ahead - local
+    size = np.linalg.norm(step, axis=2)
+    step /= np.where(size > 0, size, 1.0)[..., None]
+    normal = np.stack([-step[..., 1], step[..., 0]], axis=-1)
+    offset = np.einsum("nki,nki->nk", normal, local)
+
+    inset = inset_of(material)
+    other = real & (pattern.faces_edges[mate] != edges[:, None])
+    reach = np.abs(local).max(axis=(1, 2), initial=0.0) + 1.0
+    height = np.full(len(edges), material.tabs.height_mm)
+    zero = np.zeros(len(edges))
+    points = np.stack(
+        [
+            np.column_stack([-reach, zero]),
+            np.column_stack([reach, zero]),
+            np.column_stack([reach, height]),
+            np.column_stack([-reach, height]),
+        ],
+        axis=1,
+    )
+    count = np.full(len(edges), 4)
+    for k in range(corners.shape[1]):
+        limit = np.where(other[:, k], offset[:, k] + inset, _NO_LIMIT)
+        points, count = _clip(points, count, normal[:, k], limit)
+        if bearing is None:
+            continue
+        towards = normal[:, k] - np.array([0.0, 1.0])
+        shared = other[:, k] & bearing[mate, k]
+        limit = offset[:, k] + inset * np.linalg.norm(towards, axis=1)
+        points, count = _clip(points, count, towards, np.where(shared, limit, _NO_LIMIT))
+    points, count = _base_first(points, count)
+    placed = a[:, None] + np.einsum("nij,nki->nkj", frame, points)
+    own = pattern.edges_faces[edges, 1 - sides]
+    return TabRegions(edges, own, mate, placed, count)
+
+
+def choose_tabs(
+    pattern: CreasePattern, face_patch: NDArray[np.int64], material: Material
+) -> tuple[TabRegions, NDArray[np.bool_], NDArray[np.int64]]:
+    """One tab for each seam edge of the split ``face_patch`` (F,), the patch id of each facet.
+
+    The patch with the lower id bears the tab; where its tab would be too small, the other one.
+    Returns the tabs, (N,) which of them stand on the other patch, and (M,) the seam edges where
+    neither patch can bear one. Cuts in the pattern (assignment C) get none.
+    """
+    faces = pattern.edges_faces
+    inner = (faces >= 0).all(axis=1)
+    patch = np.where(faces >= 0, face_patch[faces], -1)
+    seam = inner & (patch[:, 0] != patch[:, 1])
+    edges = np.flatnonzero(seam & (pattern.edges_assignment != "C"))
+    usual = np.where(patch[edges, 0] < patch[edges, 1], 1, 0)
+
+    tabs = tab_regions(pattern, edges, usual, material, _bearing(pattern, edges, usual))
+    swapped = ~tabs.usable
+    if swapped.any():
+        sides = np.where(swapped, 1 - usual, usual)
+        tabs = tab_regions(pattern, edges, sides, material, _bearing(pattern, edges, sides))
+    kept = tabs.usable
+    return tabs.take(kept), swapped[kept], edges[~kept]
+
+
+def _bearing(
+    pattern: CreasePattern, edges: NDArray[np.int64], sides: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """(F, k) which facet sides have a tab glued inside them."""
+    mate_of_edge = np.full(len(pattern.edges_vertices), -2)
+    mate_of_edge[edges] = pattern.edges_faces[edges, sides]
+    facet = np.arange(len(pattern.faces_vertices))[:, None]
+    found: NDArray[np.bool_] = (pattern.faces_edges >= 0) & (
+        mate_of_edge[pattern.faces_edges] == facet
+    )
+    return found
+
+
+def _clip(
+    points: NDArray[np.float64],
+    count: NDArray[np.int64],
+    normal: NDArray[np.float64],
+    limit: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The parts p·n >= limit of N convex polygons ``points`` (N, m, 2) of ``count`` corners.
+
+    Each corner hands on itself if it is inside, and the crossing on the side that follows it if
+    there is one (Sutherland and Hodgman 1974), for all polygons at once.
+    """
+    rows, slots = points.shape[:2]
+    slot = np.arange(slots)
+    real = slot < count[:, None]
+    following = np.where(slot + 1 < count[:, None], slot + 1, 0)
+    depth = np.einsum("nki,ni->nk", points, normal) - limit[:, None]
+    inside = depth >= 0
+    ahead = np.take_along_axis(points, following[..., None], axis=1)
+    ahead_depth = np.take_along_axis(depth, following, axis=1)
+    crossed = real & (inside != np.take_along_axis(inside, following, axis=1))
+    part = np.divide(depth, depth - ahead_depth, out=np.zeros_like(depth), where=crossed)
+    crossing = points + part[..., None] * (ahead - points)
+
+    handed = np.stack([points, crossing], axis=2).reshape(rows, 2 * slots, 2)
+    kept = np.stack([real & inside, crossed], axis=2).reshape(rows, 2 * slots)
+    order = np.argsort(~kept, axis=1, kind="stable")
+    total = kept.sum(axis=1)
+    width = max(int(total.max(initial=0)), 2)
+    order = order[:, :width]
+    return np.take_along_axis(handed, order[..., None], axis=1), total
+
+
+def _base_first(
+    points: NDArray[np.float64], count: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The polygons with their base, the two corners on y = 0, as first side; those without a
+    base are left without corners.
+    """
+    slot = np.arange(points.shape[1])
+    real = slot < count[:, None]
+    on_line = real & (points[..., 1] == 0.0)
+    start = np.where(on_line, points[..., 0], np.inf).argmin(axis=1)
+    count = np.where(on_line.sum(axis=1) == 2, count, 0)
+    turn = (slot + start[:, None]) % np.maximum(count, 1)[:, None]
+    turn = np.where(slot < count[:, None], turn, slot)
+    return np.take_along_axis(points, turn[..., None], axis=1), count
