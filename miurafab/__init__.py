@@ -23,13 +23,22 @@ if TYPE_CHECKING:
     from miurafab.origami.fit import fit
     from miurafab.posting import post
     from miurafab.profiles import load_machine, load_material
+    from miurafab.workflow.cut import DEFAULT_MATERIAL, cut, prepare
     from miurafab.workflow.design import design, load_pattern, save_pattern
     from miurafab.workflow.doctor import examine
+    from miurafab.workflow.job_directory import read_job, sheets, write_job
+    from miurafab.workflow.page import write_page
+    from miurafab.workflow.picture import write_pictures
+    from miurafab.workflow.preview import ASSUMED_MACHINE as DEFAULT_MACHINE
+    from miurafab.workflow.preview import preview
 
 __version__ = "0.1.0"
 
 _HOMES = {
+    "DEFAULT_MACHINE": ("miurafab.workflow.preview", "ASSUMED_MACHINE"),
+    "DEFAULT_MATERIAL": ("miurafab.workflow.cut", "DEFAULT_MATERIAL"),
     "check": ("miurafab.origami.audit", "audit"),
+    "cut": ("miurafab.workflow.cut", "cut"),
     "design": ("miurafab.workflow.design", "design"),
     "examine": ("miurafab.workflow.doctor", "examine"),
     "fit": ("miurafab.origami.fit", "fit"),
@@ -37,12 +46,22 @@ _HOMES = {
     "load_material": ("miurafab.profiles", "load_material"),
     "load_pattern": ("miurafab.workflow.design", "load_pattern"),
     "post": ("miurafab.posting", "post"),
+    "prepare": ("miurafab.workflow.cut", "prepare"),
+    "preview": ("miurafab.workflow.preview", "preview"),
+    "read_job": ("miurafab.workflow.job_directory", "read_job"),
     "save_pattern": ("miurafab.workflow.design", "save_pattern"),
+    "sheets": ("miurafab.workflow.job_directory", "sheets"),
+    "write_job": ("miurafab.workflow.job_directory", "write_job"),
+    "write_page": ("miurafab.workflow.page", "write_page"),
+    "write_pictures": ("miurafab.workflow.picture", "write_pictures"),
 }
 
 __all__ = [
+    "DEFAULT_MACHINE",
+    "DEFAULT_MATERIAL",
     "__version__",
     "check",
+    "cut",
     "design",
     "examine",
     "fit",
@@ -50,7 +69,14 @@ __all__ = [
     "load_material",
     "load_pattern",
     "post",
+    "prepare",
+    "preview",
+    "read_job",
     "save_pattern",
+    "sheets",
+    "write_job",
+    "write_page",
+    "write_pictures",
 ]
 
 

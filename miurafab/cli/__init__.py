@@ -11,7 +11,7 @@ from typing import NoReturn
 
 import typer
 
-from miurafab.cli import check, doctor, fit, profiles, surfaces
+from miurafab.cli import check, cut, doctor, fit, profiles, sheets, surfaces
 from miurafab.cli.console import json_text
 from miurafab.errors import MiurafabError
 
@@ -26,6 +26,8 @@ app = typer.Typer(
 app.command("surfaces")(surfaces.surfaces)
 app.command("fit")(fit.fit)
 app.command("check")(check.check)
+app.command("sheets")(sheets.sheets)
+app.command("cut")(cut.cut)
 app.command("profiles")(profiles.profiles)
 app.command("materials")(profiles.materials)
 app.command("doctor")(doctor.doctor)

@@ -1,0 +1,160 @@
+"""The job directory: everything that one job is, on disk, in files that stand alone.
+
+``layout.json`` is written last and removed first, so that a directory with a layout is whole and
+one that was interrupted is no job. The pattern, and a machine or material of the user's own, are
+copied in: the directory can be carried to the machine's computer and cut there.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from miurafab.errors import InputError, LayoutError
+from miurafab.fabrication.drawing.svg import sheet_svg
+from miurafab.fabrication.layout import read_layout, write_layout
+from miurafab.fabrication.sheets import Layout, lay_out
+from miurafab.gcode.job import Job
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.fold_format import read_fold
+from miurafab.posting import post
+from miurafab.profiles import MachineProfile, find_file, load_machine, load_material
+from miurafab.profiles.shipped import Kind, shipped_directory
+from miurafab.workflow.preview import dry_run
+
+LAYOUT = "layout.json"
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class JobDirectory:
+    """A job on disk: its layout, its machine, and the jobs of its sheets in order."""
+
+    path: Path
+    layout: Layout
+    machine: MachineProfile
+    jobs: tuple[Job, ...]
+
+
+def sheets(pattern: CreasePattern, machine: str, material: str) -> Layout:
+    """``pattern`` laid out for the machine and material of these names (or TOML files).
+
+    Raises :class:`~miurafab.errors.LayoutError` or ``ProfileError``.
+    """
+    return lay_out(pattern, load_machine(machine), load_material(material))
+
+
+def write_job(
+    pattern_file: Path,
+    directory: Path,
+    machine: str,
+    material: str,
+    on_progress: Progress | None = None,
+) -> JobDirectory:
+    """Lay the pattern of a FOLD file out and write its job directory.
+
+    ``machine`` and ``material`` are shipped names or TOML files. Sheets of an earlier job in the
+    same directory are removed; files that are no part of a job are left alone. Raises
+    :class:`~miurafab.errors.InputError` where the directory holds something else than a job.
+    """
+    tell = on_progress or (lambda fraction, note: None)
+    tell(0.0, "patches, tabs, perforation, nesting")
+    profile, stock = load_machine(machine), load_material(material)
+    layout = lay_out(read_fold(pattern_file), profile, stock)
+    labels = {patch.id: patch.label for patch in layout.patches}
+    _make_room(directory)
+    jobs = []
+    seconds = 0.0
+    for number, toolpath in enumerate(layout.toolpaths):
+        tell(0.4 + 0.5 * number / len(layout.toolpaths), f"drawing {toolpath.sheet}")
+        job = post(toolpath, profile, stock, patch_labels=labels)
+        jobs.append(job)
+        size = (toolpath.width_mm, toolpath.height_mm)
+        seconds += dry_run(toolpath.sheet, job, profile, size).seconds
+        _write(directory / f"{toolpath.sheet}.nc", job.text)
+        _write(directory / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
+    layout = replace(layout, totals=replace(layout.totals, seconds=round(seconds, 1)))
+    copy = directory / pattern_file.name
+    if copy.resolve() != pattern_file.resolve():
+        shutil.copyfile(pattern_file, copy)
+    _keep_own_profile("firmware_profiles", machine, directory)
+    _keep_own_profile("materials", material, directory)
+    digest = hashlib.sha256(copy.read_bytes()).hexdigest()
+    _write(directory / LAYOUT, write_layout(layout, copy.name, digest))
+    tell(1.0, "done")
+    return JobDirectory(directory, layout, profile, tuple(jobs))
+
+
+def read_job(directory: Path) -> JobDirectory:
+    """The job in a directory that :func:`write_job` made.
+
+    Raises :class:`~miurafab.errors.InputError` if it holds no whole job.
+    """
+    path = directory / LAYOUT
+    if not path.is_file():
+        raise InputError(
+            f"{directory} holds no whole job ({LAYOUT} is missing); make it with 'miurafab sheets'."
+        )
+    try:
+        layout = read_layout(path.read_text(encoding="utf-8"))
+    except LayoutError as fault:
+        raise InputError(f"{path}: {fault}") from None
+    jobs = []
+    for sheet in layout.sheets:
+        file = directory / f"{sheet.name}.nc"
+        if not file.is_file():
+            raise InputError(f"{file} is missing; make the job again with 'miurafab sheets'.")
+        jobs.append(read_gcode(file))
+    own = directory / f"{layout.machine}.toml"
+    machine = load_machine(own if own.is_file() else layout.machine)
+    return JobDirectory(directory, layout, machine, tuple(jobs))
+
+
+def read_gcode(path: Path) -> Job:
+    """A G-code file as a job, whatever bytes it holds; the checks of the sender come later."""
+    try:
+        return Job(path.name, path.read_bytes().decode("utf-8", "surrogateescape"))
+    except OSError as fault:
+        raise InputError(f"{path} cannot be read: {fault.strerror}.") from None
+
+
+def _keep_own_profile(kind: Kind, name: str, directory: Path) -> None:
+    path = find_file(kind, name)
+    if path.resolve().parent != shipped_directory(kind).resolve():
+        copy = directory / path.name
+        if copy.resolve() != path.resolve():
+            shutil.copyfile(path, copy)
+
+
+def _make_room(directory: Path) -> None:
+    """Create the directory, or clear the sheets of the job that is in it."""
+    if directory.exists() and not directory.is_dir():
+        raise InputError(f"{directory} is a file; a job needs a directory.")
+    layout = directory / LAYOUT
+    if not layout.exists():
+        strangers = sorted(directory.glob("*.nc")) if directory.exists() else []
+        if strangers:
+            raise InputError(
+                f"{directory} holds {strangers[0].name}, which no layout there accounts for; "
+                "choose another directory or remove it."
+            )
+        directory.mkdir(parents=True, exist_ok=True)
+        return
+    try:
+        names = [str(sheet["name"]) for sheet in json.loads(layout.read_text())["sheets"]]
+    except (ValueError, KeyError, TypeError):
+        raise InputError(
+            f"{layout} is not a layout of this version; choose another directory or remove it."
+        ) from None
+    layout.unlink()
+    for name in names:
+        for suffix in (".nc", ".svg"):
+            (directory / f"{Path(name).name}{suffix}").unlink(missing_ok=True)
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
