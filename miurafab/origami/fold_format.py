@@ -1,6 +1,10 @@
 """Pattern files: FOLD 1.2 as this house writes it, and any FOLD file that holds a crease pattern.
 
-The key frame is the flat crease pattern; ``file_frames[0]`` inherits it and holds the folded form.
+The key frame is the flat crease pattern; ``file_frames[0]`` inherits it and holds the folded form,
+and the frames of a folding motion follow it. In files of other programs the flat pattern may stand
+in any frame, facets may run clockwise or be missing, and angles may have to be taken from the
+folded form (FOLD 1.2, https://github.com/edemaine/fold/blob/main/doc/spec.md).
+
 Numbers are written with as many digits as they need to be read back bit for bit, and the same
 pattern gives the same bytes.
 """
@@ -10,6 +14,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +24,19 @@ from numpy.typing import NDArray
 from miurafab import __version__
 from miurafab.errors import PatternError
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
+from miurafab.origami.interop_planar import faces_of_plane_graph
+from miurafab.origami.kinematics import Motion
+from miurafab.origami.unfold import with_angles_of_the_folded_form
 
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "um": 1e-3}
 
 
-def fold_text(pattern: CreasePattern, title: str = "") -> str:
-    """``pattern`` as the text of a FOLD 1.2 file, one top-level key a line."""
+def fold_text(pattern: CreasePattern, title: str = "", motion: Motion | None = None) -> str:
+    """``pattern`` as the text of a FOLD 1.2 file, one top-level key a line.
+
+    The frames of a ``motion`` of the pattern follow the folded form, each a frame that inherits
+    the flat pattern and has its own coordinates and fold angles.
+    """
     keys: dict[str, Any] = {
         "file_spec": 1.2,
         "file_creator": f"miurafab {__version__}",
@@ -39,17 +51,23 @@ def fold_text(pattern: CreasePattern, title: str = "") -> str:
         "edges_foldAngle": np.degrees(pattern.edges_fold_angle).tolist(),
         "faces_vertices": _polygons(pattern.faces_vertices),
     }
+    frames = []
     if pattern.folded_coords is not None:
-        keys["file_frames"] = [
-            {
-                "frame_classes": ["foldedForm"],
-                "frame_attributes": ["3D"],
-                "frame_parent": 0,
-                "frame_inherit": True,
-                "frame_unit": "mm",
-                "vertices_coords": pattern.folded_coords.tolist(),
-            }
-        ]
+        frames.append(_folded_frame(pattern.folded_coords))
+    if motion is not None:
+        keys["file_classes"].append("animation")
+        for state, points, angles in zip(
+            motion.states.tolist(), motion.frames, motion.fold_angles, strict=True
+        ):
+            frames.append(
+                {
+                    "frame_title": f"s = {state:.6g}",
+                    **_folded_frame(points),
+                    "edges_foldAngle": np.degrees(angles).tolist(),
+                }
+            )
+    if frames:
+        keys["file_frames"] = frames
     if pattern.grid is not None:
         keys["miurafab:grid"] = list(pattern.grid)
     if pattern.target:
@@ -64,6 +82,17 @@ def fold_text(pattern: CreasePattern, title: str = "") -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
+def _folded_frame(points: NDArray[np.float64]) -> dict[str, Any]:
+    return {
+        "frame_classes": ["foldedForm"],
+        "frame_attributes": ["3D"],
+        "frame_parent": 0,
+        "frame_inherit": True,
+        "frame_unit": "mm",
+        "vertices_coords": points.tolist(),
+    }
+
+
 def _polygons(faces: NDArray[np.int64]) -> list[list[int]]:
     if (faces >= 0).all():
         whole: list[list[int]] = faces.tolist()
@@ -71,9 +100,11 @@ def _polygons(faces: NDArray[np.int64]) -> list[list[int]]:
     return [[v for v in face if v >= 0] for face in faces.tolist()]
 
 
-def write_fold(pattern: CreasePattern, path: Path, title: str = "") -> None:
-    """Write ``pattern`` to the FOLD file ``path``."""
-    path.write_text(fold_text(pattern, title), encoding="utf-8", newline="\n")
+def write_fold(
+    pattern: CreasePattern, path: Path, title: str = "", motion: Motion | None = None
+) -> None:
+    """Write ``pattern``, with a ``motion`` of it or without, to the FOLD file ``path``."""
+    path.write_text(fold_text(pattern, title, motion), encoding="utf-8", newline="\n")
 
 
 def read_fold(path: Path) -> CreasePattern:
@@ -107,27 +138,88 @@ def parse_fold(document: Any) -> CreasePattern:
     """The pattern in a parsed FOLD document. Raises ``PatternError`` naming the key at fault."""
     if not isinstance(document, dict):
         raise PatternError("A FOLD file holds one JSON object.")
-    unit = document.get("frame_unit", "mm")
-    factor = _UNITS_MM.get(unit, 1.0) if isinstance(unit, str) else 1.0
-    flat = _coordinates(document, "vertices_coords") * factor
-    edges = _indices(document, "edges_vertices", 2)
-    if flat.shape[1] == 3:
-        if np.ptp(flat[:, 2]) > 1e-9 * np.ptp(flat[:, :2]):
-            raise PatternError("vertices_coords of the key frame is not a flat crease pattern.")
-        flat = flat[:, :2]
-    faces = _face_indices(document)
-    assignment = _assignments(document, len(edges))
-    return CreasePattern(
-        vertices_coords=np.ascontiguousarray(flat),
+    frames = _frames(document)
+    key = _flat_frame(frames)
+    factor = _unit(key, 1.0)
+    flat = np.ascontiguousarray(_coordinates(key, "vertices_coords")[:, :2] * factor)
+    edges = _indices(key, "edges_vertices", 2)
+    faces = _face_indices(key) if "faces_vertices" in key else _walked(flat, edges)
+    assignment = _assignments(key, len(edges))
+    others = [frame for frame in frames if frame is not key]
+    pattern = CreasePattern(
+        vertices_coords=flat,
         edges_vertices=edges,
         edges_assignment=assignment,
-        edges_fold_angle=_fold_angles(document, assignment),
+        edges_fold_angle=_fold_angles(key, assignment),
         faces_vertices=faces,
-        folded_coords=_folded(document, len(flat), factor),
+        folded_coords=_folded(others, len(flat), factor),
         grid=_grid(document, len(flat)),
         scale=_scale(document),
         target=_target(document),
     )
+    pattern = replace(pattern, faces_vertices=_counter_clockwise(flat, faces))
+    if pattern.folded_coords is not None and key.get("edges_foldAngle") is None:
+        return with_angles_of_the_folded_form(pattern)
+    return pattern
+
+
+def _frames(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The key frame and ``file_frames``, each with what it inherits filled in."""
+    listed = document.get("file_frames", [])
+    if not isinstance(listed, list) or not all(isinstance(frame, dict) for frame in listed):
+        raise PatternError("'file_frames' is not a list of objects.")
+    frames: list[Mapping[str, Any]] = [document]
+    for number, frame in enumerate(listed, start=1):
+        parent = frame.get("frame_parent", 0)
+        if not frame.get("frame_inherit"):
+            frames.append(frame)
+        elif type(parent) is int and 0 <= parent < number:
+            frames.append({**frames[parent], **frame})
+        else:
+            raise PatternError(f"Frame {number} inherits {parent!r}, which is no frame before it.")
+    return frames
+
+
+def _classes(frame: Mapping[str, Any]) -> list[Any]:
+    classes = frame.get("frame_classes")
+    return classes if isinstance(classes, list) else []
+
+
+def _flat_frame(frames: list[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """The frame with the crease pattern: the one that says so, or the first that lies flat."""
+    said = [frame for frame in frames if "creasePattern" in _classes(frame)]
+    for frame in said or [f for f in frames if "foldedForm" not in _classes(f)] or frames:
+        points = _coordinates(frame, "vertices_coords")
+        if points.shape[1] == 2 or np.ptp(points[:, 2]) <= 1e-9 * np.ptp(points[:, :2]):
+            return frame
+    raise PatternError("No frame of the file holds a flat crease pattern in 'vertices_coords'.")
+
+
+def _unit(frame: Mapping[str, Any], default: float) -> float:
+    """Millimetres in the frame's unit; ``default`` if it has none, or none that is a length."""
+    unit = frame.get("frame_unit")
+    return _UNITS_MM.get(unit, default) if isinstance(unit, str) else default
+
+
+def _counter_clockwise(flat: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """``faces`` with the corners of those that run clockwise in reverse order."""
+    whole = np.where(faces >= 0, faces, faces[:, :1])
+    x, y = np.moveaxis(flat[whole], -1, 0)
+    clockwise = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) < 0
+    size = (faces >= 0).sum(axis=1)[:, None]
+    slot = np.arange(faces.shape[1])[None, :]
+    back = np.take_along_axis(faces, np.where(slot < size, size - 1 - slot, slot), axis=1)
+    return np.where(clockwise[:, None], back, faces)
+
+
+def _walked(flat: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The facets that ``edges`` enclose, for a file that lists none."""
+    if edges.max() >= len(flat):
+        raise PatternError("'edges_vertices' refers to a vertex that does not exist.")
+    faces = faces_of_plane_graph(flat, edges)
+    if not len(faces):
+        raise PatternError("'faces_vertices' is missing and 'edges_vertices' encloses no facet.")
+    return faces
 
 
 def _array(document: Mapping[str, Any], key: str) -> list[Any]:
@@ -201,16 +293,13 @@ def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> N
 
 
 def _folded(
-    document: Mapping[str, Any], vertices: int, factor: float
+    frames: list[Mapping[str, Any]], vertices: int, factor: float
 ) -> NDArray[np.float64] | None:
-    frames = document.get("file_frames", [])
-    if not isinstance(frames, list):
-        raise PatternError("'file_frames' is not a list.")
+    """The folded form (V, 3), mm, in the first of ``frames`` that says that it is one."""
     for frame in frames:
-        if isinstance(frame, dict) and "foldedForm" in (frame.get("frame_classes") or []):
-            unit = frame.get("frame_unit")
-            own = _UNITS_MM.get(unit, factor) if isinstance(unit, str) else factor
-            points: NDArray[np.float64] = _coordinates(frame, "vertices_coords") * own
+        if "foldedForm" in _classes(frame):
+            points: NDArray[np.float64] = _coordinates(frame, "vertices_coords")
+            points = points * _unit(frame, factor)
             if points.shape[1] == 2:
                 points = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
             if len(points) != vertices:

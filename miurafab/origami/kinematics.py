@@ -31,6 +31,9 @@ RIGID = 1e-6
 """The loop mismatch, in mean edges, up to which a sheet is said to fold rigidly."""
 
 
+_POINT = 1e-6  # of the mean edge: a shorter crease has no direction to turn a facet about
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A folding motion of ``pattern`` in T frames.
@@ -229,6 +232,8 @@ def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
     """
     facets = len(pattern.faces_vertices)
     joined = _joined(pattern)
+    lengths = edge_lengths(pattern, pattern.vertices_coords)
+    joined = joined[lengths[joined] > _POINT * lengths.mean()]
     left, right = pattern.edges_faces[joined].T
     graph = coo_array((np.ones(len(joined)), (left, right)), shape=(facets, facets)).tocsr()
     distance, before = shortest_path(

@@ -10,6 +10,7 @@ measures it afresh.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,37 @@ def unfold(
         scale=scale,
         target=target or {},
     )
+
+
+def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
+    """``pattern`` with its fold angles measured in its folded form, for facets of any shape.
+
+    Mountains and valleys follow from their signs; borders, cuts and joins stay what they are.
+    """
+    assert pattern.folded_coords is not None
+    normals = _polygon_normals(pattern.folded_coords, pattern.faces_vertices)
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    left, right = (normals[pattern.edges_faces[inner, side]] for side in (0, 1))
+    angle = np.zeros(len(pattern.edges_vertices))
+    angle[inner] = fold_angles(pattern.folded_coords, pattern.edges_vertices[inner], left, right)
+    letter = np.where(angle > FLAT_ANGLE, "V", np.where(angle < -FLAT_ANGLE, "M", "F"))
+    folds = inner & ~np.isin(pattern.edges_assignment, ("B", "C", "J"))
+    kept = np.where(~inner & (pattern.edges_assignment != "C"), "B", pattern.edges_assignment)
+    return replace(
+        pattern,
+        edges_assignment=np.where(folds, letter, kept),
+        edges_fold_angle=np.where(folds, angle, 0.0),
+    )
+
+
+def _polygon_normals(points: Floats, faces: NDArray[np.int64]) -> Floats:
+    """(F, 3) unit normals of polygons (F, k), -1 padded, by Newell's sum over their corners."""
+    corners = points[np.where(faces >= 0, faces, faces[:, :1])]
+    spokes = corners - corners[:, :1]
+    normal = np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit: Floats = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    return unit
 
 
 def grid_fold_angles(points: Floats, grid: QuadGrid) -> Floats:
