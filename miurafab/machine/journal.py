@@ -43,11 +43,15 @@ class Journal:
         }
         # The blank line parts this run from what a power loss may have torn.
         self._file = DurableFile(path, "journal", b"\n" + _record(header), append=True)
+        self._count = 0
         self._due = 0.0
         self._pending: dict[str, Any] | None = None
 
     def taken(self, count: int, line: int, seconds: float) -> None:
         """Note that ``count`` lines were acknowledged, the last being ``line`` of the file."""
+        if count == self._count:
+            return
+        self._count = count
         self._pending = {"taken": count, "line": line, "seconds": round(seconds, 3)}
         if seconds >= self._due:
             self._due = seconds + _PERIOD

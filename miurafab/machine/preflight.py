@@ -54,7 +54,7 @@ def raise_findings(findings: Iterable[Finding], force: frozenset[str]) -> tuple[
         sentence = str(finding.error)
         if finding.name not in force:
             raise type(finding.error)(
-                f"{sentence.rstrip('.')} (check '{finding.name}'; to cut all the same, force it)."
+                f"{sentence.rstrip('.')} (--force {finding.name} overrides this check)."
             )
         forced.append(sentence)
     return tuple(forced)

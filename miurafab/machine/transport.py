@@ -25,6 +25,7 @@ VIRTUAL = "virtual"
 
 _SLICE = 0.01  # s; pyserial on Windows cannot be interrupted by Ctrl-C within one read
 _WRITE_TIMEOUT = 1.0  # s; far beyond the 90 ms that a full 1024-byte buffer takes at 115200 baud
+_INSTANT = 1e-6  # s; the least that a virtual clock moves, far above its rounding
 
 
 class Transport(Protocol):
@@ -141,7 +142,7 @@ class VirtualTransport:
     def read(self, timeout: float) -> bytes:
         """Let the controller's time pass until it speaks, ``timeout`` seconds at most."""
         device = self.device
-        end = device.now + timeout
+        end = device.now + (max(timeout, _INSTANT) if timeout > 0 else 0.0)
         while True:
             output = device.take_output()
             left = end - device.now
@@ -149,7 +150,7 @@ class VirtualTransport:
                 self._keep_pace()
                 return output
             upcoming = device.next_event_in()
-            device.advance(left if upcoming is None else min(left, max(upcoming, 1e-6)))
+            device.advance(left if upcoming is None else min(left, max(upcoming, _INSTANT)))
 
     def _keep_pace(self) -> None:
         if self._speed is not None:
