@@ -6,14 +6,15 @@ Each quad is split on its shorter diagonal. The energy of a shape x is
     c = (|d|^2 - L^2) / (2 L)
 
 over fold angles rho and bar vectors d; a bar of compliance delta = 0 does not stretch at all. The
-hinges are the diagonals, stiffness k = k_f l, flat at rest; the creases, k = k_c l, rest at the
-folded form, and with k_c = 0 (the default, and how Dudte et al., Nature Materials 15 (2016), is
-read) only bent facets cost energy. The unit of length is the pattern's mean edge and the unit of
-energy k_f times it, until a material gives both a size:
+hinges are the diagonals (and edges assigned F), of stiffness k = k_f l and flat at rest, and the
+creases, of stiffness k = k_c l and at rest in the folded form. With k_c = 0, the default and the
+reading of Dudte et al., Nature Materials 15 (2016), only bent facets cost energy. The unit of
+length is the pattern's mean edge L and the unit of energy k_f L, until a material gives a size:
 
     k of a diagonal = 0.55 D (l / t)^(1/3),   D = E t^3 / (12 (1 - nu^2))
 
-(Filipov, Liu, Tachi, Schenk and Paulino, Int. J. Solids Struct. 124 (2017), section 4.)
+(E. T. Filipov, K. Liu, T. Tachi, M. Schenk and G. H. Paulino, Bar and hinge models for scalable
+analysis of origami, Int. J. Solids Struct. 124 (2017).)
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ Ints = NDArray[np.int64]
 
 POISSON_RATIO = 0.3
 """Of a material that gives only its modulus; D changes by 4 % between 0.25 and 0.35."""
+DEGENERATE = 1e-9
+"""In mean edges: a shorter edge or a lower triangle is a fault of the pattern."""
 FACET_BENDING = 0.55
 """C_B of Filipov et al. 2017, for quads whose sides do not stretch."""
 
@@ -43,9 +46,9 @@ class BarHingeModel:
 
     ``points`` (V, 3) the shape it was made from. ``bars`` (B, 2) with rest ``lengths`` (B,) and
     ``compliance`` (B,); ``hinges`` (H, 4) of vertices u, v, a, b with ``stiffness`` (H,) and
-    ``rest`` angles (H,). ``creases`` (C, 4) are hinges too, those of the pattern's edges
-    ``creases_edges`` (C,) that have a facet on both sides, whether they resist or not.
-    ``unit_joule`` is None where no material was given.
+    ``rest`` angles (H,). ``creases`` (C, 4) are hinges too, on the pattern's edges
+    ``creases_edges`` (C,) that have a facet on both sides and are not assigned F, whether they
+    resist or not. ``unit_joule`` is None where no material was given.
     """
 
     points: Floats
@@ -109,39 +112,54 @@ def sheet_model(
         )
     unit = float(edge_lengths(pattern, pattern.folded_coords).mean())
     points = pattern.folded_coords / unit
-    diagonals = _diagonals(points, pattern.faces_vertices)
-    creases_edges = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
-    if not len(creases_edges):
+    facets = _diagonals(points, pattern.faces_vertices)
+    inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+    across = _across_edges(pattern, facets, inner)
+    flat = pattern.edges_assignment[inner] == "F"
+    if flat.all():
         raise PatternError("The pattern has no crease between two facets, so nothing folds.")
-    creases = _crease_hinges(pattern, diagonals, creases_edges)
-    hinges, weights = diagonals[diagonals[:, 0] >= 0], 1.0
+    diagonals = facets[facets[:, 0] >= 0]
+    _refuse_degenerate(points, pattern.edges_vertices, np.concatenate([diagonals, across]))
+    creases = across[~flat]
+    bending = np.concatenate([diagonals, across[flat]])
+    hinges, weights, rest = bending, np.ones(len(bending)), np.zeros(len(bending))
     if crease_ratio > 0:
-        hinges = np.concatenate([hinges, creases])
-        weights = np.repeat([1.0, crease_ratio], [len(hinges) - len(creases), len(creases)])
-    rest = hinge_angles(points, hinges)
-    rest[: len(hinges) - (len(creases) if crease_ratio > 0 else 0)] = 0.0
-    bars = np.concatenate([pattern.edges_vertices, diagonals[diagonals[:, 0] >= 0, :2]])
-    lengths = _lengths(points, bars)
+        hinges = np.concatenate([bending, creases])
+        weights = np.concatenate([weights, np.full(len(creases), crease_ratio)])
+        rest = np.concatenate([rest, hinge_angles(points, creases)])
     along = _lengths(points, hinges[:, :2])
     unit_joule = None
     if paper is not None:
-        unit_joule = (
-            FACET_BENDING * paper.bending_stiffness * float(np.cbrt(unit / paper.thickness_mm))
-        )
+        slender = float(np.cbrt(unit / paper.thickness_mm))
+        unit_joule = FACET_BENDING * paper.bending_stiffness * slender
         along = np.cbrt(along)
+    bars = np.concatenate([pattern.edges_vertices, diagonals[:, :2]])
     return BarHingeModel(
         points=points,
         bars=bars,
-        lengths=lengths,
+        lengths=_lengths(points, bars),
         compliance=np.zeros(len(bars)),
         hinges=hinges,
         stiffness=weights * along,
         rest=rest,
         creases=creases,
-        creases_edges=creases_edges,
+        creases_edges=inner[~flat],
         unit_mm=unit,
         unit_joule=unit_joule,
     )
+
+
+def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:
+    short = np.flatnonzero(_lengths(points, edges) < DEGENERATE)
+    if len(short):
+        raise PatternError(f"Edge {short[0]} has no length, so its facets cannot bend about it.")
+    base = points[hinges[:, 1]] - points[hinges[:, 0]]
+    for wing in (2, 3):
+        out = points[hinges[:, wing]] - points[hinges[:, 0]]
+        area = np.linalg.norm(np.cross(base, out), axis=1)
+        thin = np.flatnonzero(area < DEGENERATE * np.linalg.norm(base, axis=1))
+        if len(thin):
+            raise PatternError(f"A facet at vertex {hinges[thin[0], wing]} has no width.")
 
 
 def _lengths(points: Floats, pairs: Ints) -> Floats:
@@ -172,8 +190,8 @@ def _diagonals(points: Floats, faces: Ints) -> Ints:
     return hinges
 
 
-def _crease_hinges(pattern: CreasePattern, diagonals: Ints, edges: Ints) -> Ints:
-    """(C, 4) the hinge of each crease: its ends, and the third corners of the triangles beside."""
+def _across_edges(pattern: CreasePattern, diagonals: Ints, edges: Ints) -> Ints:
+    """(n, 4) the hinge of each of ``edges``: its ends, and the third corners of its triangles."""
     faces, ends = pattern.faces_vertices, pattern.edges_vertices[edges]
     third = []
     for side in (0, 1):

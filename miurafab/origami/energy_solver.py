@@ -12,10 +12,11 @@ A' = (J' grad d), n = (f, mu) and D = diag(delta, 0),
     [ A  -D ] [ dn ]  =  - [ F_a ],    H = Hessian of L,
 
 by eliminating dn after D has been raised by a tiny eps: K dx = -F_x - A' W F_a and
-dn = W (A dx + F_a), with K = H + A' W A and W = 1 / (D + eps). K is as sparse as the mesh and a third of the saddle system in
-size, without zeros on its diagonal, so one fill-reducing order of the vertices serves every
-factorisation and no pivoting is needed. Where the iteration ends depends neither on eps nor on how
-old K is, since F is exact; so K is factored anew only when the iteration slows down.
+dn = W (A dx + F_a), with K = H + A' W A and W = 1 / (D + eps). K is as sparse as the mesh and a
+third of the saddle system in size, without zeros on its diagonal, so one fill-reducing order of
+the vertices serves every factorisation and no pivoting is needed. Where the iteration ends depends
+neither on eps nor on how old K is, since F is exact; so K is factored anew only when the iteration
+slows down.
 
 Rigid motions are taken out by holding six coordinates of one triangle, in axes laid along it.
 """
