@@ -1,8 +1,10 @@
 """Distances from points to triangle meshes, exactly, for many points at once.
 
-A tree over triangle centroids gives an upper bound from the nearest few; every triangle whose
-centroid is nearer than that bound plus the largest triangle radius could be nearer still, and those
-are all measured. The bound makes the result exact and not a guess.
+A triangle is no nearer than its centre's distance minus its radius. So the nearest few centres give
+an upper bound, triangles that cannot beat it are left out, and where the few were too few to be
+sure, more are looked up until they suffice: the result is exact and not a guess. Triangles are
+sorted into classes by radius, each with its own tree, so that a few large ones do not spoil the
+bound of all the others.
 """
 
 from __future__ import annotations
@@ -12,6 +14,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_CHUNK = 500_000
 
 
 def closest_on_triangle(points: Floats, triangles: Floats) -> Floats:
@@ -44,43 +49,53 @@ def closest_on_triangle(points: Floats, triangles: Floats) -> Floats:
 
 def closest_on_mesh(points: Floats, triangles: Floats) -> Floats:
     """(n, 3) the points of the mesh ``triangles`` (m, 3, 3) nearest to ``points`` (n, 3)."""
-    centroids = triangles.mean(axis=1)
-    radius = float(np.linalg.norm(triangles - centroids[:, None], axis=2).max())
-    tree = cKDTree(centroids)
-    few = min(6, len(triangles))
-    near = np.asarray(tree.query(points, k=few)[1]).reshape(len(points), few)
-    row = np.repeat(np.arange(len(points)), few)
-    best = np.empty_like(points)
-    bound = _keep_nearest(points, triangles, row, near.ravel(), best, np.full(len(points), np.inf))
-    candidates = tree.query_ball_point(points, bound + radius, return_sorted=False)
-    counts = np.array([len(c) for c in candidates])
-    if (counts > few).any():
-        row = np.repeat(np.arange(len(points)), counts)
-        column = np.concatenate([np.asarray(c, dtype=np.int64) for c in candidates])
-        _keep_nearest(points, triangles, row, column, best, bound)
+    centres = (triangles.min(axis=1) + triangles.max(axis=1)) / 2
+    radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
+    classes = np.floor(np.log2(np.maximum(radii, 1e-6 * radii.max()))).astype(np.int64)
+    best, bound = points.copy(), np.full(len(points), np.inf)
+    for size in np.unique(classes)[::-1].tolist():
+        members = np.flatnonzero(classes == size)
+        _nearer_in_class(points, triangles[members], centres[members], radii[members], best, bound)
     return best
 
 
+def _nearer_in_class(
+    points: Floats, triangles: Floats, centres: Floats, radii: Floats, best: Floats, bound: Floats
+) -> None:
+    """Lower ``bound`` (n,) and move ``best`` (n, 3) where a triangle of this class is nearer."""
+    tree = cKDTree(centres)
+    largest = float(radii.max())
+    active = np.arange(len(points))
+    few, known = 1, 0
+    while len(active):
+        few = min(few, len(triangles))
+        found = tree.query(points[active], k=np.arange(known + 1, few + 1))
+        gaps, near = np.asarray(found[0]), np.asarray(found[1])
+        promising = gaps - radii[near] < bound[active][:, None]
+        row, column = np.nonzero(promising)
+        _keep_nearest(points, triangles, active[row], near[row, column], best, bound)
+        if few == len(triangles):
+            return
+        active = active[gaps[:, -1] - largest < bound[active]]
+        few, known = 4 * few + 6, few
+
+
 def _keep_nearest(
-    points: Floats,
-    triangles: Floats,
-    row: NDArray[np.int64],
-    column: NDArray[np.int64],
-    best: Floats,
-    bound: Floats,
-) -> Floats:
-    """Lower ``bound`` (n,) and move ``best`` (n, 3) by the pairs (point row, triangle column)."""
-    chunk = 500_000
-    for start in range(0, len(row), chunk):
-        rows, columns = row[start : start + chunk], column[start : start + chunk]
-        foot = closest_on_triangle(points[rows], triangles[columns])
-        gap = np.linalg.norm(foot - points[rows], axis=1)
-        order = np.lexsort((gap, rows))
-        first = order[np.unique(rows[order], return_index=True)[1]]
-        winners = first[gap[first] < bound[rows[first]]]
-        best[rows[winners]] = foot[winners]
-        bound[rows[winners]] = gap[winners]
-    return bound
+    points: Floats, triangles: Floats, rows: Ints, columns: Ints, best: Floats, bound: Floats
+) -> None:
+    """Lower ``bound`` (n,) and move ``best`` (n, 3) by the pairs (point row, triangle column),
+    which are sorted by row.
+    """
+    for start in range(0, len(rows), _CHUNK):
+        row, column = rows[start : start + _CHUNK], columns[start : start + _CHUNK]
+        foot = closest_on_triangle(points[row], triangles[column])
+        gap = np.linalg.norm(foot - points[row], axis=1)
+        first = np.flatnonzero(np.diff(row, prepend=-1))
+        least = np.minimum.reduceat(gap, first)
+        won = np.flatnonzero(gap == np.repeat(least, np.diff(first, append=len(row))))
+        won = won[gap[won] < bound[row[won]]]
+        best[row[won]] = foot[won]
+        bound[row[won]] = gap[won]
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -24,8 +24,7 @@ Floats = NDArray[np.float64]
 EXACT = 1e-10
 """The residual up to which planarity, developability and isometry count as exact."""
 
-DEGENERATE = 1e-6
-"""An edge shorter than this part of the mean edge cannot be creased."""
+DEGENERATE = invariants.DEGENERATE
 
 
 @dataclass(frozen=True)
@@ -139,8 +138,8 @@ def _distances(pattern: CreasePattern, surface: TargetSurface) -> dict[str, Any]
     scale, folded = pattern.scale, pattern.folded_coords
     triangles, _ = triangulate(pattern.faces_vertices)
     corners = folded[triangles]
-    sheet = np.concatenate([folded, _within(corners)])
     middle = _facet_means(pattern)
+    sheet = np.concatenate([folded, folded[pattern.edges_vertices].mean(axis=1), middle])
 
     def to_target(points: Floats) -> float:
         gap = surface.closest_point(points / scale) * scale - points
@@ -172,12 +171,6 @@ def surface_area(surface: TargetSurface, samples: int = 200) -> float:
     return float(density.mean() * d.width * d.height)
 
 
-def _within(corners: Floats) -> Floats:
-    """Points inside triangles (T, 3, 3): the centroid and the middles of the sides."""
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    return np.concatenate([(a + b + c) / 3, (a + b) / 2, (b + c) / 2, (c + a) / 2])
-
-
 def _facet_means(pattern: CreasePattern) -> Floats:
     assert pattern.folded_coords is not None
     real = pattern.faces_vertices >= 0
@@ -194,9 +187,9 @@ def _findings(pattern: CreasePattern, measured: Measurements) -> list[AuditFindi
         found.append(
             AuditFinding(
                 "degenerate-edge",
-                f"{len(short)} edges are shorter than a millionth of the mean edge, the first "
-                f"being edge {short[0]} ({edges[short[0]]:.1e} mm): they cannot be made. "
-                "Fit again with --min-edge.",
+                f"{_these(short, 'edge')} shorter than a millionth of the mean edge (down to "
+                f"{edges[short].min():.1e} mm): they cannot be creased or cut, so the sheet cannot "
+                "be made. Fit again with --min-edge.",
                 tuple(short.tolist()),
             )
         )
@@ -206,28 +199,57 @@ def _findings(pattern: CreasePattern, measured: Measurements) -> list[AuditFindi
             AuditFinding(
                 "overlap",
                 f"{len(pairs)} pairs of facets overlap in the flat pattern, the first being facets "
-                f"{pairs[0][0]} and {pairs[0][1]}: it cannot be cut from one sheet.",
+                f"{pairs[0][0]} and {pairs[0][1]}: it cannot be cut from one piece.",
                 tuple(np.unique(pairs).tolist()),
             )
         )
     if pattern.folded_coords is None:
         return found
-    exact = (
-        ("planarity", measured.max_planarity, "The facets are not planar"),
-        ("developability", measured.max_developability, "The vertices are not developable"),
-        ("isometry", measured.max_isometry, "Flat and folded form differ in size"),
-    )
-    for code, value, complaint in exact:
-        if value is None or not value <= EXACT:
-            found.append(AuditFinding(code, f"{complaint}: {value:.1e} is over {EXACT:.0e}."))
+    found += _inexact(pattern, pattern.folded_coords)
     if measured.self_intersections:
         pairs = self_intersections(pattern)
         found.append(
             AuditFinding(
                 "self-intersection",
-                f"{len(pairs)} pairs of facets pass through each other in the folded form, the "
-                f"first being facets {pairs[0][0]} and {pairs[0][1]}.",
+                f"{len(pairs)} pairs of facets pass through or lie on each other in the folded "
+                f"form, the first being facets {pairs[0][0]} and {pairs[0][1]}.",
                 tuple(np.unique(pairs).tolist()),
             )
         )
     return found
+
+
+def _inexact(pattern: CreasePattern, folded: Floats) -> list[AuditFinding]:
+    """Where planarity, developability and isometry are over ``EXACT``."""
+    inner = invariants.interior_vertices(pattern)
+    facets = np.arange(len(pattern.faces_vertices))
+    ring = invariants.corner_ring(pattern, folded)
+    surplus = invariants.angle_surplus(ring, inner) if len(inner) else np.empty(0)
+    checks = (
+        ("planarity", "planar", "facet", facets, invariants.facet_planarity(pattern, folded)),
+        ("developability", "developable", "vertex", inner, np.abs(surplus)),
+        ("isometry", "the same flat and folded", "facet", facets, invariants.isometry(pattern)),
+    )
+    found = []
+    for code, virtue, noun, names, values in checks:
+        over = ~(values <= EXACT)
+        if over.any():
+            where = names[over]
+            found.append(
+                AuditFinding(
+                    code,
+                    f"{_these(where, noun)} not {virtue}: up to {values.max():.1e}, over "
+                    f"{EXACT:.0e}.",
+                    tuple(where.tolist()),
+                )
+            )
+    return found
+
+
+def _these(numbers: NDArray[np.int64], noun: str) -> str:
+    """``Edge 7 is`` or ``12 edges (3, 4, 5, 6, 7, ...) are``."""
+    if len(numbers) == 1:
+        return f"{noun.capitalize()} {numbers[0]} is"
+    shown = ", ".join(str(n) for n in numbers[:5]) + (", ..." if len(numbers) > 5 else "")
+    several = "vertices" if noun == "vertex" else noun + "s"
+    return f"{len(numbers)} {several} ({shown}) are"

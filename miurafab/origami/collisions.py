@@ -1,141 +1,251 @@
-"""Where paper meets paper: facets that pass through each other, and flat facets that overlap.
+"""Where paper meets paper: facets that pass through each other, and facets that lie on each other.
 
-Folded facets are split into triangles. Two triangles that cross do so along a segment, each end of
-which is a side of one piercing the other; so testing sides against triangles finds every crossing
-in general position. Facets that share a vertex are tested with the sides that do not end there:
-their crossing starts at that vertex and ends on such a side. Facets that share an edge can only lie
-on each other, which their fold angle shows.
+Facets are split into triangles, and two facets meet where the insides of triangles (without sides
+and corners) have a common point. With heights of each triangle's corners over the other's plane:
+
+- all heights of one sign or zero, not all zero: the insides are apart;
+- all zero: the triangles lie in one plane and overlap unless one of their six sides separates them;
+- else each triangle cuts the other's plane in a segment of the line common to both planes, and they
+  cross where the two segments overlap.
+
+Facets that share a side or a corner need no case of their own: the height of a shared corner is
+zero, set so and not computed, and touching is not meeting. Sheets folded flat lie on each other;
+without an order of layers that counts as meeting.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from miurafab.geometry.boxes import meeting_pairs
 from miurafab.origami.crease_pattern import CreasePattern
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
+IN_PLANE = 1e-9
+"""Corners nearer to a plane than this part of the mean triangle side lie in it."""
+
+TOUCH = 1e-6
+"""Facets that reach into each other by less than this part of the mean side only touch."""
+
+_CHUNK = 400_000
 _SIDES = ((0, 1), (1, 2), (2, 0))
 
 
 def self_intersections(pattern: CreasePattern) -> Ints:
-    """(n, 2) the pairs of facets of the folded form that pass through each other, sorted."""
-    assert pattern.folded_coords is not None
-    triangles, owner = triangulate(pattern.faces_vertices)
-    points = pattern.folded_coords[triangles]
-    first, second = _near_pairs(points)
-    different = owner[first] != owner[second]
-    first, second = first[different], second[different]
-    adjacent = _share_an_edge(pattern, owner[first], owner[second])
-    first, second = first[~adjacent], second[~adjacent]
-    crossing = _sides_pierce(points, triangles, first, second)
-    crossing |= _sides_pierce(points, triangles, second, first)
-    pairs = np.sort(np.stack([owner[first], owner[second]], axis=1)[crossing], axis=1)
-    folded_over = _folded_onto_each_other(pattern)
-    return np.unique(np.concatenate([pairs, folded_over]), axis=0)
+    """(n, 2) the pairs of facets of the folded form that pass through or lie on each other, sorted.
+
+    Raises ``ValueError`` for a pattern without a folded form.
+    """
+    if pattern.folded_coords is None:
+        raise ValueError("the pattern has no folded form")
+    return _meeting_facets(pattern, pattern.folded_coords)
 
 
 def overlaps(pattern: CreasePattern) -> Ints:
     """(n, 2) the pairs of facets of the flat pattern that cover a common area, sorted.
 
-    Two triangles of positive area overlap unless one of their six sides separates them; overlap
-    less than a millionth of a side deep is rounding. A facet turned over overlaps its neighbours.
+    A facet turned over overlaps its neighbours.
     """
-    triangles, owner = triangulate(pattern.faces_vertices)
-    points = pattern.vertices_coords[triangles]
-    first, second = _near_pairs(points)
-    different = owner[first] != owner[second]
-    first, second = first[different], second[different]
-    depth = np.minimum(_least_depth(points, first, second), _least_depth(points, second, first))
-    meet = depth > 1e-6 * float(np.linalg.norm(points[:, 1] - points[:, 0], axis=1).mean())
-    pairs = np.sort(np.stack([owner[first], owner[second]], axis=1)[meet], axis=1)
-    return np.unique(pairs, axis=0)
+    flat = pattern.vertices_coords
+    return _meeting_facets(pattern, np.concatenate([flat, np.zeros((len(flat), 1))], axis=1))
 
 
-def _least_depth(points: Floats, one: Ints, other: Ints) -> Floats:
-    """How deep triangle ``other`` reaches behind the sides of triangle ``one``, the least over the
-    sides; negative where a side separates them. ``points`` (T, 3, 2), pair by pair.
-    """
-    a, b = points[one], points[other]
-    area = np.cross(
-        np.append(a[:, 1] - a[:, 0], np.zeros((len(a), 1)), axis=1),
-        np.append(a[:, 2] - a[:, 0], np.zeros((len(a), 1)), axis=1),
-    )[:, 2]
-    depth = np.full(len(one), np.inf)
-    for start, end in _SIDES:
-        side = a[:, end] - a[:, start]
-        inward = np.stack([-side[:, 1], side[:, 0]], axis=1) * np.sign(area)[:, None]
+def _meeting_facets(pattern: CreasePattern, points: Floats) -> Ints:
+    faces = pattern.faces_vertices
+    real = (faces >= 0)[..., None]
+    corners = points[faces]
+    low = np.where(real, corners, np.inf).min(axis=1)
+    high = np.where(real, corners, -np.inf).max(axis=1)
+    triangles, owner = triangulate(faces, pattern.vertices_coords)
+    shapes = _Triangles.of(points, triangles)
+    order = np.argsort(owner, kind="stable")
+    counts = np.bincount(owner, minlength=len(faces))
+    start = np.cumsum(counts) - counts
+    found = []
+    first, second = meeting_pairs(low, high)
+    for begin in range(0, len(first), _CHUNK):
+        a, b = first[begin : begin + _CHUNK], second[begin : begin + _CHUNK]
+        # every triangle of one facet against every triangle of the other
+        each = counts[a] * counts[b]
+        pair = np.repeat(np.arange(len(a)), each)
+        within = np.arange(len(pair)) - np.repeat(np.cumsum(each) - each, each)
+        one = order[start[a[pair]] + within // counts[b[pair]]]
+        other = order[start[b[pair]] + within % counts[b[pair]]]
+        hit = np.unique(pair[shapes.meet(one, other)])
+        found.append(np.stack([a[hit], b[hit]], axis=1))
+    pairs = np.concatenate(found) if found else np.empty((0, 2), dtype=np.int64)
+    return np.unique(np.sort(pairs, axis=1), axis=0)
+
+
+class _Triangles:
+    """Triangles with the planes that they lie in. Those without an inside meet nothing."""
+
+    def __init__(self, index: Ints, corners: Floats, normals: Floats, size: float) -> None:
+        self.index, self.corners, self.normals, self.size = index, corners, normals, size
+
+    @classmethod
+    def of(cls, points: Floats, triangles: Ints) -> _Triangles:
+        corners = points[triangles]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        size = float(sides.mean()) if len(sides) else 0.0
+        longest = sides.max(axis=1, initial=0.0)[:, None]
         with np.errstate(invalid="ignore", divide="ignore"):
-            inward /= np.linalg.norm(side, axis=1, keepdims=True)
-        reach = np.einsum("nck,nk->nc", b - a[:, start][:, None], inward).max(axis=1)
-        depth = np.fmin(depth, reach)
-    return depth
+            normals = np.where(length > TOUCH * size * longest, normals / length, np.nan)
+        return cls(triangles, corners, normals, size)
+
+    def meet(self, one: Ints, other: Ints) -> Bools:
+        """(n,) whether the insides of triangles ``one`` (n,) and ``other`` (n,) meet."""
+        result = np.zeros(len(one), dtype=bool)
+        left = np.flatnonzero(np.isfinite(self.normals[one] + self.normals[other]).all(axis=1))
+        above = self._heights(one[left], other[left])
+        near = ~_one_sided(above)
+        left, above = left[near], above[near]
+        below = self._heights(other[left], one[left])
+        near = ~_one_sided(below)
+        left, above, below = left[near], above[near], below[near]
+        flat = (above == 0).all(axis=1) | (below == 0).all(axis=1)
+        a, b = one[left], other[left]
+        result[left[flat]] = self._overlap(a[flat], b[flat])
+        result[left[~flat]] = self._cross(a[~flat], b[~flat], above[~flat], below[~flat])
+        return result
+
+    def _heights(self, one: Ints, other: Ints) -> Floats:
+        """(n, 3) the heights of the corners of ``one`` over the planes of ``other``."""
+        gap = self.corners[one] - self.corners[other][:, :1]
+        height = np.einsum("nck,nk->nc", gap, self.normals[other])
+        shared = (self.index[one][:, :, None] == self.index[other][:, None, :]).any(axis=2)
+        heights: Floats = np.where(shared | (np.abs(height) <= IN_PLANE * self.size), 0.0, height)
+        return heights
+
+    def _cross(self, one: Ints, other: Ints, above: Floats, below: Floats) -> Bools:
+        """Whether triangles that straddle each other's planes cross."""
+        line = np.cross(self.normals[one], self.normals[other])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            line /= np.linalg.norm(line, axis=1, keepdims=True)
+        origin = self.corners[one][:, :1]
+        low_a, high_a = _segment(self.corners[one] - origin, above, line)
+        low_b, high_b = _segment(self.corners[other] - origin, below, line)
+        overlap = np.minimum(high_a, high_b) - np.maximum(low_a, low_b)
+        crossing: Bools = overlap > TOUCH * self.size
+        return crossing
+
+    def _overlap(self, one: Ints, other: Ints) -> Bools:
+        """Whether triangles in one plane cover a common area: whether none of their sides has the
+        other triangle wholly on its outer side.
+        """
+        result = np.zeros(len(one), dtype=bool)
+        left = np.arange(len(one))
+        for here, there in ((one, other), (other, one)):
+            for start, end in _SIDES:
+                a, b = self.corners[here[left]], self.corners[there[left]]
+                inward = np.cross(self.normals[here[left]], a[:, end] - a[:, start])
+                length = np.linalg.norm(inward, axis=1)
+                reach = np.einsum("nck,nk->nc", b - a[:, start][:, None], inward).max(axis=1)
+                left = left[reach > TOUCH * self.size * length]
+        result[left] = True
+        return result
 
 
-def triangulate(faces: Ints) -> tuple[Ints, Ints]:
-    """Fan triangles (T, 3) of polygons (F, k), -1 padded, and the face (T,) of each."""
+def _one_sided(heights: Floats) -> Bools:
+    """Whether a triangle with these corner heights (n, 3) has its inside off the plane."""
+    some = (heights != 0).any(axis=1)
+    one_sided: Bools = some & ((heights >= 0).all(axis=1) | (heights <= 0).all(axis=1))
+    return one_sided
+
+
+def _segment(corners: Floats, heights: Floats, line: Floats) -> tuple[Floats, Floats]:
+    """The ends, along ``line`` (n, 3), of the cut of triangles (n, 3, 3) by the plane of height 0.
+
+    The cut ends on corners in the plane and on sides whose ends lie on different sides of it.
+    """
+    along = np.einsum("nck,nk->nc", corners, line)
+    low, high = np.full(len(line), np.inf), np.full(len(line), -np.inf)
+    for start, end in _SIDES:
+        p, q = heights[:, start], heights[:, end]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            at = along[:, start] + p / (p - q) * (along[:, end] - along[:, start])
+        for where, cut in ((p * q < 0, at), (p == 0, along[:, start])):
+            low = np.where(where, np.minimum(low, cut), low)
+            high = np.where(where, np.maximum(high, cut), high)
+    return low, high
+
+
+def triangulate(faces: Ints, flat: Floats | None = None) -> tuple[Ints, Ints]:
+    """Triangles (T, 3) of polygons (F, k), -1 padded, and the face (T,) of each.
+
+    Polygons are fanned from their first corner. Given their ``flat`` positions (V, 2), those that
+    are not convex there are fanned from another corner or, at need, cut ear by ear instead.
+    """
+    faces = faces if flat is None else _fannable(faces, flat)
     k = faces.shape[1]
     fans = [faces[:, [0, c, c + 1]] for c in range(1, k - 1)]
     triangles = np.concatenate(fans)
     owner = np.tile(np.arange(len(faces)), k - 2)
     real = (triangles >= 0).all(axis=1)
-    return triangles[real], owner[real]
+    triangles, owner = triangles[real], owner[real]
+    if flat is None or k <= 4:
+        return triangles, owner
+    turned = np.sign(doubled_areas(flat, triangles))
+    whole = np.sign(np.bincount(owner, doubled_areas(flat, triangles), minlength=len(faces)))
+    dented = np.unique(owner[turned * whole[owner] < 0])
+    kept = ~np.isin(owner, dented)
+    pieces, owners = [triangles[kept]], [owner[kept]]
+    for face in dented.tolist():
+        ears = _ears([v for v in faces[face].tolist() if v >= 0], flat)
+        pieces.append(np.array(ears, dtype=np.int64).reshape(-1, 3))
+        owners.append(np.full(len(ears), face))
+    return np.concatenate(pieces), np.concatenate(owners)
 
 
-def _near_pairs(points: Floats) -> tuple[Ints, Ints]:
-    """Pairs of triangles (T, 3, 3) whose bounding boxes meet."""
-    low, high = points.min(axis=1), points.max(axis=1)
-    centre = (low + high) / 2
-    radius = np.linalg.norm(high - low, axis=1) / 2
-    pairs = cKDTree(centre).query_pairs(2 * float(radius.max()), output_type="ndarray")
-    a, b = pairs[:, 0].astype(np.int64), pairs[:, 1].astype(np.int64)
-    meet = ((low[a] <= high[b]) & (low[b] <= high[a])).all(axis=1)
-    return a[meet], b[meet]
+def doubled_areas(flat: Floats, triangles: Ints) -> Floats:
+    """(T,) twice the signed areas of ``triangles`` (T, 3) in ``flat`` (V, 2)."""
+    a, b, c = (flat[triangles[:, n]] for n in range(3))
+    ab, ac = b - a, c - a
+    areas: Floats = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
+    return areas
 
 
-def _share_an_edge(pattern: CreasePattern, a: Ints, b: Ints) -> NDArray[np.bool_]:
-    faces = len(pattern.faces_vertices)
-    inner = pattern.edges_faces[(pattern.edges_faces >= 0).all(axis=1)]
-    keys = np.sort(inner, axis=1) @ np.array([faces, 1])
-    pairs = np.minimum(a, b) * faces + np.maximum(a, b)
-    return np.isin(pairs, keys)
+def _fannable(faces: Ints, flat: Floats) -> Ints:
+    """Quads turned by one corner where only their second diagonal lies inside."""
+    quads = (faces >= 0).sum(axis=1) == 4
+    if not quads.any():
+        return faces
+    q = faces[quads][:, :4]
+    first = doubled_areas(flat, q[:, [0, 1, 2]]) * doubled_areas(flat, q[:, [0, 2, 3]])
+    second = doubled_areas(flat, q[:, [1, 2, 3]]) * doubled_areas(flat, q[:, [1, 3, 0]])
+    turned = faces.copy()
+    q = np.where(((first <= 0) & (second > 0))[:, None], np.roll(q, -1, axis=1), q)
+    turned[np.flatnonzero(quads)[:, None], np.arange(4)] = q
+    return turned
 
 
-def _folded_onto_each_other(pattern: CreasePattern) -> Ints:
-    flat_folded = np.abs(pattern.edges_fold_angle) > np.pi - 1e-6
-    pairs = pattern.edges_faces[flat_folded & (pattern.edges_faces >= 0).all(axis=1)]
-    return np.sort(pairs, axis=1)
-
-
-def _sides_pierce(points: Floats, triangles: Ints, one: Ints, other: Ints) -> NDArray[np.bool_]:
-    """Whether a side of triangle ``one`` passes through triangle ``other``, pair by pair.
-
-    Sides that end at a vertex of ``other`` touch it there by construction and do not count.
-    """
-    crossing = np.zeros(len(one), dtype=bool)
-    a = points[other, 0]
-    e1, e2 = points[other, 1] - a, points[other, 2] - a
-    normal = np.cross(e1, e2)
-    for start, end in _SIDES:
-        shared = (
-            (triangles[one, start][:, None] == triangles[other])
-            | (triangles[one, end][:, None] == triangles[other])
-        ).any(axis=1)
-        p, q = points[one, start], points[one, end]
-        height_p = np.einsum("nk,nk->n", p - a, normal)
-        height_q = np.einsum("nk,nk->n", q - a, normal)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            at = height_p / (height_p - height_q)
-            hit = p + at[:, None] * (q - p) - a
-            d11, d12 = np.einsum("nk,nk->n", e1, e1), np.einsum("nk,nk->n", e1, e2)
-            d22 = np.einsum("nk,nk->n", e2, e2)
-            h1, h2 = np.einsum("nk,nk->n", hit, e1), np.einsum("nk,nk->n", hit, e2)
-            det = d11 * d22 - d12 * d12
-            s, t = (d22 * h1 - d12 * h2) / det, (d11 * h2 - d12 * h1) / det
-            margin = 1e-9
-            inside = (s > -margin) & (t > -margin) & (s + t < 1 + margin)
-            crossing |= ~shared & (height_p * height_q < 0) & inside
-    return crossing
+def _ears(polygon: list[int], flat: Floats) -> list[list[int]]:
+    """The polygon cut ear by ear: a convex corner whose triangle holds no other corner."""
+    points = flat[polygon]
+    following = np.roll(points, -1, axis=0)
+    area = float((points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]).sum())
+    rest, ears = list(polygon), []
+    while len(rest) > 3:
+        for n in range(len(rest)):
+            ear = [rest[n - 1], rest[n], rest[(n + 1) % len(rest)]]
+            others = np.array([v for v in rest if v not in ear], dtype=np.int64)
+            corners = np.array(ear)
+            turns = [
+                doubled_areas(flat, np.stack([np.full(len(others), s), np.full(len(others), e),
+                                              others], axis=1)) * np.sign(area)
+                for s, e in zip(corners, np.roll(corners, -1), strict=True)
+            ]  # fmt: skip
+            convex = float(doubled_areas(flat, corners[None])[0]) * area > 0
+            if convex and not (np.min(turns, axis=0) >= 0).any():
+                break
+        else:
+            n = 1
+        ears.append([rest[n - 1], rest[n], rest[(n + 1) % len(rest)]])
+        del rest[n]
+    return [*ears, rest]

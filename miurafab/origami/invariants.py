@@ -18,6 +18,9 @@ from miurafab.origami.crease_pattern import CreasePattern
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+DEGENERATE = 1e-6
+"""An edge shorter than this part of the mean edge cannot be creased."""
+
 
 @dataclass(frozen=True, eq=False)
 class CornerRing:
@@ -126,7 +129,8 @@ def edge_lengths(pattern: CreasePattern, points: Floats) -> Floats:
 def isometry(pattern: CreasePattern) -> Floats:
     """(F,) the largest relative difference, flat to folded, of each facet's sides and diagonals.
 
-    The diagonals make it an isometry of the facet and not only of its border.
+    The diagonals make it an isometry of the facet and not only of its border. A side that is
+    degenerate in both forms has no relative difference; the audit names it by itself.
     """
     assert pattern.folded_coords is not None
     faces = pattern.faces_vertices
@@ -139,6 +143,8 @@ def isometry(pattern: CreasePattern) -> Floats:
             ends = faces[real][:, [one, other]]
             flat = np.linalg.norm(np.diff(pattern.vertices_coords[ends], axis=1)[:, 0], axis=1)
             folded = np.linalg.norm(np.diff(pattern.folded_coords[ends], axis=1)[:, 0], axis=1)
-            difference = np.abs(flat - folded) / np.maximum(folded, 1e-12 * mean)
+            longer = np.maximum(flat, folded)
+            sound = longer > DEGENERATE * mean
+            difference = np.where(sound, np.abs(flat - folded) / np.where(sound, longer, 1.0), 0.0)
             worst[real] = np.maximum(worst[real], difference)
     return worst

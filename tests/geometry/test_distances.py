@@ -1,0 +1,37 @@
+"""Distances to meshes against all triangles, one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from miurafab.geometry.distances import closest_on_mesh, closest_on_triangle
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 80), st.floats(0, 4))
+def test_the_nearest_of_all_triangles(seed, count, spread):
+    """Triangles of sizes up to several orders apart, some without area."""
+    random = np.random.default_rng(seed)
+    triangles = random.normal(size=(count, 1, 3)) + random.normal(
+        size=(count, 3, 3)
+    ) * random.lognormal(-1, spread, (count, 1, 1))
+    triangles[random.random(count) < 0.1, 2] = triangles[0, 0]
+    points = random.normal(scale=2, size=(30, 3))
+    found = closest_on_mesh(points, triangles)
+    each = np.stack(
+        [closest_on_triangle(points, np.repeat(t[None], 30, axis=0)) for t in triangles]
+    )
+    best = np.linalg.norm(each - points, axis=2).min(axis=0)
+    np.testing.assert_allclose(np.linalg.norm(found - points, axis=1), best, rtol=1e-12, atol=1e-12)
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1))
+def test_no_sample_of_a_triangle_is_nearer_than_its_nearest_point(seed):
+    random = np.random.default_rng(seed)
+    triangle, point = random.normal(size=(3, 3)), random.normal(scale=2, size=3)
+    weights = random.dirichlet((0.5, 0.5, 0.5), 500)
+    best = np.linalg.norm(closest_on_triangle(point[None], triangle[None]) - point)
+    assert np.linalg.norm(weights @ triangle - point, axis=1).min() >= best - 1e-12
