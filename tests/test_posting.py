@@ -57,6 +57,7 @@ def with_passes(material: Material, **passes: int) -> Material:
 
 
 SQUARE = [(10.0, 10.0), (20.0, 10.0), (20.0, 20.5), (10.0, 10.0)]
+HOOK = [(10.0, 10.0), (20.0, 10.0), (20.0, 20.5)]
 DASH = [(1.0005, 2.25), (3.0, 2.25)]
 
 coordinate = st.integers(0, 4_000_000).map(lambda tenth: tenth / 10_000.0)
@@ -113,7 +114,27 @@ def test_small_job_is_written_as_the_controller_likes_it() -> None:
     ]
 
 
-@given(toolpaths())
+def joined(path: Toolpath) -> Toolpath:
+    """``path`` as the reader tells strokes apart: those that meet in one operation and patch are
+    one stroke.
+    """
+    meets = (
+        (np.rint(path.ends[:-1] * 1000) == np.rint(path.starts[1:] * 1000)).all(axis=1)
+        & (np.diff(path.operation) == 0)
+        & (np.diff(path.patch) == 0)
+    )
+    first = np.flatnonzero(np.concatenate([np.ones(min(len(path), 1), dtype=bool), ~meets]))
+    polylines: list[list[tuple[float, float]]] = []
+    for index in range(len(path)):
+        points = [(float(x), float(y)) for x, y in path.stroke(index)]
+        if index in first:
+            polylines.append(points)
+        else:
+            polylines[-1] += points[1:]
+    return toolpath(polylines, list(path.operation[first]), list(path.patch[first]))
+
+
+@given(toolpaths().map(joined))
 @settings(derandomize=True, max_examples=150, deadline=None)
 def test_read_back_it_is_the_same_strokes_in_order(path: Toolpath) -> None:
     labels = {0: "A1", 1: "B 2"}
@@ -131,6 +152,18 @@ def test_read_back_it_is_the_same_strokes_in_order(path: Toolpath) -> None:
 
 
 @given(toolpaths())
+@settings(derandomize=True, max_examples=100, deadline=None)
+def test_strokes_that_meet_are_burnt_once_each(path: Toolpath) -> None:
+    program = parse_program(post(path, LASER, CARD))
+    burnt = np.stack([program.start, program.end], axis=1)[program.beam_on][:, :, :2]
+    inner = np.ones(len(path.points), dtype=bool)
+    inner[path.offsets[1:] - 1] = False
+    asked = np.stack([path.points[inner], path.points[np.flatnonzero(inner) + 1]], axis=1)
+    assert burnt.shape == asked.shape
+    assert np.abs(burnt - asked).max(initial=0.0) <= 1e-3
+
+
+@given(toolpaths().map(joined))
 @settings(derandomize=True, max_examples=100, deadline=None)
 def test_power_and_feed_are_those_of_the_operation(path: Toolpath) -> None:
     program = parse_program(post(path, LASER, CARD))
@@ -170,12 +203,12 @@ def test_starts_and_ends_dark_and_arms_once(path: Toolpath) -> None:
 
 
 def test_passes_repeat_each_run_of_a_patch() -> None:
-    path = toolpath([DASH, SQUARE, DASH, SQUARE], [PERFORATE, CUT, CUT, CUT], [0, 0, 0, 1])
+    path = toolpath([DASH, HOOK, DASH, HOOK], [PERFORATE, CUT, CUT, CUT], [0, 0, 0, 1])
     job = post(path, LASER, with_passes(CARD, cut=3))
     read = strokes(parse_program(job))
     made = [tuple(read.stroke(index)[0, :2]) for index in range(len(read))]
-    dash, square = (1.0, 2.25), (10.0, 10.0)
-    assert made == [dash] + [square, dash] * 3 + [square] * 3
+    dash, hook = (1.0, 2.25), (10.0, 10.0)
+    assert made == [dash] + [hook, dash] * 3 + [hook] * 3
     assert job.text.count("(pass 2 of 3)\n") == 2
 
 

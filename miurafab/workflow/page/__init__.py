@@ -1,0 +1,205 @@
+"""The preview as one HTML file: the sheets move by move, the pattern flat and folded in space.
+
+The page is complete in itself. Its script and style are inline and named by their hashes in a
+Content-Security-Policy that allows nothing else, so that it can ask nothing of any network.
+Coordinates travel as 16-bit fractions of their bounding box (400 mm: 6 µm), in base64.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import re
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab import __version__
+from miurafab.errors import InputError
+from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
+from miurafab.workflow.preview import LAYERS, Preview, SheetPreview, clock_text, length_text
+
+_SCRIPTS = ("viewer.js", "sheets.js", "fold.js", "page.js")
+_STEPS = 65535
+
+
+def write_page(
+    path: Path,
+    *,
+    title: str,
+    preview: Preview | None = None,
+    pattern: CreasePattern | None = None,
+    motion: NDArray[np.float64] | None = None,
+) -> None:
+    """Write the page of a ``preview``, of a ``pattern``, or of both, to ``path``.
+
+    ``motion`` (T, V, 3) float64 mm, the vertices of ``pattern`` in T frames of a folding motion,
+    adds a slider through exactly these frames. Without it the page shows the forms that there
+    are, flat and folded, and nothing between them. The same input gives the same bytes.
+    """
+    path.write_text(page_text(title, preview, pattern, motion), encoding="utf-8", newline="\n")
+
+
+def page_text(
+    title: str,
+    preview: Preview | None = None,
+    pattern: CreasePattern | None = None,
+    motion: NDArray[np.float64] | None = None,
+) -> str:
+    """The text of the page that :func:`write_page` writes."""
+    if motion is not None and (pattern is None or not len(motion)):
+        raise InputError("A folding motion can be shown with its pattern and at least one frame.")
+    files = resources.files(__name__)
+    script = "".join(files.joinpath(name).read_text(encoding="utf-8") for name in _SCRIPTS)
+    script = f'"use strict";\n(() => {{\n{script}}})();\n'
+    style = files.joinpath("page.css").read_text(encoding="utf-8")
+    fill = {
+        "policy": (
+            f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; "
+            "base-uri 'none'; form-action 'none'"
+        ),
+        "title": html.escape(title),
+        "style": style,
+        "data": _json(_data(preview, pattern, motion)),
+        "script": script,
+    }
+    template = files.joinpath("page.html").read_text(encoding="utf-8")
+    return re.sub("@([a-z]+)@", lambda found: fill[found[1]], template)
+
+
+def _hash(text: str) -> str:
+    digest = base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
+    return f"'sha256-{digest}'"
+
+
+def _json(data: dict[str, Any]) -> str:
+    """JSON that cannot end the element it stands in."""
+    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _data(
+    preview: Preview | None, pattern: CreasePattern | None, motion: NDArray[np.float64] | None
+) -> dict[str, Any]:
+    facts = {}
+    if preview is not None:
+        facts["Sheets"] = f"{len(preview.sheets)}"
+        facts["Machine time"] = clock_text(preview.seconds)
+        facts["Beam on"] = clock_text(sum(sheet.beam_on_seconds for sheet in preview.sheets))
+        facts["Cut"] = length_text(sum(sheet.cut_mm for sheet in preview.sheets))
+        facts["Travel"] = length_text(sum(sheet.travel_mm for sheet in preview.sheets))
+    if pattern is not None:
+        facts["Facets"] = f"{len(pattern.faces_vertices):,}"
+        folding = np.isin(pattern.edges_assignment, ("M", "V"))
+        facts["Creases"] = f"{int(folding.sum()):,}"
+    return {
+        "machine": None if preview is None else preview.machine.title,
+        "facts": facts,
+        "remarks": [] if preview is None else preview.remarks,
+        "layers": [
+            {"name": layer.title, "colour": layer.colour, "travel": layer.name == "travel"}
+            for layer in LAYERS
+        ],
+        "sheets": [] if preview is None else [_sheet(preview, sheet) for sheet in preview.sheets],
+        "fold": None if pattern is None else _fold(pattern, motion),
+        "made_by": f"Made by miurafab {__version__}",
+    }
+
+
+def _sheet(preview: Preview, sheet: SheetPreview) -> dict[str, Any]:
+    program = sheet.program
+    track = np.concatenate([program.start[:1, :2], program.end[:, :2]])
+    box, packed = _packed(track if len(track) else np.zeros((1, 2)))
+    bed = preview.machine.bed
+    return {
+        "name": sheet.name,
+        **sheet.figures(),
+        "bounds": sheet.bounds_mm,
+        "warnings": sheet.warnings,
+        "paper": sheet.paper_mm,
+        "bed": (bed.width_mm, bed.height_mm, bed.margin_mm),
+        "view": sheet.view_mm,
+        "lengths": [round(length, 3) for length in sheet.layer_mm],
+        "box": box,
+        "points": packed,
+        "layers": _base64(sheet.layer, np.uint8),
+        "ends": _base64(sheet.end_seconds, np.float32),
+    }
+
+
+def _fold(pattern: CreasePattern, motion: NDArray[np.float64] | None) -> dict[str, Any]:
+    assignments = [letter for letter in ASSIGNMENTS if np.any(pattern.edges_assignment == letter)]
+    kinds = np.array([assignments.index(letter) for letter in pattern.edges_assignment.tolist()])
+    ends = pattern.vertices_coords[pattern.edges_vertices]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
+    forms = [_form("Flat", flat[None], flat=True)]
+    if pattern.folded_coords is not None:
+        forms.append(_form("Folded", pattern.folded_coords[None]))
+    if motion is not None:
+        forms.append(_form("Motion", motion))
+    return {
+        "assignments": assignments,
+        "lengths": np.bincount(kinds, lengths, len(assignments)).round(3).tolist(),
+        "kinds": _base64(kinds, np.uint8),
+        "edges": _base64(pattern.edges_vertices, np.uint32),
+        "triangles": _base64(triangles(pattern), np.uint32),
+        "forms": forms,
+        "first": min(1, len(forms) - 1),
+    }
+
+
+def _form(name: str, frames: NDArray[np.float64], *, flat: bool = False) -> dict[str, Any]:
+    box, packed = _packed(frames.reshape(-1, 3))
+    return {"name": name, "flat": flat, "frames": len(frames), "box": box, "points": packed}
+
+
+def triangles(pattern: CreasePattern) -> NDArray[np.int64]:
+    """(n, 3) vertex indices of triangles that fill the facets, counter-clockwise in the flat form.
+
+    A quadrilateral is split on the shorter diagonal that lies inside it; a facet of more corners
+    is a fan from its first.
+    """
+    faces = pattern.faces_vertices
+    corners = (faces >= 0).sum(axis=1)
+    quads = faces[corners == 4][:, :4]
+    point = pattern.vertices_coords[quads]
+    split_02 = _inside(point) & ~(_inside(np.roll(point, -1, axis=1)) & _second_shorter(point))
+    turned = np.where(split_02[:, None], quads, np.roll(quads, -1, axis=1))
+    fans = [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
+    for corner in range(1, faces.shape[1] - 1):
+        others = faces[(corners != 4) & (corners > corner + 1)]
+        fans.append(others[:, [0, corner, corner + 1]])
+    return np.concatenate(fans)
+
+
+def _inside(quads: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) whether the diagonal from corner 0 to 2 lies inside each of (n, 4, 2) quads."""
+    a, b, c, d = np.moveaxis(quads, 1, 0)
+    return (_turn(b - a, c - a) > 0) & (_turn(c - a, d - a) > 0)
+
+
+def _second_shorter(quads: NDArray[np.float64]) -> NDArray[np.bool_]:
+    a, b, c, d = np.moveaxis(quads, 1, 0)
+    return np.asarray(((d - b) ** 2).sum(axis=1) < ((c - a) ** 2).sum(axis=1))
+
+
+def _turn(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+
+
+def _packed(points: NDArray[np.float64]) -> tuple[list[float], str]:
+    """Points (n, d) as a box [low..., size...] and 16-bit fractions of it."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = high - low
+    steps = np.rint((points - low) / np.where(size > 0, size, 1.0) * _STEPS)
+    return [*low.round(6).tolist(), *size.round(6).tolist()], _base64(steps, np.uint16)
+
+
+def _base64(array: NDArray[Any], kind: type[np.generic]) -> str:
+    little = np.ascontiguousarray(array, dtype=np.dtype(kind).newbyteorder("<"))
+    return base64.b64encode(little.tobytes()).decode("ascii")

@@ -1,0 +1,250 @@
+// The pattern in space: flat-shaded facets with a colour for each side, creases by their assignment.
+
+const FACET_VERTEX = `#version 300 es
+precision highp float;
+in vec3 point;
+uniform mat4 camera, view;
+out vec3 seen;
+void main() {
+  seen = (view * vec4(point, 1.0)).xyz;
+  gl_Position = camera * vec4(point, 1.0);
+}`;
+
+// The normal of a flat facet is the same all over it: the cross product of how the place seen
+// changes from pixel to pixel. It is turned to the viewer; which side is seen is told by winding.
+const FACET_FRAGMENT = `#version 300 es
+precision highp float;
+in vec3 seen;
+uniform vec3 front, back;
+out vec4 result;
+void main() {
+  vec3 normal = normalize(cross(dFdx(seen), dFdy(seen)));
+  if (normal.z < 0.0) normal = -normal;
+  float key = max(dot(normal, normalize(vec3(-0.45, 0.6, 0.66))), 0.0);
+  float fill = max(dot(normal, normalize(vec3(0.7, -0.15, 0.5))), 0.0);
+  float shade = 0.5 + 0.42 * key + 0.14 * fill;
+  result = vec4((gl_FrontFacing ? front : back) * shade, 1.0);
+}`;
+
+// Widths are parts of the thickest line.
+const CREASES = {
+  M: { name: "Mountain", colour: "#d55e00", width: 1 },
+  V: { name: "Valley", colour: "#1a80bf", width: 1 },
+  B: { name: "Border", colour: "--crease-border", width: 0.8 },
+  F: { name: "Flat", colour: "--crease-flat", width: 0.55 },
+  U: { name: "Unassigned", colour: "--crease-flat", width: 0.55 },
+  C: { name: "Cut", colour: "#cc79a7", width: 0.8 },
+  J: { name: "Join", colour: "--crease-flat", width: 0.55 },
+};
+const THICKEST = 2.2;
+const FIELD = Math.tan((16 * Math.PI) / 180);
+
+/** The screen's axes in space: right, up, and out of it towards the eye. Z is up in space. */
+function axes({ yaw, pitch }) {
+  const [cy, sy, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
+  return { right: [cy, sy, 0], up: [-sy * sp, cy * sp, cp], out: [sy * cp, -cy * cp, sp] };
+}
+
+class FoldView {
+  constructor(fold) {
+    this.fold = fold;
+    this.stage = new Stage(byId("fold-canvas"), true, (gl) => this.paint(gl));
+    const { gl } = this.stage;
+    this.facet = compile(gl, FACET_VERTEX, FACET_FRAGMENT);
+    this.triangles = decode(fold.triangles, Uint32Array);
+    this.edges = decode(fold.edges, Uint32Array);
+    this.forms = fold.forms.map((form) => ({
+      ...form,
+      coordinates: this.unpack(form),
+      camera: this.home(form),
+    }));
+    this.pointBuffer = gl.createBuffer();
+    this.facets = gl.createVertexArray();
+    gl.bindVertexArray(this.facets);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.pointBuffer);
+    gl.enableVertexAttribArray(this.facet.attribute("point"));
+    gl.vertexAttribPointer(this.facet.attribute("point"), 3, gl.FLOAT, false, 12, 0);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.triangles, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    this.creases = new Lines(this.stage, decode(fold.kinds, Uint8Array));
+    this.crease = fold.lengths.reduce((sum, length) => sum + length, 0) / (this.edges.length / 2);
+    this.legend();
+    for (const [at, form] of this.forms.entries()) {
+      const button = element("button", { type: "button", textContent: form.name });
+      button.setAttribute("role", "radio");
+      button.addEventListener("click", () => this.choose(at));
+      byId("forms").append(button);
+    }
+    byId("forms").addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      this.choose((this.at + step + this.forms.length) % this.forms.length);
+      byId("forms").children[this.at].focus();
+    });
+    byId("motion").addEventListener("input", (event) => this.show(Number(event.target.value)));
+    byId("fold-fit").addEventListener("click", () => this.fit());
+    gestures(this.stage.canvas, {
+      turn: (dx, dy) => this.turn(dx, dy),
+      shift: (dx, dy) => this.shift(dx, dy),
+      zoom: (factor) => this.zoom(factor),
+      keys: { 0: () => this.fit() },
+    });
+    byId("fold").hidden = false;
+    this.choose(Math.min(fold.first, this.forms.length - 1));
+  }
+
+  /** (frames x vertices x 3) coordinates in mm about the middle of the form. */
+  unpack({ points, box: [, , , sx, sy, sz] }) {
+    const packed = decode(points, Uint16Array);
+    const span = [sx, sy, sz];
+    return Float32Array.from(packed, (value, at) => (value / 65535 - 0.5) * span[at % 3]);
+  }
+
+  home({ box: [, , , sx, sy, sz], flat }) {
+    const radius = Math.hypot(sx, sy, sz) / 2 || 1;
+    return {
+      radius, yaw: flat ? 0 : -0.6, pitch: flat ? Math.PI / 2 : 0.62, x: 0, y: 0, near: 1,
+    };
+  }
+
+  legend() {
+    const entries = this.fold.assignments.map((letter, kind) => ({
+      kind, name: CREASES[letter].name, colour: CREASES[letter].colour, note: lengthText(this.fold.lengths[kind]),
+    }));
+    this.shown = legend(byId("creases"), entries, () => this.stage.draw());
+    for (const [name, colour] of [["Front", "--side-a"], ["Back", "--side-b"]]) {
+      const swatch = element("span", { className: "swatch area" });
+      swatch.style.background = `var(${colour})`;
+      byId("creases").append(element("span", {}, swatch, name));
+    }
+  }
+
+  choose(at) {
+    this.at = at;
+    this.form = this.forms[at];
+    for (const [place, button] of [...byId("forms").children].entries()) {
+      button.setAttribute("aria-checked", place === at);
+      button.tabIndex = place === at ? 0 : -1;
+    }
+    byId("motion-bar").hidden = this.form.frames === 1;
+    byId("motion").max = this.form.frames - 1;
+    this.show(this.form.frames === 1 ? 0 : Number(byId("motion").value));
+    const size = this.form.box.slice(3).map((mm) => mm.toFixed(mm >= 100 ? 0 : 1));
+    byId("fold-size").value = `${(this.form.flat ? size.slice(0, 2) : size).join(" × ")} mm`;
+  }
+
+  /** Put one frame of the form on the stage. */
+  show(frame) {
+    const { gl } = this.stage;
+    const count = this.form.coordinates.length / this.form.frames;
+    const points = this.form.coordinates.subarray(frame * count, (frame + 1) * count);
+    const ends = new Float32Array(this.edges.length * 3);
+    for (let end = 0; end < this.edges.length; end += 1) {
+      const from = 3 * this.edges[end];
+      ends[3 * end] = points[from];
+      ends[3 * end + 1] = points[from + 1];
+      ends[3 * end + 2] = points[from + 2];
+    }
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.pointBuffer);
+    gl.bufferData(gl.ARRAY_BUFFER, points, gl.DYNAMIC_DRAW);
+    this.creases.place(ends, 3);
+    if (this.form.frames > 1) {
+      const text = `${frame + 1} of ${this.form.frames}`;
+      byId("motion-frame").value = text;
+      byId("motion").setAttribute("aria-valuetext", text);
+    }
+    this.stage.draw();
+  }
+
+  fit() {
+    this.form.camera = this.home(this.form);
+    this.stage.draw();
+  }
+
+  turn(dx, dy) {
+    const camera = this.form.camera;
+    const limit = Math.PI / 2;
+    camera.yaw -= dx * 0.008;
+    camera.pitch = Math.min(Math.max(camera.pitch + dy * 0.008, -limit), limit);
+    this.stage.draw();
+  }
+
+  /** The distance of the eye from the middle at which all points are in view from home. */
+  reach(points) {
+    const { right, up, out } = axes(this.home(this.form));
+    const dot = (axis, at) => axis[0] * points[at] + axis[1] * points[at + 1] + axis[2] * points[at + 2];
+    const tangents = [(FIELD * this.stage.width) / this.stage.height, FIELD];
+    let most = 0;
+    for (let at = 0; at < points.length; at += 3) {
+      const ahead = dot(out, at);
+      most = Math.max(most, ahead + Math.abs(dot(right, at)) / tangents[0], ahead + Math.abs(dot(up, at)) / tangents[1]);
+    }
+    return most * 1.06;
+  }
+
+  get distance() {
+    return this.full * this.form.camera.near;
+  }
+
+  shift(dx, dy) {
+    const mm = (2 * this.distance * FIELD) / this.stage.height;
+    this.form.camera.x += dx * mm;
+    this.form.camera.y -= dy * mm;
+    this.stage.draw();
+  }
+
+  zoom(factor) {
+    const camera = this.form.camera;
+    camera.near = Math.min(Math.max(camera.near / factor, 0.02), 6);
+    this.stage.draw();
+  }
+
+  /** The view (world to eye) and the camera (world to clip space), column by column. */
+  matrices() {
+    const { x, y, radius } = this.form.camera;
+    const { right, up, out } = axes(this.form.camera);
+    const z = -this.distance;
+    const view = [0, 1, 2].flatMap((axis) => [right[axis], up[axis], out[axis], 0]).concat([x, y, z, 1]);
+    const far = this.distance + 2 * radius;
+    const near = Math.max(this.distance - 2 * radius, far / 400);
+    const scale = [this.stage.height / this.stage.width / FIELD, 1 / FIELD];
+    const [c, d] = [-(far + near) / (far - near), (-2 * far * near) / (far - near)];
+    const camera = [];
+    for (let column = 0; column < 4; column += 1) {
+      const [vx, vy, vz, vw] = view.slice(4 * column, 4 * column + 4);
+      camera.push(scale[0] * vx, scale[1] * vy, c * vz + d * vw, -vz);
+    }
+    return { view, camera };
+  }
+
+  paint(gl) {
+    const seen = `${this.at} ${this.stage.width} ${this.stage.height}`;
+    if (seen !== this.seen) [this.seen, this.full] = [seen, this.reach(this.form.coordinates)];
+    const { view, camera } = this.matrices();
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    gl.disable(gl.BLEND);
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(1, 1);
+    gl.useProgram(this.facet.program);
+    gl.uniformMatrix4fv(this.facet.uniform.camera, false, camera);
+    gl.uniformMatrix4fv(this.facet.uniform.view, false, view);
+    gl.uniform3fv(this.facet.uniform.front, rgb("--side-a"));
+    gl.uniform3fv(this.facet.uniform.back, rgb("--side-b"));
+    gl.bindVertexArray(this.facets);
+    gl.drawElements(gl.TRIANGLES, this.triangles.length, gl.UNSIGNED_INT, 0);
+    gl.bindVertexArray(null);
+    gl.disable(gl.POLYGON_OFFSET_FILL);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthMask(false);
+    const pixels = (this.crease * this.stage.height) / (2 * this.distance * FIELD);
+    const thick = Math.min(Math.max(0.09 * pixels, 0.45), THICKEST);
+    const kinds = this.fold.assignments.map((letter) => ({ ...CREASES[letter], width: CREASES[letter].width * thick }));
+    this.stage.lines(this.creases, this.edges.length / 2, camera, kinds, { shown: this.shown(), nearer: 4e-4 });
+    gl.depthMask(true);
+  }
+}
