@@ -85,7 +85,9 @@ def _outlines(
     outlines, standing = [], []
     for patch, boundary in enumerate(around):
         found = tab_of_edge[boundary.edges]
-        found[(found >= 0) & (owner[found] != patch)] = -1
+        foreign = found >= 0
+        foreign[foreign] = owner[found[foreign]] != patch
+        found[foreign] = -1
         corners = pattern.vertices_coords[boundary.vertices]
         parts = []
         before = 0

@@ -1,0 +1,241 @@
+"""From a target to G-code, proved by reading the written files back with plain code.
+
+The reader below is the test's own: it knows G0, G1, M-words and comments, and nothing of the
+package, so that the writer and the package's reader cannot be wrong in the same way.
+"""
+
+import json
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from problems import saddle_mesh
+
+import miurafab
+from miurafab.errors import InputError, LayoutError, ProfileError
+from miurafab.profiles import shipped_directory
+
+TARGETS = ("hypar", "sphere", "log-spiral", "saddle.stl")
+WORD = re.compile(r"([A-Z])(-?\d+\.?\d*|-?\.\d+)")
+
+
+@dataclass
+class Stroke:
+    operation: str
+    patch: str
+    points: np.ndarray
+
+
+def read_strokes(text):
+    """Strokes of a program, every point ever visited, and the last words that switch the beam."""
+    strokes, visited, switches = [], [(0.0, 0.0)], []
+    at, motion, power, armed = (0.0, 0.0), 0, 0.0, False
+    operation = patch = None
+    open_stroke = None
+    for line in text.splitlines():
+        assert len(line) <= 70
+        assert line.isascii()
+        comment = re.fullmatch(r"\((\w+) (.*)\)", line)
+        if comment:
+            open_stroke = None
+            operation = comment[2] if comment[1] == "operation" else operation
+            patch = comment[2] if comment[1] == "patch" else patch
+            continue
+        words = WORD.findall(line)
+        assert "".join(f"{a}{b}" for a, b in words) == line.replace(" ", ""), line
+        target = dict(zip("XY", at, strict=True))
+        for letter, number in words:
+            value = float(number)
+            if letter == "G" and value in (0, 1):
+                motion = int(value)
+            elif letter == "M" and value in (2, 3, 4, 5):
+                armed = value in (3, 4)
+                switches.append(int(value))
+            elif letter == "S":
+                power = value
+            elif letter in "XY":
+                target[letter] = value
+        to = (target["X"], target["Y"])
+        if to == at:
+            continue
+        visited.append(to)
+        if motion == 1 and armed and power > 0:
+            if open_stroke is None:
+                open_stroke = Stroke(operation, patch, [at])
+                strokes.append(open_stroke)
+            open_stroke.points.append(to)
+        else:
+            open_stroke = None
+        at = to
+    for stroke in strokes:
+        stroke.points = np.array(stroke.points)
+    return strokes, np.array(visited), switches
+
+
+def turned(points, degrees):
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return points @ np.array([[c, s], [-s, c]])
+
+
+def to_pattern(points, placement, patch):
+    """The contract of layout.json, backwards: sheet to pattern frame."""
+    framed = turned(points - [placement["x_mm"], placement["y_mm"]], -placement["rotation_deg"])
+    return turned(framed, -patch["rotation_deg"]) + patch["origin_mm"]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The four targets, each fitted with 20 x 20 facets and laid out as files."""
+    folder = tmp_path_factory.mktemp("made")
+    saddle_mesh().export(folder / "saddle.stl")
+    jobs = {}
+    for target in TARGETS:
+        mesh = target.endswith(".stl")
+        wanted = miurafab.design(
+            str(folder / target) if mesh else target, facets="20x20", size="250mm"
+        )
+        result = miurafab.fit(wanted.request)
+        assert result.status == "converged", result.advice
+        name = target.partition(".")[0]
+        fold = folder / f"{name}.fold"
+        miurafab.save_pattern(result.pattern, fold, wanted.title)
+        job = folder / f"{name}-job"
+        miurafab.write_job(fold, job, "grbl-laser-400", "card-250")
+        jobs[target] = (fold, job)
+    return jobs
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_check_passes_from_the_file_alone(made, target):
+    pattern, surface, missing = miurafab.load_pattern(made[target][0])
+    assert missing is None
+    audit = miurafab.check(pattern, surface)
+    assert audit.findings == ()
+    measured = audit.measurements
+    assert measured.facets == 400
+    assert max(measured.max_planarity, measured.max_developability) <= 1e-10
+    assert measured.max_isometry <= 1e-10
+    assert measured.hausdorff_relative < 0.05
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_every_file_ends_dark_and_stays_on_the_bed(made, target):
+    _, job = made[target]
+    files = sorted(job.glob("sheet-*.nc"))
+    assert files
+    for file in files:
+        strokes, visited, switches = read_strokes(file.read_text())
+        assert strokes
+        assert visited.min() >= 0
+        assert visited.max() <= 400
+        assert switches[0] == 5
+        assert switches[-1] in (2, 5)
+        assert set(switches) <= {2, 4, 5}
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_each_crease_and_each_outline_exactly_once(made, target):
+    fold, job = made[target]
+    document = json.loads(fold.read_text())
+    layout = json.loads((job / "layout.json").read_text())
+    flat = np.array(document["vertices_coords"])
+    edges = np.array(document["edges_vertices"])
+    folded = np.flatnonzero(np.isin(document["edges_assignment"], ["M", "V"]))
+    tail, head = flat[edges[folded, 0]], flat[edges[folded, 1]]
+    length = np.linalg.norm(head - tail, axis=1)
+    along = (head - tail) / length[:, None]
+    normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    patches = {patch["label"]: patch for patch in layout["patches"]}
+    dashes = {edge: [] for edge in range(len(folded))}
+    outlines = []
+    assert sum(len(sheet["placements"]) for sheet in layout["sheets"]) == len(patches)
+    for sheet in layout["sheets"]:
+        placed = {p["patch"]: p for p in sheet["placements"]}
+        for stroke in read_strokes((job / f"{sheet['name']}.nc").read_text())[0]:
+            patch = patches[stroke.patch]
+            points = to_pattern(stroke.points, placed[patch["id"]], patch)
+            if stroke.operation == "perforate":
+                assert len(points) == 2
+                off = np.abs(np.einsum("ek,enk->en", normal, points[None] - tail[:, None]))
+                at = np.einsum("ek,enk->en", along, points[None] - tail[:, None])
+                on = (off.max(axis=1) < 2e-3) & (at.min(axis=1) > 0) & (at.max(axis=1) < length)
+                (edge,) = np.flatnonzero(on)
+                dashes[edge].append((patch["id"], *sorted(at[edge])))
+            elif stroke.operation == "cut":
+                outlines.append((patch["id"], stroke.points, placed[patch["id"]]))
+    # every crease: one patch, dashes that do not overlap, no gap longer than the rule's
+    for edge, found in dashes.items():
+        assert len({patch for patch, *_ in found}) == 1, f"crease {folded[edge]}"
+        intervals = np.array(sorted((a, b) for _, a, b in found))
+        assert (intervals[1:, 0] > intervals[:-1, 1]).all()
+        gaps = np.append(intervals[:, 0], length[edge]) - np.append(0.0, intervals[:, 1])
+        assert gaps.max() < 0.25 * length[edge] + 1.2
+    # every outline: one closed stroke along the outline of the layout
+    assert sorted(patch for patch, *_ in outlines) == sorted(p["id"] for p in layout["patches"])
+    for number, points, placement in outlines:
+        outline = np.array(layout["patches"][number]["outline_mm"])
+        shift = np.array([placement["x_mm"], placement["y_mm"]])
+        line = turned(outline, placement["rotation_deg"]) + shift
+        assert np.allclose(points[0], points[-1])
+        assert len(points) == len(line) + 1
+        ring = points[:-1]
+        start = int(np.argmin(np.linalg.norm(line - ring[0], axis=1)))
+        same = np.roll(line, -start, axis=0)
+        other = np.roll(same[::-1], 1, axis=0)
+        assert min(np.abs(ring - same).max(), np.abs(ring - other).max()) <= 1e-3
+
+
+def test_a_job_made_again_leaves_no_sheet_of_the_last(tmp_path, made):
+    fold, _ = made["hypar"]
+    job = tmp_path / "job"
+    miurafab.write_job(fold, job, "grbl-laser-400", "card-250")
+    before = {file.name for file in job.iterdir()}
+    small = tmp_path / "small.fold"
+    wanted = miurafab.design("hypar", facets="6x6", size="60mm")
+    miurafab.save_pattern(miurafab.fit(wanted.request).pattern, small)
+    miurafab.write_job(small, job, "grbl-laser-400", "card-250")
+    assert {f.name for f in job.glob("sheet-*")} < before
+    assert [f.name for f in job.glob("*.nc")] == ["sheet-01.nc"]
+
+
+def test_foreign_gcode_in_the_directory_is_not_touched(tmp_path, made):
+    fold, _ = made["hypar"]
+    (tmp_path / "mine.nc").write_text("G0 X1\n")
+    with pytest.raises(InputError, match=r"mine\.nc"):
+        miurafab.write_job(fold, tmp_path, "grbl-laser-400", "card-250")
+    assert (tmp_path / "mine.nc").read_text() == "G0 X1\n"
+    assert not (tmp_path / "layout.json").exists()
+
+
+def test_a_bed_smaller_than_a_facet_names_the_facet(tmp_path, made):
+    fold, _ = made["hypar"]
+    text = (shipped_directory("firmware_profiles") / "grbl-laser-400.toml").read_text()
+    small = tmp_path / "small.toml"
+    small.write_text(
+        text.replace('"400mm"', '"14mm"').replace('\nmargin = "5mm"', '\nmargin = "1mm"')
+    )
+    with pytest.raises(LayoutError, match="facet"):
+        miurafab.write_job(fold, tmp_path / "job", str(small), "card-250")
+
+
+def test_an_own_machine_travels_with_the_job(tmp_path, made):
+    fold, _ = made["hypar"]
+    text = (shipped_directory("firmware_profiles") / "grbl-laser-400.toml").read_text()
+    own = tmp_path / "mine.toml"
+    own.write_text(text.replace("Diode laser", "My laser"))
+    miurafab.write_job(fold, tmp_path / "job", str(own), "card-250")
+    own.unlink()
+    assert miurafab.read_job(tmp_path / "job").machine.title.startswith("My laser")
+    with pytest.raises(ProfileError, match="mine"):
+        miurafab.write_job(fold, tmp_path / "other", "mine", "card-250")
+
+
+def test_an_interrupted_job_is_no_job(tmp_path, made):
+    fold, _ = made["hypar"]
+    job = tmp_path / "job"
+    miurafab.write_job(fold, job, "grbl-laser-400", "card-250")
+    (job / "layout.json").unlink()
+    with pytest.raises(InputError, match="no whole job"):
+        miurafab.read_job(job)
