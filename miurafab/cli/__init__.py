@@ -11,7 +11,7 @@ from typing import NoReturn
 
 import typer
 
-from miurafab.cli import check, cut, doctor, fit, profiles, sheets, surfaces
+from miurafab.cli import check, cut, doctor, fit, machine, profiles, sheets, surfaces, virtual
 from miurafab.cli.console import json_text
 from miurafab.errors import MiurafabError
 
@@ -28,6 +28,8 @@ app.command("fit")(fit.fit)
 app.command("check")(check.check)
 app.command("sheets")(sheets.sheets)
 app.command("cut")(cut.cut)
+app.add_typer(machine.app, name="machine")
+app.command("virtual")(virtual.virtual)
 app.command("profiles")(profiles.profiles)
 app.command("materials")(profiles.materials)
 app.command("doctor")(doctor.doctor)

@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
-from miurafab.errors import ControllerError, InputError, JobStopped
+from miurafab.errors import ControllerError, InputError, JobStopped, ProfileError
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Options, StatusReport, Version
-from miurafab.grbl.settings import Settings
+from miurafab.grbl.settings import Settings, parse_dump
 from miurafab.machine.session import Session
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import open_port
@@ -110,6 +111,39 @@ def read_settings(
     """What the controller answers to ``$$``."""
     with conversation(port, baud=baud, settings=settings) as session:
         return Settings.from_events(session.command("$$"))
+
+
+def read_dump(path: Path) -> Settings:
+    """The settings saved in a file; raises :class:`~miurafab.errors.ProfileError` naming it."""
+    try:
+        text = path.read_text("utf-8", errors="replace")
+    except OSError as fault:
+        raise ProfileError(f"{path} cannot be read: {fault.strerror}.") from None
+    return parse_dump(text, path.name)
+
+
+def write_settings(
+    port: str,
+    wanted: Settings,
+    *,
+    baud: int = BAUD,
+    settings: Mapping[int, float] | None = None,
+) -> dict[int, str]:
+    """Write those of ``wanted`` that differ, one at a time; what was changed, as read back.
+
+    Homing (``$22``) goes first: soft limits are refused without it. Raises
+    :class:`~miurafab.errors.ControllerError` for a setting that is refused or does not stick.
+    """
+    with conversation(port, baud=baud, settings=settings) as session:
+        before = Settings.from_events(session.command("$$"))
+        differing = [n for n, text in wanted.texts.items() if before.texts.get(n) != text]
+        for number in sorted(differing, key=lambda n: (n != 22, n)):
+            session.command(f"${number}={wanted.texts[number]}")
+        after = Settings.from_events(session.command("$$"))
+    left = after.differences({n: v for n, v in wanted.values.items() if n in differing})
+    if left:
+        raise ControllerError(f"Not every setting was taken: {', '.join(map(str, left))}.")
+    return {n: after.texts[n] for n in differing if n in after.texts}
 
 
 def unlock(

@@ -201,7 +201,7 @@ def _why_not_opened(port: str, fault: Exception) -> str:
         )
     if number == errno.ENOENT or "FileNotFoundError" in text:
         known = ", ".join(name for name, _ in list_ports())
-        there = f"there are {known}" if known else "no serial port was found on this computer"
+        there = f"the ports here are {known}" if known else "this computer has no serial port"
         return f"The port {port} does not exist; {there}, and '{VIRTUAL}' needs no machine."
     if number == errno.ECONNREFUSED or "Connection refused" in text:
         return f"Nothing listens at {port}; start it there or correct the address."

@@ -24,8 +24,9 @@ from pathlib import Path
 from typing import Protocol, TextIO
 
 from miurafab.errors import InputError, PortError
-from miurafab.grbl.settings import parse_dump, virtual_settings
+from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.machine.actions import read_dump
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
 
@@ -152,7 +153,7 @@ def load_virtual_settings(source: str) -> Mapping[int, float] | None:
         return None
     path = Path(source)
     if path.is_file() and path.suffix != ".toml":
-        return parse_dump(path.read_text("utf-8", errors="replace"), path.name).values
+        return read_dump(path).values
     return virtual_settings(load_machine(source))
 
 
