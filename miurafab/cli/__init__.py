@@ -11,7 +11,18 @@ from typing import NoReturn
 
 import typer
 
-from miurafab.cli import check, cut, doctor, fit, machine, profiles, sheets, surfaces, virtual
+from miurafab.cli import (
+    check,
+    cut,
+    doctor,
+    fit,
+    machine,
+    preview,
+    profiles,
+    sheets,
+    surfaces,
+    virtual,
+)
 from miurafab.cli.console import json_text
 from miurafab.errors import MiurafabError
 
@@ -27,6 +38,7 @@ app.command("surfaces")(surfaces.surfaces)
 app.command("fit")(fit.fit)
 app.command("check")(check.check)
 app.command("sheets")(sheets.sheets)
+app.command("preview")(preview.preview)
 app.command("cut")(cut.cut)
 app.add_typer(machine.app, name="machine")
 app.command("virtual")(virtual.virtual)

@@ -19,8 +19,9 @@ from miurafab.origami.audit import audit
 from miurafab.origami.fit import fit
 from miurafab.profiles import MachineProfile, load_machine
 from miurafab.workflow.design import design, load_pattern, save_pattern
-from miurafab.workflow.job_directory import JobDirectory, read_gcode, read_job, write_job
-from miurafab.workflow.preview import ASSUMED_MACHINE, dry_run, named_machine
+from miurafab.workflow.dry_run import dry_run, read_gcode
+from miurafab.workflow.job_directory import JobDirectory, read_job, write_job
+from miurafab.workflow.preview import ASSUMED_MACHINE, named_machine
 
 GCODE_SUFFIXES = (".nc", ".gcode", ".ngc", ".tap")
 DEFAULT_MATERIAL = "card-250"
@@ -68,7 +69,7 @@ def prepare(
         return Prepared(path.resolve().name, profile, job.jobs, job)
     if path.suffix.lower() in GCODE_SUFFIXES:
         gcode = read_gcode(path)
-        named = named_machine(gcode) if machine is None else load_machine(machine)
+        named = named_machine(gcode, path.parent) if machine is None else load_machine(machine)
         return Prepared(path.name, named or load_machine(ASSUMED_MACHINE), (gcode,))
     if path.suffix.lower() == ".fold":
         pattern, surface, _ = load_pattern(path)

@@ -24,7 +24,7 @@ from miurafab.origami.fold_format import read_fold
 from miurafab.posting import post
 from miurafab.profiles import MachineProfile, find_file, load_machine, load_material
 from miurafab.profiles.shipped import Kind, shipped_directory
-from miurafab.workflow.preview import dry_run
+from miurafab.workflow.dry_run import dry_run, read_gcode
 
 LAYOUT = "layout.json"
 Progress = Callable[[float, str], None]
@@ -112,14 +112,6 @@ def read_job(directory: Path) -> JobDirectory:
     own = directory / f"{layout.machine}.toml"
     machine = load_machine(own if own.is_file() else layout.machine)
     return JobDirectory(directory, layout, machine, tuple(jobs))
-
-
-def read_gcode(path: Path) -> Job:
-    """A G-code file as a job, whatever bytes it holds; the checks of the sender come later."""
-    try:
-        return Job(path.name, path.read_bytes().decode("utf-8", "surrogateescape"))
-    except OSError as fault:
-        raise InputError(f"{path} cannot be read: {fault.strerror}.") from None
 
 
 def _keep_own_profile(kind: Kind, name: str, directory: Path) -> None:

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from miurafab.profiles import MachineProfile
+from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_text
 from miurafab.workflow.picture_svg import svg_text
-from miurafab.workflow.preview import LAYERS, Preview, SheetPreview, clock_text, length_text
+from miurafab.workflow.preview import Preview
 
 _FINE = 3
 """Mask pixels for one pixel of the picture, along each axis."""
@@ -33,11 +34,11 @@ _Points = NDArray[np.float64]
 
 
 def write_pictures(preview: Preview, out_dir: Path) -> tuple[Path, ...]:
-    """Write ``NAME-preview.png`` and ``NAME-preview.svg`` for every sheet; return their paths."""
+    """Write ``NAME.png`` and ``NAME.svg`` for every sheet into ``out_dir``; return their paths."""
     out_dir.mkdir(parents=True, exist_ok=True)
     written = []
     for sheet in preview.sheets:
-        png, svg = (out_dir / f"{sheet.name}-preview.{ending}" for ending in ("png", "svg"))
+        png, svg = (out_dir / f"{sheet.name}.{ending}" for ending in ("png", "svg"))
         picture(sheet, preview.machine).save(png, optimize=True)
         svg.write_text(svg_text(sheet, preview.machine), encoding="utf-8", newline="\n")
         written += [png, svg]

@@ -12,7 +12,7 @@ import html
 import numpy as np
 
 from miurafab.profiles import MachineProfile
-from miurafab.workflow.preview import LAYERS, SheetPreview, clock_text, length_text
+from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_text
 
 
 def svg_text(sheet: SheetPreview, machine: MachineProfile) -> str:

@@ -1,97 +1,28 @@
-"""The dry run: what a job would do on a machine, read back from its G-code; no port is opened.
-
-Everything is computed from the ``.nc`` files themselves, not from what made them, so that the
-preview of a foreign file is worth as much as that of our own.
-"""
+"""The preview of a job: each of its G-code files dry-run on one machine; no port is opened."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from miurafab.errors import InputError
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import Program, parse_program, strokes
 from miurafab.grbl.settings import parse_dump
-from miurafab.motion.estimate import estimate
-from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fold_format import read_fold
-from miurafab.profiles import OPERATIONS, MachineProfile, load_machine
-from miurafab.workflow.hazards import has_laser_mode, hazards
+from miurafab.profiles import MachineProfile, load_machine
+from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 
 ASSUMED_MACHINE = "grbl-laser-400"
 """The machine assumed for a file that names none; the preview says so."""
 
 
-@dataclass(frozen=True)
-class Layer:
-    """One kind of move in a picture: its ``name`` in the file, a ``title``, ``colour`` #rrggbb."""
-
-    name: str
-    title: str
-    colour: str
-
-
-# Apart for colour-blind eyes too (after Okabe and Ito, "Color Universal Design", 2008).
-_COLOURS = {"engrave": "#cc79a7", "score": "#1a80bf", "perforate": "#009e73", "cut": "#d55e00"}
-LAYERS = (
-    Layer("travel", "Travel", "#9aa4af"),
-    *(Layer(name, name.capitalize(), _COLOURS[name]) for name in OPERATIONS),
-    Layer("burn", "Other", "#b58900"),
-)
-"""The kinds of move: travels first, then the operations, then what no comment names."""
-_TRAVEL, _OTHER = 0, len(LAYERS) - 1
 _MACHINE = re.compile(r"^\(machine ([^()]+)\)$", re.MULTILINE)
-
-
-@dataclass(frozen=True, eq=False)
-class SheetPreview:
-    """One G-code file, dry-run.
-
-    ``lines`` of the file; ``seconds`` in all and with the beam on; ``cut_mm`` burnt and
-    ``travel_mm`` dark; ``bounds_mm`` (x0, y0, x1, y1) of what is burnt, None if nothing is.
-    Per move of ``program``: ``layer`` (n,) int64, into :data:`LAYERS`, and ``end_seconds`` (n,)
-    float64, when it ends. ``layer_mm`` and ``layer_strokes``: length and number, by layer.
-    ``paper_mm`` is the sheet, or the bed where no sheet is known; ``view_mm`` (x0, y0, x1, y1) the
-    smallest box that holds the bed, the sheet and every move.
-    """
-
-    name: str
-    lines: int
-    seconds: float
-    beam_on_seconds: float
-    cut_mm: float
-    travel_mm: float
-    bounds_mm: tuple[float, float, float, float] | None
-    warnings: tuple[str, ...]
-    program: Program
-    layer: NDArray[np.int64]
-    end_seconds: NDArray[np.float64]
-    layer_mm: tuple[float, ...]
-    layer_strokes: tuple[int, ...]
-    paper_mm: tuple[float, float]
-    view_mm: tuple[float, float, float, float]
-
-    def figures(self) -> dict[str, Any]:
-        """The figures as ``preview --json`` gives them."""
-        return {
-            "name": self.name,
-            "lines": self.lines,
-            "seconds": round(self.seconds, 3),
-            "beam_on_seconds": round(self.beam_on_seconds, 3),
-            "cut_mm": round(self.cut_mm, 3),
-            "travel_mm": round(self.travel_mm, 3),
-            "bounds_mm": None if self.bounds_mm is None else list(self.bounds_mm),
-            "warnings": list(self.warnings),
-        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +59,7 @@ def preview(
     *,
     machine: MachineProfile | None = None,
     settings_dump: str | Path | None = None,
+    on_progress: Callable[[float, str], None] | None = None,
 ) -> Preview:
     """Dry-run a job directory or a single G-code file.
 
@@ -144,7 +76,7 @@ def preview(
         raise InputError(f"{path} does not exist.")
     layout = _read_layout(path / "layout.json") if path.is_dir() else None
     files = _job_files(path, layout)
-    jobs = [_read(file) for file in files]
+    jobs = [read_gcode(file) for file in files]
     remarks: list[str] = []
     if machine is None:
         machine = _made_for(path, layout, jobs[0], remarks)
@@ -152,13 +84,15 @@ def preview(
         machine = with_settings(machine, Path(settings_dump))
     bed = (machine.bed.width_mm, machine.bed.height_mm)
     papers = {} if layout is None else layout.papers
+    sheets = []
+    for number, (file, job) in enumerate(zip(files, jobs, strict=True)):
+        if on_progress is not None:
+            on_progress(number / len(files), file.name)
+        sheets.append(dry_run(file.stem, job, machine, papers.get(file.stem, bed)))
     return Preview(
         name=path.resolve().name,
         machine=machine,
-        sheets=tuple(
-            dry_run(file.stem, job, machine, papers.get(file.stem, bed))
-            for file, job in zip(files, jobs, strict=True)
-        ),
+        sheets=tuple(sheets),
         pattern=None if layout is None else _pattern(path, layout, remarks),
         remarks=tuple(remarks),
     )
@@ -169,7 +103,7 @@ def with_settings(machine: MachineProfile, dump: Path) -> MachineProfile:
 
     Raises :class:`~miurafab.errors.ProfileError` for a line that is no setting.
     """
-    values = parse_dump(_read(dump).text, dump.name).values
+    values = parse_dump(read_gcode(dump).text, dump.name).values
     motion, tool, bed = machine.motion, machine.tool, machine.bed
     width, height = values.get(130, bed.width_mm), values.get(131, bed.height_mm)
     return replace(
@@ -238,28 +172,26 @@ def _job_files(path: Path, layout: _Layout | None) -> list[Path]:
     return files
 
 
-def _read(path: Path) -> Job:
-    try:
-        return Job(path.name, path.read_bytes().decode("utf-8", "surrogateescape"))
-    except OSError as fault:
-        raise InputError(f"{path} cannot be read: {fault.strerror}.") from None
+def named_machine(job: Job, folder: Path | None = None) -> MachineProfile | None:
+    """The machine that the job's ``(machine ...)`` comment names, None without one.
 
-
-def named_machine(job: Job) -> MachineProfile | None:
-    """The machine that the job's ``(machine ...)`` comment names, None without one."""
+    A profile of that name in ``folder`` is a user's own, and comes before the shipped ones.
+    """
     comment = _MACHINE.search(job.text)
-    return None if comment is None else load_machine(comment[1])
+    return None if comment is None else _own_or_shipped(comment[1], folder)
+
+
+def _own_or_shipped(name: str, folder: Path | None) -> MachineProfile:
+    own = None if folder is None else folder / f"{name}.toml"
+    return load_machine(own if own is not None and own.is_file() else name)
 
 
 def _made_for(path: Path, layout: _Layout | None, job: Job, remarks: list[str]) -> MachineProfile:
-    """The machine that the job was made for, or the assumed one, which is then remarked upon.
-
-    A job directory may hold a profile of the user's own.
-    """
+    """The machine that the job was made for, or the assumed one, which is then remarked upon."""
+    folder = path if path.is_dir() else path.parent
     if layout is not None:
-        own = path / f"{layout.machine}.toml"
-        return load_machine(own if own.is_file() else layout.machine)
-    named = named_machine(job)
+        return _own_or_shipped(layout.machine, folder)
+    named = named_machine(job, folder)
     if named is not None:
         return named
     remarks.append(
@@ -280,61 +212,3 @@ def _pattern(path: Path, layout: _Layout, remarks: list[str]) -> CreasePattern |
             return None
     remarks.append(f"The pattern {layout.pattern_file} is not there, so its fold is not shown.")
     return None
-
-
-def dry_run(
-    name: str, job: Job, machine: MachineProfile, paper_mm: tuple[float, float]
-) -> SheetPreview:
-    program = parse_program(job, laser=has_laser_mode(machine))
-    controller = machine.controller
-    link = Link(baud=controller.baud, rx_bytes=controller.rx_bytes)
-    times = estimate(program, MotionParameters.from_profile(machine), link)
-    burning = program.beam_on
-    layer = np.where(burning, _layers(program), _TRAVEL)
-    lengths = program.lengths
-    burnt = strokes(program)
-    bed = (machine.bed.width_mm, machine.bed.height_mm)
-    stroke_layer = layer[burnt.first_move]
-    return SheetPreview(
-        name=name,
-        lines=len(job.lines),
-        seconds=times.seconds,
-        beam_on_seconds=times.beam_on_seconds,
-        cut_mm=float(lengths[burning].sum()),
-        travel_mm=float(lengths[~burning].sum()),
-        bounds_mm=_box(burnt.points) if len(burnt) else None,
-        warnings=hazards(job, program, machine),
-        program=program,
-        layer=layer,
-        end_seconds=times.end,
-        layer_mm=tuple(np.bincount(layer, lengths, len(LAYERS)).tolist()),
-        layer_strokes=tuple(np.bincount(stroke_layer, minlength=len(LAYERS)).tolist()),
-        paper_mm=paper_mm,
-        view_mm=_box(np.vstack([program.start[:1, :2], program.end[:, :2], (0, 0), bed, paper_mm])),
-    )
-
-
-def _layers(program: Program) -> NDArray[np.int64]:
-    """(n,) the layer of each move by the operation that its comments name."""
-    place = {layer.name: at for at, layer in enumerate(LAYERS) if layer.name in OPERATIONS}
-    of_context = [place.get(context.operation, _OTHER) for context in program.contexts]
-    return np.array(of_context, dtype=np.int64)[program.context]
-
-
-def _box(points: NDArray[np.float64]) -> tuple[float, float, float, float]:
-    (x0, y0), (x1, y1) = points[:, :2].min(axis=0).round(3), points[:, :2].max(axis=0).round(3)
-    return float(x0), float(y0), float(x1), float(y1)
-
-
-def clock_text(seconds: float) -> str:
-    """A time as h:mm:ss or m:ss."""
-    minutes, second = divmod(round(seconds), 60)
-    hours, minute = divmod(minutes, 60)
-    return f"{hours}:{minute:02d}:{second:02d}" if hours else f"{minute}:{second:02d}"
-
-
-def length_text(mm: float) -> str:
-    """A length in mm, or in m from one metre up."""
-    if mm >= 1000:
-        return f"{mm / 1000:.2f} m"
-    return f"{mm:.0f} mm" if mm >= 100 else f"{mm:.1f} mm"

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from miurafab import __version__
 from miurafab.errors import InputError
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
-from miurafab.workflow.preview import LAYERS, Preview, SheetPreview, clock_text, length_text
+from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_text
+from miurafab.workflow.preview import Preview
 
 _SCRIPTS = ("viewer.js", "sheets.js", "fold.js", "page.js")
 _STEPS = 65535

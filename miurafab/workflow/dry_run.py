@@ -1,0 +1,155 @@
+"""The dry run of one G-code file: what it would do on a machine, move by move, and for how long.
+
+Everything is computed from the text itself, not from what made it, so that the figures of a
+foreign file are worth as much as those of our own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import InputError
+from miurafab.gcode.job import Job
+from miurafab.gcode.program import Program, parse_program, strokes
+from miurafab.motion.estimate import estimate
+from miurafab.motion.parameters import Link, MotionParameters
+from miurafab.profiles import OPERATIONS, MachineProfile
+from miurafab.workflow.hazards import has_laser_mode, hazards
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One kind of move in a picture: its ``name`` in the file, a ``title``, ``colour`` #rrggbb."""
+
+    name: str
+    title: str
+    colour: str
+
+
+# Apart for colour-blind eyes too (after Okabe and Ito, "Color Universal Design", 2008).
+_COLOURS = {"engrave": "#cc79a7", "score": "#1a80bf", "perforate": "#009e73", "cut": "#d55e00"}
+LAYERS = (
+    Layer("travel", "Travel", "#9aa4af"),
+    *(Layer(name, name.capitalize(), _COLOURS[name]) for name in OPERATIONS),
+    Layer("burn", "Other", "#b58900"),
+)
+"""The kinds of move: travels first, then the operations, then what no comment names."""
+_TRAVEL, _OTHER = 0, len(LAYERS) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class SheetPreview:
+    """One G-code file, dry-run.
+
+    ``lines`` of the file; ``seconds`` in all and with the beam on; ``cut_mm`` burnt and
+    ``travel_mm`` dark; ``bounds_mm`` (x0, y0, x1, y1) of what is burnt, None if nothing is.
+    Per move of ``program``: ``layer`` (n,) int64, into :data:`LAYERS`, and ``end_seconds`` (n,)
+    float64, when it ends. ``layer_mm`` and ``layer_strokes``: length and number, by layer.
+    ``paper_mm`` is the sheet, or the bed where no sheet is known; ``view_mm`` (x0, y0, x1, y1) the
+    smallest box that holds the bed, the sheet and every move.
+    """
+
+    name: str
+    lines: int
+    seconds: float
+    beam_on_seconds: float
+    cut_mm: float
+    travel_mm: float
+    bounds_mm: tuple[float, float, float, float] | None
+    warnings: tuple[str, ...]
+    program: Program
+    layer: NDArray[np.int64]
+    end_seconds: NDArray[np.float64]
+    layer_mm: tuple[float, ...]
+    layer_strokes: tuple[int, ...]
+    paper_mm: tuple[float, float]
+    view_mm: tuple[float, float, float, float]
+
+    def figures(self) -> dict[str, Any]:
+        """The figures as ``preview --json`` gives them."""
+        return {
+            "name": self.name,
+            "lines": self.lines,
+            "seconds": round(self.seconds, 3),
+            "beam_on_seconds": round(self.beam_on_seconds, 3),
+            "cut_mm": round(self.cut_mm, 3),
+            "travel_mm": round(self.travel_mm, 3),
+            "bounds_mm": None if self.bounds_mm is None else list(self.bounds_mm),
+            "warnings": list(self.warnings),
+        }
+
+
+def dry_run(
+    name: str, job: Job, machine: MachineProfile, paper_mm: tuple[float, float]
+) -> SheetPreview:
+    """Read ``job`` back and time it on ``machine``. ``paper_mm`` is the size of its sheet.
+
+    Raises :class:`~miurafab.errors.GcodeError`, naming the line, for a program that the
+    controller would refuse.
+    """
+    program = parse_program(job, laser=has_laser_mode(machine))
+    controller = machine.controller
+    link = Link(baud=controller.baud, rx_bytes=controller.rx_bytes)
+    times = estimate(program, MotionParameters.from_profile(machine), link)
+    burning = program.beam_on
+    layer = np.where(burning, _layers(program), _TRAVEL)
+    lengths = program.lengths
+    burnt = strokes(program)
+    bed = (machine.bed.width_mm, machine.bed.height_mm)
+    stroke_layer = layer[burnt.first_move]
+    return SheetPreview(
+        name=name,
+        lines=len(job.lines),
+        seconds=times.seconds,
+        beam_on_seconds=times.beam_on_seconds,
+        cut_mm=float(lengths[burning].sum()),
+        travel_mm=float(lengths[~burning].sum()),
+        bounds_mm=_box(burnt.points) if len(burnt) else None,
+        warnings=hazards(job, program, machine),
+        program=program,
+        layer=layer,
+        end_seconds=times.end,
+        layer_mm=tuple(np.bincount(layer, lengths, len(LAYERS)).tolist()),
+        layer_strokes=tuple(np.bincount(stroke_layer, minlength=len(LAYERS)).tolist()),
+        paper_mm=paper_mm,
+        view_mm=_box(np.vstack([program.start[:1, :2], program.end[:, :2], (0, 0), bed, paper_mm])),
+    )
+
+
+def read_gcode(path: Path) -> Job:
+    """A G-code file as a job, whatever bytes it holds: parsing and sending check it."""
+    try:
+        return Job(path.name, path.read_bytes().decode("utf-8", "surrogateescape"))
+    except OSError as fault:
+        raise InputError(f"{path} cannot be read: {fault.strerror}.") from None
+
+
+def _layers(program: Program) -> NDArray[np.int64]:
+    """(n,) the layer of each move by the operation that its comments name."""
+    place = {layer.name: at for at, layer in enumerate(LAYERS) if layer.name in OPERATIONS}
+    of_context = [place.get(context.operation, _OTHER) for context in program.contexts]
+    return np.array(of_context, dtype=np.int64)[program.context]
+
+
+def _box(points: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    (x0, y0), (x1, y1) = points[:, :2].min(axis=0).round(3), points[:, :2].max(axis=0).round(3)
+    return float(x0), float(y0), float(x1), float(y1)
+
+
+def clock_text(seconds: float) -> str:
+    """A time as h:mm:ss or m:ss."""
+    minutes, second = divmod(round(seconds), 60)
+    hours, minute = divmod(minutes, 60)
+    return f"{hours}:{minute:02d}:{second:02d}" if hours else f"{minute}:{second:02d}"
+
+
+def length_text(mm: float) -> str:
+    """A length in mm, or in m from one metre up."""
+    if mm >= 1000:
+        return f"{mm / 1000:.2f} m"
+    return f"{mm:.0f} mm" if mm >= 100 else f"{mm:.1f} mm"
