@@ -1,77 +1,218 @@
-"""A GRBL 1.1h controller in memory: bytes in, bytes out, and time only by :meth:`advance`."""
+"""A GRBL 1.1h controller in memory: bytes in, bytes out, and time only by ``advance``.
+
+It is the firmware's own machinery in virtual time. The main program (``virtual_protocol`` and
+what it calls) runs as a coroutine that yields when it works or waits; the interrupts (received
+bytes, step segments, switches) happen at their cycle of a 16 MHz clock beside it. So `ok` comes
+when the planner has room, a status report shows what the machine does at that moment, EEPROM
+writes lose bytes, and a job takes the time that it takes.
+
+Whatever is done to it, however it is cut into calls, the same bytes at the same times give the
+same output.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from miurafab.errors import ProfileError
+from miurafab.grbl.settings import parse_dump
+from miurafab.grbl.virtual_beam import BeamSegment, standing_seconds
+from miurafab.grbl.virtual_protocol import firmware
+from miurafab.grbl.virtual_settings import Settings
+from miurafab.grbl.virtual_state import Machine, Until, Wait
+from miurafab.motion import cpu
+from miurafab.motion.stepper import Processor
 
-@dataclass(frozen=True, slots=True)
-class BeamSegment:
-    """The beam on from ``t0`` to ``t1`` (s of virtual time), moving evenly from (``x0``, ``y0``)
-    to (``x1``, ``y1``) in machine mm (equal: standing still), at ``power``, the PWM duty in 0..1.
-    """
+__all__ = ["BeamSegment", "VirtualGrbl", "standing_seconds"]
 
-    t0: float
-    t1: float
-    x0: float
-    y0: float
-    x1: float
-    y1: float
-    power: float
-
-    @property
-    def standing(self) -> bool:
-        """Whether the beam burnt in place."""
-        return self.x0 == self.x1 and self.y0 == self.y1
+_NEVER = math.inf
 
 
 class VirtualGrbl:
     """The device side of the wire.
 
     ``settings`` maps a ``$`` number to its value, over the firmware's stock defaults (None: just
-    those). ``baud`` paces the wire both ways, ten bit times a byte; None: bytes take no time.
-    At power-up the banner is in the output.
+    those); an unknown number raises :class:`~miurafab.errors.ProfileError`. ``baud`` paces the
+    wire both ways, ten bit times a byte; None: bytes take no time. ``homing_switches`` False:
+    ``$H`` finds none. At power-up the banner is in the output.
     """
 
     def __init__(
-        self, settings: Mapping[int, float] | None = None, *, baud: int | None = None
+        self,
+        settings: Mapping[int, float] | None = None,
+        *,
+        baud: int | None = None,
+        homing_switches: bool = True,
     ) -> None:
-        raise NotImplementedError
+        stored = Settings()
+        unknown = sorted(set(settings or {}) - set(stored.values))
+        if unknown:
+            raise ProfileError(f"${unknown[0]} is not a setting of GRBL 1.1.")
+        stored.write(settings or {})
+        self._machine = Machine(stored, baud, homing_switches)
+        self._seconds = 0.0
+        self._frozen = False
+        self._power_on()
 
-    now: float
-    """Virtual seconds since power-up."""
-    lost_bytes: int
-    """Bytes that found the 128-byte ring full, or came while an EEPROM write blocked interrupts."""
-    beam_log: list[BeamSegment]
-    """What was burnt so far, in order of time."""
+    def _power_on(self) -> None:
+        """Boot; the time that takes until the banner is written is left out."""
+        machine = self._machine
+        machine.power_up()
+        self._processor = Processor(machine.stepper)
+        self._program = firmware(machine)
+        self._wait: Wait = None
+        machine.booting = True
+        while machine.booting:
+            self._wait = next(self._program)
+        self._resume()
 
-    def receive(self, data: bytes) -> None:
-        """Bytes that reach the UART (with ``baud``: start down the wire) now."""
-        raise NotImplementedError
+    # Time
+
+    @property
+    def now(self) -> float:
+        """Virtual seconds since power-up."""
+        return self._seconds
 
     def advance(self, seconds: float) -> None:
         """Let ``seconds`` of virtual time pass: the only way time enters."""
-        raise NotImplementedError
-
-    def take_output(self) -> bytes:
-        """The bytes that have come out of the UART since the last call."""
-        raise NotImplementedError
+        self._seconds += max(seconds, 0.0)
+        self._run(round(self._seconds * cpu.CLOCK))
 
     def next_event_in(self) -> float | None:
         """Seconds until something changes by itself; None if nothing will without input."""
-        raise NotImplementedError
+        machine = self._machine
+        departure = machine.uart.next_departure()
+        event = min(self._next_event(), _NEVER if departure is None else departure)
+        return None if event == _NEVER else max(event / cpu.CLOCK - self._seconds, 0.0)
+
+    # The wire
+
+    def receive(self, data: bytes) -> None:
+        """Bytes that reach the UART (with ``baud``: start down the wire) now."""
+        self._machine.uart.receive(self._machine.now, data)
+        self._run(self._machine.now)
+
+    def take_output(self) -> bytes:
+        """The bytes that have come out of the UART since the last call."""
+        return self._machine.uart.take(self._machine.now)
+
+    @property
+    def lost_bytes(self) -> int:
+        """Bytes that found the receive ring full, or came while an EEPROM write blocked it."""
+        return self._machine.uart.lost
+
+    # What it does
+
+    @property
+    def beam_log(self) -> list[BeamSegment]:
+        """What was burnt so far, in order of time, up to now; clear it to save memory."""
+        machine = self._machine
+        machine.set_pwm(machine.beam.pwm)
+        return machine.beam.segments
 
     @property
     def beam_on(self) -> bool:
         """Whether the beam burns now."""
-        raise NotImplementedError
+        return self._machine.beam.pwm > 0
 
     @property
     def position(self) -> tuple[float, float, float]:
         """The machine position in mm now."""
-        raise NotImplementedError
+        x, y, z = self._machine.millimetres(self._machine.position_now())
+        return x, y, z
 
-    def load_settings_dump(self, text: str) -> None:
-        """Take the settings from the text that ``$$`` printed, at power-up."""
-        raise NotImplementedError
+    @property
+    def state(self) -> str:
+        """The word of its status report: Idle, Run, Hold, Jog, Home, Alarm, Check, Door, Sleep."""
+        return self._machine.state.value
+
+    @property
+    def settings(self) -> dict[int, float]:
+        """The ``$`` settings now."""
+        return dict(self._machine.settings.values)
+
+    # What befalls it
+
+    def load_settings_dump(self, text: str) -> tuple[int, ...]:
+        """Store the settings of a ``$$`` dump and switch off and on again.
+
+        Returns the numbers that GRBL 1.1 does not have and that were passed over. Raises
+        :class:`~miurafab.errors.ProfileError` for a line that is no setting.
+        """
+        values = parse_dump(text, "the settings dump").values
+        known = self._machine.settings.values
+        self._machine.settings.write({n: v for n, v in values.items() if n in known})
+        self.power_cycle()
+        return tuple(number for number in values if number not in known)
+
+    def power_cycle(self) -> None:
+        """Switch off and on: only the EEPROM survives; output not yet taken is lost."""
+        self._frozen = False
+        self._machine.uart.power_cycle(self._machine.now)
+        self._power_on()
+
+    def freeze(self) -> None:
+        """The main program hangs: nothing is answered, prepared motion runs out."""
+        self._frozen = True
+
+    def press_limit(self, axis: str, pressed: bool = True) -> None:
+        """Press or release a limit switch, ``"X"``, ``"Y"`` or ``"Z"``."""
+        self._machine.change_limit_pin(axis, pressed)
+        self._run(self._machine.now)
+
+    def press_button(self, name: str, pressed: bool = True) -> None:
+        """Press or release a control button, ``"reset"``, ``"hold"`` or ``"start"``."""
+        self._machine.change_control_pin(name, pressed)
+        self._run(self._machine.now)
+
+    def touch_probe(self, touching: bool = True) -> None:
+        """The probe makes or loses contact."""
+        self._machine.change_probe_pin(touching)
+        self._run(self._machine.now)
+
+    # The run of events
+
+    def _next_event(self) -> float:
+        """The cycle of the next thing to happen by itself."""
+        machine = self._machine
+        events = (machine.stepper.next_change(), machine.uart.next_arrival(), self._due())
+        return min((event for event in events if event is not None), default=_NEVER)
+
+    def _due(self) -> int | None:
+        """When the main program goes on, if nothing comes between."""
+        if self._frozen or self._wait is None:
+            return None
+        if isinstance(self._wait, Until):
+            return self._wait.time
+        return self._processor.finish()
+
+    def _run(self, target: int) -> None:
+        """Let everything happen that is due by ``target``, in its order."""
+        machine = self._machine
+        stepper, uart = machine.stepper, machine.uart
+        if self._wait is None and machine.pending():
+            self._resume()
+        while (event := self._next_event()) <= target:
+            machine.now = now = int(event)
+            if stepper.next_change() == now:
+                self._processor.note(now)
+                stepper.run_to(now)
+            elif uart.next_arrival() == now:
+                uart.arrive()
+            if self._wait is None or self._due() == now:
+                self._resume()
+        machine.now = max(machine.now, target)
+
+    def _resume(self) -> None:
+        """The main program goes on until it has to wait."""
+        machine = self._machine
+        while not self._frozen:
+            self._wait = next(self._program)
+            if isinstance(self._wait, float):
+                if self._wait <= 0.0:
+                    continue
+                self._processor.start(machine.now, self._wait)
+            elif isinstance(self._wait, Until) and self._wait.time <= machine.now:
+                continue
+            return

@@ -13,8 +13,15 @@ The interrupts take their share while such work goes on: see :data:`STEP_TICK`.
 
 from __future__ import annotations
 
+import math
+
+from miurafab.gcode.numbers import single
+
 CLOCK = 16_000_000
 """Cycles a second."""
+
+DWELL_STEP = CLOCK // 20
+"""A dwell is a number of these, 50 ms each (``config.h``)."""
 
 _OPERANDS = 30
 ADD = 102 + _OPERANDS
@@ -47,6 +54,11 @@ def words_cost(words: int, characters: int, points: int) -> int:
     """Reading a line's words: ``characters`` in all, ``points`` numbers with decimals."""
     digits = max(characters - words, 0)
     return words * _WORD_FIXED + digits * _DIGIT + points * 2 * MULTIPLY
+
+
+def dwell_steps(seconds: float) -> int:
+    """How many times 50 ms a dwell of ``seconds`` lasts."""
+    return math.ceil(single(20.0 * single(seconds))) & 0xFFFF
 
 
 _LENGTH = 3 * COMPARE + 2 * (MULTIPLY + ADD) + ROOT + DIVIDE + 3 * MULTIPLY

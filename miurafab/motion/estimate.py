@@ -24,7 +24,6 @@ from miurafab.motion.segments import Segment, SegmentGenerator
 from miurafab.motion.stepper import Processor, Stepper
 
 _OK_BYTES = 4
-_DWELL_STEP = 0.05
 _FOREVER = 1 << 62
 
 
@@ -96,6 +95,7 @@ class _Run:
         self.stepper = Stepper()
         self.stepper.idle_lock = round((parameters.idle_lock or 0.0) * cpu.CLOCK)
         self.stepper.on_segment = self._segment
+        self.stepper.on_settled = self._settled
         self.processor = Processor(self.stepper)
         self.wire = _Wire(link)
         self.now = 0
@@ -103,6 +103,7 @@ class _Run:
         self.began = [-1] * len(program)
         self.ended = [-1] * len(program)
         self.moving = -1
+        self.follows = False
         self.burning = False
         self.burning_since = 0
         self.burnt = 0
@@ -183,8 +184,7 @@ class _Run:
     def _event(self, kind: int, seconds: float, power: float) -> None:
         self._synchronize()
         if kind == DWELL:
-            rounds = math.ceil(seconds / _DWELL_STEP - 1e-9)
-            self.now = self.processor.run(self.now, round(rounds * _DWELL_STEP * cpu.CLOCK))
+            self.now = self.processor.run(self.now, cpu.dwell_steps(seconds) * cpu.DWELL_STEP)
             self.last_end = self.now
         if power == power:
             self._beam(self.now, power > 0.0)
@@ -235,21 +235,19 @@ class _Run:
         if cycles:
             self.now = self.processor.run(self.now, cycles)
 
-    def _segment(self, now: int, segment: Segment | None) -> None:
-        """The stepper takes up ``segment``, or has settled."""
-        if segment is None:
-            if self.stepper_followed:
-                self._beam(now, False)
-            return
+    def _segment(self, now: int, segment: Segment) -> None:
         tag = segment.move.tag
         if tag != self.moving:
             self.moving = tag
             self.began[tag] = now
         self.ended[tag] = self.last_end = now + segment.cycles
-        self.stepper_followed = segment.follows
+        self.follows = segment.follows
         self._beam(now, segment.power > 0)
 
-    stepper_followed = False
+    def _settled(self, now: int) -> None:
+        """Power that follows the speed is off at rest; constant power stays on."""
+        if self.follows:
+            self._beam(now, False)
 
     def _beam(self, now: int, burning: bool) -> None:
         if burning and not self.burning:

@@ -25,6 +25,7 @@ CAPACITY = 15
 """Moves that can be planned ahead: 16 slots of which one stays free (``planner.h``)."""
 _STRAIGHT = 0.999999
 _UNLIMITED = 1e38
+_MOST_STEPS = 2.0**31 - 1.0
 _SLOWEST = 1.0 / 60.0
 """mm/s; no move is planned slower (``config.h``, 1 mm/min)."""
 _LEAST_ACCELERATION = 1e-6
@@ -112,7 +113,10 @@ class Planner:
         start = self.position if origin is None else tuple(origin)
         self.cycles += cpu.PLAN_LINE
         steps_per_mm = parameters.steps_per_mm
-        end = tuple(to_steps(t, k) for t, k in zip(target, steps_per_mm, strict=True))
+        end = tuple(
+            to_steps(t, k) if k else at
+            for t, k, at in zip(target, steps_per_mm, start, strict=True)
+        )
         steps = tuple(b - a for a, b in zip(start, end, strict=True))
         events = max(map(abs, steps))
         if events == 0:
@@ -248,8 +252,10 @@ class Planner:
 
 
 def to_steps(value: float, steps_per_mm: float) -> int:
-    """``value`` in mm as motor steps, rounded half away from zero."""
+    """``value`` in mm as motor steps, rounded half away from zero, within 32 bits; NaN is 0."""
     steps = value * steps_per_mm
+    if not -_MOST_STEPS <= steps <= _MOST_STEPS:
+        return 0 if steps != steps else int(math.copysign(_MOST_STEPS, steps))
     return int(steps + 0.5) if steps >= 0.0 else -int(0.5 - steps)
 
 

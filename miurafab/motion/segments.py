@@ -105,6 +105,7 @@ class SegmentGenerator:
         """Brake to a stop from now on, whatever the plan says."""
         self.replan()
         self.holding = True
+        self.refresh_power = False
 
     def next(self) -> Segment | None:
         """The next segment; None if there is no more motion to prepare."""

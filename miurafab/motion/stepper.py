@@ -26,12 +26,14 @@ class Stepper:
     ``queue`` holds them, the running one first; ``began`` is the cycle at which it began. After
     the last one the stepper is ``settling`` until the cycle given there, and then ``stopped``
     until somebody takes note and clears it. ``on_segment`` is told each segment as it begins,
-    and None when motion has settled.
+    ``on_end`` the end of the last, ``on_settled`` the end of settling; each with its cycle.
     """
 
     def __init__(self) -> None:
         self.idle_lock = 0
-        self.on_segment: Callable[[int, Segment | None], None] = lambda _now, _segment: None
+        self.on_segment: Callable[[int, Segment], None] = lambda _now, _segment: None
+        self.on_end: Callable[[int], None] = lambda _now: None
+        self.on_settled: Callable[[int], None] = lambda _now: None
         self.halt()
 
     def halt(self) -> None:
@@ -77,7 +79,7 @@ class Stepper:
         if self.settling is not None and self.settling <= now:
             settled, self.settling = self.settling, None
             self.stopped = True
-            self.on_segment(settled, None)
+            self.on_settled(settled)
 
     def _begin(self, now: int) -> None:
         if self.queue:
@@ -86,6 +88,7 @@ class Stepper:
         else:
             self.running = False
             self.settling = now + self.idle_lock
+            self.on_end(now)
 
     def progress(self, now: int) -> tuple[Move, int] | None:
         """The move being stepped at ``now`` and how far it is, in micro-steps; None at rest."""
