@@ -52,7 +52,7 @@ def virtual(
         sys.stdout.flush()
         console.remark("A virtual GRBL 1.1h listens there; Ctrl-C ends it.")
 
-    device = serve_virtual(
+    served = serve_virtual(
         tcp=tcp,
         settings=settings,
         speed=speed,
@@ -60,8 +60,7 @@ def virtual(
         reset_on_open=not keep_running,
         announce=announce,
     )
-    burnt = sum(segment.t1 - segment.t0 for segment in device.beam_log)
     console.remark(
-        f"Ran {device.now:.1f} s of its own time, beam on for {burnt:.1f} s, "
-        f"{device.lost_bytes} bytes lost."
+        f"Ran {served.seconds:.1f} s of its own time, beam on for {served.beam_on_seconds:.1f} s, "
+        f"{served.lost_bytes} bytes lost."
     )

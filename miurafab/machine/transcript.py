@@ -1,8 +1,8 @@
 """Everything that went over the wire, both ways, with the time: what to look at afterwards.
 
-One line a piece as it was written or read: seconds on the wire's clock since the opening, ``>``
-for what we sent or ``<`` for what came, and the bytes with line ends and other invisible bytes
-escaped as in Python (``\\n``, ``\\x18``)::
+One line a piece as it was written, or a reply up to its line end: seconds on the wire's clock
+since the opening (of a reply: when its end came), ``>`` for what we sent or ``<`` for what came,
+and the bytes with line ends and other invisible bytes escaped as in Python (``\\n``, ``\\x18``)::
 
     0.412345 > G1X10Y5S500F1200\\nX20\\n
     0.415002 < ok\\r\\n
@@ -23,6 +23,8 @@ class Transcript:
 
     def __init__(self, path: Path, title: str) -> None:
         self._file = DurableFile(path, "transcript", f"# {title}\n".encode(), append=False)
+        self._coming = b""
+        self._at = 0.0
 
     def sent(self, at: float, data: bytes) -> None:
         """Note what went out."""
@@ -30,7 +32,10 @@ class Transcript:
 
     def came(self, at: float, data: bytes) -> None:
         """Note what came in."""
-        self._note(at, "<", data)
+        *lines, self._coming = (self._coming + data).split(b"\n")
+        self._at = at
+        for line in lines:
+            self._note(at, "<", line + b"\n")
 
     def _note(self, at: float, direction: str, data: bytes) -> None:
         text = data.decode("latin-1").encode("unicode_escape")
@@ -42,4 +47,7 @@ class Transcript:
 
     def close(self) -> None:
         """Finish the file."""
+        if self._coming:
+            self._note(self._at, "<", self._coming)
+            self._coming = b""
         self._file.close()

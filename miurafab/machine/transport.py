@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import sys
 import time
 from collections.abc import Iterator, Mapping
 from typing import Protocol
@@ -22,6 +23,14 @@ from miurafab.grbl.virtual import VirtualGrbl
 
 VIRTUAL = "virtual"
 """The port name of the controller in memory."""
+
+# What pyserial lets through when a port goes away: a TypeError for a descriptor that is None by
+# now, a termios.error (no OSError) for a request to a line that has hung up.
+_FAULTS: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
+if sys.platform != "win32":
+    import termios
+
+    _FAULTS += (termios.error,)
 
 _SLICE = 0.01  # s; pyserial on Windows cannot be interrupted by Ctrl-C within one read
 _WRITE_TIMEOUT = 1.0  # s; far beyond the 90 ms that a full 1024-byte buffer takes at 115200 baud
@@ -87,9 +96,9 @@ class SerialTransport:
 
     def write_now(self, data: bytes) -> None:
         """Drop what the driver has not sent yet, then send ``data``."""
-        with self._gone():
+        with contextlib.suppress(*_FAULTS):
             self._serial.reset_output_buffer()
-            self._serial.write(data)
+        self.write(data)
 
     def read(self, timeout: float) -> bytes:
         """What has arrived; waits up to ``timeout`` seconds for a first byte."""
@@ -106,15 +115,14 @@ class SerialTransport:
 
     def close(self) -> None:
         """Release the port."""
-        with contextlib.suppress(serial.SerialException, OSError):
+        with contextlib.suppress(*_FAULTS):
             self._serial.close()
 
     @contextlib.contextmanager
     def _gone(self) -> Iterator[None]:
         try:
             yield
-        except (serial.SerialException, OSError, TypeError) as fault:
-            # TypeError: pyserial on a descriptor that another thread or an unplug took away.
+        except _FAULTS as fault:
             raise PortError(
                 f"The port {self.name} went away ({fault}); is the cable in and the power on?"
             ) from None

@@ -15,11 +15,13 @@ seconds of virtual time, machine millimetres, and the power as a fraction of ful
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import select
 import socket
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TextIO
 
@@ -157,6 +159,15 @@ def load_virtual_settings(source: str) -> Mapping[int, float] | None:
     return virtual_settings(load_machine(source))
 
 
+@dataclass(frozen=True)
+class Served:
+    """How a virtual controller was used: its own seconds, those with the beam on, bytes lost."""
+
+    seconds: float
+    beam_on_seconds: float
+    lost_bytes: int
+
+
 def serve_virtual(
     *,
     tcp: str | None = None,
@@ -165,19 +176,21 @@ def serve_virtual(
     beam_log: Path | None = None,
     reset_on_open: bool = True,
     announce: Callable[[str], None] = print,
-) -> VirtualGrbl:
-    """Serve a virtual controller until Ctrl-C, SIGTERM or SIGHUP; returns it as it then stands.
+) -> Served:
+    """Serve a virtual controller until Ctrl-C, SIGTERM or SIGHUP.
 
     Over TCP at ``tcp`` (``HOST:PORT``), else over a pseudo-terminal; ``announce`` is called once
     with the address to open. ``settings``: see :func:`load_virtual_settings`. ``speed`` is
-    virtual seconds a real second. Raises :class:`~miurafab.errors.InputError` for an option at
+    virtual seconds a real second. With ``reset_on_open`` the controller is switched off and on
+    when a sender opens the port. Raises :class:`~miurafab.errors.InputError` for an option at
     fault, :class:`~miurafab.errors.PortError` for an address that is taken.
     """
-    if not speed > 0:
+    if not 0 < speed < math.inf:
         raise InputError(f"A speed of {speed:g} does not run; give a positive number.")
     device = VirtualGrbl(load_virtual_settings(settings), baud=BAUD)
     with contextlib.ExitStack() as at_end:
-        log = None if beam_log is None else at_end.enter_context(_BeamLog(beam_log, device))
+        log = _BeamLog(device, beam_log)
+        at_end.callback(log.close)
         wire: Wire = TcpWire(tcp) if tcp is not None else PtyWire()
         at_end.callback(wire.close)
         signals = at_end.enter_context(StopSignals())
@@ -185,14 +198,14 @@ def serve_virtual(
         announce(wire.address)
         with contextlib.suppress(KeyboardInterrupt):
             _serve(device, wire, speed, log, signals.check, reset_on_open=reset_on_open)
-    return device
+    return Served(device.now, log.seconds, device.lost_bytes)
 
 
 def _serve(
     device: VirtualGrbl,
     wire: Wire,
     speed: float,
-    log: _BeamLog | None,
+    log: _BeamLog,
     check: Callable[[], None],
     *,
     reset_on_open: bool,
@@ -205,43 +218,55 @@ def _serve(
         data, opened = wire.wait(timeout)
         device.advance(max(0.0, (time.monotonic() - start) * speed - device.now))
         if opened and reset_on_open:
-            device.take_output()
-            device.receive(b"\x18")
+            device.power_cycle()
         if data:
             device.receive(data)
         output = device.take_output()
         if output:
             wire.write(output)
-        if log is not None:
-            log.update()
+        log.update()
 
 
 class _BeamLog:
-    """The segments of ``device.beam_log``, written to ``path`` as they come."""
+    """Takes the segments that ``device`` burns as they come, and writes them to ``path``."""
 
-    def __init__(self, path: Path, device: VirtualGrbl) -> None:
+    def __init__(self, device: VirtualGrbl, path: Path | None) -> None:
+        self.seconds = 0.0
         self._device = device
-        self._written = 0
-        try:
-            self._file: TextIO = path.open("w", encoding="ascii", newline="\n", buffering=1)
-        except OSError as fault:
-            raise InputError(f"The beam log {path} cannot be written: {fault.strerror}.") from None
-        self._file.write("t0,t1,x0,y0,x1,y1,power\n")
-
-    def __enter__(self) -> _BeamLog:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.update()
-        self._file.close()
+        self._due = 0.0
+        self._file: TextIO | None = None
+        if path is not None:
+            try:
+                self._file = path.open("w", encoding="ascii", newline="\n", buffering=1)
+            except OSError as fault:
+                raise InputError(
+                    f"The beam log {path} cannot be written: {fault.strerror}."
+                ) from None
+            self._file.write("t0,t1,x0,y0,x1,y1,power\n")
 
     def update(self) -> None:
-        """Write the segments that have come since."""
-        segments = self._device.beam_log[self._written :]
-        self._written += len(segments)
-        self._file.write(
-            "".join(
-                f"{s.t0:.6f},{s.t1:.6f},{s.x0:.4f},{s.y0:.4f},{s.x1:.4f},{s.y1:.4f},{s.power:.4f}\n"
-                for s in segments
+        """Take what has come, at most once a second of virtual time."""
+        if self._device.now >= self._due:
+            self._due = self._device.now + 1.0
+            # The last segment may still grow.
+            self._take(len(self._device.beam_log) - 1)
+
+    def close(self) -> None:
+        """Take the rest and finish the file."""
+        self._take(len(self._device.beam_log))
+        if self._file is not None:
+            self._file.close()
+
+    def _take(self, count: int) -> None:
+        log = self._device.beam_log
+        segments = log[: max(count, 0)]
+        del log[: max(count, 0)]
+        self.seconds += sum(s.t1 - s.t0 for s in segments)
+        if self._file is not None and segments:
+            self._file.write(
+                "".join(
+                    f"{s.t0:.6f},{s.t1:.6f},{s.x0:.4f},{s.y0:.4f},{s.x1:.4f},{s.y1:.4f},"
+                    f"{s.power:.4f}\n"
+                    for s in segments
+                )
             )
-        )

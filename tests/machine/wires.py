@@ -42,7 +42,8 @@ class FakeWire:
         self.closed = False
         self.cut_at = float("inf")  # the cable comes out
         self.deaf_at = float("inf")  # the controller's words are lost from here on
-        self.swallow: bytes | None = None  # the next such reply is lost
+        self.swallow_ok = False  # the next ok is lost
+        self._held = b""
         self.injections: list[tuple[float, bytes]] = []  # noise towards the host
         self._latency = latency
         self._random = random.Random(seed)
@@ -129,8 +130,13 @@ class FakeWire:
         output = self.device.take_output()
         while self.injections and self.device.now >= self.injections[0][0]:
             output += self.injections.pop(0)[1]
-        if self.swallow is not None and self.swallow in output:
-            output = output.replace(self.swallow, b"", 1)
-            self.swallow = None
+        if self.swallow_ok:
+            output = self._held + output
+            self._held = b""
+            if b"ok\r\n" in output:
+                output = output.replace(b"ok\r\n", b"", 1)
+                self.swallow_ok = False
+            else:
+                self._held, output = output, b""
         if self.device.now < self.deaf_at:
             self._post(self._to_host, output)

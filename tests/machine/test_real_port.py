@@ -1,0 +1,194 @@
+"""The sender as a process of its own, over a real pseudo-terminal, ended in every way.
+
+The only tests of this room that take real seconds. The wire is recorded between the pty and the
+virtual controller, byte by byte, with the time.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from miurafab.grbl.settings import virtual_settings
+from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.machine.actions import machine_info
+from miurafab.machine.virtual_server import PtyWire
+from miurafab.profiles import load_machine
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
+
+SENDER = """
+import sys
+from miurafab.errors import MiurafabError
+from miurafab.gcode.job import Job
+from miurafab.machine.sender import stream_job
+from miurafab.profiles import load_machine
+try:
+    job = Job("long.nc", sys.argv[2])
+    stream_job(job, load_machine("grbl-laser-400"), sys.argv[1])
+except MiurafabError as error:
+    print(error)
+    sys.exit(error.exit_code)
+"""
+LONG = "M4 S0\n" + "".join(f"G0 X5 Y{n % 300}\nG1 X15 S500 F2000\n" for n in range(400)) + "M5\n"
+
+
+class Bench:
+    """A virtual controller on a pty in real time, and a record of what came down to it."""
+
+    def __init__(self) -> None:
+        self.device = VirtualGrbl(virtual_settings(load_machine("grbl-laser-400")), baud=115_200)
+        self.wire = PtyWire()
+        self.came: list[tuple[float, float, bytes]] = []  # real time, virtual time, bytes
+        self._start = time.monotonic()
+
+    @property
+    def bytes_came(self) -> bytes:
+        return b"".join(data for _, _, data in self.came)
+
+    def run(self, until: Callable[[], bool], limit: float = 20.0) -> None:
+        end = time.monotonic() + limit
+        while not until():
+            assert time.monotonic() < end, "the bench waited too long"
+            data, opened = self.wire.wait(0.002)
+            self.device.advance(max(0.0, time.monotonic() - self._start - self.device.now))
+            if opened:
+                self.device.power_cycle()
+            if data:
+                self.came.append((time.monotonic(), self.device.now, data))
+                self.device.receive(data)
+            self.wire.write(self.device.take_output())
+
+    def sender(self) -> subprocess.Popen[str]:
+        """A sender in mid-job, with the beam on."""
+        process = subprocess.Popen(
+            [sys.executable, "-c", SENDER, self.wire.address, LONG],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self.run(lambda: self.bytes_came.count(b"\n") > 30 and self.device.beam_on)
+        return process
+
+
+@pytest.fixture
+def bench():
+    bench = Bench()
+    yield bench
+    bench.wire.close()
+
+
+def reset_after(bench: Bench, process: subprocess.Popen[str], number: int) -> tuple[float, float]:
+    """Send the signal; the real seconds until 0x18 had come, and the virtual time of it."""
+    sent = time.monotonic()
+    process.send_signal(number)
+    bench.run(lambda: b"\x18" in bench.bytes_came)
+    at, virtual, _ = bench.came[-1]
+    return at - sent, virtual
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_puts_a_reset_on_the_wire_at_once(name: str) -> None:
+    """Within 20 ms; the best of three, since the bench shares its processor with others."""
+    delays = []
+    for _ in range(3):
+        bench = Bench()
+        with bench.sender() as process:
+            delay, at = reset_after(bench, process, getattr(signal, name))
+            bench.run(lambda p=process: p.poll() is not None)
+            said = process.stdout.read()
+        assert process.returncode == 3
+        assert "long.nc was stopped by" in said
+        assert said.strip().endswith("the controller was reset and reports the beam off.")
+        assert bench.bytes_came.replace(b"?", b"").endswith(b"\x18")
+        assert not bench.device.beam_on
+        assert all(segment.t1 <= at + 0.01 for segment in bench.device.beam_log)
+        bench.wire.close()
+        delays.append(delay)
+        if delay <= 0.02:
+            return
+    pytest.fail(f"0x18 came after {', '.join(f'{1000 * d:.0f}' for d in delays)} ms")
+
+
+def test_a_killed_sender_leaves_no_beam_standing(bench: Bench) -> None:
+    """Nobody can send a reset then; M4 goes dark when the motion that was sent has ended."""
+    with bench.sender() as process:
+        process.kill()
+        bench.run(lambda: process.poll() is not None)
+    killed = bench.device.now
+    bench.device.advance(30.0)
+    assert not bench.device.beam_on
+    assert b"\x18" not in bench.bytes_came
+    assert not any(segment.standing for segment in bench.device.beam_log)
+    assert bench.device.beam_log[-1].t1 < killed + 15
+    # The port can be opened again, and the controller is found at rest.
+    code = "import sys; from miurafab.machine.actions import machine_info as m;"
+    again = subprocess.Popen(
+        [sys.executable, "-c", code + "print(m(sys.argv[1]).state)", bench.wire.address],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    with again:
+        bench._start = time.monotonic() - bench.device.now
+        bench.run(lambda: again.poll() is not None)
+        assert again.stdout.read() == "Idle\n"
+
+
+def test_a_port_in_use_is_refused_and_the_job_goes_on(bench: Bench) -> None:
+    with bench.sender() as process:
+        code = "import sys; from miurafab.machine.actions import machine_info as m; m(sys.argv[1])"
+        second = subprocess.run(
+            [sys.executable, "-c", code, bench.wire.address], capture_output=True, text=True
+        )
+        assert "is in use by another program" in second.stderr
+        count = bench.bytes_came.count(b"\n")
+        bench.run(lambda: bench.bytes_came.count(b"\n") > count + 5)
+        assert process.poll() is None
+        reset_after(bench, process, signal.SIGINT)
+        bench.run(lambda: process.poll() is not None)
+
+
+def test_an_unplugged_port_is_told(bench: Bench) -> None:
+    with bench.sender() as process:
+        bench.wire.close()
+        said = process.communicate(timeout=20)[0]
+    assert process.returncode == 3
+    assert "went away" in said
+    assert "switch the laser off at the machine" in said
+    bench.wire = PtyWire()  # for the fixture to close
+
+
+@pytest.mark.parametrize("how", ["pty", "tcp"])
+def test_the_virtual_controller_serves_sender_after_sender(how: str, tmp_path: Path) -> None:
+    log = tmp_path / "beam.csv"
+    where = ["--pty"] if how == "pty" else ["--tcp", "127.0.0.1:0"]
+    options = ["--settings", "grbl-laser-400", "--speed", "10", "--beam-log", str(log)]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "miurafab", "virtual", *where, *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    with server:
+        address = server.stdout.readline().strip()
+        for _ in range(3):
+            assert machine_info(address).state == "Idle"
+        job = "M4 S0\nG0 X5\nG1 X15 S500 F3000\nM5\n"
+        done = subprocess.run(
+            [sys.executable, "-c", SENDER, address, job], capture_output=True, text=True
+        )
+        assert (done.returncode, done.stdout) == (0, "")
+        server.send_signal(signal.SIGINT)
+        _, remarks = server.communicate(timeout=20)
+    assert server.returncode == 0
+    assert "0 bytes lost" in remarks
+    header, *rows = log.read_text().splitlines()
+    assert header == "t0,t1,x0,y0,x1,y1,power"
+    ways = [[float(value) for value in row.split(",")] for row in rows]
+    assert sum(way[4] - way[2] for way in ways) == pytest.approx(10, abs=0.05)
