@@ -28,7 +28,8 @@ _INK, _QUIET, _RULE, _BED, _MARGIN = "#1d2329", "#5c6670", "#dde1e6", "#6b7682",
 _PAGE, _DESK, _PAPER, _WARNING = "#ffffff", "#e9ecef", "#ffffff", "#b45309"
 _START, _END = "#2b8a3e", "#1d2329"
 _DASH = (5.0, 4.0)
-"""Pixels drawn and left out along a travel."""
+"""Pixels drawn and left out along a travel; a travel shorter than a dash would fill the gaps of a
+perforation and is left out."""
 
 _Points = NDArray[np.float64]
 
@@ -110,6 +111,12 @@ def _ink(
 ) -> Image.Image:
     """How much of each pixel the lines cover, 0 to 255. ``radius`` is in mask pixels."""
     length = np.linalg.norm(end - start, axis=1)
+    if dash is not None:
+        long = length >= dash[0]
+        start, end, length = start[long], end[long], length[long]
+    # Thickening lengthens both ends by the radius.
+    cap = np.minimum(0.5, 0.5 * radius / _FINE / np.maximum(length, 1e-9))[:, None]
+    start, end = start + (end - start) * cap, end + (start - end) * cap
     count = np.ceil(length * _FINE).astype(np.int64) + 1
     line = np.repeat(np.arange(len(start)), count)
     place = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)

@@ -66,7 +66,8 @@ function compile(gl, vertex, fragment) {
 }
 
 // Four vertices a segment from a to b: it is widened on the screen to a rectangle of the wanted
-// pixels. A segment is drawn while its kind is shown and its time has come; the one under way only in part.
+// pixels. Dashed ones shorter than a dash are left out: hops over the gaps of a perforation would
+// fill them. A segment is drawn while its kind is shown and its time has come; the one under way only in part.
 const LINE_VERTEX = `#version 300 es
 precision highp float;
 in vec3 a, b;
@@ -111,7 +112,7 @@ out vec4 result;
 void main() {
   float cover = clamp(half_width + 0.5 - abs(place.y), 0.0, 1.0);
   cover *= clamp(place.x + 0.5, 0.0, 1.0) * clamp(reach - place.x + 0.5, 0.0, 1.0);
-  if (dash > 0.5) cover *= 0.8 * step(mod(place.x, dash_pixels * 1.8), dash_pixels);
+  if (dash > 0.5) cover *= reach < dash_pixels ? 0.0 : 0.8 * step(mod(place.x, dash_pixels * 1.8), dash_pixels);
   if (cover <= 0.0) discard;
   result = vec4(colour * cover, cover);
 }`;
