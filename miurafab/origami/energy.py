@@ -220,7 +220,8 @@ def follow(
             solution = solve(driven, guess, goals[-1], factored)
             factored = solution.factored
             if solution.converged:
-                known = [*known[1 - HISTORY :], _Known(goals.pop(), solution.state)]
+                new = _Known(goals.pop(), solution.state)
+                known = [*(k for k in known[1 - HISTORY :] if k.drive != new.drive), new]
             elif known and len(goals) <= MAX_HALVINGS:
                 goals.append((known[-1].drive + goals[-1]) / 2)
             else:
