@@ -12,7 +12,6 @@ same output.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 from miurafab.errors import ProfileError
@@ -25,8 +24,6 @@ from miurafab.motion import cpu
 from miurafab.motion.stepper import Processor
 
 __all__ = ["BeamSegment", "VirtualGrbl", "standing_seconds"]
-
-_NEVER = math.inf
 
 
 class VirtualGrbl:
@@ -82,9 +79,15 @@ class VirtualGrbl:
     def next_event_in(self) -> float | None:
         """Seconds until something changes by itself; None if nothing will without input."""
         machine = self._machine
-        departure = machine.uart.next_departure()
-        event = min(self._next_event(), _NEVER if departure is None else departure)
-        return None if event == _NEVER else max(event / cpu.CLOCK - self._seconds, 0.0)
+        uart = machine.uart
+        events = (
+            machine.stepper.next_change(),
+            uart.next_arrival(),
+            uart.next_departure(),
+            self._due(),
+        )
+        event = min((event for event in events if event is not None), default=None)
+        return None if event is None else max(event / cpu.CLOCK - self._seconds, 0.0)
 
     # The wire
 
@@ -173,34 +176,34 @@ class VirtualGrbl:
 
     # The run of events
 
-    def _next_event(self) -> float:
-        """The cycle of the next thing to happen by itself."""
-        machine = self._machine
-        events = (machine.stepper.next_change(), machine.uart.next_arrival(), self._due())
-        return min((event for event in events if event is not None), default=_NEVER)
-
     def _due(self) -> int | None:
         """When the main program goes on, if nothing comes between."""
-        if self._frozen or self._wait is None:
+        wait = self._wait
+        if wait is None or self._frozen:
             return None
-        if isinstance(self._wait, Until):
-            return self._wait.time
-        return self._processor.finish()
+        return wait.time if isinstance(wait, Until) else self._processor.finish()
 
     def _run(self, target: int) -> None:
         """Let everything happen that is due by ``target``, in its order."""
-        machine = self._machine
+        machine, processor = self._machine, self._processor
         stepper, uart = machine.stepper, machine.uart
         if self._wait is None and machine.pending():
             self._resume()
-        while (event := self._next_event()) <= target:
-            machine.now = now = int(event)
-            if stepper.next_change() == now:
-                self._processor.note(now)
+        while True:
+            change, arrival, due = stepper.next_change(), uart.next_arrival(), self._due()
+            now = target + 1
+            for event in (change, arrival, due):
+                if event is not None and event < now:
+                    now = event
+            if now > target:
+                break
+            machine.now = now
+            if change == now:
+                processor.note(now)
                 stepper.run_to(now)
-            elif uart.next_arrival() == now:
+            elif arrival == now:
                 uart.arrive()
-            if self._wait is None or self._due() == now:
+            if due == now or self._wait is None:
                 self._resume()
         machine.now = max(machine.now, target)
 

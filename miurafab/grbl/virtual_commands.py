@@ -9,7 +9,8 @@ from miurafab.gcode.numbers import read_single, to_unsigned, whole_byte
 from miurafab.grbl import virtual_report as report
 from miurafab.grbl.virtual_homing import home
 from miurafab.grbl.virtual_motion import offsets_changed, remember, run_gcode
-from miurafab.grbl.virtual_realtime import rest_motors, say, synchronize
+from miurafab.grbl.virtual_output import rest_motors, say
+from miurafab.grbl.virtual_realtime import synchronize
 from miurafab.grbl.virtual_settings import LINE_SIZE, STARTUP_LINES
 from miurafab.grbl.virtual_state import Machine, Request, Run, State, Wait
 

@@ -9,12 +9,8 @@ from __future__ import annotations
 
 import math
 
-from miurafab.grbl.virtual_realtime import (
-    prepare,
-    realtime,
-    reset_motors,
-    sync_positions,
-)
+from miurafab.grbl.virtual_output import prepare, reset_motors, sync_positions
+from miurafab.grbl.virtual_realtime import realtime
 from miurafab.grbl.virtual_state import (
     AXES,
     HOMING_DOOR,

@@ -20,18 +20,15 @@ from miurafab.gcode.execution import (
 from miurafab.gcode.faults import BlockFault
 from miurafab.gcode.parser import parse_block
 from miurafab.grbl import virtual_report as report
-from miurafab.grbl.virtual_realtime import (
-    dwell,
+from miurafab.grbl.virtual_output import (
     prepare,
-    realtime,
     reset_motors,
     say,
     set_flood,
     set_spindle,
-    start_when_idle,
     sync_positions,
-    synchronize,
 )
+from miurafab.grbl.virtual_realtime import dwell, realtime, start_when_idle, synchronize
 from miurafab.grbl.virtual_state import (
     PROBE_BEFORE,
     PROBE_NOTHING,

@@ -6,13 +6,8 @@ from miurafab.gcode.parser import ModalState
 from miurafab.grbl import virtual_report as report
 from miurafab.grbl.virtual_commands import command, run_startup_lines, take_settings
 from miurafab.grbl.virtual_motion import run_gcode
-from miurafab.grbl.virtual_realtime import (
-    realtime,
-    reset_motors,
-    say,
-    start_when_idle,
-    sync_positions,
-)
+from miurafab.grbl.virtual_output import reset_motors, say, sync_positions
+from miurafab.grbl.virtual_realtime import realtime, start_when_idle
 from miurafab.grbl.virtual_settings import LINE_SIZE
 from miurafab.grbl.virtual_state import Machine, Run, State
 from miurafab.motion import cpu

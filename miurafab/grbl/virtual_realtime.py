@@ -8,6 +8,15 @@ controller is suspended (a hold, an open door, a jog being cancelled) it does no
 from __future__ import annotations
 
 from miurafab.grbl import virtual_report as report
+from miurafab.grbl.virtual_output import (
+    prepare,
+    reset_motors,
+    rest_motors,
+    say,
+    set_flood,
+    set_spindle,
+    sync_positions,
+)
 from miurafab.grbl.virtual_state import (
     HARD_LIMIT,
     SOFT_LIMIT,
@@ -25,8 +34,6 @@ from miurafab.motion import cpu
 _ALARM_PAUSE = 0.5
 _DOOR_SPINDLE, _DOOR_COOLANT = 4.0, 1.0
 """s; the waits after an alarm message, and for spindle and coolant after a door (``config.h``)."""
-_DIGIT_PRINTED = 620
-"""Cycles: a 32-bit division by ten for each digit of a number."""
 _LEAST_OVERRIDE, _MOST_OVERRIDE = 10, 200
 _FEED_STEPS = {0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}
 _SPINDLE_STEPS = {0x9A: 10, 0x9B: -10, 0x9C: 1, 0x9D: -1}
@@ -35,16 +42,6 @@ _HOLDING = {Request.CANCEL, Request.HOLD, Request.DOOR, Request.SLEEP}
 _BLOCK_START = {Request.CANCEL, Request.HOLD, Request.DOOR}
 _STEPPING = {State.CYCLE, State.HOLD, State.DOOR, State.HOMING, State.SLEEP, State.JOG}
 _FLOOD_STATES = {State.IDLE, State.CYCLE, State.HOLD, State.JOG}
-
-
-def say(machine: Machine, text: str) -> Run:
-    """Print ``text``, waiting while the transmit ring is full."""
-    data = text.encode("latin-1")
-    done = machine.uart.write(machine.now, data)
-    digits = sum(byte in b"0123456789" for byte in data)
-    yield float(len(data) * cpu.ANSWER_BYTE + digits * _DIGIT_PRINTED)
-    if done > machine.now:
-        yield Until(done)
 
 
 def realtime(machine: Machine) -> Run:
@@ -62,19 +59,6 @@ def flags(machine: Machine) -> Run:
             return
     if machine.state in _STEPPING:
         yield from prepare(machine)
-
-
-def prepare(machine: Machine) -> Run:
-    """Fill the segment queue."""
-    stepper, generator = machine.stepper, machine.generator
-    while stepper.room:
-        segment = generator.next()
-        if generator.cycles:
-            cycles, generator.cycles = generator.cycles, 0
-            yield float(cycles)
-        if segment is None:
-            return
-        stepper.queue.append(segment)
 
 
 def start_when_idle(machine: Machine) -> None:
@@ -103,47 +87,6 @@ def dwell(machine: Machine, seconds: float) -> Run:
             return
         yield from realtime(machine)
         yield float(cpu.DWELL_STEP)
-
-
-def set_spindle(machine: Machine, spindle: int, word: float) -> None:
-    """Run the spindle as M3, M4 or off (0); in laser mode M4 is dark while nothing moves."""
-    if machine.abort:
-        return
-    if spindle == 0:
-        machine.spindle_speed = 0.0
-        machine.set_pwm(0)
-    else:
-        machine.clockwise = spindle == 3
-        dark = machine.settings.laser and spindle == 4
-        machine.set_pwm(machine.to_pwm(0.0 if dark else word))
-    machine.override_count = 0
-
-
-def set_flood(machine: Machine, on: bool) -> None:
-    """Switch the coolant output."""
-    if not machine.abort:
-        machine.flood = on
-        machine.override_count = 0
-
-
-def rest_motors(machine: Machine) -> Run:
-    """Stop the step interrupt and hold the motors for the idle lock time."""
-    machine.stop_motors()
-    locks = machine.settings.idle_lock is not None or machine.alarm
-    if (locks or machine.state is State.SLEEP) and machine.state is not State.HOMING:
-        yield machine.settings.values[1] * 1e-3 * cpu.CLOCK
-
-
-def reset_motors(machine: Machine) -> Run:
-    """Stop, and forget all prepared segments."""
-    yield from rest_motors(machine)
-    machine.generator.reset()
-
-
-def sync_positions(machine: Machine) -> None:
-    """Parser and planner take over the stepper's position."""
-    machine.parser.position = machine.millimetres(machine.position)
-    machine.planner.position = machine.position
 
 
 def _flags(machine: Machine) -> Run:
