@@ -148,13 +148,17 @@ class VirtualTransport:
         self.device.receive(data)
 
     def read(self, timeout: float) -> bytes:
-        """Let the controller's time pass until it speaks, ``timeout`` seconds at most."""
+        """Let the controller's time pass until it has spoken a line, ``timeout`` seconds at most.
+
+        Byte by byte would be as true, and three times slower.
+        """
         device = self.device
         end = device.now + (max(timeout, _INSTANT) if timeout > 0 else 0.0)
+        output = b""
         while True:
-            output = device.take_output()
+            output += device.take_output()
             left = end - device.now
-            if output or left <= 0:
+            if output.endswith(b"\n") or left <= 0:
                 self._keep_pace()
                 return output
             upcoming = device.next_event_in()
