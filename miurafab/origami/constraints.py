@@ -68,21 +68,22 @@ class OrigamiConstraints:
     flat_foldable: bool = False
 
     @cached_property
-    def _indices(self) -> tuple[Ints, Ints]:
-        """Row and column of every Jacobian entry, in the order in which values are computed."""
+    def places(self) -> Ints:
+        """(3V, 2) the column and row, in the grid, of the vertex that each unknown belongs to."""
+        vertex = np.arange(self.grid.columns * self.grid.rows, dtype=np.int64).repeat(3)
+        return np.stack([vertex % self.grid.columns, vertex // self.grid.columns], axis=1)
+
+    @cached_property
+    def _pattern(self) -> tuple[Ints, Ints]:
+        """Column indices and row starts of J (CSR): the values are computed row by row."""
         faces = self.grid.faces_vertices
         spokes = np.concatenate(
             [self.grid.interior_vertices[:, None], self.grid.interior_neighbours], axis=1
         )
-        blocks = [(faces, 0), (spokes, len(faces))]
-        if self.flat_foldable:
-            blocks.append((spokes, len(faces) + len(spokes)))
-        rows, columns = [], []
-        for stencil, first in blocks:
-            row = first + np.arange(len(stencil), dtype=np.int64)
-            rows.append(np.repeat(row, stencil.shape[1] * 3))
-            columns.append((stencil[:, :, None] * 3 + np.arange(3)).reshape(-1))
-        return np.concatenate(rows), np.concatenate(columns)
+        stencils = [faces, spokes, *([spokes] if self.flat_foldable else [])]
+        columns = [(s[:, :, None] * 3 + np.arange(3)).reshape(-1) for s in stencils]
+        sizes = np.concatenate([np.full(len(s), 3 * s.shape[1]) for s in stencils])
+        return np.concatenate(columns), np.concatenate([[0], np.cumsum(sizes)])
 
     @property
     def count(self) -> int:
@@ -102,11 +103,10 @@ class OrigamiConstraints:
             if self.flat_foldable:
                 values.append(angles[:, 0] + angles[:, 2] - np.pi)
                 jacobian.append(_spoke_rows(gradients, (0, 2)))
-        rows, columns = self._indices
-        matrix = sparse.coo_array(
-            (np.concatenate(jacobian), (rows, columns)), shape=(self.count, len(x))
+        matrix = sparse.csr_array(
+            (np.concatenate(jacobian), *self._pattern), shape=(self.count, len(x))
         )
-        return np.concatenate(values), matrix.tocsr()
+        return np.concatenate(values), matrix
 
     def _planarity(self, points: Floats) -> tuple[Floats, Floats]:
         a, b, c = _from_first_corner(points, self.grid.faces_vertices)

@@ -302,7 +302,7 @@ def _turning(surface: TargetSurface) -> float:
 def _solve(start: Tessellation, flat_foldable: bool) -> Projection:
     length = float(start.edge_lengths.mean())
     constraints = OrigamiConstraints(start.grid, length, flat_foldable)
-    return project(constraints, start.vertices.ravel(), cap=STEP_CAP * length)
+    return project(constraints, start.vertices.ravel(), constraints.places, cap=STEP_CAP * length)
 
 
 def _bend(surface: TargetSurface, columns: int, rows: int, corrugation: Corrugation) -> Projection:
@@ -323,7 +323,12 @@ def _bend(surface: TargetSurface, columns: int, rows: int, corrugation: Corrugat
         if not solution.converged:
             break
     return Projection(
-        solution.x, solution.residual, iterations, solution.converged, solution.reason
+        solution.x,
+        solution.residual,
+        iterations,
+        solution.converged,
+        solution.reason,
+        solution.active,
     )
 
 
