@@ -39,7 +39,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 TOLERANCE = 1e-11
-"""On every component of F, in the model's units: convergence is judged by force, never by step."""
+"""On every component of F (forces over the stiffest hinge, if that is over 1): convergence is
+judged by what is out of balance, never by the length of a step."""
 EPS = 1e-7
 """The compliance lent to inextensible bars in K. From 1e-4 to 1e-10 it makes no difference."""
 SLOW = 0.2
@@ -72,12 +73,6 @@ class Residual(NamedTuple):
     force: Floats
     strain: Floats
     miss: float
-
-    @property
-    def size(self) -> float:
-        """The largest component; not a number where a triangle has degenerated."""
-        parts = (self.force, self.strain, self.miss)
-        return float(max(np.abs(part).max(initial=0.0) for part in map(np.atleast_1d, parts)))
 
 
 class Factored(NamedTuple):
@@ -142,6 +137,12 @@ class Driven:
         force = self._gather(bend, pull, state.mu * drive)
         strain = model.strains(points) - model.compliance * state.forces
         return Residual(force, strain, value - target)
+
+    def size(self, residual: Residual) -> float:
+        """The largest component of F; not a number where a triangle has degenerated."""
+        force = np.abs(residual.force).max(initial=0.0) / self._stiffest
+        strain = np.abs(residual.strain).max(initial=0.0)
+        return float(np.max([force, strain, abs(residual.miss)]))
 
     def factor(self, state: State) -> Factored:
         """K at ``state``. Raises ``RuntimeError`` (SuperLU's) where it is singular."""
@@ -211,6 +212,10 @@ class Driven:
         count = len(self.model.points)
         sums = [np.bincount(self._ends, vectors[:, axis], count) for axis in range(3)]
         return np.stack(sums, axis=1).ravel()[self._free]
+
+    @cached_property
+    def _stiffest(self) -> float:
+        return float(self.model.stiffness.max(initial=1.0))
 
     @cached_property
     def _ends(self) -> Ints:
@@ -290,10 +295,11 @@ def solve(
     """
     state, fresh = guess, False
     residual = driven.residual(state, target)
+    size = driven.size(residual)
     for _ in range(MAX_ITERATIONS):
-        if residual.size <= TOLERANCE:
+        if size <= TOLERANCE:
             return Solution(state, factored, True)
-        if not np.isfinite(residual.size):
+        if not np.isfinite(size):
             break
         if factored is None:
             try:
@@ -304,13 +310,13 @@ def solve(
         length = 1.0
         trial = state.plus(step, length)
         left = driven.residual(trial, target)
-        while fresh and not left.size < residual.size and length > SHORTEST_STEP:
+        while fresh and not driven.size(left) < size and length > SHORTEST_STEP:
             length /= 2
             trial = state.plus(step, length)
             left = driven.residual(trial, target)
-        if left.size < residual.size:
-            stale = left.size > SLOW * residual.size
-            state, residual = trial, left
+        if driven.size(left) < size:
+            stale = driven.size(left) > SLOW * size
+            state, residual, size = trial, left, driven.size(left)
         elif fresh:
             break
         else:
