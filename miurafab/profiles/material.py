@@ -47,7 +47,11 @@ class Operation:
 
 @dataclass(frozen=True)
 class Material:
-    """One material on one class of laser."""
+    """One material on one class of laser.
+
+    ``modulus_pa`` is Young's modulus in bending, None where the file does not give it: it is
+    needed for energies in joules and for nothing else.
+    """
 
     name: str
     title: str
@@ -57,6 +61,7 @@ class Material:
     perforation: Perforation
     tabs: TabRule
     operations: dict[str, Operation]
+    modulus_pa: float | None = None
 
 
 def load_material(name: str | Path) -> Material:
@@ -77,6 +82,7 @@ def load_material(name: str | Path) -> Material:
         perforation=_perforation(table.table("perforation")),
         tabs=_tabs(table.table("tabs")),
         operations=_operations(table.table("operations"), max_power),
+        modulus_pa=table.modulus("modulus", low=1e5, high=1e12) if table.has("modulus") else None,
     )
     table.finish()
     return material
