@@ -22,6 +22,7 @@ from scipy.sparse.csgraph import shortest_path
 
 from miurafab.errors import PatternError
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.fold_speeds import fold_speeds
 from miurafab.origami.invariants import edge_lengths
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,9 @@ Ints = NDArray[np.int64]
 RIGID = 1e-6
 """The loop mismatch, in mean edges, up to which a sheet is said to fold rigidly."""
 
+
+FOLDED_FLAT = np.pi - 1e-6
+"""Fold angles from here on count as 180 degrees, when a file is asked how far its creases fold."""
 
 _POINT = 1e-6  # of the mean edge: a shorter crease has no direction to turn a facet about
 
@@ -81,8 +85,7 @@ def rigid_motion(pattern: CreasePattern, states: ArrayLike) -> Motion:
     The frame nearest to s = 1 is laid on the folded form (without one, the frame nearest to 0 on
     the flat pattern) and each further frame on its neighbour, by the best rigid motion.
 
-    Raises :class:`~miurafab.errors.PatternError` if the facets are not all joined by creases, or
-    if the fold angles are all those of flat-folded paper and so give no ratios.
+    Raises :class:`~miurafab.errors.PatternError` if the facets are not all joined by creases.
     """
     s = np.atleast_1d(np.asarray(states, dtype=np.float64))
     if not (s >= 0).all():
@@ -106,23 +109,27 @@ def motion_through(pattern: CreasePattern, states: Floats, fold_angles: Floats) 
 
 def fold_angles_at(pattern: CreasePattern, states: Floats) -> Floats:
     """(T, E) the fold angles at ``states`` (T,) of s, by the closed form, radians."""
-    target = pattern.edges_fold_angle
-    if _flat_folded_only(target):
-        raise PatternError(
-            "The pattern's fold angles are 180 degrees throughout: they tell mountains from "
-            "valleys but not how fast each folds; give it a folded form that is not flat."
-        )
-    # past the float's half circle tan() changes sign, so fold angles stay just inside it
-    half = np.tan(np.clip(target, -np.pi + 1e-15, np.pi - 1e-15) / 2)
+    half = half_tangents(pattern)
     moving = half != 0.0
-    angles = np.zeros((len(states), len(target)))
+    angles = np.zeros((len(states), len(half)))
     angles[:, moving] = 2 * np.arctan(states[:, None] * half[moving])
     return angles
 
 
-def _flat_folded_only(angles: Floats) -> bool:
-    folding = np.abs(angles[angles != 0.0])
-    return len(folding) > 0 and bool((folding > np.pi - 1e-6).all())
+def half_tangents(pattern: CreasePattern) -> Floats:
+    """(E,) tan(rho / 2) of each crease at s = 1.
+
+    Where all fold angles of the pattern are 180 degrees, as in formats that tell only mountains
+    from valleys, s = 1 is where the median crease is folded by 90 degrees, and the others follow
+    from the sectors (:mod:`miurafab.origami.fold_speeds`).
+    """
+    target = pattern.edges_fold_angle
+    folding = np.abs(target[target != 0.0])
+    if len(folding) and (folding > FOLDED_FLAT).all():
+        return fold_speeds(pattern)
+    # past the float's half circle tan() changes sign, so fold angles stay just inside it
+    half: Floats = np.tan(np.clip(target, -np.pi + 1e-15, np.pi - 1e-15) / 2)
+    return half
 
 
 def states_between(pattern: CreasePattern, steps: int, last: float = np.inf) -> Floats:
@@ -131,11 +138,11 @@ def states_between(pattern: CreasePattern, steps: int, last: float = np.inf) -> 
     s = tan(phi / 2) / tan(phi* / 2) with phi* the median fold angle of the creases that fold. The
     state 1 is among them whenever it is within reach and there are at least two steps.
     """
-    folding = np.abs(pattern.edges_fold_angle[pattern.edges_fold_angle != 0.0])
-    if not len(folding):
+    half = np.abs(half_tangents(pattern))
+    if not (half > 0).any():
         raise PatternError("No crease of the pattern has a fold angle, so nothing folds.")
-    middling = float(np.median(folding))
-    end = 2 * np.arctan(last * np.tan(middling / 2))
+    speed = float(np.median(half[half > 0]))
+    middling, end = 2 * np.arctan(speed), 2 * np.arctan(last * speed)
     if last <= 1.0 or steps < 2:
         phi = np.linspace(0.0, end, steps + 1)
     else:
@@ -146,7 +153,7 @@ def states_between(pattern: CreasePattern, steps: int, last: float = np.inf) -> 
                 np.linspace(middling, end, steps - before + 1)[1:],
             ]
         )
-    states = np.tan(phi / 2) / np.tan(middling / 2)
+    states = np.tan(phi / 2) / speed
     states[phi == middling] = 1.0
     states[-1] = last
     return np.asarray(states, dtype=np.float64)

@@ -17,6 +17,7 @@ from miurafab.origami.kinematics import (
     RIGID,
     Motion,
     facet_strain,
+    half_tangents,
     laid_on,
     rigid_motion,
     states_between,
@@ -120,11 +121,25 @@ def test_facets_that_hang_on_nothing_are_refused() -> None:
         rigid_motion(replace(pattern, edges_assignment=cut), [1.0])
 
 
-def test_flat_folded_angles_alone_are_refused() -> None:
+@pytest.mark.parametrize("name", EXACT)
+def test_mountains_and_valleys_alone_tell_the_motion(name: str) -> None:
+    pattern = fitted(name, flat_foldable=0.0).pattern
+    assert pattern is not None
+    flat_folded = np.sign(pattern.edges_fold_angle) * np.pi
+    bare = replace(pattern, edges_fold_angle=flat_folded, folded_coords=None)
+    known, found = half_tangents(pattern), half_tangents(bare)
+    moving = known != 0
+    ratio = found[moving] / known[moving]
+    assert np.ptp(ratio) < 1e-9 * ratio.mean()
+    assert rigid_motion(bare, states_between(bare, 6)).is_rigid
+
+
+def test_four_creases_of_a_kind_are_refused() -> None:
     pattern = regular()
-    angle = np.sign(pattern.edges_fold_angle) * np.pi
-    with pytest.raises(PatternError, match="180 degrees"):
-        rigid_motion(replace(pattern, edges_fold_angle=angle), [1.0])
+    mountains = np.where(pattern.edges_assignment == "B", "B", "M")
+    angle = np.where(mountains == "M", -np.pi, 0.0)
+    with pytest.raises(PatternError, match="three of one kind"):
+        rigid_motion(replace(pattern, edges_assignment=mountains, edges_fold_angle=angle), [1.0])
     with pytest.raises(PatternError, match="from 0"):
         rigid_motion(pattern, [-1.0])
 
