@@ -7,9 +7,10 @@ u(θ) = (cos θ, sin θ) and v(θ) = (-sin θ, cos θ) are at most w and h. Two 
   values of a union are the maxima of those of its parts, so the boxes of all unions that a search
   meets are maxima of a few arrays. The fan samples the angle: it can miss a fit, never invent one.
 - :func:`best_turn`: exact for one convex hull. Between two angles at which a side of the hull is
-  flush with the box, the supporting corners are fixed, the extents are d·u(θ) and g·v(θ), and the
-  larger excess over the rectangle is smallest at an end of the interval or where both excesses are
-  equal: (d_x - g_y) cos θ + (d_y + g_x) sin θ = w - h. All such angles are tried.
+  flush with the box, the supporting corners are fixed, and the extents d·u(θ) and g·v(θ) are
+  concave. So the larger excess over the rectangle is least at an end of the interval or where both
+  excesses are equal, (d_x - g_y) cos θ + (d_y + g_x) sin θ = w - h; and the area is least at an end
+  of where the box fits, so also where one extent just fills the rectangle. All these are tried.
 """
 
 from __future__ import annotations
@@ -102,17 +103,21 @@ def _turns(points: NDArray[Any], width: float, height: float) -> tuple[NDArray[A
     ends = np.unique(np.concatenate([flush, flush + np.pi / 2, [0.0]]) % np.pi)
     middle = (ends + np.append(ends[1:], np.pi)) / 2
     d, g = _spans(hull, middle), _spans(hull, middle + np.pi / 2)
-    a, b = d[:, 0] - g[:, 1], d[:, 1] + g[:, 0]
-    size = np.hypot(a, b)
-    level = np.divide(width - height, size, out=np.full_like(size, 2.0), where=size > 0)
-    swing = np.arccos(np.clip(level, -1.0, 1.0))
-    real = np.abs(level) <= 1
-    peak = np.arctan2(b, a)
-    equal = np.concatenate([(peak + swing)[real], (peak - swing)[real]]) % np.pi
-    angles = np.unique(np.concatenate([ends, equal]))
+    equal = _solved(d[:, 0] - g[:, 1], d[:, 1] + g[:, 0], width - height)
+    full = [_solved(d[:, 0], d[:, 1], width), _solved(g[:, 1], -g[:, 0], height)]
+    angles = np.unique(np.concatenate([ends, equal, *full]))
     u = np.column_stack([np.cos(angles), np.sin(angles)])
     v = np.column_stack([-u[:, 1], u[:, 0]])
     return angles, np.column_stack([np.ptp(hull @ u.T, axis=0), np.ptp(hull @ v.T, axis=0)])
+
+
+def _solved(a: NDArray[Any], b: NDArray[Any], level: float) -> NDArray[Any]:
+    """The angles in [0, π) with a cos θ + b sin θ = level, for all a and b (n,) that have any."""
+    size = np.hypot(a, b)
+    part = np.divide(level, size, out=np.full_like(size, 2.0), where=size > 0)
+    real = np.abs(part) <= 1
+    peak, swing = np.arctan2(b, a)[real], np.arccos(part[real])
+    return np.concatenate([peak + swing, peak - swing]) % np.pi
 
 
 def _spans(hull: NDArray[Any], angles: NDArray[Any]) -> NDArray[Any]:

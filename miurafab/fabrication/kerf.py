@@ -1,14 +1,15 @@
 """Kerf compensation: the line the beam follows so that the piece has its nominal outline.
 
 The beam burns kerf / 2 to each side of its path, so the path is the outline moved outwards by
-kerf / 2, with mitred corners so that corners stay sharp. A mitre is cut off at twice kerf / 2 from
-its corner (below 60 degrees); the beam then takes less than 0.3 kerf off the tip. Where two parts
-of an outline are nearer to each other than the kerf the path may close a ring around waste; those
-rings are paths too.
+kerf / 2, with mitred corners so that corners stay sharp. The mitre of a corner below 60 degrees is
+cut off square, at a distance of kerf from the corner: farther than kerf / 2, so the tip stays
+whole. Where two parts of an outline are nearer to each other than the kerf the path may close a
+ring around waste; those rings are paths too.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,8 +20,10 @@ MITRE_LIMIT = 2.0
 
 
 def allowance(kerf: float) -> float:
-    """How far in mm the cut line may lie outside the nominal outline."""
-    return MITRE_LIMIT * kerf / 2
+    """How far in mm the cut line may lie outside the nominal outline: the ends of a mitre that is
+    cut off lie less than kerf / 2 to the side of its middle.
+    """
+    return math.hypot(MITRE_LIMIT, 1.0) * kerf / 2
 
 
 def cut_lines(

@@ -121,11 +121,16 @@ def _without_misfits(
         taken: BaseGeometry = shapely.Polygon(pattern.vertices_coords[around[patch].vertices])
         for tab in names[standing[patch]].tolist():
             shape = shapely.Polygon(tabs.polygon(tab))
-            if taken.intersection(shape).area < 1e-6 and _meets_in_base(taken, shape):
-                taken = taken.union(shape)
+            if _common_area(taken, shape) < 1e-6 and _meets_in_base(taken, shape):
+                taken = shapely.union(taken, shape, grid_size=1e-9)
             else:
                 kept[tab] = False
     return kept
+
+
+def _common_area(one: BaseGeometry, other: BaseGeometry) -> float:
+    # Without a grid, GEOS 3.14 can return a whole polygon that only touches the other one.
+    return float(shapely.area(shapely.intersection(one, other, grid_size=1e-9)))
 
 
 def _meets_in_base(taken: BaseGeometry, tab: shapely.Polygon) -> bool:

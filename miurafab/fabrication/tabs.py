@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
-MIN_BASE_MM = 1.0
-"""A tab with a shorter base is not worth its cut (judged)."""
+MIN_SIDE_MM = 1.0
+"""A tab with a shorter base, or lower than that on average, cannot be handled (judged)."""
 
 MIN_AREA_MM2 = 2.0
 """A tab with less glue area does not hold (judged)."""
@@ -96,8 +96,9 @@ class TabRegions:
     def usable(self) -> NDArray[np.bool_]:
         """(N,) which are long and large enough to hold."""
         base = np.linalg.norm(self.points[:, 1] - self.points[:, 0], axis=1)
-        enough = np.logical_and(base >= MIN_BASE_MM, self.areas >= MIN_AREA_MM2)
-        found: NDArray[np.bool_] = enough & (self.count >= 3)
+        area = self.areas
+        large = (base >= MIN_SIDE_MM) & (area >= MIN_SIDE_MM * base) & (area >= MIN_AREA_MM2)
+        found: NDArray[np.bool_] = large & (self.count >= 3)
         return found
 
 

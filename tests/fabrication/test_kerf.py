@@ -1,0 +1,54 @@
+"""Kerf compensation: what the beam leaves is the nominal piece."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from flat_patterns import card, zigzag
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from miurafab.fabrication.kerf import allowance, cut_lines
+from miurafab.fabrication.pieces import make_pieces
+
+
+def test_a_rectangle_grows_by_half_a_kerf_on_each_side():
+    outline = np.array([[0, 0], [40, 0], [40, 20], [0, 20]], dtype=float)
+    (line,) = cut_lines([outline], 0.2)[0]
+    assert shapely.Polygon(line).equals_exact(
+        shapely.box(-0.1, -0.1, 40.1, 20.1), 1e-9, normalize=True
+    )
+    assert shapely.Polygon(line).exterior.is_ccw
+
+
+def test_no_kerf_leaves_the_outline_as_it_is():
+    outline = np.array([[0, 0], [40, 0], [40, 20]], dtype=float)
+    np.testing.assert_array_equal(cut_lines([outline], 0.0)[0][0], outline)
+
+
+@settings(derandomize=True, max_examples=30, deadline=None)
+@given(st.floats(0.35, 1.5), st.floats(0.01, 0.4))
+def test_the_beam_burns_up_to_the_piece_and_never_into_it(sector, kerf):
+    pattern = zigzag(12, 12, a=15.0, sector=sector)
+    for piece in make_pieces(pattern, 120.0, 90.0, card(kerf=kerf, inset=0.5)).pieces:
+        nominal = shapely.Polygon(piece.outline)
+        outer, *waste = piece.cut_lines
+        path = shapely.LineString(np.concatenate([outer, outer[:1]]))
+        assert path.distance(nominal) == pytest.approx(kerf / 2, abs=1e-9)
+        sides = shapely.linestrings(np.stack([outer, np.roll(outer, -1, axis=0)], axis=1))
+        straight = shapely.distance(sides, nominal) <= kerf / 2 + 1e-9
+        assert shapely.length(sides[straight]).sum() >= 0.95 * path.length
+        assert shapely.distance(shapely.points(outer), nominal).max() <= allowance(kerf) + 1e-9
+        assert not waste
+
+
+def test_waste_enclosed_by_a_narrow_mouth_is_cut_out_too():
+    # A pocket whose mouth is 0.1 mm wide: with a kerf of 0.4 the mouth closes.
+    outline = np.array(
+        [[0, 0], [30, 0], [30, 20], [15.1, 20], [15.1, 15], [20, 15], [20, 5], [10, 5], [10, 15],
+         [15, 15], [15, 20], [0, 20]], dtype=float,
+    )  # fmt: skip
+    outer, waste = cut_lines([outline], 0.4)[0]
+    assert shapely.Polygon(outer).contains(shapely.Polygon(waste))
+    assert shapely.Polygon(waste).area == pytest.approx(9.6 * 9.6)

@@ -1,0 +1,98 @@
+"""Single-line letters, and where they are engraved."""
+
+from __future__ import annotations
+
+import flat_patterns
+import numpy as np
+import pytest
+import shapely
+from flat_patterns import bed, card, miura, triangles, zigzag
+
+from miurafab.errors import LayoutError
+from miurafab.fabrication.labels import CLEARANCE_MM, place_texts
+from miurafab.fabrication.lettering import text_strokes, text_width
+from miurafab.fabrication.pieces import make_pieces
+from miurafab.fabrication.sheets import lay_out
+
+ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ-"
+
+
+def test_every_letter_is_within_its_box_and_unlike_every_other():
+    seen = {}
+    for letter in ALPHABET:
+        strokes = text_strokes(letter)
+        points = np.concatenate(strokes)
+        assert np.abs(points[:, 0]).max() <= text_width(letter) / 2 + 1e-9
+        assert np.abs(points[:, 1]).max() <= 0.5 + 1e-9
+        assert all(len(stroke) >= 2 for stroke in strokes)
+        shape = shapely.MultiLineString([stroke.tolist() for stroke in strokes]).normalize()
+        if letter not in "0O":
+            assert shape.wkt not in seen, f"{letter} looks like {seen[shape.wkt]}"
+            seen[shape.wkt] = letter
+
+
+def test_a_text_is_its_letters_side_by_side():
+    width = text_width("AB")
+    points = np.concatenate(text_strokes("AB"))
+    assert np.ptp(points[:, 0]) == pytest.approx(width)
+    assert width == pytest.approx((4 + 2 + 4) / 6)
+
+
+def test_a_character_that_cannot_be_engraved_is_named():
+    with pytest.raises(LayoutError, match="'ä'"):
+        text_strokes("Pä")
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        pytest.param(miura(20, 20, 14.0, 14.0), id="miura"),
+        pytest.param(zigzag(18, 16, 16.0), id="acute"),
+        pytest.param(flat_patterns.fan(24, 20, cell=14.0, radius=250.0), id="fan"),
+        pytest.param(triangles(3, 12, 400.0), id="triangles"),
+    ],
+)
+def test_no_text_touches_a_crease_a_cut_or_another_text(pattern):
+    pieces = make_pieces(pattern, 190.0, 140.0, card())
+    names = [f"P{k}" for k in range(len(pieces.pieces))]
+    numbers = np.arange(len(pieces.tabs)) + 1
+    turns = np.linspace(-1.5, 1.5, len(names))
+    texts, left_out = place_texts(pattern, pieces.face_patch, names, pieces.tabs, numbers, turns)
+    assert len(texts) + left_out == len(names) + 2 * len(numbers)
+    assert len(texts) > 0.8 * (len(names) + 2 * len(numbers))
+    creases = shapely.STRtree(shapely.linestrings(pattern.vertices_coords[pattern.edges_vertices]))
+    for patch, piece in enumerate(pieces.pieces):
+        own = [text for text in texts if text.patch == patch]
+        shapes = [shapely.MultiLineString([s.tolist() for s in text.strokes]) for text in own]
+        outline = shapely.Polygon(piece.outline)
+        for shape in shapes:
+            assert outline.contains(shape)
+            assert outline.exterior.distance(shape) >= CLEARANCE_MM - 1e-6
+            assert not len(creases.query(shape, predicate="dwithin", distance=CLEARANCE_MM - 1e-6))
+        for k, shape in enumerate(shapes):
+            assert not any(shape.convex_hull.intersects(other) for other in shapes[:k])
+        for text in own:
+            # Neither mirrored nor stretched, and read from left to right once the patch is turned.
+            drawn = np.concatenate(text.strokes)
+            unit = np.concatenate(text_strokes(text.text))
+            frame = np.linalg.lstsq(unit - unit.mean(axis=0), drawn - drawn.mean(axis=0))[0]
+            along, across = frame
+            np.testing.assert_allclose(across, [-along[1], along[0]], atol=1e-9)
+            assert along @ np.array([np.cos(turns[patch]), -np.sin(turns[patch])]) > -1e-6
+    numbered = [text.text for text in texts if text.text.isdigit()]
+    # Each number stands on the tab and on the facet under it.
+    assert all(numbered.count(number) in (1, 2) for number in numbered)
+
+
+def test_a_number_stands_on_both_sides_of_its_seam():
+    layout = lay_out(miura(8, 3, 30.0, 30.0), bed(150.0, 120.0), card())
+    assert layout.unlettered == 0
+    tabs = sum(len(patch.tabs) for patch in layout.patches)
+    assert sorted(tab.number for patch in layout.patches for tab in patch.tabs) == list(
+        range(1, tabs + 1)
+    )
+
+
+def test_texts_that_find_no_room_are_counted():
+    layout = lay_out(miura(60, 50, 2.5, 2.5), bed(100.0, 90.0), card(tab=1.5))
+    assert layout.unlettered > 0

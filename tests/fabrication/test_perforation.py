@@ -1,0 +1,99 @@
+"""Perforation: dashes that fill a crease exactly, seen from either end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from flat_patterns import card
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from miurafab.errors import LayoutError
+from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate
+
+
+def burnt(length: float, material) -> np.ndarray:
+    """(n, 2) from and to of the burnt dashes along a crease, kerf included."""
+    along = np.array([0.6, 0.8])
+    start = np.array([[3.0, -7.0]])
+    dashes = perforate(start, start + length * along, material)
+    for points in (dashes.starts, dashes.ends):
+        assert np.abs((points - start) @ np.array([-0.8, 0.6])).max() < 1e-9
+    half = material.kerf_mm / 2
+    first, last = ((points - start) @ along for points in (dashes.starts, dashes.ends))
+    return np.column_stack([first - half, last + half])
+
+
+@settings(derandomize=True, max_examples=300, deadline=None)
+@given(
+    st.floats(0.5, 200.0),
+    st.floats(0.3, 5.0),
+    st.floats(0.1, 5.0),
+    st.floats(0.0, 3.0),
+    st.floats(0.0, 4.0),
+    st.floats(0.0, 0.2),
+)
+def test_dashes_fill_the_crease_exactly_and_symmetrically(length, cut, gap, bridge, least, kerf):
+    material = card(cut=cut, gap=gap, end_bridge=bridge, min_end=least, kerf=kerf)
+    dashes = burnt(length, material)
+    lengths, gaps = np.diff(dashes, axis=1)[:, 0], dashes[1:, 0] - dashes[:-1, 1]
+    assert len(dashes) >= 1
+    np.testing.assert_allclose(dashes, (length - dashes)[::-1, ::-1], atol=1e-6)
+    least = max(least, kerf + MIN_STROKE_MM)
+    used = length - 2 * bridge
+    if used < least:
+        assert len(dashes) == 1
+        if min(least, length / 2) > kerf + MIN_STROKE_MM:
+            assert lengths[0] == pytest.approx(min(least, length / 2), abs=1e-6)
+        return
+    assert dashes[0, 0] == pytest.approx(bridge, abs=1e-6)
+    assert length - dashes[-1, 1] == pytest.approx(bridge, abs=1e-6)
+    np.testing.assert_allclose(gaps, gap, atol=1e-6)
+    np.testing.assert_allclose(lengths[1:-1], cut, atol=1e-6)
+    assert lengths.min(
+        initial=np.inf, where=np.arange(len(lengths)) % max(len(lengths) - 1, 1) == 0
+    )
+    if len(dashes) == 1:
+        assert used < 2 * least + gap + 1e-6
+        assert lengths[0] == pytest.approx(used, abs=1e-6)
+    else:
+        # As many dashes as there can be: one more would make the ends too short.
+        assert least - 1e-6 <= lengths[0] < least + (cut + gap) / 2 + 1e-6
+        assert lengths.sum() + gaps.sum() == pytest.approx(used, abs=1e-6)
+
+
+def test_a_hand_computed_crease():
+    # u = 12 - 1.2 = 10.8 = 2 e + 4 cut + 5 gap, so e = (10.8 - 4.8 - 4.0) / 2 = 1.0.
+    dashes = burnt(12.0, card(cut=1.2, gap=0.8, end_bridge=0.6, min_end=0.5, kerf=0.15))
+    expected = [(0.6, 1.6), (2.4, 3.6), (4.4, 5.6), (6.4, 7.6), (8.4, 9.6), (10.4, 11.4)]
+    np.testing.assert_allclose(dashes, expected, atol=1e-9)
+
+
+def test_the_stroke_drawn_is_shorter_than_the_dash_by_the_kerf():
+    start, end = np.zeros((1, 2)), np.array([[12.0, 0.0]])
+    wide = perforate(start, end, card(kerf=0.2))
+    none = perforate(start, end, card(kerf=0.0))
+    drawn = np.linalg.norm(wide.ends - wide.starts, axis=1)
+    np.testing.assert_allclose(drawn, np.linalg.norm(none.ends - none.starts, axis=1) - 0.2)
+
+
+def test_many_creases_at_once_are_each_as_alone():
+    rng = np.random.default_rng(7)
+    starts, ends = rng.normal(size=(2, 40, 2)) * 30
+    together = perforate(starts, ends, card())
+    assert (np.diff(together.crease) >= 0).all()
+    for k in range(40):
+        alone = perforate(starts[k : k + 1], ends[k : k + 1], card())
+        np.testing.assert_allclose(together.starts[together.crease == k], alone.starts)
+        np.testing.assert_allclose(together.ends[together.crease == k], alone.ends)
+
+
+def test_no_creases_are_no_dashes():
+    assert len(perforate(np.empty((0, 2)), np.empty((0, 2)), card())) == 0
+
+
+def test_dashes_that_the_kerf_would_fill_are_refused_by_name():
+    with pytest.raises(
+        LayoutError, match=r"'test-card' asks for dashes of 0\.15 mm.*kerf of 0\.15"
+    ):
+        perforate(np.zeros((1, 2)), np.ones((1, 2)), card(cut=0.15, kerf=0.15))

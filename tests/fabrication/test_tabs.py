@@ -1,0 +1,204 @@
+"""Tabs: each in its mate facet, off everything else."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import flat_patterns
+import numpy as np
+import pytest
+import shapely
+from flat_patterns import card, facet_polygons, miura, triangles, zigzag
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from miurafab.fabrication.pieces import make_pieces
+from miurafab.fabrication.tabs import MIN_AREA_MM2, MIN_SIDE_MM, choose_tabs, inset_of
+from miurafab.origami.crease_pattern import CreasePattern
+
+CASES = {
+    "mild": (miura(30, 26), card()),
+    "acute": (zigzag(24, 30, sector=0.55), card()),
+    "very acute": (zigzag(24, 20, a=25.0, sector=0.35), card()),
+    "fan": (flat_patterns.fan(36, 30, radius=250.0), card(tab=12.0)),
+    "triangles": (triangles(3, 20, 700.0), card()),
+    "ring": (triangles(4, 20, 700.0, hole=True), card(tab=20.0)),
+    "no inset": (miura(30, 26), card(inset=0.0)),
+    "single facets": (miura(4, 4, a=60.0, b=60.0), card(tab=30.0)),
+}
+
+
+def common_area(one, other) -> float:
+    # Without a grid GEOS may give a whole polygon that only touches the other one.
+    return shapely.area(shapely.intersection(one, other, grid_size=1e-9))
+
+
+def assert_tabs_are_sound(pattern, pieces, material):
+    tabs, facets = pieces.tabs, facet_polygons(pattern)
+    patches = [shapely.union_all(facets[piece.faces]) for piece in pieces.pieces]
+    shapes = np.array([shapely.Polygon(tabs.polygon(i)) for i in range(len(tabs))])
+    assert shapely.is_valid(shapes).all()
+    assert (shapely.area(shapes) >= MIN_AREA_MM2 - 1e-9).all()
+    owner = pieces.face_patch[tabs.own_face]
+    for i, shape in enumerate(shapes):
+        edge, own, mate = tabs.edge[i], tabs.own_face[i], tabs.mate_face[i]
+        assert {own, mate} == set(pattern.edges_faces[edge])
+        assert pieces.face_patch[own] != pieces.face_patch[mate]
+        # In its mate facet, as far as its inset from every other side.
+        seam = shapely.LineString(pattern.vertices_coords[pattern.edges_vertices[edge]])
+        assert facets[mate].buffer(1e-9).contains(shape)
+        rest = shapely.difference(facets[mate].exterior, seam.buffer(1e-7))
+        assert shape.distance(rest) >= inset_of(material) - 1e-6
+        # Along its seam edge, and no higher than asked.
+        base = shapely.LineString(shapely.get_coordinates(shape)[:2])
+        assert seam.buffer(1e-9).contains(base)
+        assert base.length >= MIN_SIDE_MM - 1e-9
+        line = shapely.get_coordinates(seam)
+        way = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
+        off = (tabs.polygon(i) - line[0]) @ np.array([-way[1], way[0]])
+        assert np.abs(off).max() <= material.tabs.height_mm + 1e-9
+        # Off its own patch: it touches it in the base alone.
+        assert common_area(shape, patches[owner[i]]) < 1e-6
+        sides = shapely.difference(shape.exterior, base.buffer(1e-6))
+        assert sides.distance(patches[owner[i]]) > 0
+    # Off every other tab, and so far off that the cuts between them stay open.
+    met = shapely.STRtree(shapes).query(shapes, predicate="intersects")
+    assert (met[0] == met[1]).all()
+    assert all(len(piece.cut_lines) == 1 for piece in pieces.pieces)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_tab_is_in_its_mate_and_off_its_own_patch_and_every_other_tab(name):
+    pattern, material = CASES[name]
+    pieces = make_pieces(pattern, 190.0, 140.0, material)
+    assert len(pieces.tabs)
+    assert_tabs_are_sound(pattern, pieces, material)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_seam_edge_has_one_tab_or_is_told(name):
+    pattern, material = CASES[name]
+    pieces = make_pieces(pattern, 190.0, 140.0, material)
+    sides = pattern.edges_faces
+    seam = (sides >= 0).all(axis=1)
+    seam &= pieces.face_patch[sides[:, 0]] != pieces.face_patch[sides[:, 1]]
+    told = np.concatenate([pieces.tabs.edge, pieces.untabbed])
+    np.testing.assert_array_equal(np.sort(told), np.flatnonzero(seam))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_piece_is_its_patch_and_its_tabs(name):
+    pattern, material = CASES[name]
+    pieces = make_pieces(pattern, 190.0, 140.0, material)
+    facets = facet_polygons(pattern)
+    seen = []
+    for number, piece in enumerate(pieces.pieces):
+        outline = shapely.Polygon(piece.outline)
+        assert outline.is_valid
+        assert outline.exterior.is_ccw
+        area = shapely.area(facets[piece.faces]).sum() + pieces.tabs.areas[piece.tabs].sum()
+        assert outline.area == pytest.approx(area)
+        assert (pieces.face_patch[pieces.tabs.own_face[piece.tabs]] == number).all()
+        seen += piece.tabs.tolist()
+    assert sorted(seen) == list(range(len(pieces.tabs)))
+
+
+def test_the_tab_of_a_rectangle_is_the_strip_less_its_insets():
+    pattern = miura(2, 1, a=30.0, b=20.0, sector=np.pi / 2)
+    tabs, swapped, untabbed = choose_tabs(pattern, np.array([0, 1]), card(tab=7.0, inset=0.3))
+    assert not swapped.any()
+    assert not len(untabbed)
+    expected = shapely.box(30.0, 0.3, 37.0, 19.7)
+    assert shapely.Polygon(tabs.polygon(0)).equals_exact(expected, 1e-9, normalize=True)
+    assert tabs.areas[0] == pytest.approx(7.0 * 19.4)
+
+
+def test_a_facet_with_two_seam_edges_is_split_on_its_bisector():
+    pattern = miura(2, 2, a=30.0, b=30.0, sector=np.pi / 2)
+    # The last facet is glued to by the one left of it and by the one below it.
+    tabs, _, _ = choose_tabs(pattern, np.array([3, 0, 1, 2]), card(tab=25.0, inset=1.0))
+    both = np.flatnonzero(tabs.mate_face == 3)
+    assert len(both) == 2
+    one, other = (shapely.Polygon(tabs.polygon(i)) for i in both)
+    # Mirror images about the bisector of the square, which runs from (30, 30) to (60, 60).
+    mirrored = shapely.transform(other, lambda p: p[:, ::-1])
+    assert one.symmetric_difference(mirrored).area < 1e-9
+    assert one.distance(other) == pytest.approx(2.0)
+
+
+def test_glue_area_of_a_mild_pattern_is_at_least_5_mm2_a_mm_of_seam():
+    for pattern in (miura(30, 26), flat_patterns.fan(36, 30, radius=250.0)):
+        pieces = make_pieces(pattern, 190.0, 140.0, card())
+        ends = pattern.vertices_coords[pattern.edges_vertices[pieces.tabs.edge]]
+        seam = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+        assert pieces.tabs.areas.sum() / seam >= 5.0
+
+
+def test_a_tab_too_small_on_one_side_goes_to_the_other():
+    points = np.array(
+        [[[0.0, 0], [20, 0], [20.4, 0], [60, 0]], [[0.0, 20], [20, 20], [20.4, 20], [60, 20]]]
+    )
+    pattern = flat_patterns.grid(points)
+    # The middle facet is 0.4 mm wide: no tab can be glued into it.
+    tabs, swapped, untabbed = choose_tabs(pattern, np.array([0, 1, 2]), card())
+    assert swapped.tolist() == [True, False]
+    np.testing.assert_array_equal(tabs.mate_face, [0, 2])
+    narrow = dataclasses.replace(pattern, vertices_coords=pattern.vertices_coords * [0.02, 1.0])
+    tabs, _, untabbed = choose_tabs(narrow, np.array([0, 1, 2]), card())
+    assert len(tabs) + len(untabbed) == 2
+    assert len(untabbed) == 2
+
+
+def test_a_facet_that_is_not_convex_gets_a_tab_inside_it_or_none():
+    points = np.array([[0.0, 0], [40, 0], [40, 40], [0, 40], [20, 12], [0, -30], [40, -30]])
+    pattern = CreasePattern(
+        vertices_coords=points,
+        edges_vertices=np.array([[0, 1], [1, 2], [2, 4], [4, 0], [0, 5], [5, 6], [6, 1]]),
+        edges_assignment=np.array(["M", "B", "B", "B", "B", "B", "B"]),
+        edges_fold_angle=np.array([-1.0, 0, 0, 0, 0, 0, 0]),
+        faces_vertices=np.array([[0, 1, 2, 4], [0, 5, 6, 1]]),
+    )
+    facets = facet_polygons(pattern)
+    for order in ([0, 1], [1, 0]):
+        tabs, _, untabbed = choose_tabs(pattern, np.array(order), card())
+        assert len(tabs) == 1
+        assert not len(untabbed)
+        shape = shapely.Polygon(tabs.polygon(0))
+        assert facets[tabs.mate_face[0]].buffer(1e-9).contains(shape)
+        assert common_area(shape, facets[tabs.own_face[0]]) < 1e-9
+
+
+def test_a_pattern_that_overlaps_itself_has_tabs_that_do_not():
+    pattern = flat_patterns.fan(60, 3, cell=10.0, radius=60.0)
+    pieces = make_pieces(pattern, 1000.0, 1000.0, card())
+    for piece in pieces.pieces:
+        assert shapely.Polygon(piece.outline).is_valid
+    assert len(pieces.tabs) + len(pieces.untabbed) > 0
+
+
+@settings(derandomize=True, max_examples=40, deadline=None)
+@given(
+    st.integers(0, 10_000),
+    st.floats(1.0, 30.0),
+    st.floats(0.0, 3.0),
+    st.floats(0.0, 0.5),
+    st.integers(1, 12),
+)
+def test_any_split_of_any_shaken_grid_has_sound_tabs(seed, height, inset, kerf, parts):
+    rng = np.random.default_rng(seed)
+    i, j = np.indices((7, 7))
+    square = np.stack([j, i], axis=-1) + rng.uniform(-0.3, 0.3, (7, 7, 2))
+    pattern = flat_patterns.grid(square * rng.uniform(8, 40))
+    material = card(tab=height, inset=inset, kerf=kerf)
+    face_patch = rng.integers(0, parts, 36)
+    tabs, _, untabbed = choose_tabs(pattern, face_patch, material)
+    facets = facet_polygons(pattern)
+    shapes = np.array([shapely.Polygon(tabs.polygon(i)) for i in range(len(tabs))], dtype=object)
+    for i, shape in enumerate(shapes):
+        assert facets[tabs.mate_face[i]].buffer(1e-9).contains(shape)
+    sides = pattern.edges_faces
+    seam = (sides >= 0).all(axis=1) & (face_patch[sides[:, 0]] != face_patch[sides[:, 1]])
+    assert len(tabs) + len(untabbed) == seam.sum()
+    if len(shapes):
+        near = shapely.STRtree(shapes).query(shapes, predicate="intersects")
+        assert (near[0] == near[1]).all()
