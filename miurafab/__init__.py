@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from miurafab.workflow.cut import DEFAULT_MATERIAL, cut, prepare
     from miurafab.workflow.design import design, load_pattern, save_pattern
     from miurafab.workflow.doctor import examine
+    from miurafab.workflow.energy import check_writable as check_energy_file
+    from miurafab.workflow.energy import energy, write_energy
     from miurafab.workflow.job_directory import read_job, sheets, write_job
     from miurafab.workflow.page import write_page
     from miurafab.workflow.picture import write_pictures
@@ -38,8 +40,10 @@ _HOMES = {
     "DEFAULT_MACHINE": ("miurafab.workflow.preview", "ASSUMED_MACHINE"),
     "DEFAULT_MATERIAL": ("miurafab.workflow.cut", "DEFAULT_MATERIAL"),
     "check": ("miurafab.origami.audit", "audit"),
+    "check_energy_file": ("miurafab.workflow.energy", "check_writable"),
     "cut": ("miurafab.workflow.cut", "cut"),
     "design": ("miurafab.workflow.design", "design"),
+    "energy": ("miurafab.workflow.energy", "energy"),
     "examine": ("miurafab.workflow.doctor", "examine"),
     "fit": ("miurafab.origami.fit", "fit"),
     "load_machine": ("miurafab.profiles", "load_machine"),
@@ -51,6 +55,7 @@ _HOMES = {
     "read_job": ("miurafab.workflow.job_directory", "read_job"),
     "save_pattern": ("miurafab.workflow.design", "save_pattern"),
     "sheets": ("miurafab.workflow.job_directory", "sheets"),
+    "write_energy": ("miurafab.workflow.energy", "write_energy"),
     "write_job": ("miurafab.workflow.job_directory", "write_job"),
     "write_page": ("miurafab.workflow.page", "write_page"),
     "write_pictures": ("miurafab.workflow.picture", "write_pictures"),
@@ -61,8 +66,10 @@ __all__ = [
     "DEFAULT_MATERIAL",
     "__version__",
     "check",
+    "check_energy_file",
     "cut",
     "design",
+    "energy",
     "examine",
     "fit",
     "load_machine",
@@ -74,6 +81,7 @@ __all__ = [
     "read_job",
     "save_pattern",
     "sheets",
+    "write_energy",
     "write_job",
     "write_page",
     "write_pictures",

@@ -15,6 +15,7 @@ from miurafab.cli import (
     check,
     cut,
     doctor,
+    energy,
     fit,
     machine,
     preview,
@@ -37,6 +38,7 @@ app = typer.Typer(
 app.command("surfaces")(surfaces.surfaces)
 app.command("fit")(fit.fit)
 app.command("check")(check.check)
+app.command("energy")(energy.energy)
 app.command("sheets")(sheets.sheets)
 app.command("preview")(preview.preview)
 app.command("cut")(cut.cut)

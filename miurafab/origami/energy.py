@@ -97,6 +97,20 @@ class EnergyCurve:
         """Whether a barrier lies between two stable states."""
         return self.barrier > 0 and len(self.stable) > 1
 
+    def verdict(self) -> str:
+        """One sentence on what the curve says."""
+        if not self.path.converged:
+            reached = math.degrees(abs(self.path.drives[-1]))
+            return (
+                f"The path was lost at {reached:.1f} degrees, where the sheet jumps to another "
+                "shape; take more --steps, or drive another --crease."
+            )
+        if self.rigid:
+            return "It folds rigidly: no energy is stored on the way to flat."
+        if self.bistable:
+            return "It is bistable: the folded form is held by a barrier on the way to flat."
+        return "It is not bistable: there is no barrier on the way to flat."
+
     def report(self) -> dict[str, Any]:
         """The answer of ``miurafab energy --json``; energies in joules if a material was given."""
         model = self.path.model
@@ -145,7 +159,8 @@ def energy_curve(
     towards_flat = -math.copysign(1.0, path.drives[0])
     if not rigid and path.converged and path.loads[-1] * towards_flat < 0:
         ends = [StableState(0.0, flat_energy)]
-    folded = [] if rigid else [StableState(float(path.drives[0]), float(path.energies[0]))]
+    at_rest = float(path.energies[0]) if path.energies[0] > NOISE else 0.0
+    folded = [] if rigid else [StableState(float(path.drives[0]), at_rest)]
     top = max(maxima, key=lambda state: state.energy, default=None)
     return EnergyCurve(
         path=path,
