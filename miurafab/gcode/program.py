@@ -17,6 +17,7 @@ from miurafab.gcode.execution import (
     ProgramEnd,
     SpindleSync,
     Store,
+    Synchronize,
     execute,
 )
 from miurafab.gcode.faults import BlockFault
@@ -123,7 +124,7 @@ class _Reader:
                 still = action.spindle == BEAM_M4 and self.rules.laser
                 dark = still or action.spindle == BEAM_OFF
                 self._event(SYNC, number, power=0.0 if dark else action.speed)
-            else:
+            elif not isinstance(action, Synchronize):  # a pause or the end follows
                 if isinstance(action, Store):
                     self.stored[action.index] = tuple(action.values)
                 self._event(SYNC, number)

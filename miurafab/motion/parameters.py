@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from miurafab.errors import ProfileError
 from miurafab.profiles import MachineProfile
 
+_NEEDED = (1, 11, 12, 30, 31, 32, 100, 101, 102, 110, 111, 112, 120, 121, 122)
 Triple = tuple[float, float, float]
 _COMMON_STEPS = 80.0
 """steps/mm of a belt with 2 mm pitch, 20 teeth and 1/16 steps, the usual laser frame."""
@@ -34,7 +36,13 @@ class MotionParameters:
 
     @classmethod
     def from_settings(cls, settings: Mapping[int, float]) -> MotionParameters:
-        """The parameters among all ``$`` settings; raises KeyError for a number missing."""
+        """The parameters among all ``$`` settings.
+
+        Raises :class:`~miurafab.errors.ProfileError` naming one that is missing.
+        """
+        missing = [number for number in _NEEDED if number not in settings]
+        if missing:
+            raise ProfileError(f"The settings lack ${missing[0]}; give all that $$ prints.")
         return cls(
             steps_per_mm=_triple(settings, 100),
             max_rate_mm_min=_triple(settings, 110),

@@ -114,6 +114,8 @@ class Processor:
     def finish(self) -> int | None:
         """When it is done if the stepper changes nothing before; None while it stands still."""
         share = self.stepper.share
+        if share == 1.0:
+            return self._since + math.ceil(self._left)
         return self._since + math.ceil(self._left / share) if share else None
 
     def note(self, now: int) -> None:
