@@ -96,6 +96,7 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
     answer: dict[str, Any] = {"status": "done", "port": port, "machine": prepared.machine.name}
     if prepared.directory is not None:
         answer["job"] = str(prepared.directory.path)
+        answer["files"] = sum(1 for _ in prepared.directory.path.iterdir())
     for name in ("facets", "max_planarity", "max_developability", "max_isometry"):
         if prepared.report is not None:
             answer[name] = prepared.report[name]
@@ -107,7 +108,7 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
             "lines": each.lines,
             "cut_m": each.cut_mm / 1000,
             "travel_m": each.travel_mm / 1000,
-            "estimated_s": each.estimated_s,
+            "estimated_s": float(each.estimated_s),
             "seconds": each.result.seconds,
             "refused_lines": len(each.result.errors),
             "remarks": list(each.result.remarks),

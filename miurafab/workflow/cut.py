@@ -19,7 +19,7 @@ from miurafab.origami.audit import audit
 from miurafab.origami.fit import fit
 from miurafab.profiles import MachineProfile, load_machine
 from miurafab.workflow.design import design, load_pattern, save_pattern
-from miurafab.workflow.dry_run import dry_run, read_gcode
+from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 from miurafab.workflow.job_directory import JobDirectory, read_job, write_job
 from miurafab.workflow.preview import ASSUMED_MACHINE, named_machine
 
@@ -31,7 +31,7 @@ JOBS = Path("jobs")
 
 @dataclass(frozen=True)
 class Prepared:
-    """What will be cut: the jobs with the machine, and what is known about their making.
+    """What will be cut: the jobs with their dry runs and the machine, and how they were made.
 
     ``report`` is that of the fit or the check, None for what came as G-code or a job directory;
     ``refusal`` says why nothing will be cut (a fit that failed, a pattern that is not valid).
@@ -40,10 +40,10 @@ class Prepared:
     name: str
     machine: MachineProfile
     jobs: tuple[Job, ...]
+    dry_runs: tuple[SheetPreview, ...]
     directory: JobDirectory | None = None
     report: dict[str, Any] | None = None
     refusal: str | None = None
-    files: tuple[Path, ...] = ()
 
 
 def prepare(
@@ -66,11 +66,15 @@ def prepare(
     if path.is_dir():
         job = read_job(path)
         profile = job.machine if machine is None else load_machine(machine)
-        return Prepared(path.resolve().name, profile, job.jobs, job)
+        dry_runs = job.dry_runs
+        if machine is not None:
+            dry_runs = tuple(_dry_run(each, profile) for each in job.jobs)
+        return Prepared(path.resolve().name, profile, job.jobs, dry_runs, job)
     if path.suffix.lower() in GCODE_SUFFIXES:
         gcode = read_gcode(path)
         named = named_machine(gcode, path.parent) if machine is None else load_machine(machine)
-        return Prepared(path.name, named or load_machine(ASSUMED_MACHINE), (gcode,))
+        profile = named or load_machine(ASSUMED_MACHINE)
+        return Prepared(path.name, profile, (gcode,), (_dry_run(gcode, profile),))
     if path.suffix.lower() == ".fold":
         pattern, surface, _ = load_pattern(path)
         tell(0.1, "checking the pattern")
@@ -87,6 +91,7 @@ def prepare(
         return Prepared(
             name,
             load_machine(machine or wanted.machine or ASSUMED_MACHINE),
+            (),
             (),
             report=result.report(),
             refusal=result.advice,
@@ -119,7 +124,7 @@ def _from_pattern(
     chosen = machine or ASSUMED_MACHINE
     if not valid:
         return Prepared(
-            name, load_machine(chosen), (), report=report, refusal=str(report["advice"])
+            name, load_machine(chosen), (), (), report=report, refusal=str(report["advice"])
         )
     directory = write_job(
         fold,
@@ -128,7 +133,12 @@ def _from_pattern(
         material or DEFAULT_MATERIAL,
         lambda fraction, note: tell(0.4 + 0.6 * fraction, note),
     )
-    return Prepared(name, directory.machine, directory.jobs, directory, report)
+    return Prepared(name, directory.machine, directory.jobs, directory.dry_runs, directory, report)
+
+
+def _dry_run(job: Job, machine: MachineProfile) -> SheetPreview:
+    bed = (machine.bed.width_mm, machine.bed.height_mm)
+    return dry_run(Path(job.name).stem, job, machine, bed)
 
 
 @dataclass(frozen=True)
@@ -168,7 +178,6 @@ def cut(
     for number in chosen:
         if not 1 <= number <= len(prepared.jobs):
             raise InputError(f"{prepared.name} has no sheet {number}; it has {len(prepared.jobs)}.")
-    bed = (prepared.machine.bed.width_mm, prepared.machine.bed.height_mm)
     for number in chosen:
         plan_job(
             prepared.jobs[number - 1],
@@ -180,7 +189,7 @@ def cut(
     done = []
     for number in chosen:
         job = prepared.jobs[number - 1]
-        expected = dry_run(Path(job.name).stem, job, prepared.machine, bed)
+        expected = prepared.dry_runs[number - 1]
         if before_sheet is not None:
             before_sheet(number, len(prepared.jobs))
         result = stream_job(

@@ -24,7 +24,7 @@ from miurafab.origami.fold_format import read_fold
 from miurafab.posting import post
 from miurafab.profiles import MachineProfile, find_file, load_machine, load_material
 from miurafab.profiles.shipped import Kind, shipped_directory
-from miurafab.workflow.dry_run import dry_run, read_gcode
+from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 
 LAYOUT = "layout.json"
 Progress = Callable[[float, str], None]
@@ -32,12 +32,15 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class JobDirectory:
-    """A job on disk: its layout, its machine, and the jobs of its sheets in order."""
+    """A job on disk: its layout, its machine, and the jobs of its sheets in order, with what the
+    dry run says of each.
+    """
 
     path: Path
     layout: Layout
     machine: MachineProfile
     jobs: tuple[Job, ...]
+    dry_runs: tuple[SheetPreview, ...]
 
 
 def sheets(pattern: CreasePattern, machine: str, material: str) -> Layout:
@@ -67,17 +70,17 @@ def write_job(
     layout = lay_out(read_fold(pattern_file), profile, stock)
     labels = {patch.id: patch.label for patch in layout.patches}
     _make_room(directory)
-    jobs = []
-    seconds = 0.0
+    jobs, dry_runs = [], []
     for number, toolpath in enumerate(layout.toolpaths):
         tell(0.4 + 0.5 * number / len(layout.toolpaths), f"drawing {toolpath.sheet}")
         job = post(toolpath, profile, stock, patch_labels=labels)
         jobs.append(job)
         size = (toolpath.width_mm, toolpath.height_mm)
-        seconds += dry_run(toolpath.sheet, job, profile, size).seconds
+        dry_runs.append(dry_run(toolpath.sheet, job, profile, size))
         _write(directory / f"{toolpath.sheet}.nc", job.text)
         _write(directory / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
-    layout = replace(layout, totals=replace(layout.totals, seconds=round(seconds, 1)))
+    seconds = round(float(sum(sheet.seconds for sheet in dry_runs)), 1)
+    layout = replace(layout, totals=replace(layout.totals, seconds=seconds))
     copy = directory / pattern_file.name
     if copy.resolve() != pattern_file.resolve():
         shutil.copyfile(pattern_file, copy)
@@ -86,7 +89,7 @@ def write_job(
     digest = hashlib.sha256(copy.read_bytes()).hexdigest()
     _write(directory / LAYOUT, write_layout(layout, copy.name, digest))
     tell(1.0, "done")
-    return JobDirectory(directory, layout, profile, tuple(jobs))
+    return JobDirectory(directory, layout, profile, tuple(jobs), tuple(dry_runs))
 
 
 def read_job(directory: Path) -> JobDirectory:
@@ -111,7 +114,11 @@ def read_job(directory: Path) -> JobDirectory:
         jobs.append(read_gcode(file))
     own = directory / f"{layout.machine}.toml"
     machine = load_machine(own if own.is_file() else layout.machine)
-    return JobDirectory(directory, layout, machine, tuple(jobs))
+    dry_runs = (
+        dry_run(sheet.name, job, machine, (sheet.width_mm, sheet.height_mm))
+        for sheet, job in zip(layout.sheets, jobs, strict=True)
+    )
+    return JobDirectory(directory, layout, machine, tuple(jobs), tuple(dry_runs))
 
 
 def _keep_own_profile(kind: Kind, name: str, directory: Path) -> None:
