@@ -44,7 +44,7 @@ def test_a_sheet_is_true_to_scale(toolpath):
 
 def test_there_is_one_layer_an_operation_with_its_name_and_colour(toolpath):
     root = ElementTree.fromstring(sheet_svg(toolpath))
-    layers = [group for group in root.iter(SVG + "g")]
+    layers = list(root.iter(SVG + "g"))
     assert [layer.get(INKSCAPE + "label") for layer in layers] == list(OPERATIONS)
     assert all(layer.get(INKSCAPE + "groupmode") == "layer" for layer in layers)
     assert [layer.get("stroke") for layer in layers] == [COLOURS[name] for name in OPERATIONS]

@@ -65,7 +65,8 @@ def sheet_svg(toolpath: Toolpath) -> str:
         layer.attribs["inkscape:label"] = name
         strokes = np.flatnonzero(toolpath.operation == operation)
         for run in np.split(strokes, np.flatnonzero(np.diff(together[strokes])) + 1):
-            layer.add(drawing.path(d="".join(paths[s] for s in run.tolist())))
+            if len(run):
+                layer.add(drawing.path(d="".join(paths[s] for s in run.tolist())))
         drawing.add(layer)
     return _text(drawing)
 
