@@ -80,13 +80,18 @@ class StatusReport(Event):
     accessories: str | None = None
 
     @property
-    def beam_off(self) -> bool:
-        """Whether the report says that nothing drives the beam: S is 0 and no spindle is on.
-
-        A report without any S (``F:`` alone, firmware without a variable spindle) cannot say so.
-        """
+    def beam_on(self) -> bool:
+        """Whether the report says that the beam is driven: S is above 0 or a spindle is on."""
         spindle_on = self.accessories is not None and bool(set("SC") & set(self.accessories))
-        return self.speed == 0 and not spindle_on
+        return spindle_on or (self.speed is not None and self.speed > 0)
+
+    @property
+    def beam_off(self) -> bool:
+        """Whether the report says that nothing drives the beam.
+
+        One without any S (``F:`` alone: no variable spindle, GRBL 0.9) says neither.
+        """
+        return self.speed is not None and not self.beam_on
 
 
 @dataclass(frozen=True, slots=True)

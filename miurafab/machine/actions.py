@@ -21,8 +21,6 @@ from miurafab.machine.transport import open_port
 
 BAUD = 115_200
 """What nearly every GRBL board speaks."""
-HOMING_S = 180.0
-"""How long homing may take; GRBL answers nothing meanwhile, not even a status query."""
 _POLL_S = 0.1
 
 
@@ -160,7 +158,7 @@ def home(
 ) -> StatusReport:
     """Run the homing cycle (``$H``) and wait for its end."""
     with conversation(port, baud=baud, settings=settings, moves=True) as session:
-        session.command("$H", HOMING_S)
+        session.home()
         return session.wait_status()
 
 

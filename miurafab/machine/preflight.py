@@ -128,12 +128,12 @@ def check_status(status: StatusReport) -> Iterator[Finding]:
                 "look at the machine, then home or unlock it"
             ),
         )
-    if status.speed is not None and not status.beam_off:
+    if status.beam_on:
         yield Finding(
             "beam",
             ControllerError(
-                f"The controller reports the beam on (S{status.speed:g}) before the job has begun; "
-                "switch the laser off and reset the controller"
+                "The controller reports the beam on before the job has begun; switch the laser off "
+                "at the machine and reset the controller"
             ),
         )
 

@@ -98,6 +98,7 @@ class Plan:
     program: Program | None
     force: frozenset[str]
     check_mode: bool
+    home: bool
     remarks: tuple[str, ...]
 
 
@@ -112,6 +113,7 @@ def stream_job(
     force: frozenset[str] = frozenset(),
     allow_m3: bool = False,
     check_mode: bool = False,
+    home: bool = False,
     virtual_speed: float | None = None,
 ) -> StreamResult:
     """Send ``job`` to ``machine`` at ``port`` and wait until it is done.
@@ -120,27 +122,32 @@ def stream_job(
     profile says, as fast as the computer allows or at ``virtual_speed`` times real time.
     ``on_progress`` is called about five times a second. ``force`` names checks to override
     (:data:`~miurafab.machine.preflight.CHECKS`). With ``check_mode`` the controller only reads
-    the job (``$C``): nothing moves, and refused lines are gathered in the result.
+    the job (``$C``): nothing moves, and refused lines are gathered in the result. With ``home``
+    the machine is homed first, in the same conversation: most boards forget where they are when
+    the port is opened.
 
     Raises :class:`~miurafab.errors.InputError` for a job or option at fault,
     :class:`~miurafab.errors.PortError` and :class:`~miurafab.errors.ControllerError` for what the
     machine did, :class:`~miurafab.errors.JobStopped` after Ctrl-C, SIGTERM or SIGHUP. Whichever
     it is, the controller was reset if a line of the job had been sent.
     """
-    plan = plan_job(job, machine, force=force, allow_m3=allow_m3, check_mode=check_mode)
+    plan = plan_job(job, machine, force=force, allow_m3=allow_m3, check_mode=check_mode, home=home)
     with StopSignals() as signals:
-        transport = open_port(
-            port, machine.controller.baud, virtual_settings(machine), virtual_speed
-        )
-        signals.at_once = transport.blocks
-        return deliver(
-            plan,
-            transport,
-            signals,
-            journal_path=journal_path,
-            transcript_path=transcript_path,
-            on_progress=on_progress,
-        )
+        try:
+            transport = open_port(
+                port, machine.controller.baud, virtual_settings(machine), virtual_speed
+            )
+            signals.at_once = transport.blocks
+            return deliver(
+                plan,
+                transport,
+                signals,
+                journal_path=journal_path,
+                transcript_path=transcript_path,
+                on_progress=on_progress,
+            )
+        except KeyboardInterrupt:
+            raise JobStopped(f"{job.name} was stopped by {signals.reason}.") from None
 
 
 def plan_job(
@@ -150,6 +157,7 @@ def plan_job(
     force: frozenset[str] = frozenset(),
     allow_m3: bool = False,
     check_mode: bool = False,
+    home: bool = False,
 ) -> Plan:
     """Check ``job`` by itself; raises :class:`~miurafab.errors.InputError` for what is wrong."""
     require_known(force)
@@ -170,7 +178,7 @@ def plan_job(
     else:
         findings.extend(check_program(program, machine))
     remarks = raise_findings(findings, force)
-    return Plan(job, machine, count, program, force, check_mode, remarks)
+    return Plan(job, machine, count, program, force, check_mode, home, remarks)
 
 
 def deliver(
@@ -206,8 +214,9 @@ def deliver(
         except MiurafabError as error:
             signals.hold()
             delivery.end(error)
-        finally:
+        except BaseException:
             signals.hold()
+            raise
 
 
 class _Delivery:
@@ -226,7 +235,7 @@ class _Delivery:
         self._records = [record for record in (transcript, journal) if record is not None]
         self._journal = journal
         self._on_progress = on_progress
-        self._at_risk = False  # whether the controller may hold lines of the job
+        self._at_risk = False  # whether the machine may move or burn by what we sent
         self._begin = 0.0
         self._streamer = Streamer(
             session.connection,
@@ -249,6 +258,9 @@ class _Delivery:
         seconds = session.now() - self._begin
         if self._plan.check_mode:
             session.stop()
+        elif self._plan.machine.tool.kind == "laser" and session.wait_status().beam_on:
+            session.stop()
+            remarks += ("The job ended with the laser armed, so the controller was reset.",)
         self._at_risk = False
         if self._journal is not None:
             self._journal.ended("done", f"{streamer.acknowledged} lines acknowledged, then idle")
@@ -270,6 +282,10 @@ class _Delivery:
         """Greet the controller and make all checks that need it; the sentences forced."""
         plan, session = self._plan, self._session
         session.greet()
+        if plan.home:
+            self._at_risk = True
+            session.home()
+            self._at_risk = False
         remarks = raise_findings(check_status(session.wait_status()), plan.force)
         session.command("$I")
         settings = Settings.from_events(session.command("$$"))

@@ -28,6 +28,8 @@ BANNER_S = 2.5
 """How long a board that resets when its port opens may take to speak (boot loader: 1 to 2 s)."""
 ANSWER_S = 3.0
 """How long a living controller may be silent when it was asked something."""
+HOMING_S = 180.0
+"""How long homing may take; GRBL answers nothing meanwhile, not even a status query."""
 _RESET_S = 0.8  # from a soft reset to its banner
 _RESETS = 3
 _HOLD_S = 1.0  # to come to rest from full speed before the reset that ends a refused job
@@ -189,6 +191,11 @@ class Session:
         raise ControllerError(
             f"The controller at {self.name} did not answer '{text}' within {timeout:g} s."
         )
+
+    def home(self) -> None:
+        """Run the homing cycle and wait for its end; raises as :meth:`command` does."""
+        self.command("$H", HOMING_S)
+        self.wait_status()
 
     def _require_ready(self, text: str) -> None:
         if self.connection.may_send(SendLine(0, text.encode("ascii"))):

@@ -31,7 +31,7 @@ class StopSignals:
     def __init__(self) -> None:
         self.at_once = True
         self._caught: str | None = None
-        self._raised = False
+        self._held = False
         self._old: dict[int, Any] = {}
 
     @property
@@ -40,17 +40,16 @@ class StopSignals:
         return _WORDS.get(self._caught or "SIGINT", "a signal")
 
     def check(self) -> None:
-        """Raise ``KeyboardInterrupt`` for a signal that has not been raised yet.
+        """Raise ``KeyboardInterrupt`` for a signal that has come, until :meth:`hold`.
 
-        One that fell into code where Python drops exceptions (a finaliser) is raised here.
+        So one whose exception Python dropped (it came during a finaliser) is not lost.
         """
-        if self._caught is not None and not self._raised:
-            self._raised = True
+        if self._caught is not None and not self._held:
             raise KeyboardInterrupt
 
     def hold(self) -> None:
         """From now on ignore every signal: the job is being stopped."""
-        self._raised = True
+        self._held = True
 
     def __enter__(self) -> StopSignals:
         if threading.current_thread() is threading.main_thread():
@@ -73,5 +72,5 @@ class StopSignals:
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self._caught is None:
             self._caught = signal.Signals(number).name
-        if self.at_once:
-            self.check()
+            if self.at_once:
+                self.check()

@@ -481,3 +481,50 @@ def test_a_board_at_work_is_left_alone() -> None:
     with pytest.raises(ControllerError, match=r"is at work \(Run\)"):
         send(STOPPED, wire)
     assert wire.commands == b""
+
+
+def test_a_job_that_leaves_the_laser_burning_is_ended_by_a_reset() -> None:
+    device = new_device()
+    result = deliver(
+        plan_job(Job("forgot.nc", "M3 S500\nG1 X5 F600\n"), MACHINE, allow_m3=True),
+        FakeWire(device),
+        StopSignals(),
+    )
+    assert result.remarks == ("The job ended with the laser armed, so the controller was reset.",)
+    device.advance(1)
+    assert not device.beam_on
+
+
+def test_a_machine_with_homing_is_homed_first_if_asked() -> None:
+    """After power-up such a controller is locked, and nothing unlocks it by itself."""
+    homing = {"s22": 1, "s24": 500, "s25": 3000}
+    job = Job("job.nc", "G90\nG53 G0 X-5\n")
+    wire = FakeWire(new_device(**homing))
+    force = frozenset({"bounds", "program"})
+    with pytest.raises(ControllerError, match=r"in state Alarm, not Idle.*--force idle"):
+        send(job, wire, force=force)
+    assert b"$X" not in wire.bytes_written
+    assert b"$H" not in wire.bytes_written
+    plan = plan_job(job, MACHINE, force=force, home=True)
+    wire = FakeWire(new_device(**homing))
+    assert deliver(plan, wire, StopSignals()).lines == 2
+    assert wire.commands.startswith(b"$H\n$I\n$$\nG90\n")
+    assert wire.device.position[0] == pytest.approx(-5)
+
+
+def test_soft_limits_are_checked_from_where_the_machine_stands() -> None:
+    device = new_device(s20=1, s22=1, s24=500, s25=3000)
+    wire = FakeWire(device)
+    job = Job("job.nc", "G0 X10\n")
+    with pytest.raises(ControllerError, match=r"past its soft limits.*--force travel"):
+        deliver(plan_job(job, MACHINE, home=True), wire, StopSignals())
+    assert b"G0X10" not in wire.bytes_written
+    device = new_device(s20=1, s22=1, s24=500, s25=3000)
+    device.receive(b"$X\n")
+    device.advance(0.1)
+    device.receive(b"G10L2P1X-400Y-400\n")
+    device.advance(0.5)
+    device.power_cycle()
+    wire = FakeWire(device)
+    assert deliver(plan_job(job, MACHINE, home=True), wire, StopSignals()).lines == 1
+    assert device.position[0] == pytest.approx(-390)
