@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +30,9 @@ _FOREVER = 1 << 62
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """``seconds`` from the first step to the end of the last move or dwell;
-    ``beam_on_seconds`` of them burning, moving or not; ``start`` and ``end`` (n,) float64, when
-    each move of the program is made, in s from the first step.
+    """``seconds`` from the first step (or dwell) to the end of the last move or dwell;
+    ``beam_on_seconds`` with the beam on, moving or not; ``start`` and ``end`` (n,) float64, when
+    each move of the program is made, in s from the same beginning.
     """
 
     seconds: float
@@ -107,6 +108,7 @@ class _Run:
         self.burning = False
         self.burning_since = 0
         self.burnt = 0
+        self.first: int | None = None
         self.last_end = 0
 
     def lines(self) -> None:
@@ -184,6 +186,7 @@ class _Run:
     def _event(self, kind: int, seconds: float, power: float) -> None:
         self._synchronize()
         if kind == DWELL:
+            self._begin(self.now)
             self.now = self.processor.run(self.now, cpu.dwell_steps(seconds) * cpu.DWELL_STEP)
             self.last_end = self.now
         if power == power:
@@ -235,7 +238,12 @@ class _Run:
         if cycles:
             self.now = self.processor.run(self.now, cycles)
 
+    def _begin(self, now: int) -> None:
+        if self.first is None:
+            self.first = now
+
     def _segment(self, now: int, segment: Segment) -> None:
+        self._begin(now)
         tag = segment.move.tag
         if tag != self.moving:
             self.moving = tag
@@ -261,7 +269,7 @@ class _Run:
         start = np.array(self.began, dtype=np.float64)
         end = np.array(self.ended, dtype=np.float64)
         made = start >= 0.0
-        first = start[made].min(initial=float(self.last_end)) if made.any() else 0.0
+        first = float(self.first or 0)
         # A move too short for a motor step takes no time: it happens where the one before ended.
         before = np.maximum.accumulate(np.where(made, end, first))
         start = np.where(made, start, before)
@@ -286,7 +294,6 @@ def _in_line_order(program: Program) -> list[list[int]]:
     lines, places, kinds = np.concatenate([event_key, move_key], axis=1).astype(np.int64)
     values = np.concatenate([~np.arange(count), np.arange(len(program))])
     order = np.lexsort((kinds, places, lines))
-    bounds = np.searchsorted(lines[order], program.line_number)
-    tail = np.append(bounds[1:], len(order))
+    bounds = [*np.searchsorted(lines[order], program.line_number).tolist(), len(order)]
     done = values[order].tolist()
-    return [done[a:b] for a, b in zip(bounds.tolist(), tail.tolist(), strict=True)]
+    return [done[a:b] for a, b in pairwise(bounds)]
