@@ -3,45 +3,13 @@
 import json
 import subprocess
 import sys
-from dataclasses import dataclass
 
 import pytest
+from command_line import sentence
 
-from miurafab.cli import app, main
+from miurafab.cli import app
 
 COMMANDS = sorted(command.name for command in app.registered_commands)
-
-
-@dataclass(frozen=True)
-class Done:
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-@pytest.fixture
-def run(capsys, monkeypatch, tmp_path):
-    """The command line within this process, in an empty folder."""
-
-    def call(*arguments):
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["miurafab", *map(str, arguments)])
-        with pytest.raises(SystemExit) as exited:
-            main()
-        return Done(exited.value.code or 0, *capsys.readouterr())
-
-    return call
-
-
-def sentence(done, exit_code):
-    """The one sentence of a failure; nothing else may have been printed."""
-    assert done.returncode == exit_code, done
-    assert "Traceback" not in done.stderr
-    lines = done.stderr.strip().splitlines()
-    assert len(lines) == 1, done.stderr
-    assert lines[0].startswith("miurafab: ")
-    assert lines[0].endswith(".")
-    return lines[0]
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -1,0 +1,136 @@
+"""``miurafab sheets`` and ``miurafab cut``: the main job, and every way in which it is refused."""
+
+import json
+
+import pytest
+from command_line import sentence
+from problems import saddle_mesh
+
+from miurafab.profiles import shipped_directory
+
+DESIGN = """
+title = "Small saddle"
+facets = "6x5"
+size = "70mm"
+[target]
+surface = "hypar"
+[layout]
+machine = "grbl-laser-400"
+material = "paper-100"
+"""
+
+
+@pytest.fixture
+def job(run, tmp_path):
+    """A small pattern and its job directory."""
+    assert run("fit", "hypar", "--facets", "6x5", "--size", "70mm", "-o", "s.fold").returncode == 0
+    done = run("sheets", "s.fold", "-o", "job", "--material", "paper-100", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["totals"]["patches"] == 1
+    return tmp_path / "job"
+
+
+def test_a_design_is_cut_in_one_command(run, tmp_path):
+    (tmp_path / "small.toml").write_text(DESIGN)
+    done = run("cut", "small.toml", "--port", "virtual", "--json")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    answer = json.loads(done.stdout)
+    assert answer["status"] == "done"
+    assert answer["facets"] == 30
+    assert max(answer["max_planarity"], answer["max_developability"]) <= 1e-10
+    (sheet,) = answer["sheets"]
+    assert sheet["seconds"] == pytest.approx(sheet["estimated_s"], rel=0.03)
+    made = {path.name for path in (tmp_path / "jobs" / "small").iterdir()}
+    assert made >= {"small.fold", "layout.json", "sheet-01.nc", "sheet-01.svg"}
+    journal = (tmp_path / "jobs" / "small" / "sheet-01.journal").read_text()
+    assert '"ended"' in journal
+
+
+def test_a_mesh_goes_the_whole_way(run, tmp_path):
+    saddle_mesh(15, 30.0).export(tmp_path / "saddle.stl")
+    fitted = run("fit", "saddle.stl", "--facets", "6x6", "--size", "80mm", "-o", "saddle.fold")
+    assert fitted.returncode == 0, fitted.stderr
+    assert run("check", "saddle.fold").returncode == 0
+    assert run("sheets", "saddle.fold", "-o", "job").returncode == 0
+    shown = run("preview", "job", "--json")
+    assert shown.returncode == 0, shown.stderr
+    (sheet,) = json.loads(shown.stdout)["sheets"]
+    assert set(sheet) >= {
+        "lines", "seconds", "beam_on_seconds", "cut_mm", "travel_mm", "bounds_mm", "warnings",
+    }  # fmt: skip
+    assert sheet["warnings"] == []
+
+
+def test_a_job_directory_and_its_file_are_cut_alike(run, job):
+    whole = json.loads(run("cut", "job", "--port", "virtual", "--json").stdout)
+    single = json.loads(run("cut", "job/sheet-01.nc", "--port", "virtual", "--json").stdout)
+    assert whole["sheets"][0]["lines"] == single["sheets"][0]["lines"]
+    assert whole["sheets"][0]["cut_m"] == single["sheets"][0]["cut_m"]
+
+
+def test_check_mode_moves_nothing(run, job):
+    done = run("cut", "job", "--port", "virtual", "--check-mode", "--json")
+    assert done.returncode == 0, done.stderr
+    (sheet,) = json.loads(done.stdout)["sheets"]
+    assert sheet["refused_lines"] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named", "code"),
+    [
+        (("cut", "job", "--port", "/dev/no-such-port"), "/dev/no-such-port", 3),
+        (("cut", "job", "--port", "socket://127.0.0.1:1"), "127.0.0.1", 3),
+        (("cut", "job", "--port", "virtual", "--sheet", "7"), "no sheet 7", 2),
+        (("cut", "job", "--port", "virtual", "--machine", "gone"), "'gone'", 2),
+        (("cut", "job", "--port", "virtual", "--force", "gone"), "gone", 2),
+        (("cut", "gone.nc", "--port", "virtual"), "gone.nc", 2),
+        (("cut", "gone.fold", "--port", "virtual"), "gone.fold", 2),
+        (("cut", "gone", "--port", "virtual"), "gone", 2),
+        (("sheets", "gone.fold", "-o", "other"), "gone.fold", 2),
+        (("sheets", "s.fold", "-o", "s.fold"), "needs a directory", 2),
+        (("sheets", "s.fold", "-o", "other", "--material", "gone"), "'gone'", 2),
+        (("preview", "gone"), "gone", 2),
+    ],
+)
+def test_bad_input_is_one_sentence(run, job, arguments, named, code):
+    assert named in sentence(run(*arguments, "--quiet"), code)
+
+
+def test_an_empty_directory_is_no_job(run, job, tmp_path):
+    (tmp_path / "empty").mkdir()
+    assert "no whole job" in sentence(run("cut", "empty", "--port", "virtual", "--quiet"), 2)
+
+
+def test_a_bed_smaller_than_one_facet(run, job, tmp_path):
+    text = (shipped_directory("firmware_profiles") / "grbl-laser-400.toml").read_text()
+    small = text.replace('"400mm"', '"13mm"').replace('margin = "5mm"', 'margin = "1mm"')
+    (tmp_path / "tiny.toml").write_text(small)
+    done = run("sheets", "s.fold", "-o", "other", "--machine", "tiny.toml", "--quiet")
+    assert "facet" in sentence(done, 2)
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("M3 S100\nG1 X10 F600\nM5\n", "--force m3"),
+        ("M4 S100\nG1 X900 F600\nM5\n", "bed"),
+        ("M4 S100\nG1 X10 F600 ; careful\nG1 X2 !\nM5\n", "line 3"),
+        ("M4 S100\nG1 X10\nM5\n", "line 2"),
+    ],
+)
+def test_a_dangerous_program_is_refused(run, tmp_path, text, named):
+    (tmp_path / "job.nc").write_text(text)
+    assert named in sentence(run("cut", "job.nc", "--port", "virtual", "--quiet"), 2)
+
+
+def test_a_pattern_that_is_not_valid_is_not_cut(run, job, tmp_path):
+    document = json.loads((tmp_path / "s.fold").read_text())
+    document["vertices_coords"][8][0] += 0.5
+    (tmp_path / "torn.fold").write_text(json.dumps(document))
+    done = run("cut", "torn.fold", "--port", "virtual", "--json")
+    assert done.returncode == 1
+    answer = json.loads(done.stdout)
+    assert answer["status"] == "refused"
+    assert "not the same flat and folded" in answer["advice"]
+    assert not (tmp_path / "jobs" / "torn").exists()
