@@ -3,10 +3,11 @@
 A fit is a short list of attempts in a fixed order, each a seed and a projection; the first that
 meets everything asked is the answer. The order:
 
-1. both directions of the rows, the one along which the normal turns less first, with growing
-   stretch along the rows (1.3, 1.6, 2, 2.6), straight from the seed;
-2. the same bent step by step from flat to the full target, carrying the solution along;
-3. the seeds of the first way shaken a little at random, by the request's ``seed``.
+1. on a surface of revolution, one period solved and turned about the axis;
+2. straight from the seed, with several stretches along and across the rows, each in both directions
+   of the rows, the one along which the normal turns less first;
+3. the same bent step by step from flat to the full target, carrying the solution along;
+4. the seeds shaken a little at random, by the request's ``seed``.
 
 Exact flat-foldability is appended to a developable solution. Whatever happens, the result says what
 was tried and, if nothing served, what to change.
@@ -32,13 +33,16 @@ from miurafab.origami.seed import Corrugation, seed
 from miurafab.origami.solver import Projection, project
 from miurafab.origami.tessellation import Tessellation
 from miurafab.origami.unfold import unfold
-from miurafab.surfaces.analytic import GeneralizedCylinder
+from miurafab.origami.strip import solve_strip
+from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
 from miurafab.surfaces.surface import Bent, Swapped, TargetSurface, tangents
 
 Floats = NDArray[np.float64]
 
-STRETCHES_ALONG = (1.3, 1.6, 2.0, 2.6)
-STRETCH_ACROSS = 1.3
+STRETCHES = ((1.3, 1.3), (1.15, 1.6), (1.6, 1.3), (1.3, 1.6), (2.0, 1.3), (2.6, 1.3), (1.15, 2.0))
+"""The stretches along and across the rows that are tried in turn. Strong curvature along the rows
+wants more of the first, strong twist less of the first and more of the second.
+"""
 BEND_STEPS = 12
 STEP_CAP = 0.25
 """The farthest that a coordinate moves in one step, in mean edge lengths."""
@@ -88,8 +92,9 @@ class FitRequest:
 
 @dataclass(frozen=True)
 class Attempt:
-    """One attempt: the way (``direct``, ``seed``, ``bent``), the row direction, the corrugation,
-    the residual it ended with, and why it was not enough (empty if it was).
+    """One attempt: the way (``direct``, ``strip``, ``seed``, ``bent``, ``shaken``), the row
+    direction, the corrugation, the residual it ended with, and why it was not enough (empty if it
+    was).
     """
 
     way: str
@@ -208,6 +213,7 @@ class _Plan:
     def describe(self) -> str:
         how = {
             "direct": "direct construction",
+            "strip": "one period of the revolution",
             "seed": "seed",
             "bent": "bending step by step",
             "shaken": "seed shaken",
@@ -226,7 +232,10 @@ class _Plan:
             )
             return self._candidate(request, sheet, 0)
         columns, rows = request.columns + 1, request.rows + 1
-        if self.way == "bent":
+        if self.way == "strip":
+            assert isinstance(self.surface, Revolution)
+            solution = solve_strip(self.surface, columns, rows, self.corrugation)
+        elif self.way == "bent":
             solution = _bend(self.surface, columns, rows, self.corrugation)
         else:
             start, _ = seed(self.surface, columns, rows, self.corrugation)
@@ -277,19 +286,28 @@ def _plans(request: FitRequest) -> Iterator[_Plan]:
         return
     oriented = [(request.surface, "u"), (Swapped(request.surface), "v")]
     oriented.sort(key=lambda pair: _turning(pair[0]))
+    if isinstance(request.surface, Revolution):
+        for corrugation in corrugations:
+            yield _Plan("strip", request.surface, "u", corrugation)
     for way in ("seed", "bent", "shaken"):
-        for surface, name in oriented:
-            for corrugation in corrugations:
+        for corrugation in corrugations:
+            for surface, name in oriented:
                 yield _Plan(way, surface, name, corrugation)
 
 
 def _corrugations(request: FitRequest) -> list[Corrugation]:
-    across = Corrugation.from_stretches(STRETCHES_ALONG[0], STRETCH_ACROSS).amplitude
-    amplitude = across if request.amplitude is None else request.amplitude
-    if request.zigzag is not None:
-        return [Corrugation(amplitude, request.zigzag)]
-    stretch = float(np.hypot(1.0, amplitude))
-    return [Corrugation.from_stretches(along, stretch) for along in STRETCHES_ALONG]
+    if request.amplitude is not None and request.zigzag is not None:
+        return [Corrugation(request.amplitude, request.zigzag)]
+    corrugations = []
+    for along, across in STRETCHES:
+        usual = Corrugation.from_stretches(along, across)
+        amplitude = usual.amplitude if request.amplitude is None else request.amplitude
+        if request.zigzag is not None:
+            corrugations.append(Corrugation(amplitude, request.zigzag))
+        else:
+            stretch = float(np.hypot(1.0, amplitude))
+            corrugations.append(Corrugation.from_stretches(along, stretch))
+    return list(dict.fromkeys(corrugations))
 
 
 def _turning(surface: TargetSurface) -> float:

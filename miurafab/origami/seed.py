@@ -6,7 +6,10 @@ Symbols (grid index i along the rows, spacing S; j across, spacing L; H height, 
     lambda_j^2 = 1 + sigma^2,   lambda_i^2 = 1 + tau^2 sigma^2 / (1 + sigma^2)
 
 are the stretches from the surface to the flat paper. Paper is flat, so lambda_i S and lambda_j L
-are made constant over the sheet: lambda_i = c_i max(S) / S, lambda_j = c_j max(L) / L.
+are those of a rectangle, or of a fan where the spacing grows to one side: one of them is constant
+over the sheet and the other A (1 + k n), n the grid index across it and k fitted to the spacing
+(constant speed along geodesics from one point: the plane in polar coordinates, flat for every k).
+A is as small as lambda >= c allows.
 
 Curvature kappa_i along the rows cannot be absorbed within a cell; the upper layer slides over the
 lower one instead, by the angle psi,
@@ -78,8 +81,9 @@ def seed(
     # the distance between rows, not between neighbours: the parameter lines may be oblique
     oblique = np.einsum("...k,...k->...", across, t)
     spacing_j = np.sqrt(np.maximum(speed_v**2 - oblique**2, 1e-12 * speed_v**2)) * dv
-    lambda_i = corrugation.stretch_along * spacing_i.max() / spacing_i
-    lambda_j = corrugation.stretch_across * spacing_j.max() / spacing_j
+    fan_i, fan_j = _fans(spacing_i, spacing_j)
+    lambda_i = corrugation.stretch_along * (spacing_i / fan_i).max() * fan_i / spacing_i
+    lambda_j = corrugation.stretch_across * (spacing_j / fan_j).max() * fan_j / spacing_j
     sigma = np.sqrt(lambda_j**2 - 1)
     tau = np.sqrt((lambda_i**2 - 1) * (1 + sigma**2)) / sigma
 
@@ -97,3 +101,27 @@ def seed(
     lift = ((j % 2) - 0.5)[:, None] * sigma * spacing_j
     direction = surface.normal(shifted) + t * ramp[..., None]
     return Tessellation(surface.point(shifted) + lift[..., None] * direction), steepest
+
+
+def _fans(spacing_i: Floats, spacing_j: Floats) -> tuple[Floats, Floats]:
+    """The shapes that lambda_i S and lambda_j L take, each (rows, columns) with mean one.
+
+    Only one of them may vary, or the paper would not be flat: the one whose linear trend matters
+    more.
+    """
+    fan_i, trend_i = _trend(spacing_i.mean(axis=1))
+    fan_j, trend_j = _trend(spacing_j.mean(axis=0))
+    level = np.ones_like(spacing_i)
+    if trend_i > trend_j:
+        return level * fan_i[:, None], level
+    return level, level * fan_j[None, :]
+
+
+def _trend(spacing: Floats) -> tuple[Floats, float]:
+    """The straight line nearest to ``spacing`` (n,), over its mean, and its rise from end to end,
+    kept under that from 1/4 to 7/4.
+    """
+    n = np.linspace(-1.0, 1.0, len(spacing))
+    slope = float(n @ spacing / (n @ n)) / float(spacing.mean())
+    slope = min(max(slope, -0.75), 0.75)
+    return 1 + slope * n, 2 * abs(slope)

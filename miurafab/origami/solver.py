@@ -125,9 +125,15 @@ def project(
         return Projection(x, residual, iterations, converged, reason, state.held)
 
     for iteration in range(max_iterations):
-        if residual <= tolerance:
-            return ended(iteration, True, "converged")
         values, jacobian = state.values, state.jacobian
+        if residual <= tolerance:
+            if factor is not None and len(factor.order) == len(values):
+                # one more step on the last factor takes the residual down to rounding
+                trial = x - jacobian.T @ factor.solve(values)
+                following = _Rows.at(constraints, inequalities, trial, state.held)
+                if following.residual < residual:
+                    x, state, residual = trial, following, following.residual
+            return ended(iteration, True, "converged")
         same_rows = ordered_for is not None and np.array_equal(ordered_for, state.held)
         mu = None
         if factor is not None and same_rows and last_step < SMALL_STEP * cap:

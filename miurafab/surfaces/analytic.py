@@ -80,7 +80,19 @@ def helicoid(radius: float, inner: float, pitch: float, turns: float) -> Paramet
     return ParametricSurface(position, Domain(inner, radius, -swing / 2, swing / 2))
 
 
-def revolution(profile: ProfileCurve, angle: float) -> ParametricSurface:
+@dataclass(frozen=True)
+class Revolution(ParametricSurface):
+    """``profile`` (r, z) turned through ``angle`` about z: the surfaces that repeat themselves."""
+
+    profile: ProfileCurve = field(kw_only=True)
+
+    @property
+    def angle(self) -> float:
+        """The angle turned through, radians."""
+        return self.domain.height
+
+
+def revolution(profile: ProfileCurve, angle: float) -> Revolution:
     """``profile`` (r, z) turned through ``angle`` about z; rows run along the profile."""
 
     def position(u: Floats, v: Floats) -> Floats:
@@ -88,7 +100,7 @@ def revolution(profile: ProfileCurve, angle: float) -> ParametricSurface:
         r, z = curve[..., 0], curve[..., 1]
         return np.stack([r * np.cos(v), r * np.sin(v), z], axis=-1)
 
-    return ParametricSurface(position, Domain(0.0, 1.0, -angle / 2, angle / 2))
+    return Revolution(position, Domain(0.0, 1.0, -angle / 2, angle / 2), profile=profile)
 
 
 def _graph(width: float, height: float, z: Callable[[Floats, Floats], Floats]) -> ParametricSurface:

@@ -55,6 +55,7 @@ def _signed(default: float, meaning: str) -> Parameter:
     return Parameter(default, -1e6, 1e6, meaning)
 
 
+_TURN = {"angle": _angle(120, "angle turned through", 360)}
 _SIDES = {"width": _length(2.0, "side along x"), "depth": _length(2.0, "side along y")}
 _VASE = ((0.55, 0.0), (0.8, 0.5), (0.72, 1.1), (0.5, 1.6), (0.58, 2.0))
 
@@ -68,11 +69,40 @@ def _log_spiral(start: float, growth: float, turns: float, length: float) -> Tar
     return analytic.cylinder_over(curves.log_spiral(start, growth, turns), length)
 
 
+def _turned(name: str, profile: curves.ProfileCurve, angle: float) -> TargetSurface:
+    if profile.evenly(400, -0.05, 1.05)[:, 0].min() <= 0:
+        raise TargetError(f"The profile of '{name}' must keep off its axis (r > 0).")
+    return analytic.revolution(profile, angle)
+
+
 def _revolution(angle: float, profile: Any = None) -> TargetSurface:
-    curve = curves.spline(_VASE if profile is None else profile)
-    if curve.evenly(400, -0.05, 1.05)[:, 0].min() <= 0:
-        raise TargetError("The profile of a revolution must keep off its axis (r > 0).")
-    return analytic.revolution(curve, angle)
+    return _turned("revolution", curves.spline(_VASE if profile is None else profile), angle)
+
+
+def _pill(radius: float, waist: float, caps: float, angle: float) -> TargetSurface:
+    return _turned("pill", curves.capped(radius, waist, radius, caps), angle)
+
+
+def _candlestick(
+    radius: float, waist: float, flare: float, caps: float, angle: float
+) -> TargetSurface:
+    return _turned("candlestick", curves.capped(radius, waist, -flare, caps), angle)
+
+
+def _vase(belly: float, neck: float, height: float, angle: float) -> TargetSurface:
+    return _turned("vase", curves.vase(belly, neck, height), angle)
+
+
+def _hyperboloid(waist: float, spread: float, height: float, angle: float) -> TargetSurface:
+    return _turned("hyperboloid", curves.hyperbola(waist, spread, height), angle)
+
+
+def _catenoid(waist: float, height: float, angle: float) -> TargetSurface:
+    return _turned("catenoid", curves.catenary(waist, height), angle)
+
+
+def _ellipsoid(radius: float, height: float, latitude: float, angle: float) -> TargetSurface:
+    return _turned("ellipsoid", curves.ellipse(radius, height, latitude), angle)
 
 
 _ENTRIES = (
@@ -154,9 +184,75 @@ _ENTRIES = (
         lambda radius, inner, pitch, turns: analytic.helicoid(radius, inner, pitch, turns),
     ),
     NamedSurface(
+        "pill",
+        "a cylindrical waist with spherical caps, turned about z",
+        {
+            "radius": _length(1.0, "radius of waist and caps"),
+            "waist": _length(1.2, "length of the waist"),
+            "caps": _angle(60, "latitude that each cap reaches", 85),
+            **_TURN,
+        },
+        _pill,
+    ),
+    NamedSurface(
+        "candlestick",
+        "a cylindrical waist with flaring ends of negative curvature, turned about z",
+        {
+            "radius": _length(0.6, "radius of the waist"),
+            "waist": _length(1.0, "length of the waist"),
+            "flare": _length(0.8, "radius of the arcs of the ends"),
+            "caps": _angle(60, "angle through which each end bends outwards", 85),
+            **_TURN,
+        },
+        _candlestick,
+    ),
+    NamedSurface(
+        "vase",
+        "a belly of positive and a neck of negative curvature, turned about z",
+        {
+            "belly": _length(0.9, "largest radius"),
+            "neck": _length(0.5, "smallest radius"),
+            "height": _length(2.2, "height"),
+            **_TURN,
+        },
+        _vase,
+    ),
+    NamedSurface(
+        "hyperboloid",
+        "a hyperboloid of one sheet about z",
+        {
+            "waist": _length(0.7, "radius at the waist"),
+            "spread": _length(0.9, "height over the waist at which r is 1.41 times the waist"),
+            "height": _length(2.0, "height"),
+            **_TURN,
+        },
+        _hyperboloid,
+    ),
+    NamedSurface(
+        "catenoid",
+        "the minimal surface of revolution, about z",
+        {
+            "waist": _length(0.8, "radius at the waist"),
+            "height": _length(1.6, "height"),
+            **_TURN,
+        },
+        _catenoid,
+    ),
+    NamedSurface(
+        "ellipsoid",
+        "an ellipsoid of revolution between two latitudes, about z",
+        {
+            "radius": _length(1.0, "half axis across z"),
+            "height": _length(1.0, "half axis along z; equal to the radius for a sphere"),
+            "latitude": _angle(60, "parametric latitude reached on both sides", 85),
+            **_TURN,
+        },
+        _ellipsoid,
+    ),
+    NamedSurface(
         "revolution",
         "a profile curve turned about the z axis; by default a vase",
-        {"angle": _angle(120, "angle turned through", 350)},
+        _TURN,
         _revolution,
         "r, z",
     ),

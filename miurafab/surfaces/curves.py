@@ -55,6 +55,66 @@ def log_spiral(start: float, growth: float, turns: float) -> ProfileCurve:
     return ProfileCurve(position)
 
 
+def capped(radius: float, waist: float, reach: float, angle: float) -> ProfileCurve:
+    """A straight waist (r, z) of length ``waist`` at ``radius``, bent at both ends by arcs.
+
+    The arcs have the radius ``reach`` and turn through ``angle``: towards the axis where ``reach``
+    is positive, away from it where it is negative. Walked at constant speed.
+    """
+    half, bend = waist / 2, abs(reach) * angle
+
+    def position(t: Floats) -> Floats:
+        along = (2 * t - 1) * (half + bend)
+        phi = np.maximum(np.abs(along) - half, 0.0) / abs(reach)
+        r = radius - reach * (1 - np.cos(phi))
+        z = np.minimum(np.abs(along), half) + abs(reach) * np.sin(phi)
+        return np.stack([r, np.sign(along) * z], axis=-1)
+
+    return ProfileCurve(position)
+
+
+def vase(belly: float, neck: float, height: float) -> ProfileCurve:
+    """A wave (r, z) from under the ``belly`` over it and the ``neck`` to a little flare."""
+    start, stop = -0.35 * np.pi, 1.25 * np.pi
+
+    def position(t: Floats) -> Floats:
+        r = (belly + neck) / 2 + (belly - neck) / 2 * np.cos(start + (stop - start) * t)
+        return np.stack([r, height * t], axis=-1)
+
+    return ProfileCurve(position)
+
+
+def hyperbola(waist: float, spread: float, height: float) -> ProfileCurve:
+    """r = waist sqrt(1 + (z / spread)^2) over ``height``."""
+
+    def position(t: Floats) -> Floats:
+        z = (t - 0.5) * height
+        return np.stack([waist * np.hypot(1.0, z / spread), z], axis=-1)
+
+    return ProfileCurve(position)
+
+
+def catenary(waist: float, height: float) -> ProfileCurve:
+    """r = waist cosh(z / waist) over ``height``, walked at constant speed."""
+    end = np.sinh(height / 2 / waist)
+
+    def position(t: Floats) -> Floats:
+        along = (2 * t - 1) * end
+        return waist * np.stack([np.hypot(1.0, along), np.arcsinh(along)], axis=-1)
+
+    return ProfileCurve(position)
+
+
+def ellipse(radius: float, height: float, latitude: float) -> ProfileCurve:
+    """The ellipse (r, z) of half axes ``radius`` and ``height`` between latitudes +-``latitude``."""
+
+    def position(t: Floats) -> Floats:
+        phi = (2 * t - 1) * latitude
+        return np.stack([radius * np.cos(phi), height * np.sin(phi)], axis=-1)
+
+    return ProfileCurve(position)
+
+
 def spline(points: Sequence[Sequence[float]]) -> ProfileCurve:
     """The cubic spline through ``points`` (n, 2), parameterised by chord length.
 
