@@ -135,7 +135,7 @@ def joined(path: Toolpath) -> Toolpath:
 
 
 @given(toolpaths().map(joined))
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_read_back_it_is_the_same_strokes_in_order(path: Toolpath) -> None:
     labels = {0: "A1", 1: "B 2"}
     read = strokes(parse_program(post(path, LASER, CARD, patch_labels=labels)))
@@ -152,7 +152,7 @@ def test_read_back_it_is_the_same_strokes_in_order(path: Toolpath) -> None:
 
 
 @given(toolpaths())
-@settings(derandomize=True, max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_strokes_that_meet_are_burnt_once_each(path: Toolpath) -> None:
     program = parse_program(post(path, LASER, CARD))
     burnt = np.stack([program.start, program.end], axis=1)[program.beam_on][:, :, :2]
@@ -164,7 +164,7 @@ def test_strokes_that_meet_are_burnt_once_each(path: Toolpath) -> None:
 
 
 @given(toolpaths().map(joined))
-@settings(derandomize=True, max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_power_and_feed_are_those_of_the_operation(path: Toolpath) -> None:
     program = parse_program(post(path, LASER, CARD))
     read = strokes(program)
@@ -176,7 +176,7 @@ def test_power_and_feed_are_those_of_the_operation(path: Toolpath) -> None:
 
 
 @given(toolpaths())
-@settings(derandomize=True, max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_every_line_is_short_plain_and_needed(path: Toolpath) -> None:
     text = post(path, LASER, CARD).text
     assert text.endswith("\n")
@@ -194,7 +194,7 @@ def test_every_line_is_short_plain_and_needed(path: Toolpath) -> None:
 
 
 @given(toolpaths())
-@settings(derandomize=True, max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_starts_and_ends_dark_and_arms_once(path: Toolpath) -> None:
     code = [line for line in post(path, LASER, CARD).text.splitlines() if line[0] != "("]
     assert code[0] == "M5"

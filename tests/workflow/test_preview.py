@@ -1,0 +1,248 @@
+"""The dry run against lengths known beforehand, and every warning by a job that earns it."""
+
+import json
+import re
+import socket
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import serial
+from problems import regular
+from small_jobs import KNOWN, LASER, dashes, known_toolpath, write_folder, write_nc
+
+import miurafab
+from miurafab.errors import GcodeError, InputError, ProfileError
+from miurafab.gcode.job import Job
+from miurafab.workflow.dry_run import LAYERS, clock_text, dry_run, length_text
+from miurafab.workflow.preview import preview, with_settings
+
+BED = (400.0, 400.0)
+
+
+def run(text, machine=LASER):
+    return dry_run("job", Job("job.nc", text), machine, BED)
+
+
+def test_figures_of_a_known_sheet(tmp_path):
+    path = write_nc(tmp_path, known_toolpath())
+    sheet = preview(path).sheets[0]
+    assert sheet.name == "sheet-01"
+    assert sheet.lines == len(path.read_text().splitlines())
+    assert sheet.cut_mm == pytest.approx(5 + 30 + 40 + 100)
+    assert sheet.travel_mm == pytest.approx(known_toolpath().travel_mm)
+    assert sheet.bounds_mm == (3.0, 4.0, 130.0, 140.0)
+    assert sheet.warnings == ()
+    by_layer = {layer.name: mm for layer, mm in zip(LAYERS, sheet.layer_mm, strict=True)}
+    assert by_layer.pop("travel") == pytest.approx(sheet.travel_mm)
+    assert by_layer == pytest.approx(
+        {"engrave": 5, "score": 30, "perforate": 40, "cut": 100, "burn": 0}
+    )
+    assert sheet.layer_strokes == (0, 1, 1, 1, 1, 0)
+    # never faster than its feeds, and every move ends no sooner than the one before
+    slowest = 60 * (5 / 3000 + 30 / 2400 + 40 / 1500 + 100 / 900)
+    assert slowest <= sheet.beam_on_seconds < 1.2 * slowest
+    assert sheet.beam_on_seconds < sheet.seconds
+    assert (np.diff(sheet.end_seconds) >= 0).all()
+    assert sheet.end_seconds[-1] == pytest.approx(sheet.seconds)
+
+
+def test_many_dashes_add_up(tmp_path):
+    toolpath = dashes(500)
+    sheet = preview(write_nc(tmp_path, toolpath)).sheets[0]
+    assert sheet.cut_mm == pytest.approx(toolpath.lengths.sum(), abs=500 * 1e-3)
+    assert sheet.travel_mm == pytest.approx(toolpath.travel_mm, abs=500 * 1e-3)
+    assert (
+        sheet.layer_strokes[LAYERS.index(next(x for x in LAYERS if x.name == "perforate"))] == 500
+    )
+
+
+CLEAN = "(operation cut)\nM5\nG21\nG90\nM4 S0\nG0 X10 Y10\nG1 X20 S500 F900\nM5\nM2\n"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "warning"),
+    [
+        ("X20", "X400.01", r"1 move goes outside the 400 x 400 mm bed, the first in line 7"),
+        ("X10 Y10", "X10 Y-2", r"2 moves go outside .* in line 6 to X 10\.000 Y -2\.000"),
+        ("S500", "S1001", r"S1001 \(line 7\) is above the machine's full power S1000"),
+        ("F900", "F6001", r"F6001 \(line 7\) is faster than the machine's largest rate"),
+        ("M4", "M3", r"M3 \(line 5\) keeps the beam burning"),
+        ("M4", "m3", r"M3 \(line 5\) keeps the beam burning"),
+        ("M5\nM2", "", r"The job ends with M4 in force"),
+        ("G1 X20 S500", "M3\nG1 X20 S500", r"M3 \(line 7\)"),
+        ("(operation cut)", "(stop!)", r"Line 1 holds '!' in a comment"),
+        ("(operation cut)", "; größer", r"Line 1 holds 'ö' in a comment"),
+        ("S500", "S0", r"The job burns nothing"),
+        ("F900", "F900." + "0" * 80, r"Line 7 has \d+ characters .* controller's 79"),
+    ],
+)
+def test_each_warning_is_earned(before, after, warning):
+    assert run(CLEAN).warnings == ()
+    assert before in CLEAN
+    found = run(CLEAN.replace(before, after)).warnings
+    assert [text for text in found if re.search(warning, text)] == list(found)
+    assert len(found) == 1
+
+
+def test_a_dwell_under_a_constant_beam_burns_in_place():
+    text = CLEAN.replace("M4", "M3").replace("F900\n", "F900\nG4 P0.5\nG4P1\n")
+    assert "The beam burns in place during 2 dwells, the first in line 8." in run(text).warnings
+    assert not any("in place" in warning for warning in run(text.replace("M3", "M4")).warnings)
+    dark = text.replace("G4 P0.5\nG4P1\n", "M5\nG4 P0.5\n")
+    assert not any("in place" in warning for warning in run(dark).warnings)
+
+
+def test_m2_disarms_and_g40_is_no_dwell():
+    assert run(CLEAN.replace("M5\nM2", "M2")).warnings == ()
+    assert run(CLEAN.replace("M4 S0", "M4 S0\nG40")).warnings == ()
+
+
+def test_laser_mode_off_is_a_hazard_for_lasers_only():
+    off = replace(LASER, settings={**LASER.settings, 32: 0.0})
+    assert any("Laser mode is off" in warning for warning in run(CLEAN, off).warnings)
+    pen = replace(off, tool=replace(off.tool, kind="pen"))
+    assert run(CLEAN.replace("M4", "M3"), pen).warnings == ()
+
+
+def test_what_no_comment_names_is_shown_as_other():
+    sheet = run(CLEAN.replace("(operation cut)", "(operation travel)"))
+    assert sheet.layer_mm[-1] == pytest.approx(10)
+
+
+def test_a_program_the_controller_would_refuse_is_an_error():
+    with pytest.raises(GcodeError, match=r"job\.nc, line 7"):
+        run(CLEAN.replace("F900", ""))
+    with pytest.raises(GcodeError, match=r"job\.nc, line 7.*feed hold"):
+        run(CLEAN.replace("F900", "F900!"))
+
+
+def test_a_dump_wins_over_the_profile(tmp_path):
+    path = write_nc(tmp_path, known_toolpath())
+    dump = tmp_path / "mine.txt"
+    dump.write_text(
+        "$30=300\n$110=1200.000\n$111=1200.000\n$120=20.000\n$121=20.000\n$131=120\nok\n"
+    )
+    seen = preview(path, settings_dump=dump)
+    assert seen.machine.tool.s_max == 300
+    assert seen.machine.motion.max_rate_mm_min == (1200.0, 1200.0)
+    assert seen.machine.bed.height_mm == 120
+    assert seen.sheets[0].seconds > 2 * preview(path).sheets[0].seconds
+    warnings = " ".join(seen.sheets[0].warnings)
+    assert "400 x 120 mm bed" in warnings
+    assert "above the machine's full power S300" in warnings
+    dump.write_text("hello\n")
+    with pytest.raises(ProfileError, match=r"mine\.txt"):
+        with_settings(LASER, dump)
+    with pytest.raises(InputError, match=r"none\.txt"):
+        preview(path, settings_dump=tmp_path / "none.txt")
+
+
+def test_the_machine_is_the_one_that_the_job_names(tmp_path):
+    path = write_nc(tmp_path, known_toolpath())
+    assert preview(path).remarks == ()
+    path.write_text(path.read_text().replace("(machine grbl-laser-400)\n", ""))
+    seen = preview(path)
+    assert seen.machine == LASER
+    assert "No machine is named" in seen.remarks[0]
+    path.write_text("(machine mine)\n" + path.read_text())
+    with pytest.raises(ProfileError, match="mine"):
+        preview(path)
+    profiles = miurafab.profiles.shipped_directory("firmware_profiles")
+    own = (profiles / "grbl-laser-400.toml").read_text().replace("Diode laser", "My laser")
+    (tmp_path / "mine.toml").write_text(own)
+    assert preview(path).machine.title.startswith("My laser")
+    assert preview(path, machine=LASER).machine == LASER
+
+
+def test_a_job_directory_with_its_pattern(tmp_path):
+    pattern = regular()
+    seen = preview(write_folder(tmp_path / "job", pattern))
+    assert seen.name == "job"
+    assert [sheet.name for sheet in seen.sheets] == ["sheet-01", "sheet-02"]
+    assert seen.sheets[0].paper_mm == (380.0, 300.0)
+    assert seen.seconds == pytest.approx(2 * seen.sheets[0].seconds)
+    assert seen.remarks == ()
+    assert seen.pattern is not None
+    assert np.array_equal(seen.pattern.vertices_coords, pattern.vertices_coords)
+    answer = json.loads(json.dumps(seen.as_dict()))
+    assert answer["machine"] == "grbl-laser-400"
+    assert set(answer["sheets"][1]) >= {
+        *("lines", "seconds", "beam_on_seconds", "cut_mm", "travel_mm", "bounds_mm", "warnings")
+    }
+
+
+def test_a_pattern_that_is_not_the_same_is_not_shown(tmp_path):
+    folder = write_folder(tmp_path / "job", regular())
+    fold = folder / "shape.fold"
+    fold.write_text(fold.read_text() + "\n")
+    seen = preview(folder)
+    assert seen.pattern is None
+    assert "has changed" in seen.remarks[0]
+    fold.unlink()
+    assert "is not there" in preview(folder).remarks[0]
+
+
+def test_a_folder_of_plain_gcode_is_a_job_too(tmp_path):
+    for name in ("b", "a"):
+        write_nc(tmp_path, known_toolpath(name))
+    seen = preview(tmp_path)
+    assert [sheet.name for sheet in seen.sheets] == ["a", "b"]
+    assert seen.sheets[0].paper_mm == BED
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"machine": 3}', '{"schema": "other"}'])
+def test_a_broken_layout_is_named(tmp_path, text):
+    folder = write_folder(tmp_path / "job")
+    (folder / "layout.json").write_text(text)
+    with pytest.raises(InputError, match=r"layout\.json is not a layout"):
+        preview(folder)
+
+
+def test_what_is_no_job_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"nothing does not exist"):
+        preview(tmp_path / "nothing")
+    with pytest.raises(InputError, match=r"holds no G-code"):
+        preview(tmp_path)
+    folder = write_folder(tmp_path / "job")
+    (folder / "sheet-02.nc").unlink()
+    with pytest.raises(InputError, match=r"sheet-02\.nc cannot be read"):
+        preview(folder)
+
+
+def test_no_port_is_opened(tmp_path, monkeypatch):
+    def refuse(*_args, **_kwargs):
+        raise AssertionError("a port was opened")
+
+    monkeypatch.setattr(serial, "Serial", refuse)
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    monkeypatch.setattr(socket, "socket", refuse)
+    assert preview(write_folder(tmp_path / "job")).sheets
+
+
+def test_progress_is_told(tmp_path):
+    told = []
+    preview(
+        write_folder(tmp_path / "job"), on_progress=lambda part, note: told.append((part, note))
+    )
+    assert told == [(0.0, "sheet-01.nc"), (0.5, "sheet-02.nc")]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0, "0:00"), (59.4, "0:59"), (59.6, "1:00"), (3599.6, "1:00:00"), (7325, "2:02:05")],
+)
+def test_clock_text(seconds, text):
+    assert clock_text(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("mm", "text"), [(0, "0.0 mm"), (12.34, "12.3 mm"), (123.4, "123 mm"), (1234.5, "1.23 m")]
+)
+def test_length_text(mm, text):
+    assert length_text(mm) == text
+
+
+def test_known_lengths_are_what_the_tests_say():
+    lengths = {name: sum(np.hypot(*np.diff(points, axis=0).T)) for name, points in KNOWN.items()}
+    assert lengths == {"engrave": 5, "score": 30, "perforate": 40, "cut": 100}
