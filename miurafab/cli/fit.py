@@ -49,6 +49,13 @@ def fit(
     seed: Annotated[
         str | None, typer.Option(help="Seed of the random attempts [default: 0].")
     ] = None,
+    close: Annotated[
+        str | None,
+        typer.Option(
+            help="For surfaces of revolution: sector (of the angle given), open (all round but "
+            "one facet), or seam (all round, to be glued) [default: sector]."
+        ),
+    ] = None,
     report: Annotated[
         Path | None, typer.Option(help="Also write the report to this JSON file.")
     ] = None,
@@ -67,6 +74,7 @@ def fit(
         max_deviation=max_deviation,
         flat_foldable="exact" if rigid else flat_foldable,
         seed=seed,
+        close=close,
     )
     with console.progress("fitting") as progress:
         result = miurafab.fit(wanted.request, progress)

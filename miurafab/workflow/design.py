@@ -7,6 +7,7 @@ file. A design file says the same as the options of ``miurafab fit``, and option
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,6 +19,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fit import FitRequest
 from miurafab.origami.fold_format import read_fold, write_fold
 from miurafab.profiles import Table, find_file, read_toml
+from miurafab.surfaces.analytic import Revolution
 from miurafab.surfaces.catalogue import make_surface, parse_target
 from miurafab.surfaces.mesh import MESH_SUFFIXES, load_mesh
 from miurafab.surfaces.surface import TargetSurface
@@ -72,8 +74,34 @@ def design(target: str, **options: str | None) -> Design:
             f"'{target}' cannot be a target: known files are .toml, {', '.join(MESH_SUFFIXES)}."
         )
     name, parameters = parse_target(target)
-    surface, values = make_surface(name, parameters)
+    surface, values = _named(name, parameters, given)
     return Design(_request(surface, {"surface": name, "parameters": values}, given), name)
+
+
+CLOSINGS = ("sector", "open", "seam")
+
+
+def _named(
+    name: str, parameters: Mapping[str, Any], given: Mapping[str, str | None]
+) -> tuple[TargetSurface, dict[str, Any]]:
+    """A named surface, turned as far as ``close`` says: the sector of its parameter ``angle``,
+    all round with a gap of one facet (``open``), or all round with a seam to glue (``seam``).
+    """
+    surface, values = make_surface(name, parameters)
+    close = given.get("close") or "sector"
+    if close not in CLOSINGS:
+        raise InputError(f"--close is '{close}'; it must be one of {', '.join(CLOSINGS)}.")
+    if close == "sector":
+        return surface, values
+    if not isinstance(surface, Revolution):
+        raise InputError(f"--close {close} needs a surface of revolution, and '{name}' is none.")
+    _, rows = parse_facets(given.get("facets") or DEFAULT_FACETS)
+    if close == "seam" and rows % 2:
+        raise InputError(
+            f"--close seam needs an even number of rows of facets, and --facets asks for {rows}."
+        )
+    turn = 2 * math.pi * (rows / (rows + 1) if close == "open" else 1.0)
+    return make_surface(name, {**values, "angle": turn})
 
 
 _OPTIONS = (
@@ -85,6 +113,7 @@ _OPTIONS = (
     "min_edge",
     "max_deviation",
     "seed",
+    "close",
 )
 
 
@@ -105,7 +134,7 @@ def _from_file(path: Path, given: Mapping[str, str | None]) -> Design:
         defaults["size"] = None
     else:
         name = target.text("surface")
-        surface, values = make_surface(name, target.rest())
+        surface, values = _named(name, target.rest(), defaults | written | dict(given))
         description = {"surface": name, "parameters": values}
     try:
         request = _request(surface, description, defaults | written | dict(given))
