@@ -55,11 +55,11 @@ def test_travels_are_dashed_and_gaps_stay_open(tmp_path):
     assert 0.4 < grey.mean() < 0.95
     assert (np.diff(grey.astype(int)) == 1).sum() > 10
     dashed = Job("a.nc", "G21 G90\nM4 S9 F99\n" + "".join(
-        f"G0 X{x} Y200\nG1 X{x + 2}\n" for x in range(100, 200, 4)
+        f"G0 X{x} Y200\nG1 X{x + 2.4}\n" for x in range(100, 200, 4)
     ) + "M5\nM2\n")  # fmt: skip
     row = picture(dry_run("a", dashed, LASER, (400, 400)), LASER)
-    burnt = [pixel(row, x, 200) for x in np.arange(109, 185, 4)]
-    left = [pixel(row, x, 200) for x in np.arange(111, 185, 4)]
+    burnt = [pixel(row, x, 200) for x in np.arange(109.2, 185, 4)]
+    left = [pixel(row, x, 200) for x in np.arange(111.2, 185, 4)]
     assert set(burnt) == {COLOURS["burn"]}
     assert set(left) == {"#ffffff"}
 
