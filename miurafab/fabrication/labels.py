@@ -160,13 +160,12 @@ def _spots(
 
 def _upright(along: NDArray[np.float64], turns: NDArray[np.float64]) -> NDArray[np.float64]:
     """The unit directions of ``along`` (N, 2), each reversed if, turned by ``turns`` (N,), its
-    text would run to the left, or downwards where it runs up or down.
+    text would run to the left. Within 10 degrees of upright it runs upwards.
     """
     along = along / np.linalg.norm(along, axis=1)[:, None]
-    right = np.cos(turns) * along[:, 0] - np.sin(turns) * along[:, 1]
-    up = np.sin(turns) * along[:, 0] + np.cos(turns) * along[:, 1]
-    wrong = (right < -1e-6) | ((np.abs(right) <= 1e-6) & (up < 0))
-    return np.where(wrong[:, None], -along, along)
+    tilted = turns - np.radians(10.0)
+    forward = np.cos(tilted) * along[:, 0] - np.sin(tilted) * along[:, 1]
+    return np.where(forward[:, None] < -1e-9, -along, along)
 
 
 def _box(
