@@ -1,0 +1,80 @@
+"""``miurafab preview``: what it prints, what it writes, and what it says to bad input."""
+
+import json
+
+import pytest
+from command_line import sentence
+
+GCODE = """(machine grbl-laser-400)
+(operation cut)
+M5
+G21 G90
+M4 S0
+G0 X10 Y10
+G1 X110 S500 F1200
+M5
+M2
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    (tmp_path / "plate.nc").write_text(GCODE)
+    return "plate.nc"
+
+
+def test_a_file_in_figures_and_pictures(run, file, tmp_path):
+    done = run("preview", file, "--json")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    answer = json.loads(done.stdout)
+    (sheet,) = answer["sheets"]
+    assert sheet["name"] == "plate"
+    assert sheet["lines"] == 9
+    assert sheet["cut_mm"] == 100
+    assert sheet["travel_mm"] == pytest.approx(200**0.5, abs=1e-3)
+    assert sheet["bounds_mm"] == [10, 10, 110, 10]
+    assert 5.0 < sheet["beam_on_seconds"] < 5.2 < sheet["seconds"] < 6
+    assert sheet["warnings"] == []
+    assert answer["machine"] == "grbl-laser-400"
+    assert sorted(path.name for path in (tmp_path / "plate-preview").iterdir()) == [
+        *("plate.png", "plate.svg", "preview.html")
+    ]
+    assert all((tmp_path / name).is_file() for name in answer["files"])
+
+
+def test_people_get_a_table_and_every_warning(run, file, tmp_path):
+    (tmp_path / file).write_text(GCODE.replace("X110", "X410").replace("M4", "M3"))
+    done = run("preview", file, "-o", "seen")
+    assert done.returncode == 0
+    assert "400 mm" in done.stdout
+    assert "plate: 1 move goes outside the 400 x 400 mm bed" in done.stdout
+    assert "plate: M3 (line 5)" in done.stdout
+    assert (tmp_path / "seen" / "preview.html").is_file()
+
+
+def test_a_dump_says_how_fast_the_machine_is(run, file, tmp_path):
+    (tmp_path / "dump.txt").write_text("$110=600\n$120=10\nok\n")
+    slow = json.loads(run("preview", file, "--settings", "dump.txt", "--json").stdout)
+    assert slow["sheets"][0]["seconds"] > 10
+    assert any("largest rate" in text for text in slow["sheets"][0]["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("gone.nc",), "gone.nc does not exist"),
+        (("empty",), "empty holds no G-code"),
+        (("bad.nc",), "bad.nc, line 2"),
+        (("good.nc", "--machine", "gone"), "'gone'"),
+        (("good.nc", "--settings", "gone.txt"), "gone.txt cannot be read"),
+        (("good.nc", "--settings", "bad.nc"), "bad.nc"),
+    ],
+)
+def test_bad_input_is_one_sentence(run, tmp_path, arguments, named):
+    (tmp_path / "good.nc").write_text(GCODE)
+    (tmp_path / "bad.nc").write_text("G21\nG1 X5!\n")
+    (tmp_path / "empty").mkdir()
+    assert named in sentence(run("preview", *arguments, "--quiet"), 2)
+    answer = json.loads(run("preview", *arguments, "--json").stdout)
+    assert named in answer["error"]
