@@ -18,34 +18,46 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from miurafab.version import __version__
+
 if TYPE_CHECKING:
     from miurafab.origami.audit import audit as check
     from miurafab.origami.fit import fit
+    from miurafab.origami.thickness import thick_panels
     from miurafab.posting import post
     from miurafab.profiles import load_machine, load_material
+    from miurafab.workflow.convert import convert, read_pattern
     from miurafab.workflow.cut import DEFAULT_MATERIAL, cut, prepare
     from miurafab.workflow.design import design, load_pattern, save_pattern
     from miurafab.workflow.doctor import examine
     from miurafab.workflow.energy import check_writable as check_energy_file
     from miurafab.workflow.energy import energy, write_energy
+    from miurafab.workflow.fold import (
+        check_motion_file,
+        fold,
+        thickness_report,
+        write_angles,
+        write_motion,
+    )
     from miurafab.workflow.job_directory import read_job, sheets, write_job
     from miurafab.workflow.page import write_page
     from miurafab.workflow.picture import write_pictures
     from miurafab.workflow.preview import ASSUMED_MACHINE as DEFAULT_MACHINE
     from miurafab.workflow.preview import preview
 
-__version__ = "0.1.0"
-
 _HOMES = {
     "DEFAULT_MACHINE": ("miurafab.workflow.preview", "ASSUMED_MACHINE"),
     "DEFAULT_MATERIAL": ("miurafab.workflow.cut", "DEFAULT_MATERIAL"),
     "check": ("miurafab.origami.audit", "audit"),
     "check_energy_file": ("miurafab.workflow.energy", "check_writable"),
+    "check_motion_file": ("miurafab.workflow.fold", "check_motion_file"),
+    "convert": ("miurafab.workflow.convert", "convert"),
     "cut": ("miurafab.workflow.cut", "cut"),
     "design": ("miurafab.workflow.design", "design"),
     "energy": ("miurafab.workflow.energy", "energy"),
     "examine": ("miurafab.workflow.doctor", "examine"),
     "fit": ("miurafab.origami.fit", "fit"),
+    "fold": ("miurafab.workflow.fold", "fold"),
     "load_machine": ("miurafab.profiles", "load_machine"),
     "load_material": ("miurafab.profiles", "load_material"),
     "load_pattern": ("miurafab.workflow.design", "load_pattern"),
@@ -53,10 +65,15 @@ _HOMES = {
     "prepare": ("miurafab.workflow.cut", "prepare"),
     "preview": ("miurafab.workflow.preview", "preview"),
     "read_job": ("miurafab.workflow.job_directory", "read_job"),
+    "read_pattern": ("miurafab.workflow.convert", "read_pattern"),
     "save_pattern": ("miurafab.workflow.design", "save_pattern"),
     "sheets": ("miurafab.workflow.job_directory", "sheets"),
+    "thick_panels": ("miurafab.origami.thickness", "thick_panels"),
+    "thickness_report": ("miurafab.workflow.fold", "thickness_report"),
+    "write_angles": ("miurafab.workflow.fold", "write_angles"),
     "write_energy": ("miurafab.workflow.energy", "write_energy"),
     "write_job": ("miurafab.workflow.job_directory", "write_job"),
+    "write_motion": ("miurafab.workflow.fold", "write_motion"),
     "write_page": ("miurafab.workflow.page", "write_page"),
     "write_pictures": ("miurafab.workflow.picture", "write_pictures"),
 }
@@ -67,11 +84,14 @@ __all__ = [
     "__version__",
     "check",
     "check_energy_file",
+    "check_motion_file",
+    "convert",
     "cut",
     "design",
     "energy",
     "examine",
     "fit",
+    "fold",
     "load_machine",
     "load_material",
     "load_pattern",
@@ -79,10 +99,15 @@ __all__ = [
     "prepare",
     "preview",
     "read_job",
+    "read_pattern",
     "save_pattern",
     "sheets",
+    "thick_panels",
+    "thickness_report",
+    "write_angles",
     "write_energy",
     "write_job",
+    "write_motion",
     "write_page",
     "write_pictures",
 ]

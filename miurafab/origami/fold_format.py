@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab import __version__
 from miurafab.errors import PatternError
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.interop_planar import faces_of_plane_graph
 from miurafab.origami.kinematics import Motion
 from miurafab.origami.unfold import with_angles_of_the_folded_form
+from miurafab.version import __version__
 
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "um": 1e-3}
 

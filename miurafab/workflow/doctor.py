@@ -10,10 +10,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from miurafab import __version__
 from miurafab.errors import ProfileError
 from miurafab.machine.transport import list_ports
 from miurafab.profiles import load_machine, load_material, shipped_names
+from miurafab.version import __version__
 
 DEPENDENCIES = ("numpy", "scipy", "shapely", "trimesh", "svgwrite", "pyserial", "pillow")
 ROOM_NEEDED_MB = 100

@@ -12,6 +12,7 @@ import hashlib
 import html
 import json
 import re
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -19,14 +20,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab import __version__
 from miurafab.errors import InputError
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
+from miurafab.version import __version__
 from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_text
 from miurafab.workflow.preview import Preview
 
 _SCRIPTS = ("viewer.js", "sheets.js", "fold.js", "page.js")
 _STEPS = 65535
+
+
+@dataclass(frozen=True, eq=False)
+class Slider:
+    """What the slider of a motion of T frames tells: a word for each frame in ``names`` (T, or
+    none), the frame that it stands at first, and ``strain`` (T, F) of the facets, which can be
+    shown by colours and is at first if ``show_strain``.
+    """
+
+    names: tuple[str, ...] = ()
+    start: int = 0
+    strain: NDArray[np.float64] | None = None
+    show_strain: bool = False
 
 
 def write_page(
@@ -36,14 +50,17 @@ def write_page(
     preview: Preview | None = None,
     pattern: CreasePattern | None = None,
     motion: NDArray[np.float64] | None = None,
+    slider: Slider | None = None,
 ) -> None:
     """Write the page of a ``preview``, of a ``pattern``, or of both, to ``path``.
 
     ``motion`` (T, V, 3) float64 mm, the vertices of ``pattern`` in T frames of a folding motion,
-    adds a slider through exactly these frames. Without it the page shows the forms that there
-    are, flat and folded, and nothing between them. The same input gives the same bytes.
+    adds a slider through exactly these frames, which tells what ``slider`` holds. Without it the
+    page shows the forms that there are, flat and folded, and nothing between them. The same input
+    gives the same bytes.
     """
-    path.write_text(page_text(title, preview, pattern, motion), encoding="utf-8", newline="\n")
+    text = page_text(title, preview, pattern, motion, slider)
+    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def page_text(
@@ -51,6 +68,7 @@ def page_text(
     preview: Preview | None = None,
     pattern: CreasePattern | None = None,
     motion: NDArray[np.float64] | None = None,
+    slider: Slider | None = None,
 ) -> str:
     """The text of the page that :func:`write_page` writes."""
     if motion is not None and (pattern is None or not len(motion)):
@@ -66,7 +84,7 @@ def page_text(
         ),
         "title": html.escape(title),
         "style": style,
-        "data": _json(_data(preview, pattern, motion)),
+        "data": _json(_data(preview, pattern, motion, slider or Slider())),
         "script": script,
     }
     template = files.joinpath("page.html").read_text(encoding="utf-8")
@@ -84,7 +102,10 @@ def _json(data: dict[str, Any]) -> str:
 
 
 def _data(
-    preview: Preview | None, pattern: CreasePattern | None, motion: NDArray[np.float64] | None
+    preview: Preview | None,
+    pattern: CreasePattern | None,
+    motion: NDArray[np.float64] | None,
+    slider: Slider,
 ) -> dict[str, Any]:
     facts = {}
     if preview is not None:
@@ -106,7 +127,7 @@ def _data(
             for layer in LAYERS
         ],
         "sheets": [] if preview is None else [_sheet(preview, sheet) for sheet in preview.sheets],
-        "fold": None if pattern is None else _fold(pattern, motion),
+        "fold": None if pattern is None else _fold(pattern, motion, slider),
         "made_by": f"Made by miurafab {__version__}",
     }
 
@@ -132,7 +153,9 @@ def _sheet(preview: Preview, sheet: SheetPreview) -> dict[str, Any]:
     }
 
 
-def _fold(pattern: CreasePattern, motion: NDArray[np.float64] | None) -> dict[str, Any]:
+def _fold(
+    pattern: CreasePattern, motion: NDArray[np.float64] | None, slider: Slider
+) -> dict[str, Any]:
     assignments = [letter for letter in ASSIGNMENTS if np.any(pattern.edges_assignment == letter)]
     kinds = np.array([assignments.index(letter) for letter in pattern.edges_assignment.tolist()])
     ends = pattern.vertices_coords[pattern.edges_vertices]
@@ -150,7 +173,23 @@ def _fold(pattern: CreasePattern, motion: NDArray[np.float64] | None) -> dict[st
         "edges": _base64(pattern.edges_vertices, np.uint32),
         "triangles": _base64(triangles(pattern), np.uint32),
         "forms": forms,
-        "first": min(1, len(forms) - 1),
+        "first": len(forms) - 1,
+        "names": slider.names,
+        "start": slider.start,
+        "strain": _strain(pattern, slider),
+    }
+
+
+def _strain(pattern: CreasePattern, slider: Slider) -> dict[str, Any] | None:
+    """Strains in 255ths of the greatest, and the facet of each triangle."""
+    if slider.strain is None:
+        return None
+    most = float(slider.strain.max())
+    return {
+        "most": most,
+        "shown": slider.show_strain,
+        "values": _base64(np.rint(slider.strain / (most or 1.0) * 255), np.uint8),
+        "owners": _base64(_split(pattern)[1], np.uint32),
     }
 
 
@@ -165,6 +204,11 @@ def triangles(pattern: CreasePattern) -> NDArray[np.int64]:
     A quadrilateral is split on the shorter diagonal that lies inside it; a facet of more corners
     is a fan from its first.
     """
+    return _split(pattern)[0]
+
+
+def _split(pattern: CreasePattern) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The triangles (n, 3) that fill the facets, and the facet (n,) of each."""
     faces = pattern.faces_vertices
     corners = (faces >= 0).sum(axis=1)
     quads = faces[corners == 4][:, :4]
@@ -172,10 +216,12 @@ def triangles(pattern: CreasePattern) -> NDArray[np.int64]:
     split_02 = _inside(point) & ~(_inside(np.roll(point, -1, axis=1)) & _second_shorter(point))
     turned = np.where(split_02[:, None], quads, np.roll(quads, -1, axis=1))
     fans = [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
+    owners = [np.flatnonzero(corners == 4)] * 2
     for corner in range(1, faces.shape[1] - 1):
-        others = faces[(corners != 4) & (corners > corner + 1)]
-        fans.append(others[:, [0, corner, corner + 1]])
-    return np.concatenate(fans)
+        others = np.flatnonzero((corners != 4) & (corners > corner + 1))
+        fans.append(faces[others][:, [0, corner, corner + 1]])
+        owners.append(others)
+    return np.concatenate(fans), np.concatenate(owners)
 
 
 def _inside(quads: NDArray[np.float64]) -> NDArray[np.bool_]:
