@@ -27,7 +27,9 @@ def regular(columns: int = 9, rows: int = 7) -> CreasePattern:
 
 
 @cache
-def fitted(name: str, columns: int = 20, rows: int = 20, flat_foldable: float | None = None) -> FitResult:
+def fitted(
+    name: str, columns: int = 20, rows: int = 20, flat_foldable: float | None = None
+) -> FitResult:
     """A named surface with its default parameters, 200 mm long."""
     surface, parameters = make_surface(name, {})
     request = FitRequest(
