@@ -20,8 +20,8 @@ _HALF_MICRON = 5e-4
 _REALTIME = re.compile(r"[!?~\x18]|[^\x00-\x7f]")
 # The words that arm, disarm, set the power or wait, in a line without comments and blanks.
 _BEAM_WORD = re.compile(
-    r"(?P<spindle>M0*[345])(?![\d.])|(?P<end>M0*(?:2|30))(?![\d.])"
-    r"|S(?P<power>\d+\.?\d*|\.\d+)|(?P<dwell>G0*4)(?![\d.])"
+    r"M0*(?P<spindle>[345])(?:\.0*)?(?![\d.])|(?P<end>M0*(?:2|30))(?:\.0*)?(?![\d.])"
+    r"|S(?P<power>\d+\.?\d*|\.\d+)|(?P<dwell>G0*4)(?:\.0*)?(?![\d.])"
 )
 
 
@@ -130,7 +130,7 @@ def _beam(job: Job) -> list[str]:
         waits = False
         for word in _BEAM_WORD.finditer(code):
             if word["spindle"]:
-                armed = word["spindle"][-1]
+                armed = word["spindle"]
                 if armed == "3":
                     constant += 1
                     first_constant = first_constant or number

@@ -69,6 +69,7 @@ CLEAN = "(operation cut)\nM5\nG21\nG90\nM4 S0\nG0 X10 Y10\nG1 X20 S500 F900\nM5\
         ("F900", "F6001", r"F6001 \(line 7\) is faster than the machine's largest rate"),
         ("M4", "M3", r"M3 \(line 5\) keeps the beam burning"),
         ("M4", "m3", r"M3 \(line 5\) keeps the beam burning"),
+        ("M4", "M03.0", r"M3 \(line 5\) keeps the beam burning"),
         ("M5\nM2", "", r"The job ends with M4 in force"),
         ("G1 X20 S500", "M3\nG1 X20 S500", r"M3 \(line 7\)"),
         ("(operation cut)", "(stop!)", r"Line 1 holds '!' in a comment"),
