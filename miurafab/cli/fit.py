@@ -46,6 +46,16 @@ def fit(
     rigid: Annotated[
         bool, typer.Option("--rigid", help="The same as --flat-foldable exact.")
     ] = False,
+    region: Annotated[
+        str | None,
+        typer.Option(
+            help="For meshes: the part to cover, u0,u1,v0,v1 of the layout, as fractions or "
+            "lengths [default: automatic]."
+        ),
+    ] = None,
+    rotate: Annotated[
+        str | None, typer.Option(help="For meshes: turn the grid by this angle.")
+    ] = None,
     seed: Annotated[
         str | None, typer.Option(help="Seed of the random attempts [default: 0].")
     ] = None,
@@ -74,8 +84,12 @@ def fit(
         max_deviation=max_deviation,
         flat_foldable="exact" if rigid else flat_foldable,
         seed=seed,
+        region=region,
+        rotate=rotate,
         close=close,
     )
+    for remark in wanted.remarks:
+        console.remark(remark)
     with console.progress("fitting") as progress:
         result = miurafab.fit(wanted.request, progress)
     answer = result.report()

@@ -1,42 +1,128 @@
 """Mesh targets: a scanned or modelled surface as a smooth map from a rectangle.
 
-The mesh must be one disk. It is laid flat, the largest rectangle within the layout becomes the
-parameter domain, and a smooth tensor spline through the mesh over that rectangle gives points and
-normals. Distances are measured to the mesh itself, not to the spline.
+The mesh must be one disk. Small holes are filled, it is laid flat, a rectangle in the layout is the
+parameter domain, and a smooth spline through the vertices over that rectangle gives points and
+normals. Where the mesh is rough (a scan), it is laid flat a second time as the spline has smoothed
+it. Distances are measured to the triangles themselves, not to the spline.
 """
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
-from scipy.interpolate import NdBSpline, make_lsq_spline
+from scipy.interpolate import NdBSpline
 
 from miurafab.errors import TargetError
 from miurafab.geometry.distances import closest_on_mesh
-from miurafab.surfaces.parameterise import flatten, largest_rectangle, locate
+from miurafab.surfaces.parameterise import border_loops, flatten
+from miurafab.surfaces.placement import (
+    Placement,
+    Region,
+    covered,
+    largest_rectangle,
+    placements,
+    turned,
+)
+from miurafab.surfaces.smoothing import Smoothed, smooth
 from miurafab.surfaces.surface import Domain, Floats, tangents, unit
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb")
 Ints = NDArray[np.int64]
 
+SMALL_HOLE = 0.15
+"""Holes are filled up to this part of the length of the border."""
+
+ROUGH = 0.03
+"""A mesh is rough where the smooth spline leaves it by this part of its median edge."""
+
+MARGIN = 0.12
+"""The spline also follows the mesh this part of the rectangle beyond it, where there is any."""
+
+SMOOTHER = 0.03
+"""The stiffness of the alternative that irons out what a scan's noise may have left."""
+
+_SPANS = 40
+_ROUGH_SPANS = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A mesh laid flat. ``faces`` (F, 3) are all triangles, of which the first ``real`` are of the
+    mesh and the others fill holes; the first ``known`` of ``vertices`` (V, 3) are of the mesh.
+    ``flat`` (V, 2) are their places.
+    """
+
+    vertices: Floats
+    faces: Ints
+    real: int
+    known: int
+    flat: Floats
+    name: str
+
+    def surface(self, placement: Placement, stiffness: float = 0.0) -> MeshSurface:
+        """The target over ``placement``, the spline as stiff as the data ask, or ``stiffness``."""
+        frame = turned(self.flat, placement.angle)
+        domain = placement.domain
+        if not covered(frame, self.faces, domain):
+            raise TargetError(self._not_covered(frame))
+        edge = _median_edge(frame, self.faces)
+        wide = Domain(
+            domain.u0 - MARGIN * domain.width,
+            domain.u1 + MARGIN * domain.width,
+            domain.v0 - MARGIN * domain.height,
+            domain.v1 + MARGIN * domain.height,
+        )
+        places, points = _within(frame[: self.known], self.vertices[: self.known], wide)
+        smoothed = smooth(places, points, wide, _spans(wide, edge, _SPANS), stiffness)
+        triangles = _even_triangles(self.vertices, self.faces[: self.real])
+        return MeshSurface(smoothed.spline, domain, triangles, placement, stiffness, self)
+
+    def _not_covered(self, frame: Floats) -> str:
+        best = largest_rectangle(frame, self.faces)
+        low, size = frame.min(axis=0), np.ptp(frame, axis=0)
+        if best is None:
+            return f"{self.name}: no rectangle fits into the mesh at this rotation."
+        parts = ",".join(
+            f"{value:.2f}"
+            for value in (
+                math.ceil(100 * (best.u0 - low[0]) / size[0]) / 100,
+                math.floor(100 * (best.u1 - low[0]) / size[0]) / 100,
+                math.ceil(100 * (best.v0 - low[1]) / size[1]) / 100,
+                math.floor(100 * (best.v1 - low[1]) / size[1]) / 100,
+            )
+        )
+        return (
+            f"{self.name}: --region reaches beyond the mesh; the largest rectangle at this "
+            f"rotation is --region {parts}."
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class MeshSurface:
-    """A rectangle of a mesh. ``spline`` maps the domain to space; ``triangles`` (T, 3, 3)."""
+    """A rectangle of a mesh. ``spline`` maps a little more than ``domain`` to space; ``triangles``
+    (T, 3, 3) are the mesh itself. ``remarks`` say what the user might want to know of the file.
+    """
 
     spline: NdBSpline
     domain: Domain
     triangles: Floats
+    placement: Placement
+    stiffness: float
+    layout: Layout = field(repr=False)
+    remarks: tuple[str, ...] = ()
 
     def point(self, uv: Floats) -> Floats:
-        """Within the domain the spline, outside it the spline continued straight on."""
-        d = self.domain
-        low, high = np.array([d.u0, d.v0]), np.array([d.u1, d.v1])
+        """Within reach the spline, beyond it the spline continued straight on."""
+        low = np.array([knots[0] for knots in self.spline.t])
+        high = np.array([knots[-1] for knots in self.spline.t])
         inside = np.clip(uv, low, high)
         beyond = uv - inside
         points: Floats = self.spline(inside)
@@ -52,13 +138,51 @@ class MeshSurface:
     def closest_point(self, points: Floats) -> Floats:
         return closest_on_mesh(points, self.triangles)
 
+    @property
+    def description(self) -> dict[str, Any]:
+        """Where the rectangle lies, for :func:`load_mesh` to lay it there again."""
+        d = self.domain
+        return {
+            "rotate": self.placement.angle,
+            "rectangle": [d.u0, d.u1, d.v0, d.v1],
+            "stiffness": self.stiffness,
+        }
 
-def load_mesh(path: Path) -> tuple[MeshSurface, str]:
+    def alternatives(self) -> Iterator[tuple[str, MeshSurface]]:
+        """Other ways to lay a sheet on the same mesh, each with a word on it, the gentlest first:
+        smoother, the grid turned, smaller parts of the same rectangle.
+        """
+        yield "the scan smoothed more", self.layout.surface(self.placement, SMOOTHER)
+        others = placements(self.layout.vertices, self.layout.flat, self.layout.faces)
+        kept = [self.placement.angle]
+        for _, other in others:
+            apart = [abs((other.angle - angle + math.pi / 4) % (math.pi / 2) - math.pi / 4)
+                     for angle in kept]  # fmt: skip
+            if min(apart) > math.radians(20) and len(kept) < 3:
+                kept.append(other.angle)
+                degrees = math.degrees(other.angle - self.placement.angle)
+                yield f"the grid turned by {degrees:.0f} degrees", self.layout.surface(other)
+        for part in (0.85, 0.7, 0.55):
+            smaller = self.layout.surface(self.placement.shrunk(part))
+            yield f"the middle {100 * part:.0f} % of the rectangle", smaller
+
+
+def load_mesh(
+    path: Path,
+    *,
+    region: Region | None = None,
+    rotate: float | None = None,
+    place: dict[str, Any] | None = None,
+) -> tuple[MeshSurface, str]:
     """The mesh file as a target, and the SHA-256 of the file.
+
+    ``rotate`` turns the grid against the longer axis of the layout (radians), ``region`` is laid in
+    the turned layout; without both the rectangle is chosen. ``place`` is a
+    :attr:`MeshSurface.description` to be laid out again.
 
     Raises :class:`~miurafab.errors.TargetError` with one sentence for a file that is missing,
     unreadable, empty, holds numbers that are not finite, several pieces, a closed or non-manifold
-    surface, or holes.
+    surface, large holes, or no such region.
     """
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise TargetError(f"{path} is not a mesh file; known are {', '.join(MESH_SUFFIXES)}.")
@@ -70,23 +194,123 @@ def load_mesh(path: Path) -> tuple[MeshSurface, str]:
         raise TargetError(f"{path} cannot be read: {fault.strerror}.") from None
     try:
         with path.open("rb") as stream:
-            mesh = trimesh.load_mesh(stream, file_type=path.suffix[1:].lower())
+            mesh = trimesh.load_mesh(stream, file_type=path.suffix[1:].lower(), process=False)
     except Exception as fault:  # noqa: BLE001 - trimesh's readers raise whatever their parser does
-        raise TargetError(f"{path} cannot be read as a mesh: {fault}.") from None
+        reason = " ".join(str(fault).split()) or type(fault).__name__
+        raise TargetError(f"{path} cannot be read as a mesh: {reason.rstrip('.')}.") from None
     if not isinstance(mesh, trimesh.Trimesh):
         raise TargetError(f"{path} holds no triangle mesh.")
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
     faces = np.asarray(mesh.faces, dtype=np.int64)
-    vertices, faces = _clean(vertices, faces, path.name)
-    return mesh_surface(vertices, faces, path.name), hashlib.sha256(content).hexdigest()
+    layout, remarks = lay_out(vertices, faces, path.name)
+    if place is not None:
+        placement, stiffness = _placed_before(place, path.name)
+        surface = layout.surface(placement, stiffness)
+    else:
+        surface = layout.surface(_placement(layout, region, rotate))
+    return replace(surface, remarks=remarks), hashlib.sha256(content).hexdigest()
+
+
+def mesh_surface(vertices: Floats, faces: Ints, name: str = "The mesh") -> MeshSurface:
+    """A target from the arrays of a triangle mesh, ``vertices`` (V, 3) and ``faces`` (F, 3).
+
+    Raises :class:`~miurafab.errors.TargetError` if it is not one disk.
+    """
+    layout, remarks = lay_out(vertices, faces, name)
+    return replace(layout.surface(_placement(layout, None, None)), remarks=remarks)
+
+
+def _placement(layout: Layout, region: Region | None, rotate: float | None) -> Placement:
+    if region is not None:
+        angle = rotate or 0.0
+        return Placement(angle, region.domain(turned(layout.flat, angle)))
+    if rotate is not None:
+        domain = largest_rectangle(turned(layout.flat, rotate), layout.faces)
+        if domain is None:
+            raise TargetError(f"{layout.name}: no rectangle fits into the mesh at this --rotate.")
+        return Placement(rotate, domain)
+    found = placements(layout.vertices, layout.flat, layout.faces)
+    if not found:
+        raise TargetError(f"{layout.name}: no rectangle fits into the mesh; it is too narrow.")
+    return found[0][1]
+
+
+def _placed_before(place: dict[str, Any], name: str) -> tuple[Placement, float]:
+    try:
+        u0, u1, v0, v1 = (float(value) for value in place["rectangle"])
+        angle, stiffness = float(place["rotate"]), float(place["stiffness"])
+    except (KeyError, TypeError, ValueError):
+        raise TargetError(f"{name}: the pattern's note of the rectangle is damaged.") from None
+    if not (u0 < u1 and v0 < v1 and math.isfinite(angle) and 0 <= stiffness < math.inf):
+        raise TargetError(f"{name}: the pattern's note of the rectangle is damaged.")
+    return Placement(angle, Domain(u0, u1, v0, v1)), stiffness
+
+
+def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[Layout, tuple[str, ...]]:
+    """The mesh laid flat, and remarks on it. Raises ``TargetError`` if it is not one disk."""
+    vertices, faces = _clean(vertices, faces, name)
+    remarks = _size_remarks(vertices, name)
+    faces = _check_sheet(vertices, faces, name)
+    known, real = len(vertices), len(faces)
+    vertices, faces, filled = _fill_holes(vertices, faces, name)
+    if filled:
+        remarks += (f"{name}: {filled} small hole{'s were' if filled > 1 else ' was'} filled.",)
+    if len(vertices) - len(_edges(faces)[0]) + len(faces) != 1:
+        raise TargetError(f"{name} has a handle; it cannot be laid flat. Cut it open.")
+    flat = flatten(vertices, faces)
+    smoothed = _smoothed(vertices[:known], flat[:known], faces)
+    edge = float(np.median(_side_lengths(vertices, faces[:real])))
+    if smoothed.roughness > ROUGH * edge:
+        even = np.asarray(smoothed.spline(flat), dtype=np.float64)
+        if _doubled_areas(even, faces).min() > 1e-6 * np.median(_doubled_areas(even, faces)):
+            flat = flatten(even, faces)
+    return Layout(vertices, faces, real, known, flat, name), remarks
+
+
+def _smoothed(points: Floats, flat: Floats, faces: Ints) -> Smoothed:
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    domain = Domain(low[0], high[0], low[1], high[1])
+    faces = faces[(faces < len(flat)).all(axis=1)]
+    return smooth(flat, points, domain, _spans(domain, _median_edge(flat, faces), _ROUGH_SPANS))
+
+
+def _spans(domain: Domain, edge: float, most: int) -> tuple[int, int]:
+    """Knots stand about one and a half edges apart, with at most ``most`` spans to a side."""
+    step = max(1.5 * edge, max(domain.width, domain.height) / most)
+    return max(math.ceil(domain.width / step), 4), max(math.ceil(domain.height / step), 4)
+
+
+def _within(places: Floats, points: Floats, domain: Domain) -> tuple[Floats, Floats]:
+    low, high = np.array([domain.u0, domain.v0]), np.array([domain.u1, domain.v1])
+    inside = ((places >= low) & (places <= high)).all(axis=1)
+    return places[inside], points[inside]
+
+
+def _side_lengths(points: Floats, faces: Ints) -> Floats:
+    corners = points[faces]
+    lengths: Floats = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    return lengths
+
+
+def _median_edge(points: Floats, faces: Ints) -> float:
+    return float(np.median(_side_lengths(points, faces)))
+
+
+def _doubled_areas(points: Floats, faces: Ints) -> Floats:
+    p = points[faces]
+    areas: Floats = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    return areas
 
 
 def _clean(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
     """Merge equal vertices, drop degenerate triangles and unused vertices."""
     if not len(faces):
         raise TargetError(f"{name} holds no triangles.")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise TargetError(f"{name}: a triangle refers to a vertex that does not exist.")
     if not np.isfinite(vertices[faces]).all():
-        bad = int(np.flatnonzero(~np.isfinite(vertices).all(axis=1))[0])
+        used = np.unique(faces)
+        bad = int(used[~np.isfinite(vertices[used]).all(axis=1)][0])
         raise TargetError(
             f"{name}: vertex {bad} has a coordinate that is not a finite number (NaN or infinite); "
             "repair the mesh and try again."
@@ -94,25 +318,41 @@ def _clean(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
     size = float(np.ptp(vertices[faces].reshape(-1, 3), axis=0).max())
     if size == 0:
         raise TargetError(f"{name}: all triangles lie in one point.")
-    keys = np.round(vertices / (1e-9 * size)).astype(np.int64)
+    if not size < 1e100:
+        raise TargetError(f"{name}: its coordinates are too large to be lengths ({size:.0e} mm).")
+    vertices = np.where(np.isfinite(vertices), vertices, 0.0)
+    low = vertices[faces].reshape(-1, 3).min(axis=0)
+    keys = np.round(np.clip((vertices - low) / (1e-9 * size), -1e12, 1e12)).astype(np.int64)
     _, first, merged = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     vertices, faces = vertices[first], merged.reshape(-1)[faces]
-    corners = vertices[faces]
-    doubled = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
     distinct = (np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)
-    faces = faces[distinct & (doubled > 1e-14 * size**2)]
+    faces = faces[distinct & (_doubled_areas(vertices, faces) > 1e-14 * size**2)]
     if not len(faces):
         raise TargetError(f"{name}: all triangles are degenerate (have no area).")
     used, faces = np.unique(faces, return_inverse=True)
     return vertices[used], faces.reshape(-1, 3)
 
 
-def _check_disk(vertices: Floats, faces: Ints, name: str) -> None:
-    """Refuse whatever is not one disk, by its true fault."""
+def _size_remarks(vertices: Floats, name: str) -> tuple[str, ...]:
+    size = float(np.ptp(vertices, axis=0).max())
+    if 1.0 <= size <= 10_000.0:
+        return ()
+    return (
+        f"{name} is {size:.3g} mm large, as mesh files are read in millimetres; if it is in "
+        "another unit, give the size that is meant with --size.",
+    )
+
+
+def _edges(faces: Ints) -> tuple[Ints, Ints]:
+    """(E, 2) the edges of a triangle mesh, and (E,) the number of triangles at each."""
     sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, uses = np.unique(sides, axis=0, return_counts=True)
+    return edges, uses
+
+
+def _check_sheet(vertices: Floats, faces: Ints, name: str) -> Ints:
+    """The triangles oriented alike; refuses what is not one sheet with a border, by its fault."""
+    edges, uses = _edges(faces)
     if (uses > 2).any():
         raise TargetError(
             f"{name} is not a surface: {int((uses > 2).sum())} edges have more than two triangles; "
@@ -120,39 +360,78 @@ def _check_disk(vertices: Floats, faces: Ints, name: str) -> None:
         )
     pieces = trimesh.graph.connected_components(edges, nodes=np.arange(len(vertices)))
     if len(pieces) > 1:
-        raise TargetError(f"{name} holds {len(pieces)} separate pieces; keep one and try again.")
+        sizes = sorted((len(piece) for piece in pieces), reverse=True)
+        raise TargetError(
+            f"{name} holds {len(pieces)} separate pieces (the largest of {sizes[0]} and "
+            f"{sizes[1]} vertices); keep one and try again."
+        )
     border = edges[uses == 1]
     if not len(border):
         raise TargetError(f"{name} is closed; cut it open so that it is a sheet with one border.")
-    if (np.bincount(border.ravel()) > 2).any():
-        raise TargetError(f"{name}: its border touches itself in a vertex; widen it there.")
-    loops = len(trimesh.graph.connected_components(border))
-    if loops > 1:
+    touching = np.flatnonzero(np.bincount(border.ravel()) > 2)
+    if len(touching):
+        x, y, z = vertices[touching[0]]
         raise TargetError(
-            f"{name} has {loops - 1} hole{'s' if loops > 2 else ''}; fill them in your mesh "
-            "program, or cut the mesh to a part without."
+            f"{name}: its border touches itself at ({x:.4g}, {y:.4g}, {z:.4g}); widen it there or "
+            "cut it apart."
         )
-    if len(vertices) - len(edges) + len(faces) != 1:
-        raise TargetError(f"{name} has a handle; it cannot be laid flat. Cut it open.")
-
-
-def mesh_surface(vertices: Floats, faces: Ints, name: str = "The mesh") -> MeshSurface:
-    """A target from the arrays of a triangle mesh, ``vertices`` (V, 3) and ``faces`` (F, 3).
-
-    Raises :class:`~miurafab.errors.TargetError` if it is not one oriented disk.
-    """
-    _check_disk(vertices, faces, name)
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     if not mesh.is_winding_consistent:
         trimesh.repair.fix_winding(mesh)
-        faces = np.asarray(mesh.faces, dtype=np.int64)
-    flat = flatten(vertices, faces)
-    angle, (x0, x1, y0, y1) = largest_rectangle(flat, faces)
-    c, s = np.cos(angle), np.sin(angle)
-    flat = flat @ np.array([[c, s], [-s, c]])
-    domain = Domain(x0, x1, y0, y1)
-    spline = _fit_spline(vertices, faces, flat, domain)
-    return MeshSurface(spline, domain, _even_triangles(vertices, faces))
+        if not mesh.is_winding_consistent:
+            raise TargetError(
+                f"{name} has one side only, like a Moebius strip; cut it open across."
+            )
+    fan = np.asarray(mesh.faces, dtype=np.int64)
+    pinched = _pinched(fan, len(vertices))
+    if pinched is not None:
+        x, y, z = vertices[pinched]
+        raise TargetError(
+            f"{name} is pinched: parts that share no edge meet at ({x:.4g}, {y:.4g}, {z:.4g}); "
+            "separate them there."
+        )
+    return fan
+
+
+def _pinched(faces: Ints, count: int) -> int | None:
+    """A vertex about which the triangles do not form one fan, if there is any."""
+    corners = faces.ravel()
+    # corners of neighbouring triangles at one vertex are joined across their common side
+    following, previous = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, 1, axis=1).ravel()
+    out, back = corners * count + following, corners * count + previous
+    order = np.argsort(back)
+    place = np.searchsorted(back, out, sorter=order).clip(max=len(back) - 1)
+    match = order[place]
+    joined = np.flatnonzero(back[match] == out)
+    fans = trimesh.graph.connected_component_labels(
+        np.stack([joined, match[joined]], axis=1), node_count=len(corners)
+    )
+    pairs = np.unique(np.stack([corners, fans], axis=1), axis=0)
+    several = np.flatnonzero(np.bincount(pairs[:, 0], minlength=count) > 1)
+    return int(several[0]) if len(several) else None
+
+
+def _fill_holes(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints, int]:
+    """Each small hole closed by a fan about its middle, and their number."""
+    loops = border_loops(faces)
+    lengths = [
+        float(np.linalg.norm(vertices[np.roll(loop, -1)] - vertices[loop], axis=1).sum())
+        for loop in loops
+    ]
+    order = sorted(range(len(loops)), key=lambda n: -lengths[n])
+    for n in order[1:]:
+        if lengths[n] > SMALL_HOLE * lengths[order[0]]:
+            raise TargetError(
+                f"{name} has a hole {lengths[n] / math.pi:.3g} mm across, too large to be filled "
+                f"here (it has {len(loops) - 1} in all); fill it in your mesh program, or cut the "
+                "mesh to a part without."
+            )
+        loop = loops[n]
+        middle = np.full(len(loop), len(vertices))
+        vertices = np.concatenate([vertices, vertices[loop].mean(axis=0, keepdims=True)])
+        # a border runs with its triangles, so what fills it runs against
+        faces = np.concatenate([faces, np.stack([np.roll(loop, -1), loop, middle], axis=1)])
+    return vertices, faces, len(loops) - 1
 
 
 def _even_triangles(vertices: Floats, faces: Ints) -> Floats:
@@ -166,36 +445,3 @@ def _even_triangles(vertices: Floats, faces: Ints) -> Floats:
     points, split = trimesh.remesh.subdivide_to_size(vertices, faces, limit, max_iter=24)
     fine: Floats = np.asarray(points, dtype=np.float64)[np.asarray(split)]
     return fine
-
-
-def _fit_spline(vertices: Floats, faces: Ints, flat: Floats, domain: Domain) -> NdBSpline:
-    """The least-squares bicubic spline through the mesh over ``domain``.
-
-    Knots stand about one and a half mesh edges apart, so that the spline follows the shape and
-    irons out the facets; samples are twice as dense as knots.
-    """
-    sides = flat[faces] - flat[np.roll(faces, 1, axis=1)]
-    edge = float(np.median(np.linalg.norm(sides, axis=2)))
-    spans = [int(np.clip(length / (1.5 * edge), 3, 60)) for length in (domain.width, domain.height)]
-    counts = [max(2 * (span + 3), 24) for span in spans]
-    lattice = domain.lattice(*counts).reshape(-1, 2)
-    centre = np.array([(domain.u0 + domain.u1) / 2, (domain.v0 + domain.v1) / 2])
-    triangle, weights = locate(flat, faces, centre + (lattice - centre) * (1 - 2e-6))
-    if (triangle < 0).any():
-        raise TargetError(
-            "The rectangle laid into the mesh reaches into a gap of it; remesh it more evenly."
-        )
-    samples = np.einsum("nc,nck->nk", weights, vertices[faces[triangle]])
-    grid = samples.reshape(counts[1], counts[0], 3).transpose(1, 0, 2)
-    knots = [
-        np.concatenate([[low] * 3, np.linspace(low, high, span + 1), [high] * 3])
-        for span, low, high in (
-            (spans[0], domain.u0, domain.u1),
-            (spans[1], domain.v0, domain.v1),
-        )
-    ]
-    u = np.linspace(domain.u0, domain.u1, counts[0])
-    v = np.linspace(domain.v0, domain.v1, counts[1])
-    along = make_lsq_spline(u, grid, knots[0]).c
-    both = make_lsq_spline(v, along.transpose(1, 0, 2), knots[1]).c.transpose(1, 0, 2)
-    return NdBSpline((knots[0], knots[1]), both, 3, extrapolate=True)

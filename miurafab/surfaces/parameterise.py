@@ -1,9 +1,17 @@
-"""Laying a disk-shaped triangle mesh into the plane, and a rectangle into the layout.
+"""Laying a disk-shaped triangle mesh into the plane with little stretch.
 
-A mesh that is a graph over its mean plane is simply projected. Any other disk is mapped by least
-squares conformal maps (Levy, Petitjean, Ray and Maillot, SIGGRAPH 2002, section 2): for each
-triangle with local coordinates, the map's complex derivative with respect to the conjugate vanishes
-as nearly as possible, two vertices held fixed.
+Three maps, each the start of the next:
+
+- least squares conformal maps (Levy, Petitjean, Ray and Maillot, SIGGRAPH 2002, section 2): for
+  each triangle with local coordinates the map's complex derivative with respect to the conjugate
+  vanishes as nearly as possible, two vertices held fixed;
+- where a triangle turns over in it, Tutte's map: the border on a circle, each other vertex the mean
+  of its neighbours, which never turns a triangle over (Tutte, Proc. London Math. Soc. 13, 1963);
+- as rigid as possible from there (Liu, Zhang, Xu, Gotsman and Gortler, Eurographics SGP 2008,
+  section 4): the rotation nearest to each triangle's map, then the vertices that suit those
+  rotations best, in turn. The matrix stays the same, so it is factorised once.
+
+Points of the plane are complex numbers inside.
 """
 
 from __future__ import annotations
@@ -12,71 +20,69 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
-
-from miurafab.errors import TargetError
+from scipy.spatial import ConvexHull
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Complexes = NDArray[np.complex128]
+
+RIGID_ROUNDS = 60
 
 
 def flatten(vertices: Floats, faces: Ints) -> Floats:
-    """(V, 2) a one-to-one layout of the disk mesh ``vertices`` (V, 3), ``faces`` (F, 3).
+    """(V, 2) a layout of the disk mesh ``vertices`` (V, 3), ``faces`` (F, 3), in its own lengths.
 
-    Areas agree in total. Raises :class:`~miurafab.errors.TargetError` where a triangle turns over.
+    No triangle is turned over; the smallest box about the layout is upright, its longer side
+    along x. Triangles must have
+    an area and be oriented alike.
     """
-    projected = _projection(vertices, faces)
-    if _signed_areas(projected, faces).min() > 0:
-        return projected
-    flat = _conformal(vertices, faces)
-    areas = _signed_areas(flat, faces)
-    if areas.sum() < 0:
-        flat, areas = flat * np.array([1.0, -1.0]), -areas
-    if areas.min() <= 0:
-        turned = int((areas <= 0).sum())
-        raise TargetError(
-            f"The mesh cannot be laid flat one-to-one: {turned} triangles turn over. Cut it into "
-            "flatter pieces, or remesh it with more even triangles."
-        )
-    corners = vertices[faces]
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    ).sum()
-    scaled: Floats = flat * np.sqrt(area / (2 * areas.sum()))
-    return scaled
+    z = conformal(vertices, faces)
+    if turned_over(z, faces).any():
+        z = tutte(vertices, faces)
+    z = _rigid(z, _local(vertices, faces), faces)
+    return _upright(z)
 
 
-def _signed_areas(flat: Floats, faces: Ints) -> Floats:
-    a, b, c = flat[faces[:, 0]], flat[faces[:, 1]], flat[faces[:, 2]]
-    ab, ac = b - a, c - a
-    areas: Floats = (ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]) / 2
-    return areas
+def _upright(z: Complexes) -> Floats:
+    """(V, 2) the layout turned so that its bounding box is the smallest, the longer side along x.
+
+    The smallest box has a side along one of the convex hull.
+    """
+    plane = np.stack([z.real, z.imag], axis=1)
+    hull = z[ConvexHull(plane).vertices]
+    frames = np.exp(-1j * np.unique(np.round(np.angle(np.roll(hull, -1) - hull), 9)))
+    boxes = hull[None, :] * frames[:, None]
+    width, height = np.ptp(boxes.real, axis=1), np.ptp(boxes.imag, axis=1)
+    least = int(np.flatnonzero(width * height <= 1.0001 * (width * height).min())[0])
+    z = z * frames[least] * (1 if width[least] >= 0.9999 * height[least] else -1j)
+    z = z - z.mean()
+    return np.stack([z.real, z.imag], axis=1)
 
 
-def _projection(vertices: Floats, faces: Ints) -> Floats:
-    """Onto the plane across the mean normal, turned so that the longer principal axis is x."""
-    corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).sum(axis=0)
-    length = np.linalg.norm(normal)
-    if length == 0:
-        return np.zeros((len(vertices), 2))
-    normal = normal / length
-    axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    x = np.cross(np.cross(normal, axis), normal)
-    x /= np.linalg.norm(x)
-    projected: Floats = vertices @ np.stack([x, np.cross(normal, x)], axis=1)
-    return projected
+def turned_over(z: Complexes, faces: Ints) -> NDArray[np.bool_]:
+    """(F,) which triangles of the layout ``z`` (V,) have no area or the wrong orientation."""
+    e1, e2 = z[faces[:, 1]] - z[faces[:, 0]], z[faces[:, 2]] - z[faces[:, 0]]
+    turned: NDArray[np.bool_] = (e1.conj() * e2).imag <= 0
+    return turned
 
 
-def _conformal(vertices: Floats, faces: Ints) -> Floats:
+def _local(vertices: Floats, faces: Ints) -> Complexes:
+    """(F, 3) each triangle laid into the plane by itself: one corner at 0, the next on x."""
     corners = vertices[faces]
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     x = np.linalg.norm(e1, axis=1)
     unit = e1 / x[:, None]
     x2 = np.einsum("fk,fk->f", e2, unit)
     y2 = np.linalg.norm(e2 - x2[:, None] * unit, axis=1)
-    root = np.sqrt(x * y2)
+    return np.stack([0j * x, x + 0j, x2 + 1j * y2], axis=1)
+
+
+def conformal(vertices: Floats, faces: Ints) -> Complexes:
+    """(V,) the least squares conformal layout, in about the mesh's own lengths."""
+    local = _local(vertices, faces)
+    area = (local[:, 1].conj() * local[:, 2]).imag
     # complex weights of the three corners: the opposite side, over the root of twice the area
-    weights = np.stack([(x2 - x) + 1j * y2, -(x2 + 1j * y2), x + 0j], axis=1) / root[:, None]
+    weights = (np.roll(local, -2, axis=1) - np.roll(local, -1, axis=1)) / np.sqrt(area)[:, None]
     row = np.repeat(np.arange(len(faces)), 3)
     matrix = sparse.coo_array(
         (weights.ravel(), (row, faces.ravel())), shape=(len(faces), len(vertices))
@@ -89,13 +95,101 @@ def _conformal(vertices: Floats, faces: Ints) -> Floats:
     z = np.zeros(len(vertices), dtype=complex)
     z[held] = pinned
     z[free] = splu(normal).solve(a.conj().T @ b)
-    return np.stack([z.real, z.imag], axis=1)
+    e1, e2 = z[faces[:, 1]] - z[faces[:, 0]], z[faces[:, 2]] - z[faces[:, 0]]
+    laid = float((e1.conj() * e2).imag.sum())
+    if laid < 0:
+        z, laid = z.conj(), -laid
+    scaled: Complexes = z * np.sqrt(area.sum() / max(laid, 1e-300))
+    return scaled
 
 
 def _far_apart(vertices: Floats) -> Ints:
     start = int(np.argmax(np.linalg.norm(vertices - vertices.mean(axis=0), axis=1)))
     end = int(np.argmax(np.linalg.norm(vertices - vertices[start], axis=1)))
     return np.array([start, end])
+
+
+def tutte(vertices: Floats, faces: Ints) -> Complexes:
+    """(V,) the layout with the border on a circle by its length, neighbours evenly weighted."""
+    loop = border_loops(faces)[0]
+    steps = np.linalg.norm(vertices[np.roll(loop, -1)] - vertices[loop], axis=1)
+    at = np.concatenate([[0.0], np.cumsum(steps[:-1])]) / steps.sum()
+    z = np.zeros(len(vertices), dtype=complex)
+    z[loop] = steps.sum() / (2 * np.pi) * np.exp(2j * np.pi * at)
+    sides = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+    count = len(vertices)
+    ones = np.ones(len(sides))
+    graph = sparse.coo_array((ones, (sides[:, 0], sides[:, 1])), shape=(count, count)).tocsr()
+    graph = graph + graph.T
+    free = np.setdiff1d(np.arange(count), loop)
+    if len(free):
+        degree = np.asarray(graph.sum(axis=1), dtype=np.float64).ravel()[free]
+        matrix = (sparse.diags_array(degree) - graph[free][:, free]).tocsc()
+        right = graph[free][:, loop] @ z[loop]
+        factor = splu(matrix)
+        z[free] = factor.solve(right.real) + 1j * factor.solve(right.imag)
+    return z
+
+
+def border_loops(faces: Ints) -> list[Ints]:
+    """The border of an oriented mesh as loops of vertices, the one of most vertices first."""
+    sides = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    count = int(faces.max()) + 1
+    keys = sides[:, 0] * count + sides[:, 1]
+    open_sides = sides[~np.isin(keys, sides[:, 1] * count + sides[:, 0])]
+    following = dict(open_sides.tolist())
+    loops = []
+    while following:
+        start, at = following.popitem()
+        loop = [start]
+        while at != start:
+            loop.append(at)
+            at = following.pop(at)
+        loops.append(np.array(loop, dtype=np.int64))
+    return sorted(loops, key=lambda loop: (-len(loop), int(loop.min())))
+
+
+def _rigid(z: Complexes, local: Complexes, faces: Ints) -> Complexes:
+    """The layout made as rigid as possible; the last one in which no triangle is turned over."""
+    # side k runs from corner k to the next; its weight is the cotangent of the opposite angle
+    side = np.roll(local, -1, axis=1) - local
+    to, back = np.roll(local, -2, axis=1), local
+    opposite = (back - to).conj() * (np.roll(local, -1, axis=1) - to)
+    weight = np.clip(opposite.real / np.abs(opposite.imag), 0.05, 20.0)
+    tail, head = faces, np.roll(faces, -1, axis=1)
+    count = len(z)
+    rows = np.concatenate([tail.ravel(), head.ravel(), tail.ravel(), head.ravel()])
+    columns = np.concatenate([tail.ravel(), head.ravel(), head.ravel(), tail.ravel()])
+    w = weight.ravel()
+    matrix = sparse.coo_array(
+        (np.concatenate([w, w, -w, -w]), (rows, columns)), shape=(count, count)
+    ).tocsc()
+    matrix = matrix + sparse.coo_array(([w.mean()], ([0], [0])), shape=(count, count)).tocsc()
+    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    best = z
+    energy = np.inf
+    for _ in range(RIGID_ROUNDS):
+        turn = (weight * (z[head] - z[tail]) * side.conj()).sum(axis=1)
+        turn = turn / np.maximum(np.abs(turn), 1e-300)
+        wanted = weight * turn[:, None] * side
+        right = np.bincount(head.ravel(), wanted.real.ravel(), count) - np.bincount(
+            tail.ravel(), wanted.real.ravel(), count
+        )
+        above = np.bincount(head.ravel(), wanted.imag.ravel(), count) - np.bincount(
+            tail.ravel(), wanted.imag.ravel(), count
+        )
+        z = factor.solve(right) + 1j * factor.solve(above)
+        if turned_over(z, faces).any():
+            # half the way keeps more of the gain than none of it
+            z = (z - z.mean() + best - best.mean()) / 2
+            if turned_over(z, faces).any():
+                break
+        best = z
+        misfit = weight * np.abs(z[head] - z[tail] - turn[:, None] * side) ** 2
+        if misfit.sum() > (1 - 1e-4) * energy:
+            break
+        energy = float(misfit.sum())
+    return best
 
 
 def locate(flat: Floats, faces: Ints, points: Floats) -> tuple[Ints, Floats]:
@@ -135,58 +229,7 @@ def _barycentric(corners: Floats, points: Floats) -> Floats:
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     ab, ac, ap = b - a, c - a, points - a
     det = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    s = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / det
-    t = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / det
+    with np.errstate(invalid="ignore", divide="ignore"):
+        s = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / det
+        t = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / det
     return np.stack([1 - s - t, s, t], axis=1)
-
-
-def largest_rectangle(flat: Floats, faces: Ints) -> tuple[float, tuple[float, float, float, float]]:
-    """The angle and (x0, x1, y0, y1), in the turned frame, of a large rectangle within the layout.
-
-    Angles are tried every five degrees; at each, the largest block of covered cells of a lattice is
-    found. The angle nearest to zero wins among those within a hundredth of the best area.
-    """
-    best: tuple[float, float, tuple[float, float, float, float]] | None = None
-    for degrees in (0, *(sign * d for d in range(5, 45, 5) for sign in (1, -1)), 45):
-        angle = np.radians(degrees)
-        turned = flat @ _turn(angle)
-        low, high = turned.min(axis=0), turned.max(axis=0)
-        count = 81
-        x, y = (np.linspace(low[k], high[k], count) for k in (0, 1))
-        # cell corners pulled in by a hair, so that those on the border count as covered
-        centre, shrink = (low + high) / 2, 1 - 1e-6
-        lattice = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        lattice = centre + (lattice - centre) * shrink
-        covered = locate(turned, faces, lattice)[0].reshape(count, count) >= 0
-        i0, i1, j0, j1 = _largest_block(covered)
-        area = (x[i1] - x[i0]) * (y[j1] - y[j0])
-        if best is None or area > 1.01 * best[0]:
-            best = (area, angle, (x[i0], x[i1], y[j0], y[j1]))
-    assert best is not None
-    return best[1], best[2]
-
-
-def _turn(angle: float) -> Floats:
-    return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-
-
-def _largest_block(covered: NDArray[np.bool_]) -> tuple[int, int, int, int]:
-    """Column and row range of the largest rectangle of lattice points that are all covered.
-
-    Row by row with the histogram of covered runs above (the stack algorithm).
-    """
-    rows, columns = covered.shape
-    run = np.zeros(columns, dtype=np.int64)
-    best, block = -1, (0, 0, 0, 0)
-    for j in range(rows):
-        run = np.where(covered[j], run + 1, 0)
-        stack: list[tuple[int, int]] = []
-        for i, height in enumerate([*run.tolist(), 0]):
-            start = i
-            while stack and stack[-1][1] >= height:
-                start, tall = stack.pop()
-                area = (i - 1 - start) * (tall - 1)
-                if area > best:
-                    best, block = area, (start, i - 1, j - tall + 1, j)
-            stack.append((start, height))
-    return block

@@ -21,7 +21,8 @@ from miurafab.origami.fold_format import read_fold, write_fold
 from miurafab.profiles import Table, find_file, read_toml
 from miurafab.surfaces.analytic import Revolution
 from miurafab.surfaces.catalogue import make_surface, parse_target
-from miurafab.surfaces.mesh import MESH_SUFFIXES, load_mesh
+from miurafab.surfaces.mesh import MESH_SUFFIXES, MeshSurface, load_mesh
+from miurafab.surfaces.placement import Region
 from miurafab.surfaces.surface import TargetSurface
 from miurafab.units import parse_angle, parse_length
 
@@ -32,12 +33,15 @@ DEFAULT_SIZE_MM = 200.0
 
 @dataclass(frozen=True)
 class Design:
-    """A request with a title, and the machine and material that its file names, if any."""
+    """A request with a title, the machine and material that its file names, if any, and remarks on
+    the target that the user might want to know.
+    """
 
     request: FitRequest
     title: str
     machine: str | None = None
     material: str | None = None
+    remarks: tuple[str, ...] = ()
 
 
 def parse_facets(text: str) -> tuple[int, int]:
@@ -66,13 +70,15 @@ def design(target: str, **options: str | None) -> Design:
     if suffix == ".toml":
         return _from_file(find_file("patterns", target, error=TargetError), given)
     if suffix in MESH_SUFFIXES:
-        surface, description = _mesh(Path(target))
+        mesh, description = _mesh(Path(target), given)
         own_size: dict[str, str | None] = {"size": None}
-        return Design(_request(surface, description, own_size | given), Path(target).stem)
+        request = _request(mesh, description, own_size | given)
+        return Design(request, Path(target).stem, remarks=mesh.remarks)
     if suffix and os.sep in target:
         raise TargetError(
             f"'{target}' cannot be a target: known files are .toml, {', '.join(MESH_SUFFIXES)}."
         )
+    _only_for_meshes(given)
     name, parameters = parse_target(target)
     surface, values = _named(name, parameters, given)
     return Design(_request(surface, {"surface": name, "parameters": values}, given), name)
@@ -113,6 +119,8 @@ _OPTIONS = (
     "min_edge",
     "max_deviation",
     "seed",
+    "region",
+    "rotate",
     "close",
 )
 
@@ -128,11 +136,15 @@ def _from_file(path: Path, given: Mapping[str, str | None]) -> Design:
     layout.finish()
     table.finish(known=_OPTIONS)
     defaults: dict[str, str | None] = {}
+    surface: TargetSurface
+    remarks: tuple[str, ...] = ()
     if target.has("mesh"):
-        surface, description = _mesh(path.parent / target.text("mesh"))
+        mesh, description = _mesh(path.parent / target.text("mesh"), written | dict(given))
+        surface, remarks = mesh, mesh.remarks
         target.finish()
         defaults["size"] = None
     else:
+        _only_for_meshes(written | dict(given))
         name = target.text("surface")
         surface, values = _named(name, target.rest(), defaults | written | dict(given))
         description = {"surface": name, "parameters": values}
@@ -140,12 +152,23 @@ def _from_file(path: Path, given: Mapping[str, str | None]) -> Design:
         request = _request(surface, description, defaults | written | dict(given))
     except InputError as fault:
         raise TargetError(f"{path.name}: {fault}") from None
-    return Design(request, title, machine, material)
+    return Design(request, title, machine, material, remarks)
 
 
-def _mesh(path: Path) -> tuple[TargetSurface, dict[str, Any]]:
-    surface, sha256 = load_mesh(path)
-    return surface, {"mesh": str(path.resolve()), "sha256": sha256}
+def _mesh(path: Path, given: Mapping[str, str | None]) -> tuple[MeshSurface, dict[str, Any]]:
+    region, rotate = given.get("region"), given.get("rotate")
+    surface, sha256 = load_mesh(
+        path,
+        region=None if region is None else Region.parse(region),
+        rotate=None if rotate is None else parse_angle(rotate),
+    )
+    return surface, {"mesh": str(path.resolve()), "sha256": sha256, **surface.description}
+
+
+def _only_for_meshes(given: Mapping[str, str | None]) -> None:
+    for key in ("region", "rotate"):
+        if given.get(key) is not None:
+            raise InputError(f"--{key} is for mesh targets; a named surface has parameters.")
 
 
 def _request(
@@ -217,7 +240,7 @@ def load_pattern(path: Path) -> tuple[CreasePattern, TargetSurface | None, str |
             return pattern, None, f"the target mesh {mesh} is not there"
         if hashlib.sha256(mesh.read_bytes()).hexdigest() != target.get("sha256"):
             return pattern, None, f"the target mesh {mesh} has changed since the fit"
-        return pattern, load_mesh(mesh)[0], None
+        return pattern, load_mesh(mesh, place=target)[0], None
     parameters = target.get("parameters", {})
     if not isinstance(target.get("surface"), str) or not isinstance(parameters, dict):
         raise PatternError(f"{path}: 'miurafab:target' names neither a surface nor a mesh.")

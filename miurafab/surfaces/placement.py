@@ -1,0 +1,163 @@
+"""Where a sheet's rectangle lies in the flat layout of a mesh.
+
+The layout is turned by an angle, and in the turned frame the rectangle is upright. Of the largest
+rectangles at many angles the best is the one that covers much while the spacing of a lattice on it
+stays even: paper is flat, so uneven spacing must be made up by deeper corrugation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import TargetError, UnitError
+from miurafab.surfaces.parameterise import locate
+from miurafab.surfaces.surface import Domain, Floats
+from miurafab.units import parse_length
+
+Ints = NDArray[np.int64]
+
+ANGLES = np.radians(np.arange(-45, 45, 7.5))
+_LATTICE = 81
+_SAMPLES = 13
+
+
+@dataclass(frozen=True)
+class Placement:
+    """The rectangle ``domain`` in the layout turned back by ``angle`` (radians)."""
+
+    angle: float
+    domain: Domain
+
+    def shrunk(self, factor: float) -> Placement:
+        """The same about the same centre, ``factor`` times as wide and high."""
+        d = self.domain
+        u, v = (d.u0 + d.u1) / 2, (d.v0 + d.v1) / 2
+        half_u, half_v = factor * d.width / 2, factor * d.height / 2
+        return Placement(self.angle, Domain(u - half_u, u + half_u, v - half_v, v + half_v))
+
+
+@dataclass(frozen=True)
+class Region:
+    """What a user asks for: u0, u1, v0, v1 from the lower left corner of the layout's bounding box,
+    as fractions of it or as lengths.
+    """
+
+    values: tuple[float, float, float, float]
+    fractions: bool
+
+    @classmethod
+    def parse(cls, text: str) -> Region:
+        """``0.1,0.9,0.2,0.8`` (fractions) or ``10mm,90mm,2cm,8cm``. Raises ``TargetError``."""
+        words = [word.strip() for word in text.split(",")]
+        example = "write u0,u1,v0,v1 such as 0.1,0.9,0.2,0.8 or 10mm,90mm,2cm,8cm"
+        if len(words) != 4:
+            raise TargetError(f"--region is '{text}'; {example}.")
+        try:
+            values = [parse_length(word) for word in words]
+        except UnitError as fault:
+            raise TargetError(f"--region is '{text}': {fault}") from None
+        bare = [word.replace(".", "").replace("e-", "").isdigit() for word in words]
+        fractions = all(bare) and max(values) <= 1
+        if not (0 <= values[0] < values[1] and 0 <= values[2] < values[3]):
+            raise TargetError(f"--region is '{text}'; each start must be under its end: {example}.")
+        return cls((values[0], values[1], values[2], values[3]), fractions)
+
+    def domain(self, frame: Floats) -> Domain:
+        """The rectangle in the turned layout ``frame`` (V, 2)."""
+        low, size = frame.min(axis=0), np.ptp(frame, axis=0)
+        step = size if self.fractions else np.ones(2)
+        u0, u1, v0, v1 = self.values
+        return Domain(
+            float(low[0] + u0 * step[0]),
+            float(low[0] + u1 * step[0]),
+            float(low[1] + v0 * step[1]),
+            float(low[1] + v1 * step[1]),
+        )
+
+
+def turned(flat: Floats, angle: float) -> Floats:
+    """``flat`` (V, 2) in the frame turned by ``angle``."""
+    c, s = math.cos(angle), math.sin(angle)
+    frame: Floats = flat @ np.array([[c, -s], [s, c]])
+    return frame
+
+
+def placements(vertices: Floats, flat: Floats, faces: Ints) -> list[tuple[float, Placement]]:
+    """The best placement at each angle with its score, the best first.
+
+    The score is the area times the evenness, the product over both directions of the least over
+    the greatest spacing of a lattice on the rectangle, to the power of a half.
+    """
+    found = []
+    for angle in ANGLES.tolist():
+        frame = turned(flat, angle)
+        domain = largest_rectangle(frame, faces)
+        if domain is not None:
+            score = domain.width * domain.height * evenness(vertices, frame, faces, domain) ** 0.5
+            found.append((score, Placement(angle, domain)))
+    # what is as good to a hundredth goes to the angle nearest to the axes of the layout
+    best = max((score for score, _ in found), default=0.0)
+    return sorted(found, key=lambda pair: (-math.floor(50 * pair[0] / best), abs(pair[1].angle)))
+
+
+def covered(frame: Floats, faces: Ints, domain: Domain, count: int = 41) -> bool:
+    """Whether all of a lattice over ``domain`` lies in the layout ``frame``."""
+    return bool((_lattice_triangles(frame, faces, domain, count)[0] >= 0).all())
+
+
+def evenness(vertices: Floats, frame: Floats, faces: Ints, domain: Domain) -> float:
+    """The least over the greatest spacing along u, times that along v, in (0, 1]."""
+    triangle = _lattice_triangles(frame, faces, domain, _SAMPLES)[0]
+    triangle = np.unique(triangle[triangle >= 0])
+    p, q = vertices[faces[triangle]], frame[faces[triangle]]
+    e, f = p[:, 1:] - p[:, :1], q[:, 1:] - q[:, :1]
+    speeds = np.linalg.norm(np.linalg.solve(f, e), axis=2)
+    low, high = np.quantile(speeds, 0.03, axis=0), np.quantile(speeds, 0.97, axis=0)
+    return float(np.prod(low / high))
+
+
+def _lattice_triangles(
+    frame: Floats, faces: Ints, domain: Domain, count: int
+) -> tuple[Ints, Floats]:
+    """The triangle of each point of a lattice a hair within ``domain``, and its coordinates."""
+    lattice = domain.lattice(count, count).reshape(-1, 2)
+    centre = np.array([(domain.u0 + domain.u1) / 2, (domain.v0 + domain.v1) / 2])
+    return locate(frame, faces, centre + (lattice - centre) * (1 - 2e-6))
+
+
+def largest_rectangle(frame: Floats, faces: Ints) -> Domain | None:
+    """The largest upright rectangle of covered cells of a lattice over the layout, if any."""
+    low, high = frame.min(axis=0), frame.max(axis=0)
+    whole = Domain(low[0], high[0], low[1], high[1])
+    inside = _lattice_triangles(frame, faces, whole, _LATTICE)[0] >= 0
+    i0, i1, j0, j1 = _largest_block(inside.reshape(_LATTICE, _LATTICE))
+    if i1 <= i0 or j1 <= j0:
+        return None
+    x, y = (np.linspace(low[k], high[k], _LATTICE).tolist() for k in (0, 1))
+    return Domain(x[i0], x[i1], y[j0], y[j1])
+
+
+def _largest_block(covered: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """Column and row range of the largest rectangle of lattice points that are all covered.
+
+    Row by row with the histogram of covered runs above (the stack algorithm).
+    """
+    rows, columns = covered.shape
+    run = np.zeros(columns, dtype=np.int64)
+    best, block = -1, (0, 0, 0, 0)
+    for j in range(rows):
+        run = np.where(covered[j], run + 1, 0)
+        stack: list[tuple[int, int]] = []
+        for i, height in enumerate([*run.tolist(), 0]):
+            start = i
+            while stack and stack[-1][1] >= height:
+                start, tall = stack.pop()
+                area = (i - 1 - start) * (tall - 1)
+                if area > best:
+                    best, block = area, (start, i - 1, j - tall + 1, j)
+            stack.append((start, height))
+    return block

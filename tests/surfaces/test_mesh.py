@@ -1,0 +1,345 @@
+"""Mesh files: what is refused and in which words, and what a good one becomes."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from problems import saddle_mesh
+from typer.testing import CliRunner
+
+from miurafab.cli import app
+from miurafab.errors import TargetError
+from miurafab.surfaces.mesh import Layout, load_mesh, mesh_surface
+from miurafab.surfaces.placement import Region
+from miurafab.surfaces.surface import tangents
+from miurafab.workflow.design import design, load_pattern
+
+
+def square(count: int = 9, size: float = 100.0) -> tuple[np.ndarray, np.ndarray]:
+    grid = np.linspace(0, size, count)
+    x, y = np.meshgrid(grid, grid)
+    points = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
+    index = np.arange(count * count).reshape(count, count)
+    a, b, c, d = (
+        q.ravel() for q in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
+    )
+    return points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+
+
+def written(path: Path, vertices: np.ndarray, faces: np.ndarray) -> Path:
+    """An OFF file, byte by byte, so that nothing is tidied up on the way."""
+    lines = [f"OFF\n{len(vertices)} {len(faces)} 0"]
+    lines += [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices).tolist()]
+    lines += [f"3 {a} {b} {c}" for a, b, c in np.asarray(faces).tolist()]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def nan(v, f):
+    v[7, 1] = math.nan
+    return v, f
+
+
+def infinite(v, f):
+    v[7, 1] = math.inf
+    return v, f
+
+
+def two_pieces(v, f):
+    return np.concatenate([v, v + np.array([0, 0, 50])]), np.concatenate([f, f + len(v)])
+
+
+def closed(v, f):
+    box = trimesh.creation.icosphere(2)
+    return box.vertices, box.faces
+
+
+def fin(v, f):
+    """A third triangle on an inner edge."""
+    return np.concatenate([v, [[50, 50, 30]]]), np.concatenate([f, [[f[40, 0], f[40, 1], len(v)]]])
+
+
+def twice(v, f):
+    return v, np.concatenate([f, f])
+
+
+def flat_triangles(v, f):
+    return v * [1, 0, 0], f
+
+
+def one_point(v, f):
+    return v * 0, f
+
+
+def large_hole(v, f):
+    middle = v[f].mean(axis=1)
+    return v, f[np.abs(middle - [50, 50, 0]).max(axis=1) > 25]
+
+
+def waist_of_nothing(v, f):
+    """Two squares that touch in one vertex."""
+    middle = v[f].mean(axis=1)
+    return v, f[((middle[:, 0] < 50) == (middle[:, 1] < 50))]
+
+
+def moebius(v, f):
+    t, w = np.meshgrid(np.linspace(0, 2 * np.pi, 40, endpoint=False), np.linspace(-1, 1, 5))
+    r = 3 + w * np.cos(t / 2)
+    points = np.stack([r * np.cos(t), r * np.sin(t), w * np.sin(t / 2)], axis=-1).reshape(-1, 3)
+    faces = []
+    for j in range(4):
+        for i in range(40):
+            a, d = j * 40 + i, (j + 1) * 40 + i
+            b, c = (a + 1, d + 1) if i < 39 else ((4 - j) * 40, (3 - j) * 40)
+            faces += [[a, b, c], [a, c, d]]
+    return points, np.array(faces)
+
+
+def handle(v, f):
+    torus = trimesh.creation.torus(30, 10)
+    faces = np.asarray(torus.faces)
+    return torus.vertices, faces[(faces != 0).all(axis=1)]
+
+
+REFUSED = {
+    nan: "vertex .* not a finite number",
+    infinite: "vertex .* not a finite number",
+    two_pieces: "2 separate pieces",
+    closed: "is closed; cut it open",
+    fin: "1 edges have more than two triangles",
+    twice: "more than two triangles",
+    flat_triangles: "all triangles are degenerate",
+    one_point: "all triangles lie in one point",
+    large_hole: "has a hole .* mm across, too large",
+    waist_of_nothing: "border touches itself at",
+    moebius: "one side only",
+    handle: "has a handle",
+}
+
+
+@pytest.mark.parametrize("broken", REFUSED, ids=lambda b: b.__name__)
+def test_one_true_sentence_for_each_fault(tmp_path, broken):
+    path = written(tmp_path / "mesh.off", *broken(*square()))
+    with pytest.raises(TargetError, match=REFUSED[broken]) as refusal:
+        load_mesh(path)
+    sentence = str(refusal.value)
+    assert "mesh.off" in sentence
+    assert sentence.endswith(".")
+    assert "\n" not in sentence
+
+
+FILES = {
+    "missing.off": (None, "does not exist"),
+    "empty.off": (b"", "cannot be read as a mesh|holds no tri"),
+    "empty.obj": (b"", "cannot be read as a mesh|holds no tri"),
+    "empty.stl": (b"", "cannot be read as a mesh|holds no tri"),
+    "empty.ply": (b"", "cannot be read as a mesh|holds no tri"),
+    "empty.glb": (b"", "cannot be read as a mesh|holds no tri"),
+    "text.off": (b"Dear Sir or Madam,\n", "cannot be read as a mesh|holds no tri"),
+    "text.obj": (b"Dear Sir or Madam,\n", "cannot be read as a mesh|holds no tri"),
+    "text.stl": (b"Dear Sir or Madam,\n" * 9, "cannot be read as a mesh|holds no tri"),
+    "text.ply": (b"Dear Sir or Madam,\n", "cannot be read as a mesh|holds no tri"),
+    "text.glb": (b"Dear Sir or Madam,\n", "cannot be read as a mesh|holds no tri"),
+    "points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "cannot be read as a mesh|holds no tri"),
+    "wild.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read|does not exist"),
+    "sheet.step": (b"ISO-10303-21;", "is not a mesh file"),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_that_hold_no_mesh(tmp_path, name):
+    content, words = FILES[name]
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(TargetError, match=words) as refusal:
+        load_mesh(tmp_path / name)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_folder_is_no_mesh(tmp_path):
+    (tmp_path / "mesh.stl").mkdir()
+    with pytest.raises(TargetError, match="cannot be read"):
+        load_mesh(tmp_path / "mesh.stl")
+
+
+@pytest.mark.parametrize("broken", [nan, large_hole, two_pieces], ids=lambda b: b.__name__)
+def test_the_command_line_refuses_without_a_pattern(tmp_path, broken):
+    path = written(tmp_path / "mesh.off", *broken(*square()))
+    out = tmp_path / "out.fold"
+    result = CliRunner().invoke(app, ["fit", str(path), "-o", str(out)])
+    assert isinstance(result.exception, TargetError)
+    assert result.exception.exit_code == 2
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "off", "glb"])
+def test_every_format_gives_the_same_surface(tmp_path, suffix):
+    """STL and GLB hold single precision and STL no connections."""
+    mesh = saddle_mesh(15)
+    path = tmp_path / f"saddle.{suffix}"
+    mesh.export(path)
+    surface, sha256 = load_mesh(path)
+    assert len(sha256) == 64
+    original = mesh_surface(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    points = surface.point(surface.domain.lattice(9, 9)).reshape(-1, 3)
+    gap = np.linalg.norm(original.closest_point(points) - points, axis=1).max()
+    assert gap < 0.5
+
+
+@pytest.mark.parametrize(("scale", "noted"), [(0.002, True), (0.3, False), (1, False), (500, True)])
+def test_a_size_that_suggests_another_unit_is_a_remark(tmp_path, scale, noted):
+    v, f = square()
+    surface, _ = load_mesh(written(tmp_path / "mesh.off", v * scale, f))
+    assert bool(surface.remarks) == noted
+    if noted:
+        assert "millimetres" in surface.remarks[0]
+        assert "--size" in surface.remarks[0]
+
+
+def test_dirt_is_cleaned_away():
+    """Doubled vertices, triangles without area, unused vertices, triangles turned over."""
+    v, f = square()
+    v = np.concatenate([v, v[:20], [[1e6, 0, 0]]])
+    f = np.concatenate([f, [[3, 3, 4], [0, 1, 2]]])
+    f[10] = f[10][::-1]
+    f[5] = np.where(f[5] < 20, f[5] + 81, f[5])
+    surface = mesh_surface(v, f)
+    assert surface.domain.width * surface.domain.height == pytest.approx(1e4, rel=0.1)
+
+
+def test_small_holes_are_filled_and_said():
+    v, f = square(21)
+    middle = v[f].mean(axis=1)
+    surface = mesh_surface(v, f[np.abs(middle - [50, 50, 0]).max(axis=1) > 5])
+    assert "1 small hole was filled" in surface.remarks[0]
+    point = surface.point(np.array([0.0, 0.0]))
+    assert abs(point[2]) < 1e-6
+    # distances are to the mesh as it is, hole and all
+    gap = surface.closest_point(np.array([[50.0, 50.0, 0.0]])) - [50, 50, 0]
+    assert np.linalg.norm(gap) > 4
+
+
+def dome(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """A cap of 60 degrees of a sphere of radius 100."""
+    v, f = square(count, 2.0)
+    x, y = (v[:, :2] - 1).T * math.radians(60) / math.sqrt(2)
+    r = np.hypot(x, y)
+    s = np.sinc(r / np.pi)
+    return 100 * np.stack([x * s, y * s, np.cos(r)], axis=1), f
+
+
+def test_the_surface_lies_on_the_mesh_and_is_laid_out_evenly():
+    v, f = dome(41)
+    surface = mesh_surface(v, f)
+    uv = surface.domain.lattice(31, 31)
+    assert np.abs(np.linalg.norm(surface.point(uv), axis=-1) - 100).max() < 0.05
+    outward = np.einsum("ijk,ijk->ij", surface.normal(uv), surface.point(uv) / 100)
+    assert np.abs(outward).min() > 0.999
+    along, across = tangents(surface, uv)
+    for speed in (np.linalg.norm(along, axis=-1), np.linalg.norm(across, axis=-1)):
+        assert speed.min() > 0.8
+        assert speed.max() < 1.25
+
+
+def test_noise_is_ironed_out():
+    """The spline lies nearer to the true sphere than the scan does, and its normals are smooth."""
+    v, f = dome(61)
+    random = np.random.default_rng(5)
+    scan = v + random.normal(scale=0.5, size=v.shape)
+    surface = mesh_surface(scan, f)
+    points = surface.point(surface.domain.lattice(31, 31))
+    error = np.linalg.norm(points, axis=-1) - 100
+    assert np.sqrt((error**2).mean()) < 0.15
+    normal = surface.normal(surface.domain.lattice(31, 31))
+    tilt = np.abs(np.einsum("ijk,ijk->ij", normal, points / 100))
+    assert math.degrees(math.acos(np.quantile(tilt, 0.02))) < 4
+
+
+def test_a_scan_that_folds_over_itself_when_projected():
+    """More than half a sphere: no projection is one-to-one."""
+    t, w = np.meshgrid(np.linspace(-2.2, 2.2, 60), np.linspace(-1, 1, 40))
+    points = np.stack([np.cos(t), np.sin(t), w], axis=-1).reshape(-1, 3) * 50
+    index = np.arange(60 * 40).reshape(40, 60)
+    a, b, c, d = (
+        q.ravel() for q in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
+    )
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    surface = mesh_surface(points, faces)
+    sides = sorted((surface.domain.width, surface.domain.height))
+    assert sides[0] == pytest.approx(100, rel=0.05)
+    assert sides[1] == pytest.approx(220, rel=0.05)
+
+
+def laid() -> Layout:
+    v, f = square(21)
+    return mesh_surface(v * [1, 0.5, 1], f).layout
+
+
+def test_region_in_fractions_and_in_lengths_are_the_same(tmp_path):
+    v, f = square(21)
+    path = written(tmp_path / "mesh.off", v * [1, 0.5, 1], f)
+    for text in ("0.2,0.8,0.1,0.5", "20,80,5,25", "2cm,8cm,5mm,2.5cm"):
+        domain = load_mesh(path, region=Region.parse(text))[0].domain
+        assert domain.width == pytest.approx(60)
+        assert domain.height == pytest.approx(20)
+
+
+def test_rotate_turns_the_grid(tmp_path):
+    v, f = square(41)
+    path = written(tmp_path / "mesh.off", v, f)
+    straight, _ = load_mesh(path, rotate=0.0)
+    turned, _ = load_mesh(path, rotate=math.radians(45))
+    assert straight.domain.width == pytest.approx(100, rel=0.03)
+    assert turned.domain.width * turned.domain.height == pytest.approx(5000, rel=0.1)
+
+
+@pytest.mark.parametrize("text", ["", "1,2,3", "a,b,c,d", "0.9,0.1,0,1", "0,1,-1,1", "0,1,0,nan"])
+def test_regions_that_are_none(text):
+    with pytest.raises(TargetError, match="--region is"):
+        Region.parse(text)
+
+
+def test_a_region_beyond_the_mesh_names_one_that_is_not(tmp_path):
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    rings = [np.zeros((1, 2))]
+    rings += [r * np.stack([np.cos(angle), np.sin(angle)], 1) for r in range(1, 11)]
+    points = np.concatenate(rings)
+    from scipy.spatial import Delaunay
+
+    path = written(
+        tmp_path / "disc.off", np.pad(points, ((0, 0), (0, 1))), Delaunay(points).simplices
+    )
+    with pytest.raises(TargetError, match="--region reaches beyond") as refusal:
+        load_mesh(path, region=Region.parse("0,1,0,1"))
+    words = str(refusal.value).split("--region ")[-1].rstrip(".")
+    load_mesh(path, region=Region.parse(words))
+
+
+def test_region_and_rotate_are_for_meshes():
+    for option in ("region", "rotate"):
+        with pytest.raises(Exception, match=f"--{option} is for mesh targets"):
+            design("hypar", **{option: "0.5"})
+
+
+def test_a_mesh_is_fitted_checked_and_laid_out_again_from_its_file(tmp_path):
+    path = tmp_path / "saddle.ply"
+    saddle_mesh(21).export(path)
+    out = tmp_path / "saddle.fold"
+    arguments = ["fit", str(path), "-o", str(out), "--facets", "12x12", "--json"]
+    arguments += ["--region", "0.3,0.7,0.3,0.7", "--rotate", "10deg"]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    report = json.loads(result.stdout)
+    pattern, _, missing = load_pattern(out)
+    assert missing is None
+    assert pattern.target["rotate"] == pytest.approx(math.radians(10))
+    checked = CliRunner().invoke(app, ["check", str(out), "--json"])
+    assert checked.exit_code == 0
+    again = json.loads(checked.stdout)
+    for name in ("hausdorff_mm", "hausdorff_midsurface_mm", "area_ratio"):
+        assert again[name] == pytest.approx(report[name], rel=1e-9)
