@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
+from miurafab.origami.collisions import triangulate
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.version import __version__
 from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_text
@@ -160,6 +161,7 @@ def _fold(
     kinds = np.array([assignments.index(letter) for letter in pattern.edges_assignment.tolist()])
     ends = pattern.vertices_coords[pattern.edges_vertices]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    triangles, owners = triangulate(pattern.faces_vertices, pattern.vertices_coords)
     flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
     forms = [_form("Flat", flat[None], flat=True)]
     if pattern.folded_coords is not None:
@@ -171,16 +173,18 @@ def _fold(
         "lengths": np.bincount(kinds, lengths, len(assignments)).round(3).tolist(),
         "kinds": _base64(kinds, np.uint8),
         "edges": _base64(pattern.edges_vertices, np.uint32),
-        "triangles": _base64(triangles(pattern), np.uint32),
+        "triangles": _base64(
+            triangulate(pattern.faces_vertices, pattern.vertices_coords)[0], np.uint32
+        ),
         "forms": forms,
         "first": len(forms) - 1,
         "names": slider.names,
         "start": slider.start,
-        "strain": _strain(pattern, slider),
+        "strain": _strain(slider, owners),
     }
 
 
-def _strain(pattern: CreasePattern, slider: Slider) -> dict[str, Any] | None:
+def _strain(slider: Slider, owners: NDArray[np.int64]) -> dict[str, Any] | None:
     """Strains in 255ths of the greatest, and the facet of each triangle."""
     if slider.strain is None:
         return None
@@ -189,54 +193,15 @@ def _strain(pattern: CreasePattern, slider: Slider) -> dict[str, Any] | None:
         "most": most,
         "shown": slider.show_strain,
         "values": _base64(np.rint(slider.strain / (most or 1.0) * 255), np.uint8),
-        "owners": _base64(_split(pattern)[1], np.uint32),
+        "owners": _base64(
+            triangulate(pattern.faces_vertices, pattern.vertices_coords)[1], np.uint32
+        ),
     }
 
 
 def _form(name: str, frames: NDArray[np.float64], *, flat: bool = False) -> dict[str, Any]:
     box, packed = _packed(frames.reshape(-1, 3))
     return {"name": name, "flat": flat, "frames": len(frames), "box": box, "points": packed}
-
-
-def triangles(pattern: CreasePattern) -> NDArray[np.int64]:
-    """(n, 3) vertex indices of triangles that fill the facets, counter-clockwise in the flat form.
-
-    A quadrilateral is split on the shorter diagonal that lies inside it; a facet of more corners
-    is a fan from its first.
-    """
-    return _split(pattern)[0]
-
-
-def _split(pattern: CreasePattern) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The triangles (n, 3) that fill the facets, and the facet (n,) of each."""
-    faces = pattern.faces_vertices
-    corners = (faces >= 0).sum(axis=1)
-    quads = faces[corners == 4][:, :4]
-    point = pattern.vertices_coords[quads]
-    split_02 = _inside(point) & ~(_inside(np.roll(point, -1, axis=1)) & _second_shorter(point))
-    turned = np.where(split_02[:, None], quads, np.roll(quads, -1, axis=1))
-    fans = [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
-    owners = [np.flatnonzero(corners == 4)] * 2
-    for corner in range(1, faces.shape[1] - 1):
-        others = np.flatnonzero((corners != 4) & (corners > corner + 1))
-        fans.append(faces[others][:, [0, corner, corner + 1]])
-        owners.append(others)
-    return np.concatenate(fans), np.concatenate(owners)
-
-
-def _inside(quads: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(n,) whether the diagonal from corner 0 to 2 lies inside each of (n, 4, 2) quads."""
-    a, b, c, d = np.moveaxis(quads, 1, 0)
-    return (_turn(b - a, c - a) > 0) & (_turn(c - a, d - a) > 0)
-
-
-def _second_shorter(quads: NDArray[np.float64]) -> NDArray[np.bool_]:
-    a, b, c, d = np.moveaxis(quads, 1, 0)
-    return np.asarray(((d - b) ** 2).sum(axis=1) < ((c - a) ** 2).sum(axis=1))
-
-
-def _turn(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
 def _packed(points: NDArray[np.float64]) -> tuple[list[float], str]:
