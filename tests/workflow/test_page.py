@@ -18,7 +18,7 @@ from small_jobs import LASER, dashes, write_folder, write_nc
 from miurafab.errors import InputError
 from miurafab.gcode.job import Job
 from miurafab.workflow.dry_run import LAYERS, dry_run
-from miurafab.workflow.page import page_text, write_page
+from miurafab.workflow.page import Slider, page_text, write_page
 from miurafab.workflow.preview import Preview, preview
 
 
@@ -153,6 +153,12 @@ def test_nothing_between_flat_and_folded_unless_it_is_given():
     assert (motion["name"], motion["frames"]) == ("Motion", 3)
     read = points(motion["points"], motion["box"]).reshape(frames.shape)
     assert np.abs(read - frames).max() <= max(motion["box"][3:]) / 65535
+    told = Slider(("flat", "half", "folded"), 2, np.full((3, len(pattern.faces_vertices)), 0.1))
+    fold = data_of(page_text("a", None, pattern, frames, told))["fold"]
+    assert (fold["names"], fold["start"]) == (["flat", "half", "folded"], 2)
+    assert fold["strain"]["most"] == 0.1
+    assert set(unpack(fold["strain"]["values"], "u1")) == {255}
+    assert len(unpack(fold["strain"]["owners"], "<u4")) == len(unpack(fold["triangles"], "<u4")) / 3
     with pytest.raises(InputError, match="folding motion"):
         page_text("a", None, None, frames)
 

@@ -173,9 +173,7 @@ def _fold(
         "lengths": np.bincount(kinds, lengths, len(assignments)).round(3).tolist(),
         "kinds": _base64(kinds, np.uint8),
         "edges": _base64(pattern.edges_vertices, np.uint32),
-        "triangles": _base64(
-            triangulate(pattern.faces_vertices, pattern.vertices_coords)[0], np.uint32
-        ),
+        "triangles": _base64(triangles, np.uint32),
         "forms": forms,
         "first": len(forms) - 1,
         "names": slider.names,
@@ -193,9 +191,7 @@ def _strain(slider: Slider, owners: NDArray[np.int64]) -> dict[str, Any] | None:
         "most": most,
         "shown": slider.show_strain,
         "values": _base64(np.rint(slider.strain / (most or 1.0) * 255), np.uint8),
-        "owners": _base64(
-            triangulate(pattern.faces_vertices, pattern.vertices_coords)[1], np.uint32
-        ),
+        "owners": _base64(owners, np.uint32),
     }
 
 
