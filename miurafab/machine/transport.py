@@ -74,9 +74,11 @@ class SerialTransport:
 
     def __init__(self, port: str, baud: int) -> None:
         self.name = port
+        # pyserial's RFC 2217 client refuses a write timeout.
+        patience = None if port.lower().startswith("rfc2217:") else _WRITE_TIMEOUT
         try:
             self._serial = serial.serial_for_url(
-                port, baudrate=baud, timeout=_SLICE, write_timeout=_WRITE_TIMEOUT, exclusive=True
+                port, baudrate=baud, timeout=_SLICE, write_timeout=patience, exclusive=True
             )
         except (serial.SerialException, OSError, ValueError) as fault:
             raise PortError(_why_not_opened(port, fault)) from None
@@ -96,8 +98,10 @@ class SerialTransport:
 
     def write_now(self, data: bytes) -> None:
         """Drop what the driver has not sent yet, then send ``data``."""
-        with contextlib.suppress(*_FAULTS):
-            self._serial.reset_output_buffer()
+        # Only here is that at once: over RFC 2217 it is a question that waits for its answer.
+        if isinstance(self._serial, serial.Serial):
+            with contextlib.suppress(*_FAULTS):
+                self._serial.reset_output_buffer()
         self.write(data)
 
     def read(self, timeout: float) -> bytes:

@@ -6,15 +6,21 @@ virtual controller, byte by byte, with the time.
 
 from __future__ import annotations
 
+import contextlib
 import os
+import select
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import serial
+import serial.rfc2217
 
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl
@@ -73,7 +79,12 @@ class Bench:
             stdout=subprocess.PIPE,
             text=True,
         )
-        self.run(lambda: self.bytes_came.count(b"\n") > 30 and self.device.beam_on)
+        try:
+            self.run(lambda: self.bytes_came.count(b"\n") > 30 and self.device.beam_on)
+        except BaseException:
+            process.kill()
+            process.wait()
+            raise
         return process
 
 
@@ -175,7 +186,8 @@ def test_the_virtual_controller_serves_sender_after_sender(how: str, tmp_path: P
         stderr=subprocess.PIPE,
         text=True,
     )
-    with server:
+    with server, contextlib.ExitStack() as at_end:
+        at_end.callback(server.kill)
         address = server.stdout.readline().strip()
         for _ in range(3):
             assert machine_info(address).state == "Idle"
@@ -192,3 +204,39 @@ def test_the_virtual_controller_serves_sender_after_sender(how: str, tmp_path: P
     assert header == "t0,t1,x0,y0,x1,y1,power"
     ways = [[float(value) for value in row.split(",")] for row in rows]
     assert sum(way[4] - way[2] for way in ways) == pytest.approx(10, abs=0.05)
+
+
+@pytest.mark.filterwarnings("ignore:set\\w+:DeprecationWarning")  # pyserial's own
+def test_a_port_behind_an_rfc_2217_server_is_spoken_to() -> None:
+    """A serial server as pyserial builds it, before the virtual controller on TCP."""
+    command = [sys.executable, "-m", "miurafab", "virtual", "--tcp", "127.0.0.1:0", "--quiet"]
+    with contextlib.ExitStack() as at_end:
+        server = at_end.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+        at_end.callback(server.terminate)
+        line = serial.serial_for_url(server.stdout.readline().strip(), timeout=0.01)
+        at_end.callback(line.close)
+        listener = at_end.enter_context(socket.create_server(("127.0.0.1", 0)))
+        thread = threading.Thread(target=_rfc_2217, args=(listener, line), daemon=True)
+        thread.start()
+        info = machine_info(f"rfc2217://127.0.0.1:{listener.getsockname()[1]}")
+        thread.join(5)
+    assert (info.version, info.state) == ("1.1h", "Idle")
+
+
+def _rfc_2217(listener: socket.socket, line: serial.SerialBase) -> None:
+    class Reply:
+        def write(self, data: bytes) -> None:
+            client.sendall(data)
+
+    client, _ = listener.accept()
+    manager = serial.rfc2217.PortManager(line, Reply())
+    with client:
+        while True:
+            readable, _, _ = select.select([client], [], [], 0.002)
+            if readable:
+                data = client.recv(1024)
+                if not data:
+                    return
+                line.write(b"".join(manager.filter(data)))
+            if line.in_waiting:
+                client.sendall(b"".join(manager.escape(line.read(1))))
