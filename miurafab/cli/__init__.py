@@ -13,10 +13,12 @@ import typer
 
 from miurafab.cli import (
     check,
+    convert,
     cut,
     doctor,
     energy,
     fit,
+    fold,
     machine,
     preview,
     profiles,
@@ -38,6 +40,8 @@ app = typer.Typer(
 app.command("surfaces")(surfaces.surfaces)
 app.command("fit")(fit.fit)
 app.command("check")(check.check)
+app.command("fold")(fold.fold)
+app.command("convert")(convert.convert)
 app.command("energy")(energy.energy)
 app.command("sheets")(sheets.sheets)
 app.command("preview")(preview.preview)

@@ -101,7 +101,7 @@ def motion_through(pattern: CreasePattern, states: Floats, fold_angles: Floats) 
     return Motion(
         pattern,
         states,
-        _laid_on_each_other(pattern, states, frames),
+        laid_on_each_other(pattern, states, frames),
         fold_angles,
         loop_mismatch(pattern, placement),
     )
@@ -287,7 +287,7 @@ def _first_facets(pattern: CreasePattern, depth: Ints) -> Ints:
     return first
 
 
-def _laid_on_each_other(pattern: CreasePattern, states: Floats, frames: Floats) -> Floats:
+def laid_on_each_other(pattern: CreasePattern, states: Floats, frames: Floats) -> Floats:
     """``frames`` moved rigidly: one onto the known form, the others each onto its neighbour."""
     known = pattern.folded_coords
     if known is None:

@@ -1,11 +1,15 @@
-// The pattern in space: flat-shaded facets with a colour for each side, creases by their assignment.
+// The pattern in space: flat-shaded facets with a colour for each side or for their strain, creases
+// by their assignment.
 
 const FACET_VERTEX = `#version 300 es
 precision highp float;
 in vec3 point;
+in float strain;
 uniform mat4 camera, view;
 out vec3 seen;
+flat out float amount;
 void main() {
+  amount = strain;
   seen = (view * vec4(point, 1.0)).xyz;
   gl_Position = camera * vec4(point, 1.0);
 }`;
@@ -15,15 +19,23 @@ void main() {
 const FACET_FRAGMENT = `#version 300 es
 precision highp float;
 in vec3 seen;
-uniform vec3 front, back;
+flat in float amount;
+uniform vec3 front, back, ramp[5];
+uniform bool strained;
 out vec4 result;
+vec3 ramped() {
+  float at = clamp(amount, 0.0, 1.0) * 4.0;
+  int low = min(int(at), 3);
+  return mix(ramp[low], ramp[low + 1], at - float(low));
+}
 void main() {
   vec3 normal = normalize(cross(dFdx(seen), dFdy(seen)));
   if (normal.z < 0.0) normal = -normal;
   float key = max(dot(normal, normalize(vec3(-0.45, 0.6, 0.66))), 0.0);
   float fill = max(dot(normal, normalize(vec3(0.7, -0.15, 0.5))), 0.0);
   float shade = 0.5 + 0.42 * key + 0.14 * fill;
-  result = vec4((gl_FrontFacing ? front : back) * shade, 1.0);
+  vec3 paper = gl_FrontFacing ? front : back;
+  result = vec4((strained ? ramped() : paper) * shade, 1.0);
 }`;
 
 // Widths are parts of the thickest line.
@@ -37,12 +49,25 @@ const CREASES = {
   J: { name: "Join", colour: "--crease-flat", width: 0.55 },
 };
 const THICKEST = 2.2;
+const RAMP = ["#4575b4", "#abd9e9", "#ffffbf", "#fdae61", "#d73027"];
 const FIELD = Math.tan((16 * Math.PI) / 180);
 
 /** The screen's axes in space: right, up, and out of it towards the eye. Z is up in space. */
 function axes({ yaw, pitch }) {
   const [cy, sy, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
   return { right: [cy, sy, 0], up: [-sy * sp, cy * sp, cp], out: [sy * cp, -cy * cp, sp] };
+}
+
+/** The points (three numbers each) that `order` names, one after another. */
+function gather(points, order) {
+  const found = new Float32Array(order.length * 3);
+  for (let at = 0; at < order.length; at += 1) {
+    const from = 3 * order[at];
+    found[3 * at] = points[from];
+    found[3 * at + 1] = points[from + 1];
+    found[3 * at + 2] = points[from + 2];
+  }
+  return found;
 }
 
 class FoldView {
@@ -64,9 +89,12 @@ class FoldView {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.pointBuffer);
     gl.enableVertexAttribArray(this.facet.attribute("point"));
     gl.vertexAttribPointer(this.facet.attribute("point"), 3, gl.FLOAT, false, 12, 0);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.triangles, gl.STATIC_DRAW);
+    this.strainBuffer = gl.createBuffer();
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.strainBuffer);
+    gl.vertexAttribPointer(this.facet.attribute("strain"), 1, gl.UNSIGNED_BYTE, true, 1, 0);
     gl.bindVertexArray(null);
+    this.strains = fold.strain && decode(fold.strain.values, Uint8Array);
+    this.owners = fold.strain && decode(fold.strain.owners, Uint32Array);
     this.creases = new Lines(this.stage, decode(fold.kinds, Uint8Array));
     this.crease = fold.lengths.reduce((sum, length) => sum + length, 0) / (this.edges.length / 2);
     this.legend();
@@ -84,6 +112,8 @@ class FoldView {
       byId("forms").children[this.at].focus();
     });
     byId("motion").addEventListener("input", (event) => this.show(Number(event.target.value)));
+    byId("by-strain").addEventListener("change", () => this.stage.draw());
+    byId("by-strain").checked = Boolean(fold.strain && fold.strain.shown);
     byId("fold-fit").addEventListener("click", () => this.fit());
     gestures(this.stage.canvas, {
       turn: (dx, dy) => this.turn(dx, dy),
@@ -114,6 +144,11 @@ class FoldView {
       kind, name: CREASES[letter].name, colour: CREASES[letter].colour, note: lengthText(this.fold.lengths[kind]),
     }));
     this.shown = legend(byId("creases"), entries, () => this.stage.draw());
+    if (this.fold.strain) {
+      const { most } = this.fold.strain;
+      byId("strain-most").textContent = most ? `strain 0 to ${most.toExponential(1)}` : "no strain";
+      byId("strain-ramp").style.background = `linear-gradient(to right, ${RAMP.join(", ")})`;
+    }
     for (const [name, colour] of [["Front", "--side-a"], ["Back", "--side-b"]]) {
       const swatch = element("span", { className: "swatch area" });
       swatch.style.background = `var(${colour})`;
@@ -128,9 +163,14 @@ class FoldView {
       button.setAttribute("aria-checked", place === at);
       button.tabIndex = place === at ? 0 : -1;
     }
-    byId("motion-bar").hidden = this.form.frames === 1;
-    byId("motion").max = this.form.frames - 1;
-    this.show(this.form.frames === 1 ? 0 : Number(byId("motion").value));
+    const moves = this.form.frames > 1;
+    byId("motion-bar").hidden = !moves;
+    byId("strain-key").hidden = !moves || !this.strains;
+    if (moves && Number(byId("motion").max) !== this.form.frames - 1) {
+      byId("motion").max = this.form.frames - 1;
+      byId("motion").value = this.fold.start;
+    }
+    this.show(moves ? Number(byId("motion").value) : 0);
     const size = this.form.box.slice(3).map((mm) => mm.toFixed(mm >= 100 ? 0 : 1));
     byId("fold-size").value = `${(this.form.flat ? size.slice(0, 2) : size).join(" × ")} mm`;
   }
@@ -140,22 +180,27 @@ class FoldView {
     const { gl } = this.stage;
     const count = this.form.coordinates.length / this.form.frames;
     const points = this.form.coordinates.subarray(frame * count, (frame + 1) * count);
-    const ends = new Float32Array(this.edges.length * 3);
-    for (let end = 0; end < this.edges.length; end += 1) {
-      const from = 3 * this.edges[end];
-      ends[3 * end] = points[from];
-      ends[3 * end + 1] = points[from + 1];
-      ends[3 * end + 2] = points[from + 2];
-    }
     gl.bindBuffer(gl.ARRAY_BUFFER, this.pointBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, points, gl.DYNAMIC_DRAW);
-    this.creases.place(ends, 3);
+    gl.bufferData(gl.ARRAY_BUFFER, gather(points, this.triangles), gl.DYNAMIC_DRAW);
+    this.creases.place(gather(points, this.edges), 3);
+    if (this.strains && this.form.frames > 1) this.colour(frame);
     if (this.form.frames > 1) {
-      const text = `${frame + 1} of ${this.form.frames}`;
+      const name = this.fold.names[frame];
+      const text = `${frame + 1} of ${this.form.frames}${name ? `, ${name}` : ""}`;
       byId("motion-frame").value = text;
       byId("motion").setAttribute("aria-valuetext", text);
     }
     this.stage.draw();
+  }
+
+  /** The strain of each triangle's facet, at each of its corners. */
+  colour(frame) {
+    const { gl } = this.stage;
+    const from = (frame * this.strains.length) / this.form.frames;
+    const strain = new Uint8Array(this.triangles.length);
+    this.owners.forEach((facet, at) => strain.fill(this.strains[from + facet], 3 * at, 3 * at + 3));
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.strainBuffer);
+    gl.bufferData(gl.ARRAY_BUFFER, strain, gl.DYNAMIC_DRAW);
   }
 
   fit() {
@@ -234,8 +279,14 @@ class FoldView {
     gl.uniformMatrix4fv(this.facet.uniform.view, false, view);
     gl.uniform3fv(this.facet.uniform.front, rgb("--side-a"));
     gl.uniform3fv(this.facet.uniform.back, rgb("--side-b"));
+    const strained = Boolean(this.strains) && this.form.frames > 1 && byId("by-strain").checked;
+    gl.uniform1i(this.facet.uniform.strained, strained);
+    gl.uniform3fv(this.facet.uniform.ramp, RAMP.flatMap(rgb));
     gl.bindVertexArray(this.facets);
-    gl.drawElements(gl.TRIANGLES, this.triangles.length, gl.UNSIGNED_INT, 0);
+    const place = this.facet.attribute("strain");
+    if (strained) gl.enableVertexAttribArray(place);
+    else gl.disableVertexAttribArray(place);
+    gl.drawArrays(gl.TRIANGLES, 0, this.triangles.length);
     gl.bindVertexArray(null);
     gl.disable(gl.POLYGON_OFFSET_FILL);
     gl.enable(gl.BLEND);
