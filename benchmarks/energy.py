@@ -4,7 +4,8 @@
 
 A size n is n x n Miura cells, that is 4 n^2 facets. Each sheet is fitted for developability alone,
 which does not fold rigidly, and unfolded from its folded form to nearly flat, with barrier and
-stiffness; the fit is not part of the time. "factor" is one factorisation of the matrix K. The last line is the exponent p of time ~ facets^p over all sizes.
+stiffness; the fit is not part of the time. "factor" is one factorisation of the matrix K. The last
+line is the exponent p of time ~ facets^p over all sizes.
 """
 
 from __future__ import annotations

@@ -1,0 +1,133 @@
+"""miurafab energy: what it prints, what it writes, what it refuses."""
+
+import csv
+import importlib.util
+import io
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from command_line import sentence
+from problems import regular
+
+from miurafab.errors import InputError
+from miurafab.origami.fit import FitRequest, fit
+from miurafab.profiles import load_material
+from miurafab.surfaces.catalogue import make_surface
+from miurafab.workflow.design import save_pattern
+from miurafab.workflow.energy import energy, energy_plot, energy_table
+
+
+@pytest.fixture(scope="module")
+def hypar():
+    """A hypar of 8 x 8 facets, which does not fold rigidly."""
+    return fit(FitRequest(make_surface("hypar", {})[0], 8, 8, size_mm=200.0)).pattern
+
+
+@pytest.fixture
+def saved(hypar, tmp_path):
+    save_pattern(hypar, tmp_path / "hypar.fold")
+    return tmp_path / "hypar.fold"
+
+
+def test_json_tells_the_barrier_and_where_it_is(run, saved, hypar):
+    done = run("energy", saved, "--steps", "20", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    answer = json.loads(done.stdout)
+    curve = energy(hypar, 20)
+    assert answer == json.loads(json.dumps(curve.report()))
+    assert answer["converged"]
+    assert answer["bistable"]
+    assert not answer["rigid"]
+    assert answer["energy_unit"] == "k_f L"
+    assert answer["barrier"] == curve.barrier >= answer["highest_energy"] > 0
+    assert abs(answer["last_angle_deg"]) == pytest.approx(2.5)
+    low, high = sorted(abs(state["angle_deg"]) for state in answer["stable_states"])
+    assert low == 0 < abs(answer["barrier_angle_deg"]) < high
+    assert high == pytest.approx(abs(answer["folded_angle_deg"]))
+
+
+def test_joules_with_a_material(run, saved):
+    bare = json.loads(run("energy", saved, "--steps", "10", "--json").stdout)
+    card = json.loads(
+        run("energy", saved, "--steps", "10", "--material", "card-250", "--json").stdout
+    )
+    assert card["energy_unit"] == "J"
+    assert 0 < card["barrier"] < bare["barrier"]
+
+
+def test_people_get_a_verdict(run, saved, tmp_path):
+    done = run("energy", saved, "--steps", "10")
+    assert done.returncode == 0
+    assert done.stdout.strip().endswith("held by a barrier on the way to flat.")
+    save_pattern(regular(5, 5), tmp_path / "flat.fold")
+    done = run("energy", tmp_path / "flat.fold", "--steps", "6", "-o", tmp_path / "flat.png")
+    assert "It folds rigidly" in done.stdout
+
+
+def test_the_table_is_the_curve(run, saved, hypar, tmp_path):
+    assert run("energy", saved, "--steps", "12", "-o", tmp_path / "e.csv").returncode == 0
+    text = (tmp_path / "e.csv").read_text(encoding="utf-8")
+    curve = energy(hypar, 12)
+    assert text == energy_table(curve)
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert list(rows[0]) == ["step", "angle_deg", "energy_k_f_L", "torque_k_f_L_per_rad"]
+    values = np.array([[float(value) for value in row.values()] for row in rows])
+    assert values[:, 0].tolist() == list(range(13))
+    assert np.radians(values[:, 1]) == pytest.approx(curve.path.drives, rel=1e-14)
+    assert values[:, 2].tolist() == curve.path.energies.tolist()
+    assert values[:, 3].tolist() == curve.path.loads.tolist()
+
+
+@pytest.mark.parametrize(("kind", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_plots_are_the_same_every_time(run, saved, hypar, tmp_path, kind, start):
+    out = tmp_path / f"e.{kind}"
+    assert run("energy", saved, "--steps", "10", "-o", out, "--quiet").returncode == 0
+    assert out.read_bytes().startswith(start)
+    assert out.read_bytes() == energy_plot(energy(hypar, 10), kind, "hypar")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["-o", "e.pdf"], "by the ending"),
+        (["-o", "nowhere/e.csv"], "does not exist"),
+        (["--steps", "0"], "--steps is 0"),
+        (["--crease", "0"], "Edge 0 is not a crease"),
+        (["--crease-ratio", "-1"], "--crease-ratio is -1"),
+        (["--material", "granite"], "granite"),
+    ],
+)
+def test_what_cannot_be_done_is_one_sentence(run, saved, arguments, part):
+    assert part in sentence(run("energy", saved, *arguments), 2)
+
+
+def test_a_pattern_without_a_folded_form_is_refused(run, tmp_path):
+    save_pattern(replace(regular(5, 5), folded_coords=None), tmp_path / "flat.fold")
+    assert "no folded form" in sentence(run("energy", tmp_path / "flat.fold"), 2)
+
+
+def test_a_material_without_a_modulus_is_refused(hypar):
+    material = replace(load_material("card-250"), modulus_pa=None)
+    with pytest.raises(InputError, match="gives no modulus"):
+        energy(hypar, material=material)
+
+
+def test_without_matplotlib_the_way_out_is_told(run, saved, monkeypatch):
+    there = importlib.util.find_spec
+
+    def missing(name, *rest):
+        return None if name == "matplotlib" else there(name, *rest)
+
+    monkeypatch.setattr(importlib.util, "find_spec", missing)
+    told = sentence(run("energy", saved, "-o", "e.png"), 2)
+    assert "pip install 'miurafab[plot]'" in told
+
+
+def test_a_path_that_is_lost_is_exit_1(run, saved):
+    done = run("energy", saved, "--steps", "3", "--crease-ratio", "1", "--json")
+    assert done.returncode == 1
+    answer = json.loads(done.stdout)
+    assert not answer["converged"]
+    assert not answer["bistable"]
