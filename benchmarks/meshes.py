@@ -12,14 +12,19 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, cKDTree
+
+from miurafab.errors import TargetError
+from miurafab.origami.fit import FitRequest, fit
+from miurafab.surfaces.mesh import mesh_surface
+from miurafab.workflow.design import parse_facets
 
 Array = np.ndarray
 Formula = Callable[[Array, Array], Array]
@@ -51,9 +56,7 @@ def torus(big: float, small: float, at: float) -> Formula:
 
 
 def revolution(radius: Callable[[Array], Array]) -> Formula:
-    return lambda x, y: np.stack(
-        [radius(y) * np.cos(x), radius(y) * np.sin(x), y + 0 * x], axis=-1
-    )
+    return lambda x, y: np.stack([radius(y) * np.cos(x), radius(y) * np.sin(x), y + 0 * x], axis=-1)
 
 
 def helicoid(x: Array, y: Array) -> Array:
@@ -61,9 +64,7 @@ def helicoid(x: Array, y: Array) -> Array:
 
 
 def enneper(x: Array, y: Array) -> Array:
-    return np.stack(
-        [x - x**3 / 3 + x * y**2, y - y**3 / 3 + y * x**2, x**2 - y**2], axis=-1
-    )
+    return np.stack([x - x**3 / 3 + x * y**2, y - y**3 / 3 + y * x**2, x**2 - y**2], axis=-1)
 
 
 def twisted(x: Array, y: Array) -> Array:
@@ -110,7 +111,10 @@ def corner(x: Array, y: Array) -> Array:
 
 
 def lattice(
-    position: Formula, half: tuple[float, float], count: int, outline: Formula = square,
+    position: Formula,
+    half: tuple[float, float],
+    count: int,
+    outline: Formula = square,
     skew: bool = False,
 ) -> tuple[Array, Array]:
     """An even triangulation of |x| <= half[0], |y| <= half[1] within ``outline`` <= 1."""
@@ -138,9 +142,7 @@ def scattered(
     pool = pool[outline(*pool.T) < 0.97]
     centres = pool[:count]
     for _ in range(6):
-        nearest = np.argmin(
-            ((pool[:, None, :] - centres[None, :, :]) ** 2).sum(axis=2), axis=1
-        ) if count < 300 else _nearest(pool, centres)
+        nearest = cKDTree(centres).query(pool)[1]
         total = np.bincount(nearest, minlength=len(centres))
         sums = np.stack(
             [np.bincount(nearest, pool[:, k], minlength=len(centres)) for k in (0, 1)], axis=1
@@ -159,12 +161,6 @@ def scattered(
     faces = np.where((area < 0)[:, None], faces[:, ::-1], faces)[np.abs(area) > 1e-6]
     x, y = points.T
     return compact(position(half[0] * x, half[1] * y), faces)
-
-
-def _nearest(pool: Array, centres: Array) -> Array:
-    from scipy.spatial import cKDTree
-
-    return cKDTree(centres).query(pool)[1]
 
 
 def compact(points: Array, faces: Array) -> tuple[Array, Array]:
@@ -203,16 +199,18 @@ def _meshes() -> Iterator[tuple[str, tuple[Array, Array]]]:
     yield "bump-noisy", noisy(lattice(graph(lambda x, y: 0.5 * gauss(x, y)), (1, 1), 70), 2e-3, 2)
     yield "bumps-two", lattice(graph(lambda x, y: 0.4 * two(x, y)), (1, 1), 50)
     yield "peaks", lattice(graph(lambda x, y: 0.08 * peaks(3 * x, 3 * y)), (1, 1), 60)
-    yield "egg-box", lattice(
-        graph(lambda x, y: 0.12 * np.cos(1.5 * pi * x) * np.cos(1.5 * pi * y)), (1, 1), 60
+    yield (
+        "egg-box",
+        lattice(graph(lambda x, y: 0.12 * np.cos(1.5 * pi * x) * np.cos(1.5 * pi * y)), (1, 1), 60),
     )
     yield "waves", scattered(graph(waves(3, 0.25)), (1, 1), 1500, square, 3)
     yield "waves-noisy", noisy(scattered(graph(waves(4, 0.25)), (1, 1), 2500, drop, 4), 2e-3, 4)
     yield "saddle", lattice(graph(lambda x, y: 0.4 * (x**2 - y**2)), (1, 1), 30)
     yield "saddle-steep", lattice(graph(lambda x, y: 0.8 * (x**2 - y**2)), (1, 1), 40)
     yield "saddle-disc", scattered(graph(lambda x, y: 0.5 * x * y), (1, 1), 600, disc, 5)
-    yield "saddle-noisy", noisy(
-        lattice(graph(lambda x, y: 0.5 * (x**2 - y**2)), (1, 1), 60, skew=True), 3e-3, 6
+    yield (
+        "saddle-noisy",
+        noisy(lattice(graph(lambda x, y: 0.5 * (x**2 - y**2)), (1, 1), 60, skew=True), 3e-3, 6),
     )
     yield "saddle-monkey", lattice(graph(lambda x, y: 0.4 * (x**3 - 3 * x * y**2)), (1, 1), 50)
     yield "enneper", lattice(enneper, (0.7, 0.7), 40)
@@ -230,11 +228,84 @@ def _meshes() -> Iterator[tuple[str, tuple[Array, Array]]]:
     yield "torus-top", lattice(torus(1, 0.45, pi / 2), (0.9, 0.9), 50)
     yield "torus-both", lattice(torus(1, 0.4, pi / 2), (1.3, 1.3), 70)
     yield "torus-noisy", noisy(lattice(torus(1, 0.5, pi / 2), (0.8, 0.9), 70), 2e-3, 11)
-    yield "vase-noisy", noisy(
-        lattice(revolution(lambda y: 0.8 + 0.2 * np.sin(2.2 * y)), (1, 1.1), 70), 1.5e-3, 12
+    yield (
+        "vase-noisy",
+        noisy(lattice(revolution(lambda y: 0.8 + 0.2 * np.sin(2.2 * y)), (1, 1.1), 70), 1.5e-3, 12),
     )
 
 
 def meshes() -> dict[str, tuple[Array, Array]]:
     """The thirty meshes by name, each (vertices (V, 3), faces (F, 3))."""
     return {name: placed(mesh, n) for n, (name, mesh) in enumerate(_meshes())}
+
+
+def trial(name: str, mesh: tuple[Array, Array], facets: tuple[int, int]) -> dict[str, Any]:
+    """One mesh fitted; ``fitted`` says whether it counts, ``why`` why not."""
+    started = time.perf_counter()
+    answer: dict[str, Any] = {"name": name, "triangles": len(mesh[1]), "fitted": False}
+    try:
+        surface = mesh_surface(*mesh, name)
+    except TargetError as refusal:
+        return answer | {"why": str(refusal), "seconds": time.perf_counter() - started}
+    result = fit(FitRequest(surface, *facets))
+    answer |= {
+        "status": result.status,
+        "attempts": len(result.attempts),
+        "place": result.attempts[-1].place,
+        "why": result.advice,
+    }
+    if result.pattern is not None and result.measurements is not None:
+        found = result.measurements
+        diagonal = float(np.linalg.norm(np.ptp(mesh[0], axis=0)))
+        residual = max(found.max_planarity, found.max_developability, found.max_isometry)
+        deviation = found.hausdorff_midsurface_mm / diagonal
+        answer |= {
+            "residual": residual,
+            "deviation": deviation,
+            "self_intersections": found.self_intersections,
+            "overlaps": found.overlaps,
+            "area_ratio": found.area_ratio,
+            "fitted": bool(
+                residual <= 1e-10
+                and deviation <= 0.02
+                and not found.self_intersections
+                and not found.overlaps
+            ),
+        }
+    return answer | {"seconds": time.perf_counter() - started}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    parser.add_argument("--facets", default="20x20")
+    parser.add_argument("--json", type=Path, help="also write the answers here")
+    parser.add_argument("--save", type=Path, help="write the meshes as .ply files here and stop")
+    asked = parser.parse_args()
+    chosen = {
+        name: mesh for name, mesh in meshes().items() if not asked.names or name in asked.names
+    }
+    if asked.save is not None:
+        asked.save.mkdir(parents=True, exist_ok=True)
+        for name, (vertices, faces) in chosen.items():
+            trimesh.Trimesh(vertices, faces, process=False).export(asked.save / f"{name}.ply")
+        return
+    print(f"{'mesh':14} {'fitted':6} {'residual':>9} {'deviation':>9} {'tries':>5} {'s':>6}  how")
+    answers = []
+    for name, mesh in chosen.items():
+        a = trial(name, mesh, parse_facets(asked.facets))
+        answers.append(a)
+        print(
+            f"{name:14} {'yes' if a['fitted'] else 'no':6} {a.get('residual', np.nan):9.1e} "
+            f"{100 * a.get('deviation', np.nan):8.2f}% {a.get('attempts', 0):5} "
+            f"{a['seconds']:6.1f}  {a.get('place') or a['why']}",
+            flush=True,
+        )
+    fitted = sum(a["fitted"] for a in answers)
+    print(f"{fitted} of {len(answers)} fitted, {sum(a['seconds'] for a in answers):.0f} s")
+    if asked.json is not None:
+        asked.json.write_text(json.dumps(answers, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -9,6 +9,10 @@ meets everything asked is the answer. The order:
 3. the same bent step by step from flat to the full target, carrying the solution along;
 4. the seeds shaken a little at random, by the request's ``seed``.
 
+On a mesh the sheet may then lie elsewhere: the scan smoothed more, the grid turned, and as the last
+resort a smaller part of the rectangle, each with the seeds and some of the bends. The advice says
+where it lies.
+
 Exact flat-foldability is appended to a developable solution. Whatever happens, the result says what
 was tried and, if nothing served, what to change.
 """
@@ -31,10 +35,11 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cylinder import cylinder_on
 from miurafab.origami.seed import Corrugation, seed
 from miurafab.origami.solver import Projection, project
+from miurafab.origami.strip import solve_strip
 from miurafab.origami.tessellation import Tessellation
 from miurafab.origami.unfold import unfold
-from miurafab.origami.strip import solve_strip
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
+from miurafab.surfaces.mesh import MeshSurface
 from miurafab.surfaces.surface import Bent, Swapped, TargetSurface, tangents
 
 Floats = NDArray[np.float64]
@@ -43,9 +48,13 @@ STRETCHES = ((1.3, 1.3), (1.15, 1.6), (1.6, 1.3), (1.3, 1.6), (2.0, 1.3), (2.6, 
 """The stretches along and across the rows that are tried in turn. Strong curvature along the rows
 wants more of the first, strong twist less of the first and more of the second.
 """
+BENDS_ELSEWHERE = 4
+"""How many of those stretches are bent step by step where a sheet is laid elsewhere on a mesh."""
 BEND_STEPS = 12
 STEP_CAP = 0.25
 """The farthest that a coordinate moves in one step, in mean edge lengths."""
+FAR = 0.02
+"""A mid-surface farther from the target than this part of the diagonal makes the search go on."""
 SHAKE = 0.03
 """The standard deviation of a random attempt's coordinates, in mean edge lengths."""
 
@@ -93,8 +102,8 @@ class FitRequest:
 @dataclass(frozen=True)
 class Attempt:
     """One attempt: the way (``direct``, ``strip``, ``seed``, ``bent``, ``shaken``), the row
-    direction, the corrugation, the residual it ended with, and why it was not enough (empty if it
-    was).
+    direction, the corrugation, the residual it ended with, why it was not enough (empty if it
+    was), and on a mesh where else the sheet was laid.
     """
 
     way: str
@@ -103,6 +112,7 @@ class Attempt:
     residual: float
     iterations: int
     fault: str
+    place: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +147,7 @@ class FitResult:
                     "residual": a.residual,
                     "iterations": a.iterations,
                     "fault": a.fault,
+                    "place": a.place,
                 }
                 for a in self.attempts
             ],
@@ -152,6 +163,14 @@ class _Candidate:
     measurements: Measurements
     faults: tuple[str, ...]
 
+    @property
+    def rank(self) -> tuple[int, bool]:
+        """The smaller the better: the number of faults, then whether it strays from the target."""
+        assert self.pattern.folded_coords is not None
+        extent = np.ptp(self.pattern.folded_coords, axis=0)
+        stray = (self.measurements.hausdorff_midsurface_mm or 0.0) > FAR * np.linalg.norm(extent)
+        return len(self.faults), bool(stray)
+
 
 def fit(request: FitRequest, on_progress: Callable[[float, str], None] | None = None) -> FitResult:
     """The tessellation asked for; ``on_progress`` gets a fraction and a word on what is tried.
@@ -162,18 +181,18 @@ def fit(request: FitRequest, on_progress: Callable[[float, str], None] | None = 
     started = time.perf_counter()
     attempts: list[Attempt] = []
     best: _Candidate | None = None
-    plans = list(_plans(request))
-    for number, plan in enumerate(plans):
+    for number, plan in enumerate(_plans(request)):
         if on_progress is not None:
-            on_progress(number / len(plans), plan.describe())
+            # how many attempts it takes is not known; most sheets need one or two
+            on_progress(1 - 0.9**number, plan.describe())
         outcome = plan.run(request)
         if isinstance(outcome, Attempt):
             attempts.append(outcome)
             continue
         attempts.append(outcome.attempt)
-        if best is None or len(outcome.faults) < len(best.faults):
+        if best is None or outcome.rank < best.rank:
             best = outcome
-        if not outcome.faults:
+        if outcome.rank == (0, False):
             break
     if on_progress is not None:
         on_progress(1.0, "done")
@@ -183,9 +202,13 @@ def fit(request: FitRequest, on_progress: Callable[[float, str], None] | None = 
         advice = _advice_when_stalled(attempts)
         return FitResult("stalled", advice, None, None, tuple(attempts), iterations, seconds)
     status = "infeasible" if best.faults else "converged"
+    place = best.attempt.place
+    remarks = [f"On the whole rectangle no sheet was found; this one has {place}."] if place else []
+    if best.rank[1]:
+        remarks.append("The mid-surface lies far from the target; ask for more --facets.")
     return FitResult(
         status,
-        " ".join(best.faults),
+        " ".join((*best.faults, *remarks)),
         best.pattern,
         best.measurements,
         tuple(attempts),
@@ -209,6 +232,8 @@ class _Plan:
     surface: TargetSurface
     rows_along: str
     corrugation: Corrugation
+    place: str = ""
+    layout: dict[str, Any] = field(default_factory=dict)
 
     def describe(self) -> str:
         how = {
@@ -218,7 +243,8 @@ class _Plan:
             "bent": "bending step by step",
             "shaken": "seed shaken",
         }
-        return f"{how[self.way]}, rows along {self.rows_along}"
+        place = f", {self.place}" if self.place else ""
+        return f"{how[self.way]}, rows along {self.rows_along}{place}"
 
     def run(self, request: FitRequest) -> _Candidate | Attempt:
         if self.way == "direct":
@@ -258,13 +284,14 @@ class _Plan:
                 solution.residual,
                 iterations,
                 solution.reason,
+                self.place,
             )
         return self._candidate(request, sheet, iterations)
 
     def _candidate(self, request: FitRequest, sheet: Tessellation, iterations: int) -> _Candidate:
         extent = float(np.ptp(sheet.vertices, axis=0).max())
         scale = 1.0 if request.size_mm is None else request.size_mm / extent
-        pattern = unfold(sheet.scaled(scale), scale=scale, target=request.target)
+        pattern = unfold(sheet.scaled(scale), scale=scale, target=request.target | self.layout)
         measured = measure(pattern, self.surface)
         faults = tuple(_faults(request, pattern, measured))
         attempt = Attempt(
@@ -274,6 +301,7 @@ class _Plan:
             max(measured.max_planarity or 0.0, measured.max_developability or 0.0),
             iterations,
             " ".join(faults),
+            self.place,
         )
         return _Candidate(attempt, pattern, measured, faults)
 
@@ -293,6 +321,19 @@ def _plans(request: FitRequest) -> Iterator[_Plan]:
         for corrugation in corrugations:
             for surface, name in oriented:
                 yield _Plan(way, surface, name, corrugation)
+    if isinstance(request.surface, MeshSurface):
+        yield from _elsewhere(request.surface, corrugations)
+
+
+def _elsewhere(surface: MeshSurface, corrugations: list[Corrugation]) -> Iterator[_Plan]:
+    """The same ways with the sheet laid elsewhere on the mesh; each layout is made when needed."""
+    for place, other in surface.alternatives():
+        oriented: list[tuple[TargetSurface, str]] = [(other, "u"), (Swapped(other), "v")]
+        oriented.sort(key=lambda pair: _turning(pair[0]))
+        for way, some in (("seed", corrugations), ("bent", corrugations[:BENDS_ELSEWHERE])):
+            for corrugation in some:
+                for turned, name in oriented:
+                    yield _Plan(way, turned, name, corrugation, place, other.description)
 
 
 def _corrugations(request: FitRequest) -> list[Corrugation]:
