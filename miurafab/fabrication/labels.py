@@ -10,7 +10,7 @@ would be too small to read is left out. For a polygon that is not convex the sam
 than needed.
 
 The number of a tab stands on the tab, and once more on the facet it is glued to, at the place that
-the tab will cover.
+the tab will cover; a patch name stands where no tab will.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from miurafab.fabrication.lettering import text_strokes, text_width
-from miurafab.fabrication.tabs import TabRegions
+from miurafab.fabrication.tabs import NO_LIMIT, TabRegions, clip_convex
 from miurafab.origami.crease_pattern import CreasePattern
 
 CLEARANCE_MM = 0.5
@@ -83,25 +82,18 @@ def place_texts(
     engraved so that they can be read then.
     """
     texts, left_out = _tab_numbers(face_patch, tabs, numbers, turns)
-    spots = _facet_spots(pattern, turns[face_patch])
+    spots = _facet_spots(pattern, tabs, turns[face_patch])
     width = np.array([text_width(name) for name in names])
     height = np.minimum(spots.height(width[face_patch]), NAME_MM[1])
-    glued = np.zeros(len(face_patch), dtype=bool)
-    glued[tabs.mate_face] = True
     for patch, name in enumerate(names):
-        faces = np.flatnonzero((face_patch == patch) & (height >= NAME_MM[0]))
-        middle = spots.centre[face_patch == patch].mean(axis=0)
-        far = np.linalg.norm(spots.centre[faces] - middle, axis=1)
-        best = np.lexsort((far, -np.round(height[faces], 3), glued[faces]))
-        for face in faces[best].tolist():
-            centre, along, size = spots.centre[face], spots.along[face], float(height[face])
-            under = np.flatnonzero(tabs.mate_face == face)
-            box = shapely.Polygon(_box(centre, along, size, float(width[patch])))
-            if not any(box.intersects(shapely.Polygon(tabs.polygon(tab))) for tab in under):
-                texts.append(_written(patch, name, centre, along, size))
-                break
-        else:
+        faces = np.flatnonzero(face_patch == patch)
+        far = np.linalg.norm(spots.centre[faces] - spots.centre[faces].mean(axis=0), axis=1)
+        face = int(faces[np.lexsort((far, -np.round(height[faces], 3)))[0]])
+        if height[face] < NAME_MM[0]:
             left_out += 1
+            continue
+        centre, along = spots.centre[face], spots.along[face]
+        texts.append(_written(patch, name, centre, along, float(height[face])))
     return texts, left_out
 
 
@@ -131,22 +123,37 @@ def _tab_numbers(
     return texts, left_out
 
 
-def _facet_spots(pattern: CreasePattern, turns: NDArray[np.float64]) -> _Spots:
-    """A place in each facet, along its longest side."""
+def _facet_spots(pattern: CreasePattern, tabs: TabRegions, turns: NDArray[np.float64]) -> _Spots:
+    """A place in each facet, along its longest side, beyond whatever tabs cover it."""
     corners = pattern.faces_vertices
-    points = pattern.vertices_coords[corners]
+    points, count = pattern.vertices_coords[corners], (corners >= 0).sum(axis=1)
     ends = pattern.vertices_coords[pattern.edges_vertices[pattern.faces_edges]]
     side = ends[:, :, 1] - ends[:, :, 0]
     # Sides equal up to rounding: the first one, so that rounding decides nothing.
     length = np.where(corners >= 0, np.round(np.linalg.norm(side, axis=2), 6), -1.0)
     longest = side[np.arange(len(corners)), length.argmax(axis=1)]
-    return _spots(points, corners >= 0, _upright(longest, turns))
+
+    left = np.arange(len(tabs))
+    while len(left):
+        # One tab of each facet at a time.
+        faces, first = np.unique(tabs.mate_face[left], return_index=True)
+        tab = left[first]
+        base = tabs.points[tab, 1] - tabs.points[tab, 0]
+        base /= np.linalg.norm(base, axis=1)[:, None]
+        normal, limit = np.zeros((len(corners), 2)), np.full(len(corners), NO_LIMIT)
+        normal[faces] = np.column_stack([-base[:, 1], base[:, 0]])
+        depth = np.einsum("nki,ni->nk", tabs.points[tab], normal[faces])
+        limit[faces] = np.where(tabs.present[tab], depth, -np.inf).max(axis=1)
+        points, count = clip_convex(points, count, normal, limit)
+        left = np.delete(left, first)
+    present = np.arange(points.shape[1]) < count[:, None]
+    return _spots(points, present, _upright(longest, turns))
 
 
 def _spots(
     points: NDArray[np.float64], present: NDArray[np.bool_], along: NDArray[np.float64]
 ) -> _Spots:
-    count = present.sum(axis=1)[:, None]
+    count = np.maximum(present.sum(axis=1), 1)[:, None]
     slot = np.arange(points.shape[1])
     following = np.where(slot + 1 < count, slot + 1, 0)
     step = np.take_along_axis(points, following[..., None], axis=1) - points
@@ -155,7 +162,10 @@ def _spots(
     normal = np.stack([-step[..., 1], step[..., 0]], axis=-1)
     centre = np.where(present[..., None], points, 0.0).sum(axis=1) / count
     depth = np.einsum("nki,nki->nk", normal, centre[:, None] - points) - CLEARANCE_MM
-    return _Spots(centre, along, normal, np.where(present, depth, np.inf))
+    depth = np.where(present, depth, np.inf)
+    # Nothing fits into a place that is gone.
+    depth[~present.any(axis=1)] = -np.inf
+    return _Spots(centre, along, normal, depth)
 
 
 def _upright(along: NDArray[np.float64], turns: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -166,15 +176,6 @@ def _upright(along: NDArray[np.float64], turns: NDArray[np.float64]) -> NDArray[
     tilted = turns - np.radians(10.0)
     forward = np.cos(tilted) * along[:, 0] - np.sin(tilted) * along[:, 1]
     return np.where(forward[:, None] < -1e-9, -along, along)
-
-
-def _box(
-    centre: NDArray[np.float64], along: NDArray[np.float64], height: float, width: float
-) -> NDArray[np.float64]:
-    across = np.array([-along[1], along[0]])
-    half = np.array([[-width, -1.0], [width, -1.0], [width, 1.0], [-width, 1.0]]) * height / 2
-    box: NDArray[np.float64] = centre + half @ np.stack([along, across])
-    return box
 
 
 def _written(

@@ -30,8 +30,8 @@ MIN_SIDE_MM = 1.0
 MIN_AREA_MM2 = 2.0
 """A tab with less glue area does not hold (judged)."""
 
-_NO_LIMIT = -1e12
-"""Below every p·n in mm; finite, so that differences of depths stay numbers."""
+NO_LIMIT = -1e12
+"""A limit below every p·n in mm; finite, so that differences of depths stay numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,14 +159,14 @@ def tab_regions(
     )
     count = np.full(len(edges), 4)
     for k in range(corners.shape[1]):
-        limit = np.where(other[:, k], offset[:, k] + inset, _NO_LIMIT)
-        points, count = _clip(points, count, normal[:, k], limit)
+        limit = np.where(other[:, k], offset[:, k] + inset, NO_LIMIT)
+        points, count = clip_convex(points, count, normal[:, k], limit)
         if bearing is None:
             continue
         towards = normal[:, k] - np.array([0.0, 1.0])
         shared = other[:, k] & bearing[mate, k]
         limit = offset[:, k] + inset * np.linalg.norm(towards, axis=1)
-        points, count = _clip(points, count, towards, np.where(shared, limit, _NO_LIMIT))
+        points, count = clip_convex(points, count, towards, np.where(shared, limit, NO_LIMIT))
     points, count = _base_first(points, count)
     placed = a[:, None] + np.einsum("nij,nki->nkj", frame, points)
     own = pattern.edges_faces[edges, 1 - sides]
@@ -211,7 +211,7 @@ def _bearing(
     return found
 
 
-def _clip(
+def clip_convex(
     points: NDArray[np.float64],
     count: NDArray[np.int64],
     normal: NDArray[np.float64],

@@ -16,9 +16,8 @@ from miurafab.fabrication.pieces import make_pieces
 def test_a_rectangle_grows_by_half_a_kerf_on_each_side():
     outline = np.array([[0, 0], [40, 0], [40, 20], [0, 20]], dtype=float)
     (line,) = cut_lines([outline], 0.2)[0]
-    assert shapely.Polygon(line).equals_exact(
-        shapely.box(-0.1, -0.1, 40.1, 20.1), 1e-9, normalize=True
-    )
+    expected = shapely.box(-0.1, -0.1, 40.1, 20.1).normalize()
+    assert shapely.Polygon(line).normalize().equals_exact(expected, 1e-9)
     assert shapely.Polygon(line).exterior.is_ccw
 
 

@@ -13,6 +13,7 @@ from miurafab.fabrication.labels import CLEARANCE_MM, place_texts
 from miurafab.fabrication.lettering import text_strokes, text_width
 from miurafab.fabrication.pieces import make_pieces
 from miurafab.fabrication.sheets import lay_out
+from miurafab.fabrication.tabs import choose_tabs
 
 ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ-"
 
@@ -93,6 +94,19 @@ def test_a_number_stands_on_both_sides_of_its_seam():
     assert sorted(tab.number for patch in layout.patches for tab in patch.tabs) == list(
         range(1, tabs + 1)
     )
+
+
+def test_a_patch_whose_facets_are_all_glued_upon_is_named_beside_its_tabs():
+    pattern = miura(9, 3, 24.0, 24.0)
+    face_patch = np.repeat([0, 0, 1], 9)
+    tabs, _, _ = choose_tabs(pattern, face_patch, card())
+    numbers, turns = np.arange(len(tabs)) + 1, np.zeros(2)
+    texts, left_out = place_texts(pattern, face_patch, ["P1", "P2"], tabs, numbers, turns)
+    assert left_out == 0
+    (name,) = [text for text in texts if text.text == "P2"]
+    shape = shapely.MultiLineString([stroke.tolist() for stroke in name.strokes])
+    for tab in range(len(tabs)):
+        assert shape.distance(shapely.Polygon(tabs.polygon(tab))) >= CLEARANCE_MM - 1e-6
 
 
 def test_texts_that_find_no_room_are_counted():
