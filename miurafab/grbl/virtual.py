@@ -77,13 +77,16 @@ class VirtualGrbl:
         self._run(round(self._seconds * cpu.CLOCK))
 
     def next_event_in(self) -> float | None:
-        """Seconds until something changes by itself; None if nothing will without input."""
+        """Seconds until something changes by itself; None if nothing will without input.
+
+        Output that is out already and only waits to be taken is no change.
+        """
         machine = self._machine
         uart = machine.uart
         events = (
             machine.stepper.next_change(),
             uart.next_arrival(),
-            uart.next_departure(),
+            uart.next_departure(machine.now),
             self._due(),
         )
         event = min((event for event in events if event is not None), default=None)

@@ -95,9 +95,9 @@ class Uart:
             self._going.pop()
         self._tx_free = float(self._going[-1][0]) if self._going else float(now)
 
-    def next_departure(self) -> int | None:
-        """When the next byte will be out."""
-        return self._going[0][0] if self._going else None
+    def next_departure(self, now: int) -> int | None:
+        """When the next byte that is not out by ``now`` will be out."""
+        return next((done for done, _ in self._going if done > now), None)
 
     def power_cycle(self, now: int) -> None:
         """Switched off and on: all bytes on their way are lost."""
