@@ -56,6 +56,7 @@ def opx_text(lines: Lines, title: str = "") -> str:
     rows = list(_down(lines))
     size = max((abs(value) for row in rows for value in row[1:]), default=0.0)
     _property(data, "mainVersion", "int", "1")
+    _property(data, "subVersion", "int", "1")
     _property(data, "paperSize", "double", repr(size))
     array = ElementTree.SubElement(
         ElementTree.SubElement(data, "void", {"property": "lines"}),
@@ -68,7 +69,8 @@ def opx_text(lines: Lines, title: str = "") -> str:
         _property(line, "type", "int", str(kind))
         for name, value in zip(("x0", "y0", "x1", "y1"), ends, strict=True):
             _property(line, name, "double", repr(value))
-    _property(data, "title", "string", title)
+    if title:
+        _property(data, "title", "string", title)
     ElementTree.indent(java, " ")
     head = '<?xml version="1.0" encoding="UTF-8"?>\n'
     return head + ElementTree.tostring(java, encoding="unicode") + "\n"

@@ -1,5 +1,5 @@
-// What the packages `fold` and `rabbit-ear` make of a FOLD file: JSON on standard output.
-// usage: node read_with_others.cjs FILE.fold
+// What the packages `fold` and `rabbit-ear` make of a FOLD file, or `fold` of an OPX file: JSON on
+// standard output. usage: node read_with_others.cjs FILE
 const { readFileSync } = require("node:fs");
 const FOLD = require("fold");
 const ear = require("rabbit-ear");
@@ -43,4 +43,7 @@ function withRabbitEar() {
   };
 }
 
-process.stdout.write(JSON.stringify({ fold: withFold(), rabbit_ear: withRabbitEar() }));
+const answer = process.argv[2].endsWith(".opx")
+  ? FOLD.convert.convertFromTo(text, "opx", "fold")
+  : { fold: withFold(), rabbit_ear: withRabbitEar() };
+process.stdout.write(JSON.stringify(answer));

@@ -19,6 +19,8 @@ from problems import fitted, regular
 
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fold_format import read_fold, write_fold
+from miurafab.origami.interop_lines import opx_text
+from miurafab.origami.interop_planar import lines_of
 from miurafab.origami.kinematics import laid_on, rigid_motion
 from miurafab.origami.unfold import with_angles_of_the_folded_form
 
@@ -115,6 +117,17 @@ def test_they_walk_the_same_facets_from_the_edges_alone(tmp_path: Path) -> None:
     theirs = {frozenset(face) for face in walked}
     assert ours <= theirs
     assert len(theirs) <= len(ours) + 1  # it may list the outside, too
+
+
+def test_they_read_our_opx_files(tmp_path: Path) -> None:
+    pattern = sheet("hypar")
+    (tmp_path / "sheet.opx").write_text(opx_text(lines_of(pattern), "hypar"), encoding="utf-8")
+    read = others(tmp_path / "sheet.opx")
+    assert len(read["vertices_coords"]) == len(pattern.vertices_coords)
+    assert len(read["edges_vertices"]) == len(pattern.edges_vertices)
+    for letter in "BMV":
+        expected = int((pattern.edges_assignment == letter).sum())
+        assert read["edges_assignment"].count(letter) == expected
 
 
 @pytest.mark.large
