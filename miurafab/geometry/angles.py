@@ -18,6 +18,20 @@ def angle_between(a: Floats, b: Floats) -> Floats:
     return angle
 
 
+def sectors(a: Floats, b: Floats) -> tuple[Floats, Floats, Floats]:
+    """The angles between ``a`` and ``b``, both (..., 3), and their gradients by ``a`` and by ``b``.
+
+    With n = a x b / |a x b|: d alpha / d a = (a x n) / |a|^2 and d alpha / d b = (n x b) / |b|^2.
+    """
+    cross = np.cross(a, b)
+    sine = np.linalg.norm(cross, axis=-1)
+    angle: Floats = np.arctan2(sine, np.einsum("...k,...k->...", a, b))
+    n = cross / sine[..., None]
+    to_a: Floats = np.cross(a, n) / np.einsum("...k,...k->...", a, a)[..., None]
+    to_b: Floats = np.cross(n, b) / np.einsum("...k,...k->...", b, b)[..., None]
+    return angle, to_a, to_b
+
+
 def sector_angles(points: Floats, vertices: NDArray[np.int64], ring: NDArray[np.int64]) -> Floats:
     """(I, 4) sector angles at ``vertices`` (I,) with neighbours ``ring`` (I, 4), radians.
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from miurafab.geometry.angles import sector_angles
+from miurafab.geometry.angles import sector_angles, sectors
 from miurafab.geometry.quads import QuadGrid
 
 Floats = NDArray[np.float64]
@@ -119,13 +119,7 @@ class OrigamiConstraints:
         """Angles (I, 4) and gradients (I, 4, 2, 3): sector k to its first and second spoke."""
         centre = points[self.grid.interior_vertices][:, None, :]
         a = points[self.grid.interior_neighbours] - centre
-        b = np.roll(a, -1, axis=1)
-        cross = np.cross(a, b)
-        sine = np.linalg.norm(cross, axis=-1)
-        angles: Floats = np.arctan2(sine, np.einsum("nsk,nsk->ns", a, b))
-        n = cross / sine[..., None]
-        to_a = np.cross(a, n) / np.einsum("nsk,nsk->ns", a, a)[..., None]
-        to_b = np.cross(n, b) / np.einsum("nsk,nsk->ns", b, b)[..., None]
+        angles, to_a, to_b = sectors(a, np.roll(a, -1, axis=1))
         return angles, np.stack([to_a, to_b], axis=2)
 
 

@@ -43,13 +43,18 @@ def cylinder_over_polyline(profile: Floats, step: float, push: float, columns: i
 
 
 def cylinder_on(
-    surface: GeneralizedCylinder, columns: int, rows: int, amplitude: float, zigzag: float
+    surface: GeneralizedCylinder,
+    columns: int,
+    rows: int,
+    amplitude: float,
+    zigzag: float,
+    level: float = 0.0,
 ) -> Tessellation:
     """The tessellation of ``columns`` x ``rows`` vertices on a generalized cylinder.
 
     ``amplitude`` is the height of the corrugation over the row spacing, ``zigzag`` the zig-zag
     over the column spacing. The zig-zag profile has its vertices evenly spaced along the curve,
-    half the height above and below it.
+    half the height above and below it; ``level`` lifts the sheet by that part of the height.
     """
     beyond = 1.0 / (rows - 1)
     on_curve = surface.profile.evenly(rows + 2, -beyond, 1.0 + beyond)
@@ -59,7 +64,7 @@ def cylinder_on(
     spacing = float(np.linalg.norm(np.diff(on_curve, axis=0), axis=1).mean())
     # the point before the first row is row -1, hence the shifted parity
     side = np.where(np.arange(rows + 2) % 2, -0.5, 0.5)
-    profile = on_curve + side[:, None] * amplitude * spacing * normal
+    profile = on_curve + (side + level)[:, None] * amplitude * spacing * normal
     step = surface.domain.width / (columns - 1)
     # On a plane |v_j| = 1 / sin(phi), phi the profile's slope, tan(phi) = amplitude.
     push = zigzag * step * math.sin(math.atan(amplitude))

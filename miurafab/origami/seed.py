@@ -64,9 +64,14 @@ class Corrugation:
 
 
 def seed(
-    surface: TargetSurface, columns: int, rows: int, corrugation: Corrugation
+    surface: TargetSurface,
+    columns: int,
+    rows: int,
+    corrugation: Corrugation,
+    level: float = 0.0,
 ) -> tuple[Tessellation, float]:
-    """The corrugation on ``surface`` with ``columns`` x ``rows`` vertices.
+    """The corrugation on ``surface`` with ``columns`` x ``rows`` vertices, half of them above it
+    and half below; ``level`` lifts the sheet by that part of its height.
 
     Returns it with the largest |tan psi| that the ramp asked for before it was clipped at
     tan(60 degrees): above that, the target bends too much along its rows for one sheet.
@@ -98,7 +103,7 @@ def seed(
     i, j = np.arange(columns), np.arange(rows)
     shifted = uv.copy()
     shifted[..., 1] += ((i % 2) - 0.5)[None, :] * tau * spacing_i / speed_v
-    lift = ((j % 2) - 0.5)[:, None] * sigma * spacing_j
+    lift = ((j % 2) - 0.5 + level)[:, None] * sigma * spacing_j
     direction = surface.normal(shifted) + t * ramp[..., None]
     return Tessellation(surface.point(shifted) + lift[..., None] * direction), steepest
 

@@ -91,6 +91,11 @@ class Revolution(ParametricSurface):
         """The angle turned through, radians."""
         return self.domain.height
 
+    @property
+    def closed(self) -> bool:
+        """Whether the two ends meet."""
+        return bool(self.angle > 2 * np.pi * (1 - 1e-12))
+
 
 def revolution(profile: ProfileCurve, angle: float) -> Revolution:
     """``profile`` (r, z) turned through ``angle`` about z; rows run along the profile."""

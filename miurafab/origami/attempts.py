@@ -1,0 +1,387 @@
+"""The attempts of a fit: where the rows run, how strong the corrugation, and what is solved.
+
+A plan is one way from the target to an exact sheet: a start (a closed form, a seed on the target,
+one period of a revolution, a seed bent step by step), the projection onto the constraints, then
+flat-foldability if asked for, then polishing where a limit calls for it. What comes of it is a
+candidate with its faults, or a bare record of the attempt.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.origami.audit import DEGENERATE, EXACT, Measurements, measure
+from miurafab.origami.bounds import Bounds
+from miurafab.origami.constraints import flat_foldability
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.cylinder import cylinder_on
+from miurafab.origami.fit_request import Attempt, FitRequest
+from miurafab.origami.polish import Follow, followers, polish
+from miurafab.origami.seed import Corrugation, seed
+from miurafab.origami.solver import Projection, project
+from miurafab.origami.tessellation import Tessellation
+from miurafab.origami.unfold import unfold
+from miurafab.origami.unknowns import Unknowns, about_z
+from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution, revolution
+from miurafab.surfaces.mesh import MeshSurface
+from miurafab.surfaces.surface import Bent, Swapped, TargetSurface, tangents
+
+Floats = NDArray[np.float64]
+
+STRETCHES = ((1.3, 1.3), (1.15, 1.6), (1.6, 1.3), (1.3, 1.6), (2.0, 1.3), (2.6, 1.3), (1.15, 2.0))
+"""The stretches along and across the rows that are tried in turn. Strong curvature along the rows
+wants more of the first, strong twist less of the first and more of the second.
+"""
+BENDS_ELSEWHERE = 4
+"""How many of those stretches are bent step by step where a sheet is laid elsewhere on a mesh."""
+BEND_STEPS = 12
+STEP_CAP = 0.25
+"""The farthest that a coordinate moves in one step, in mean edge lengths."""
+FAR = 0.02
+"""A mid-surface farther from the target than this part of the diagonal makes the search go on."""
+SHAKE = 0.03
+"""The standard deviation of a random attempt's coordinates, in mean edge lengths."""
+BOUND_MARGIN = 2e-3
+"""Limits are tightened by this part while polishing, since the scale of the sheet still changes."""
+LEVELS: Mapping[Follow, float] = {"middle": 0.0, "top": -0.5, "bottom": 0.5}
+"""How far the sheet is lifted off the middle for the target to be followed, in parts of its height.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A tessellation that some attempt produced, in the target's own unit."""
+
+    attempt: Attempt
+    pattern: CreasePattern
+    measurements: Measurements
+    faults: tuple[str, ...]
+    deviation_mm: float
+    polished: bool = False
+    active_bounds: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def rank(self) -> tuple[int, bool]:
+        """The smaller the better: the number of faults, then whether it strays from the target."""
+        assert self.pattern.folded_coords is not None
+        extent = np.ptp(self.pattern.folded_coords, axis=0)
+        stray = (self.measurements.hausdorff_midsurface_mm or 0.0) > FAR * np.linalg.norm(extent)
+        return len(self.faults), bool(stray)
+
+
+@dataclass(frozen=True)
+class Plan:
+    way: str
+    surface: TargetSurface
+    rows_along: str
+    corrugation: Corrugation
+    place: str = ""
+    layout: dict[str, Any] = field(default_factory=dict)
+
+    def describe(self) -> str:
+        how = {
+            "direct": "direct construction",
+            "strip": "one period of the revolution",
+            "seed": "seed",
+            "bent": "bending step by step",
+            "shaken": "seed shaken",
+        }
+        place = f", {self.place}" if self.place else ""
+        return f"{how[self.way]}, rows along {self.rows_along}{place}"
+
+    def run(self, request: FitRequest) -> Candidate | Attempt:
+        """The sheet that this plan leads to, or, where it leads to none, what came of it."""
+        unknowns, solution = self._developable(request)
+        iterations = solution.iterations
+        crooked = solution.converged and _worst_kawasaki(unknowns.sheet(solution.x)) > EXACT
+        if request.exactly_flat_foldable and crooked:
+            if unknowns.turn is not None and not (
+                isinstance(self.surface, Revolution) and self.surface.closed
+            ):
+                # a period repeated leaves an open sheet fewer freedoms than it has
+                whole = unknowns.sheet(solution.x)
+                solution = replace(solution, x=whole.vertices.ravel())
+                unknowns = Unknowns(unknowns.columns, unknowns.rows, unknowns.length)
+            solution = _solve(unknowns, solution.x, flat_foldable=True)
+            iterations += solution.iterations
+        if not solution.converged:
+            return Attempt(
+                self.way,
+                self.rows_along,
+                self.corrugation,
+                solution.residual,
+                iterations,
+                solution.reason,
+                self.place,
+            )
+        plain = self._candidate(request, unknowns, solution, iterations)
+        asked = request.flat_foldable is not None or plain.rank != (0, False)
+        if request.polish == "off" or (request.polish == "auto" and not asked):
+            return plain
+        crumpled = plain.measurements.overlaps > 0
+        if crumpled:
+            return plain  # so far from a sheet that polishing it is lost work
+        closer = self._polished(request, unknowns, solution, plain)
+        if (closer.rank, closer.deviation_mm) < (plain.rank, plain.deviation_mm):
+            return closer
+        return plain
+
+    def _follow(self, request: FitRequest) -> Follow:
+        """What follows the target in this orientation: the normal turns over with the swap."""
+        turned: dict[Follow, Follow] = {"middle": "middle", "top": "bottom", "bottom": "top"}
+        return request.follow if self.rows_along == "u" else turned[request.follow]
+
+    def _developable(self, request: FitRequest) -> tuple[Unknowns, Projection]:
+        columns, rows = request.columns + 1, request.rows + 1
+        level = LEVELS[self._follow(request)]
+        if self.way == "direct":
+            assert isinstance(self.surface, GeneralizedCylinder)
+            c = self.corrugation
+            sheet = cylinder_on(self.surface, columns, rows, c.amplitude, c.zigzag, level)
+            nothing = np.zeros(0, dtype=bool)
+            unknowns = Unknowns(columns, rows, float(sheet.edge_lengths.mean()))
+            return unknowns, Projection(sheet.vertices.ravel(), 0.0, 0, True, "exact", nothing)
+        if self.way == "bent":
+            return _bend(self.surface, columns, rows, self.corrugation, level)
+        if self.way == "strip":
+            assert isinstance(self.surface, Revolution)
+            unknowns, start = _period(self.surface, columns, rows, self.corrugation, level)
+        else:
+            start, _ = seed(self.surface, columns, rows, self.corrugation, level)
+            if self.way == "shaken":
+                start = _shaken(start, request.seed)
+            unknowns = Unknowns(columns, rows, float(start.edge_lengths.mean()))
+        return unknowns, _solve(unknowns, start.vertices.ravel(), flat_foldable=False)
+
+    def _polished(
+        self, request: FitRequest, unknowns: Unknowns, solution: Projection, plain: Candidate
+    ) -> Candidate:
+        """The sheet ``solution`` brought within the limits and as close to the target as it goes;
+        ``plain`` where that fails.
+        """
+        constraints = unknowns.constraints(request.exactly_flat_foldable)
+        limits = request.bounds(unknowns, plain.pattern.scale, BOUND_MARGIN)
+        bounds = unknowns.on_unknowns(limits) if limits.any else None
+        iterations = plain.attempt.iterations
+        if bounds is not None:
+            solution = project(
+                constraints,
+                solution.x,
+                unknowns.places,
+                inequalities=bounds,
+                cap=STEP_CAP * unknowns.length,
+            )
+            iterations += solution.iterations
+            if not solution.converged:
+                return plain
+        better = polish(
+            solution,
+            self.surface,
+            unknowns,
+            constraints,
+            follow=self._follow(request),
+            bounds=bounds,
+        )
+        found = self._candidate(request, unknowns, better.projection, iterations + better.rounds)
+        active = limits.count(better.projection.active) if bounds is not None else {}
+        return replace(found, polished=True, active_bounds=active)
+
+    def _candidate(
+        self, request: FitRequest, unknowns: Unknowns, solution: Projection, iterations: int
+    ) -> Candidate:
+        sheet = unknowns.sheet(solution.x)
+        extent = float(np.ptp(sheet.vertices, axis=0).max())
+        scale = 1.0 if request.size_mm is None else request.size_mm / extent
+        pattern = unfold(sheet.scaled(scale), scale=scale, target=request.target | self.layout)
+        measured = measure(pattern, self.surface)
+        deviation = measured.hausdorff_midsurface_mm or 0.0
+        if request.follow != "middle":
+            points = followers(sheet.grid, self._follow(request)) @ sheet.vertices
+            gap = np.linalg.norm(points - self.surface.closest_point(points), axis=1)
+            deviation = float(gap.max()) * scale
+        limits = replace(
+            request.bounds(Unknowns(unknowns.columns, unknowns.rows, unknowns.length), scale),
+            min_edge=None,
+            kawasaki=None,
+        )
+        faults = tuple(_faults(request, pattern, measured, deviation, limits, sheet))
+        attempt = Attempt(
+            self.way,
+            self.rows_along,
+            self.corrugation,
+            max(measured.max_planarity or 0.0, measured.max_developability or 0.0),
+            iterations,
+            " ".join(faults),
+            self.place,
+        )
+        return Candidate(attempt, pattern, measured, faults, deviation)
+
+
+def plans(request: FitRequest) -> Iterator[Plan]:
+    """The attempts in the order in which they are made, the likeliest first."""
+    corrugations = _corrugations(request)
+    if isinstance(request.surface, GeneralizedCylinder):
+        for corrugation in corrugations:
+            yield Plan("direct", request.surface, "u", corrugation)
+        return
+    oriented = [(request.surface, "u"), (Swapped(request.surface), "v")]
+    oriented.sort(key=lambda pair: _turning(pair[0]))
+    if isinstance(request.surface, Revolution):
+        for corrugation in corrugations:
+            yield Plan("strip", request.surface, "u", corrugation)
+        if request.surface.closed:
+            return  # any other way would open the seam
+    for way in ("seed", "bent", "shaken"):
+        for corrugation in corrugations:
+            for surface, name in oriented:
+                yield Plan(way, surface, name, corrugation)
+    if isinstance(request.surface, MeshSurface):
+        yield from _elsewhere(request.surface, corrugations)
+
+
+def _elsewhere(surface: MeshSurface, corrugations: list[Corrugation]) -> Iterator[Plan]:
+    """The same ways with the sheet laid elsewhere on the mesh; each layout is made when needed."""
+    for place, other in surface.alternatives():
+        oriented: list[tuple[TargetSurface, str]] = [(other, "u"), (Swapped(other), "v")]
+        oriented.sort(key=lambda pair: _turning(pair[0]))
+        for way, some in (("seed", corrugations), ("bent", corrugations[:BENDS_ELSEWHERE])):
+            for corrugation in some:
+                for turned, name in oriented:
+                    yield Plan(way, turned, name, corrugation, place, other.description)
+
+
+def _corrugations(request: FitRequest) -> list[Corrugation]:
+    if request.amplitude is not None and request.zigzag is not None:
+        return [Corrugation(request.amplitude, request.zigzag)]
+    corrugations = []
+    for along, across in STRETCHES:
+        usual = Corrugation.from_stretches(along, across)
+        amplitude = usual.amplitude if request.amplitude is None else request.amplitude
+        if request.zigzag is not None:
+            corrugations.append(Corrugation(amplitude, request.zigzag))
+        else:
+            stretch = float(np.hypot(1.0, amplitude))
+            corrugations.append(Corrugation.from_stretches(along, stretch))
+    return list(dict.fromkeys(corrugations))
+
+
+def _turning(surface: TargetSurface) -> float:
+    """The mean angle through which the normal turns along the u-lines, radians."""
+    normals = surface.normal(surface.domain.lattice(17, 9))
+    cosine = np.einsum("ijk,ijk->ij", normals[:, 1:], normals[:, :-1])
+    return float(np.arccos(np.clip(cosine, -1, 1)).sum(axis=1).mean())
+
+
+def _solve(unknowns: Unknowns, x: Floats, flat_foldable: bool) -> Projection:
+    constraints = unknowns.constraints(flat_foldable)
+    return project(constraints, x, unknowns.places, cap=STEP_CAP * unknowns.length)
+
+
+def _period(
+    surface: Revolution, columns: int, rows: int, corrugation: Corrugation, level: float
+) -> tuple[Unknowns, Tessellation]:
+    """One period of the pattern on ``surface``, where its sector starts."""
+    beta = surface.angle / (rows - 1)
+    start, _ = seed(revolution(surface.profile, beta), columns, 2, corrugation, level)
+    unknowns = Unknowns(columns, rows, float(start.edge_lengths.mean()), 2 * beta)
+    return unknowns, Tessellation(start.points @ about_z((beta - surface.angle) / 2).T)
+
+
+def _bend(
+    surface: TargetSurface, columns: int, rows: int, corrugation: Corrugation, level: float
+) -> tuple[Unknowns, Projection]:
+    """From the flat sheet to the full target in equal steps; each starts from the last solution,
+    carried along in the target's own frame (tangents and normal at each vertex).
+    """
+    uv = surface.domain.lattice(columns, rows)
+    bends = np.linspace(0.0, 1.0, BEND_STEPS + 1)
+    start, _ = seed(Bent(surface, 0.0), columns, rows, corrugation, level)
+    unknowns = Unknowns(columns, rows, float(start.edge_lengths.mean()))
+    solution = _solve(unknowns, start.vertices.ravel(), flat_foldable=False)
+    iterations = solution.iterations
+    for before, after in itertools.pairwise(bends):
+        offset = solution.x.reshape(rows, columns, 3) - Bent(surface, before).point(uv)
+        local = np.linalg.solve(_frame(Bent(surface, before), uv), offset[..., None])
+        there = Bent(surface, after)
+        carried = Tessellation(there.point(uv) + (_frame(there, uv) @ local)[..., 0])
+        unknowns = replace(unknowns, length=float(carried.edge_lengths.mean()))
+        solution = _solve(unknowns, carried.vertices.ravel(), flat_foldable=False)
+        iterations += solution.iterations
+        if not solution.converged:
+            break
+    return unknowns, replace(solution, iterations=iterations)
+
+
+def _frame(surface: TargetSurface, uv: Floats) -> Floats:
+    along, across = tangents(surface, uv)
+    return np.stack([along, across, surface.normal(uv)], axis=-1)
+
+
+def _shaken(start: Tessellation, seed_number: int) -> Tessellation:
+    random = np.random.default_rng(seed_number)
+    amount = SHAKE * float(start.edge_lengths.mean())
+    return Tessellation(start.points + random.normal(scale=amount, size=start.points.shape))
+
+
+def _worst_kawasaki(sheet: Tessellation) -> float:
+    return float(np.abs(flat_foldability(sheet.vertices, sheet.grid)).max(initial=0.0))
+
+
+def _faults(
+    request: FitRequest,
+    pattern: CreasePattern,
+    measured: Measurements,
+    deviation: float,
+    limits: Bounds,
+    sheet: Tessellation,
+) -> Iterator[str]:
+    """What keeps this sheet from being the answer, one sentence of advice each; ``limits`` are
+    those that the measurements do not show.
+    """
+    residual = max(
+        measured.max_planarity or 0.0,
+        measured.max_developability or 0.0,
+        measured.max_isometry or 0.0,
+    )
+    if residual > EXACT:
+        yield f"A residual of {residual:.1e} is left; ask for fewer --facets."
+    if measured.self_intersections:
+        yield (
+            f"{measured.self_intersections} pairs of facets pass through each other; ask for more "
+            "--facets, lower --zigzag or --amplitude, or take a smaller part of the target."
+        )
+    if measured.overlaps:
+        yield f"{measured.overlaps} pairs of facets overlap in the flat pattern; lower --zigzag."
+    mean = float(
+        np.linalg.norm(
+            np.diff(pattern.vertices_coords[pattern.edges_vertices], axis=1), axis=2
+        ).mean()
+    )
+    wanted = request.min_edge_mm or DEGENERATE * mean
+    if measured.min_edge_mm < wanted:
+        yield (
+            f"The shortest edge is {measured.min_edge_mm:.3g} mm, under the {wanted:.3g} mm asked "
+            "for; ask for fewer --facets or a larger --size."
+        )
+    if request.max_deviation_mm is not None and deviation > request.max_deviation_mm:
+        what = "mid-surface" if request.follow == "middle" else request.follow
+        yield (
+            f"The {what} lies up to {deviation:.3g} mm from the target, over the "
+            f"{request.max_deviation_mm:.3g} mm allowed; ask for more --facets."
+        )
+    if limits.any:
+        for kind, number in limits.count(limits(sheet.vertices.ravel())[0] < -1e-9).items():
+            if number:
+                yield (
+                    f"{number} facet corners or sides break the {kind} limit; loosen it, or ask "
+                    "for other --facets, --amplitude or --zigzag."
+                )
+    asked = request.flat_foldable
+    if asked is not None and (measured.max_flat_foldability or 0.0) > max(asked, EXACT):
+        yield f"The sheet is flat-foldable only to {measured.max_flat_foldability:.1e} rad."

@@ -1,0 +1,135 @@
+"""What a sheet must not fall below: inequalities g(x) >= 0, each with its sparse gradient.
+
+    edge       |e| - s                               each edge, s the shortest allowed
+    angle      alpha - low  and  high - alpha        each corner of each facet
+    aspect     A |e| - |e'|                          each ordered pair of sides of one facet
+    kawasaki   eps -+ (a0 + a2 - pi)                 each interior vertex
+
+Lengths are divided by the mean edge length L, so that all are of one size.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from miurafab.geometry.angles import sectors
+from miurafab.geometry.quads import QuadGrid
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """The bounds on one grid; None leaves one out. x is (3V,) row-major.
+
+    ``min_edge`` in the unit of x, ``angles`` the least and greatest sector angle in radians,
+    ``aspect`` the greatest ratio of two sides of a facet, ``kawasaki`` the greatest
+    |a0 + a2 - pi| in radians.
+    """
+
+    grid: QuadGrid
+    length: float
+    min_edge: float | None = None
+    angles: tuple[float, float] | None = None
+    aspect: float | None = None
+    kawasaki: float | None = None
+
+    def __call__(self, x: Floats) -> tuple[Floats, sparse.csr_array]:
+        """g (p,) and its gradient (p, 3V), kind after kind in the order above."""
+        points = x.reshape(-1, 3)
+        blocks = [block for _, block in self._blocks(points)]
+        values = np.concatenate([value for value, _ in blocks])
+        return values, _stacked([rows for _, rows in blocks])
+
+    @property
+    def any(self) -> bool:
+        """Whether there is a bound at all."""
+        limits = (self.min_edge, self.angles, self.aspect, self.kawasaki)
+        return any(limit is not None for limit in limits)
+
+    def count(self, held: Bools) -> dict[str, int]:
+        """How many of each kind are among ``held`` (p,)."""
+        faces = (self.grid.columns - 1) * (self.grid.rows - 1)
+        interior = (self.grid.columns - 2) * (self.grid.rows - 2)
+        sizes = {
+            "edge": len(self.grid.edges_vertices) if self.min_edge is not None else 0,
+            "angle": 8 * faces if self.angles is not None else 0,
+            "aspect": 12 * faces if self.aspect is not None else 0,
+            "kawasaki": 2 * interior if self.kawasaki is not None else 0,
+        }
+        parts = np.split(held, np.cumsum(list(sizes.values()))[:-1])
+        counts = {kind: int(part.sum()) for kind, part in zip(sizes, parts, strict=True)}
+        return {kind: number for kind, number in counts.items() if sizes[kind]}
+
+    def _blocks(self, points: Floats) -> list[tuple[str, tuple[Floats, sparse.csr_array]]]:
+        blocks: list[tuple[str, tuple[Floats, sparse.csr_array]]] = []
+        if self.min_edge is not None:
+            lengths, rows = _lengths(points, self.grid.edges_vertices)
+            blocks.append(("edge", ((lengths - self.min_edge) / self.length, rows / self.length)))
+        if self.angles is not None:
+            low, high = self.angles
+            alpha, rows = self._corner_angles(points)
+            both = _stacked([rows, -rows])
+            blocks.append(("angle", (np.concatenate([alpha - low, high - alpha]), both)))
+        if self.aspect is not None:
+            blocks.append(("aspect", self._aspect(points, self.aspect)))
+        if self.kawasaki is not None:
+            residual, rows = self._kawasaki(points)
+            both = _stacked([-rows, rows])
+            slack = np.concatenate([self.kawasaki - residual, self.kawasaki + residual])
+            blocks.append(("kawasaki", (slack, both)))
+        return blocks
+
+    def _corner_angles(self, points: Floats) -> tuple[Floats, sparse.csr_array]:
+        faces = self.grid.faces_vertices
+        corners = np.stack([faces, np.roll(faces, -1, axis=1), np.roll(faces, 1, axis=1)], axis=-1)
+        return _angles(points, corners.reshape(-1, 3))
+
+    def _kawasaki(self, points: Floats) -> tuple[Floats, sparse.csr_array]:
+        centre, ring = self.grid.interior_vertices, self.grid.interior_neighbours
+        first, rows = _angles(points, np.stack([centre, ring[:, 0], ring[:, 1]], axis=1))
+        third, others = _angles(points, np.stack([centre, ring[:, 2], ring[:, 3]], axis=1))
+        return first + third - np.pi, rows + others
+
+    def _aspect(self, points: Floats, limit: float) -> tuple[Floats, sparse.csr_array]:
+        faces = self.grid.faces_vertices
+        sides = [_lengths(points, faces[:, [k, (k + 1) % 4]]) for k in range(4)]
+        values, rows = [], []
+        for one, other in itertools.permutations(range(4), 2):
+            values.append((limit * sides[one][0] - sides[other][0]) / self.length)
+            rows.append((limit * sides[one][1] - sides[other][1]) / self.length)
+        return np.concatenate(values), _stacked(rows)
+
+
+def _lengths(points: Floats, edges: Ints) -> tuple[Floats, sparse.csr_array]:
+    """(E,) lengths of ``edges`` (E, 2) and their gradient (E, 3V)."""
+    along = points[edges[:, 1]] - points[edges[:, 0]]
+    lengths = np.linalg.norm(along, axis=1)
+    unit = along / lengths[:, None]
+    return lengths, _rows(edges, np.stack([-unit, unit], axis=1), points.size)
+
+
+def _angles(points: Floats, corners: Ints) -> tuple[Floats, sparse.csr_array]:
+    """(n,) angles at ``corners`` (n, 3), each a vertex and the ends of its two sides."""
+    centre = points[corners[:, 0]]
+    alpha, to_a, to_b = sectors(points[corners[:, 1]] - centre, points[corners[:, 2]] - centre)
+    return alpha, _rows(corners, np.stack([-(to_a + to_b), to_a, to_b], axis=1), points.size)
+
+
+def _rows(stencil: Ints, gradient: Floats, unknowns: int) -> sparse.csr_array:
+    """The matrix with the rows ``gradient`` (n, k, 3) over the vertices ``stencil`` (n, k)."""
+    n, k = stencil.shape
+    columns = (stencil[:, :, None] * 3 + np.arange(3)).reshape(-1)
+    starts = np.arange(0, 3 * n * k + 1, 3 * k)
+    return sparse.csr_array((gradient.reshape(-1), columns, starts), shape=(n, unknowns))
+
+
+def _stacked(matrices: list[sparse.csr_array]) -> sparse.csr_array:
+    return sparse.csr_array(sparse.vstack(matrices, format="csr"))
