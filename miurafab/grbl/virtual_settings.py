@@ -136,8 +136,7 @@ class Settings:
             for index in range(POSITIONS):
                 waits += self.store_position(index, (0.0, 0.0, 0.0))
         if what == "*":
-            # The firmware clears the second byte where it means the checksum, so that a text
-            # which was stored there reads as damaged once.
+            # The firmware clears the second byte where it means the checksum.
             for address in (_STARTUP_AT, _STARTUP_AT + LINE_SIZE + 1, _BUILD_NOTE_AT):
                 waits += self._put(address, b"\0\0")
         return waits
