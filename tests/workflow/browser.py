@@ -15,7 +15,7 @@ from typing import Any
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
-_FLAGS = [
+_FLAGS = (
     "--headless",
     "--no-sandbox",
     "--use-gl=angle",
@@ -29,7 +29,7 @@ _FLAGS = [
     "--hide-scrollbars",
     "--window-size=1400,1000",
     "--remote-debugging-pipe",
-]
+)
 
 
 class Browser:

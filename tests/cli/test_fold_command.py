@@ -1,0 +1,84 @@
+"""miurafab fold and miurafab convert: what they print, what they write, how they exit."""
+
+import json
+
+import pytest
+from command_line import sentence
+from problems import fitted, regular
+
+from miurafab.workflow.design import save_pattern
+
+
+@pytest.fixture
+def rigid(tmp_path):
+    save_pattern(regular(6, 5), tmp_path / "rigid.fold")
+    return tmp_path / "rigid.fold"
+
+
+@pytest.fixture
+def stiff(tmp_path):
+    save_pattern(fitted("hypar", 8, 8).pattern, tmp_path / "stiff.fold")
+    return tmp_path / "stiff.fold"
+
+
+@pytest.mark.parametrize("ending", ["fold", "gif", "glb", "html"])
+def test_a_motion_is_written_by_its_ending(run, rigid, tmp_path, ending):
+    out = tmp_path / f"motion.{ending}"
+    done = run("fold", rigid, "-o", out, "--steps", "6", "--csv", tmp_path / "a.csv", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    answer = json.loads(done.stdout)
+    assert answer["file"] == str(out)
+    assert out.stat().st_size > 1000
+    assert (tmp_path / "a.csv").read_text().startswith("edge,tail,head,assignment,s=0,")
+    assert answer["motion"] == "rigid"
+    assert answer["rigid"] is True
+    assert answer["frames"] == 7
+    assert answer["states"][0] == 0.0
+    assert answer["states"][-1] is None  # folded flat
+    assert answer["self_contacts"] == []
+    assert answer["max_mismatch"] < 1e-9
+
+
+def test_a_sheet_that_bends_says_so(run, stiff, tmp_path):
+    done = run("fold", stiff, "-o", tmp_path / "a.html", "--steps", "6", "--colour", "strain")
+    assert done.returncode == 0
+    assert "does not fold rigidly" in done.stderr
+    assert "bending" in done.stdout
+    quiet = run("fold", stiff, "--steps", "6", "--quiet")
+    assert quiet.stderr == ""
+
+
+def test_thickness_decides_the_exit_code(run, rigid):
+    thin = run("fold", rigid, "--steps", "4", "--thickness", "1mm", "--json")
+    assert thin.returncode == 0
+    assert json.loads(thin.stdout)["thickness"]["folds"] is True
+    thick = run("fold", rigid, "--steps", "4", "--thickness", "2in")
+    assert thick.returncode == 1
+    assert "is too small" in thick.stdout
+
+
+def test_what_cannot_be_folded_is_one_sentence(run, rigid, stiff, tmp_path):
+    assert "a.mp4" in sentence(run("fold", rigid, "-o", tmp_path / "a.mp4"), 2)
+    assert "none.fold" in sentence(run("fold", tmp_path / "none.fold"), 2)
+    assert "does not fold rigidly" in sentence(run("fold", stiff, "--thickness", "1mm"), 2)
+    assert run("fold", rigid, "--colour", "mood").returncode == 2
+
+
+def test_convert_tells_what_was_lost(run, rigid, tmp_path):
+    done = run("convert", rigid, tmp_path / "a.cp", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    answer = json.loads(done.stdout)
+    assert answer["facets"] == 20
+    assert answer["remarks"] == [
+        "a.cp does not hold the folded form.",
+        "a.cp tells mountains from valleys and no fold angles.",
+    ]
+    done = run("convert", tmp_path / "a.cp", tmp_path / "b.fold", "--tolerance", "0.1mm")
+    assert done.returncode == 0
+    assert "folded flat" in done.stderr
+
+
+def test_what_cannot_be_converted_is_one_sentence(run, rigid, tmp_path):
+    assert "a.doc" in sentence(run("convert", rigid, tmp_path / "a.doc"), 2)
+    assert "tolerance" in run("convert", "--help").stdout
+    assert "'x'" in sentence(run("convert", rigid, tmp_path / "a.cp", "--tolerance", "x"), 2)

@@ -1,0 +1,122 @@
+"""From format to format: what is kept, what is said to be lost, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from problems import fitted, regular, saddle_mesh
+
+from miurafab.errors import InputError, PatternError
+from miurafab.origami.audit import audit
+from miurafab.origami.fit import fit
+from miurafab.origami.fold_format import read_fold
+from miurafab.origami.kinematics import rigid_motion, states_between
+from miurafab.workflow.convert import WRITTEN, convert, read_pattern
+from miurafab.workflow.design import design, load_pattern, save_pattern
+
+
+@pytest.fixture
+def saved(tmp_path: Path) -> Path:
+    save_pattern(regular(6, 5), tmp_path / "sheet.fold")
+    return tmp_path / "sheet.fold"
+
+
+@pytest.mark.parametrize("ending", WRITTEN)
+def test_every_format_is_written_the_same_every_time(saved: Path, ending: str) -> None:
+    one, two = (saved.with_name(f"{name}{ending}") for name in ("a", "a2"))
+    done = convert(saved, one)
+    convert(saved, two)
+    same_but_for_the_name = one.read_bytes().replace(b"# a,", b"# a2,")
+    assert same_but_for_the_name == two.read_bytes()
+    assert done.report()["facets"] == 20
+    counted = sum(done.report()["edges"].values())
+    assert counted == len(regular(6, 5).edges_vertices)
+
+
+@pytest.mark.parametrize("ending", [".fold", ".svg", ".cp", ".opx", ".dxf"])
+def test_there_and_back_is_the_same_pattern(saved: Path, ending: str) -> None:
+    middle, back = saved.with_name(f"middle{ending}"), saved.with_name("back.fold")
+    convert(saved, middle)
+    lost = convert(middle, back).remarks
+    first, last = read_fold(saved), read_fold(back)
+    assert len(last.vertices_coords) == len(first.vertices_coords)
+    assert len(last.faces_vertices) == len(first.faces_vertices)
+    for letter in "BMV":
+        same = (last.edges_assignment == letter).sum() == (first.edges_assignment == letter).sum()
+        assert same
+    if ending in (".fold", ".svg"):
+        assert np.sort(last.edges_fold_angle) == pytest.approx(np.sort(first.edges_fold_angle))
+        assert lost == ()
+    else:
+        assert "no fold angles" in lost[0]
+        assert rigid_motion(last, states_between(last, 5)).is_rigid
+
+
+def test_two_obj_files_make_the_pattern_again(saved: Path) -> None:
+    flat, folded = saved.with_name("flat.obj"), saved.with_name("folded.obj")
+    convert(saved, flat, form="flat")
+    convert(saved, folded)
+    convert(flat, saved.with_name("again.fold"), folded=folded)
+    again = read_fold(saved.with_name("again.fold"))
+    assert audit(again).valid
+    first = read_fold(saved)
+    assert np.array_equal(again.folded_coords, first.folded_coords)  # type: ignore[arg-type]
+    assert np.sort(again.edges_fold_angle) == pytest.approx(np.sort(first.edges_fold_angle))
+
+
+def test_a_mesh_target_is_still_found_from_another_folder(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    saddle_mesh().export(tmp_path / "saddle.stl")
+    found = fit(design(str(tmp_path / "saddle.stl"), facets="8x8").request).pattern
+    assert found is not None
+    save_pattern(found, tmp_path / "a.fold")
+    convert(tmp_path / "a.fold", tmp_path / "there" / "b.fold")
+    _, surface, missing = load_pattern(tmp_path / "there" / "b.fold")
+    assert missing is None
+    assert surface is not None
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "options", "words"),
+    [
+        ("sheet.fold", "a.pdf", {}, "does not end in one of"),
+        ("sheet.fold", "a.obj", {"form": "round"}, "flat or folded"),
+        ("sheet.fold", "a.cp", {"folded": "b.obj"}, "--folded goes with"),
+        ("sheet.txt", "a.cp", {}, "does not end in one of"),
+        ("sheet.stl", "a.fold", {}, "no crease pattern"),
+        ("sheet.obj", "a.fold", {}, "--folded FOLDED.obj"),
+        ("none.svg", "a.fold", {}, "does not exist"),
+    ],
+)
+def test_what_does_not_go_is_refused(
+    saved: Path, source: str, target: str, options: dict[str, str], words: str
+) -> None:
+    folder = saved.parent
+    with pytest.raises((InputError, PatternError), match=words):
+        convert(folder / source, folder / target, **options)  # type: ignore[arg-type]
+    assert not (folder / target).exists()
+
+
+def test_a_fault_in_a_drawing_names_the_file(tmp_path: Path) -> None:
+    (tmp_path / "bad.cp").write_text("1 2 3\n")
+    with pytest.raises(PatternError, match=r"bad\.cp: line 1"):
+        read_pattern(tmp_path / "bad.cp")
+
+
+def test_a_flat_pattern_has_no_folded_form_to_write(tmp_path: Path) -> None:
+    save_pattern(regular(5, 4), tmp_path / "a.fold")
+    convert(tmp_path / "a.fold", tmp_path / "a.cp")
+    with pytest.raises(InputError, match="no folded form"):
+        convert(tmp_path / "a.cp", tmp_path / "a.stl", form="folded")
+
+
+def test_a_curved_sheet_of_another_program_folds_like_ours(tmp_path: Path) -> None:
+    pattern = fitted("sphere", 10, 10, 0.0).pattern
+    assert pattern is not None
+    save_pattern(pattern, tmp_path / "a.fold")
+    convert(tmp_path / "a.fold", tmp_path / "a.dxf")
+    read = read_pattern(tmp_path / "a.dxf")
+    motion = rigid_motion(read, states_between(read, 6))
+    assert motion.is_rigid

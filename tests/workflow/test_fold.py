@@ -1,0 +1,221 @@
+"""Folding as a whole: rigid where it can be, bent where not, and what is written of it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from problems import fitted, regular
+
+from miurafab.errors import InputError, PatternError
+from miurafab.origami.collisions import self_intersections
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.fold_format import read_fold
+from miurafab.origami.invariants import edge_lengths
+from miurafab.origami.kinematics import Motion, facet_strain, laid_on, place
+from miurafab.origami.motion_bending import bending_motion
+from miurafab.origami.motion_output import angles_csv, contacts
+from miurafab.origami.thickness import thick_panels
+from miurafab.workflow.convert import read_pattern
+from miurafab.workflow.fold import fold, thickness_report, write_motion
+from miurafab.workflow.fold_gif import picture, target_frame
+
+DATA = Path(__file__).parent.parent / "data"
+
+
+def exact(name: str) -> CreasePattern:
+    found = fitted(name, 10, 10, 0.0).pattern
+    assert found is not None
+    return found
+
+
+def developable(name: str) -> CreasePattern:
+    found = fitted(name, 10, 10).pattern
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("name", ["plane", "hypar", "sphere", "saddle", "cylinder"])
+def test_an_exact_sheet_goes_from_flat_to_flat_folded_without_meeting_itself(name: str) -> None:
+    folding = fold(exact(name), 12)
+    assert folding.motion.is_rigid
+    assert folding.mismatch < 1e-9
+    assert folding.contacts == ()
+    assert folding.motion.states[0] == 0
+    assert math.isinf(folding.motion.states[-1])
+
+
+@pytest.mark.parametrize("name", ["hypar", "sphere", "saddle"])
+def test_any_other_sheet_bends_on_its_way_to_the_folded_form(name: str) -> None:
+    pattern = developable(name)
+    folding = fold(pattern, 12)
+    motion = folding.motion
+    assert not motion.is_rigid
+    assert folding.mismatch > 0.1
+    assert (np.diff(motion.states) > 0).all()
+    assert motion.states[-1] == 1.0
+    assert motion.states[0] < 0.1
+    assert pattern.folded_coords is not None
+    size = float(np.linalg.norm(np.ptp(pattern.folded_coords, axis=0)))
+    assert np.abs(motion.frames[-1] - pattern.folded_coords).max() < 1e-8 * size
+    lengths = edge_lengths(pattern, pattern.folded_coords)
+    for points in motion.frames:  # its sides do not stretch
+        assert np.abs(edge_lengths(pattern, points) / lengths - 1).max() < 1e-6
+    strain = facet_strain(pattern, motion.frames)
+    assert strain[-1].max() < 1e-9 < strain.max() < 1e-2
+    # and it is no straight line between its ends
+    middle = (motion.frames[0] + motion.frames[-1]) / 2
+    halfway = laid_on(motion.frames[6], middle)
+    assert np.linalg.norm(halfway - middle, axis=1).max() > 0.01 * size
+
+
+def test_a_bent_motion_has_the_fold_angles_of_its_triangles() -> None:
+    pattern = developable("hypar")
+    motion = bending_motion(pattern, 8)
+    assert np.abs(motion.fold_angles[-1] - pattern.edges_fold_angle).max() < 1e-6
+    assert np.degrees(np.abs(motion.fold_angles[0])).max() < 30
+
+
+def test_what_neither_folds_nor_bends_says_both() -> None:
+    bare = replace(developable("hypar"), folded_coords=None)
+    with pytest.raises(PatternError, match=r"does not fold rigidly.*without a folded form"):
+        fold(bare, 8)
+    published = read_pattern(DATA / "peaks_coarse_flat.obj", folded=DATA / "peaks_coarse_fold.obj")
+    with pytest.raises(PatternError, match=r"does not fold rigidly.*cannot be bent either"):
+        fold(published, 8)
+    with pytest.raises(InputError, match="--steps is 1"):
+        fold(regular(), 1)
+
+
+def test_the_published_pattern_folds_to_its_given_folded_form() -> None:
+    pattern = read_pattern(DATA / "peaks_coarse_flat.obj", folded=DATA / "peaks_coarse_fold.obj")
+    assert pattern.folded_coords is not None
+    placement = place(pattern, pattern.edges_fold_angle[None])
+    facet, corner = np.nonzero(pattern.faces_vertices >= 0)
+    vertex = pattern.faces_vertices[facet, corner]
+    placed = placement.points(pattern.vertices_coords[vertex], facet)[0]
+    given = pattern.folded_coords[vertex]
+    size = float(np.linalg.norm(np.ptp(given, axis=0)))
+    assert np.linalg.norm(laid_on(placed, given) - given, axis=1).max() < 2e-9 * size
+
+
+def folded_through_itself() -> Motion:
+    """A strip of four squares folded by 150 degrees three times the same way."""
+    x = np.repeat(np.arange(5.0), 2) * 10
+    flat = np.stack([x, np.tile([0.0, 10.0], 5)], axis=1)
+    index = np.arange(10).reshape(5, 2)
+    corners = (index[:-1, 0], index[1:, 0], index[1:, 1], index[:-1, 1])
+    ends = [*index.tolist(), *np.stack([index[:-1, 0], index[1:, 0]], axis=1).tolist()]
+    ends += np.stack([index[:-1, 1], index[1:, 1]], axis=1).tolist()
+    angle = np.zeros(13)
+    angle[1:4] = math.radians(150)
+    strip = CreasePattern(
+        vertices_coords=flat,
+        edges_vertices=np.array(ends),
+        edges_assignment=np.where(angle > 0, "V", "B"),
+        edges_fold_angle=angle,
+        faces_vertices=np.stack(corners, axis=1),
+    )
+    return fold(strip, 20).motion
+
+
+def test_self_contact_is_reported_by_state_and_facets() -> None:
+    motion = folded_through_itself()
+    found = contacts(motion)
+    assert found
+    touched = {pair for contact in found for pair in contact.facets}
+    assert (0, 3) in touched
+    assert all(abs(a - b) > 1 for a, b in touched)
+    first = found[0]
+    assert motion.states[first.frame] == first.state
+    # three equal folds close a square at 90 degrees; beyond, the last goes through the first
+    turned = math.degrees(motion.fold_angles[first.frame].max())
+    before = math.degrees(motion.fold_angles[first.frame - 1].max())
+    assert before <= 90 + 1e-9 < turned
+    for contact in found:
+        shape = replace(motion.pattern, folded_coords=motion.frames[contact.frame])
+        assert [tuple(p) for p in self_intersections(shape).tolist()] == list(contact.facets)
+
+
+def test_the_angles_of_every_crease_and_frame_are_in_the_table() -> None:
+    motion = fold(regular(4, 4), 6).motion
+    rows = list(csv.reader(io.StringIO(angles_csv(motion))))
+    assert rows[0][:4] == ["edge", "tail", "head", "assignment"]
+    assert len(rows[0]) == 4 + 7
+    inner = (motion.pattern.edges_faces >= 0).all(axis=1)
+    assert len(rows) == 1 + int(inner.sum())
+    for row in rows[1:]:
+        edge = int(row[0])
+        assert row[3] == motion.pattern.edges_assignment[edge]
+        expected = np.degrees(motion.fold_angles[:, edge])
+        assert [float(value) for value in row[4:]] == pytest.approx(expected.tolist(), rel=1e-8)
+        assert float(row[4]) == 0.0
+        assert abs(float(row[-1])) == pytest.approx(180)
+
+
+@pytest.mark.parametrize("ending", ["fold", "gif", "glb", "html"])
+def test_the_same_motion_gives_the_same_bytes(ending: str, tmp_path: Path) -> None:
+    folding = fold(regular(5, 4), 6)
+    for name in ("one", "two"):
+        write_motion(folding, tmp_path / f"{name}.{ending}", "regular")
+    one, two = (tmp_path / f"{name}.{ending}" for name in ("one", "two"))
+    assert one.read_bytes() == two.read_bytes()
+    if ending == "fold":
+        frames = json.loads(one.read_text())["file_frames"]
+        assert len(frames) == 1 + 7
+        assert read_fold(one).grid == (5, 4)
+
+
+def test_a_gif_goes_there_and_back_and_rests_at_the_folded_form(tmp_path: Path) -> None:
+    folding = fold(regular(5, 4), 6)
+    write_motion(folding, tmp_path / "a.gif")
+    durations, coverage = [], []
+    with Image.open(tmp_path / "a.gif") as image:
+        assert image.n_frames == 12
+        assert image.info["loop"] == 0
+        for frame in range(12):
+            image.seek(frame)
+            durations.append(image.info["duration"])
+            pixels = np.asarray(image.convert("RGB")).astype(int)
+            coverage.append(int((np.abs(pixels - pixels[0, 0]).sum(axis=2) > 30).sum()))
+    rests = {frame for frame, duration in enumerate(durations) if duration > 500}
+    target = target_frame(folding.motion)
+    assert rests == {0, 6, target, 12 - target}
+    assert coverage[0] == max(coverage)
+    assert coverage[6] < coverage[0] / 2
+    assert coverage[1:6] == coverage[:6:-1]
+
+
+def test_facets_in_front_hide_those_behind() -> None:
+    motion = fold(regular(), 6).motion
+    pixels = np.asarray(picture(motion, 1)).astype(int)
+    blue = (pixels[..., 2] > pixels[..., 0] + 20) & (pixels[..., 1] > pixels[..., 0])
+    # hardly folded, the sheet shows its front alone; the bar of progress is blue, too
+    assert blue[:-60].sum() < 0.002 * pixels[..., 0].size
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a"])
+def test_an_ending_that_is_no_motion_is_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"does not end in one of \.fold"):
+        write_motion(fold(regular(4, 4), 2), tmp_path / name)
+    with pytest.raises(InputError, match="folder"):
+        write_motion(fold(regular(4, 4), 2), tmp_path / "none" / "a.gif")
+
+
+def test_the_report_on_thickness_tells_every_crease() -> None:
+    pattern = regular(5, 4)
+    report = thickness_report(thick_panels(pattern, 2.0))
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    assert [crease["edge"] for crease in report["creases"]] == np.flatnonzero(inner).tolist()
+    for crease in report["creases"]:
+        assert crease["hinge_side"] == {"V": "top", "M": "bottom"}[crease["assignment"]]
+        expected = math.tan(math.radians(abs(crease["fold_deg"])) / 2)
+        assert crease["offset_mm"] == pytest.approx(expected)
+    assert report["folds"] is True
