@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from miurafab.workflow.picture import write_pictures
     from miurafab.workflow.preview import ASSUMED_MACHINE as DEFAULT_MACHINE
     from miurafab.workflow.preview import preview
+    from miurafab.workflow.tradeoff import check_writable as check_tradeoff_file
+    from miurafab.workflow.tradeoff import tradeoff, write_tradeoff
 
 _HOMES = {
     "DEFAULT_MACHINE": ("miurafab.workflow.preview", "ASSUMED_MACHINE"),
@@ -51,6 +53,7 @@ _HOMES = {
     "check": ("miurafab.origami.audit", "audit"),
     "check_energy_file": ("miurafab.workflow.energy", "check_writable"),
     "check_motion_file": ("miurafab.workflow.fold", "check_motion_file"),
+    "check_tradeoff_file": ("miurafab.workflow.tradeoff", "check_writable"),
     "convert": ("miurafab.workflow.convert", "convert"),
     "cut": ("miurafab.workflow.cut", "cut"),
     "design": ("miurafab.workflow.design", "design"),
@@ -70,10 +73,12 @@ _HOMES = {
     "sheets": ("miurafab.workflow.job_directory", "sheets"),
     "thick_panels": ("miurafab.origami.thickness", "thick_panels"),
     "thickness_report": ("miurafab.workflow.fold", "thickness_report"),
+    "tradeoff": ("miurafab.workflow.tradeoff", "tradeoff"),
     "write_angles": ("miurafab.workflow.fold", "write_angles"),
     "write_energy": ("miurafab.workflow.energy", "write_energy"),
     "write_job": ("miurafab.workflow.job_directory", "write_job"),
     "write_motion": ("miurafab.workflow.fold", "write_motion"),
+    "write_tradeoff": ("miurafab.workflow.tradeoff", "write_tradeoff"),
     "write_page": ("miurafab.workflow.page", "write_page"),
     "write_pictures": ("miurafab.workflow.picture", "write_pictures"),
 }
@@ -85,6 +90,7 @@ __all__ = [
     "check",
     "check_energy_file",
     "check_motion_file",
+    "check_tradeoff_file",
     "convert",
     "cut",
     "design",
@@ -104,12 +110,14 @@ __all__ = [
     "sheets",
     "thick_panels",
     "thickness_report",
+    "tradeoff",
     "write_angles",
     "write_energy",
     "write_job",
     "write_motion",
     "write_page",
     "write_pictures",
+    "write_tradeoff",
 ]
 
 

@@ -24,6 +24,7 @@ from miurafab.cli import (
     profiles,
     sheets,
     surfaces,
+    tradeoff,
     virtual,
 )
 from miurafab.cli.console import json_text
@@ -43,6 +44,7 @@ app.command("check")(check.check)
 app.command("fold")(fold.fold)
 app.command("convert")(convert.convert)
 app.command("energy")(energy.energy)
+app.command("tradeoff")(tradeoff.tradeoff)
 app.command("sheets")(sheets.sheets)
 app.command("preview")(preview.preview)
 app.command("cut")(cut.cut)

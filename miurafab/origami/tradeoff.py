@@ -1,0 +1,148 @@
+"""Accuracy against effort: how near a sheet comes to its target for how many facets.
+
+Let n be the facets along a side (the root of their number F), d the Hausdorff distance between
+sheet and target over the diagonal of the folded form, A the area of the paper and A0 that of the
+target. A corrugation of height in proportion to its facets gives
+
+    d(n) = c / n,        A / A0 = a + b / n,
+
+a > 1 being the price in paper that no refinement takes away. With a weight w in (0, 1) on effort,
+
+    C_w(n) = (1 - w) d(n) / 1% + w n^2 / 1000,    least at  n = ((1 - w) 1000 c / (2 w 1%))^(1/3).
+
+(Dudte, Vouga, Tachi and Mahadevan, Nature Materials 15, 2016, last figure, ask the same of a
+hyperboloid; the units of the cost, 1 % and 1000 facets, are this project's.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+UNIT_DISTANCE = 0.01
+UNIT_FACETS = 1000.0
+WEIGHTS = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95)
+ENOUGH = 3
+"""Sheets that it takes to fit a law."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One sheet: what was asked and what was measured, None where no sheet was found. Lengths in
+    mm; the names are those of the fit report.
+    """
+
+    columns: int
+    rows: int
+    status: str
+    amplitude: float | None = None
+    zigzag: float | None = None
+    hausdorff_mm: float | None = None
+    hausdorff_relative: float | None = None
+    hausdorff_midsurface_mm: float | None = None
+    area_ratio: float | None = None
+    min_edge_mm: float | None = None
+
+    @property
+    def side(self) -> float:
+        """n, the root of the number of facets."""
+        return float(np.sqrt(self.columns * self.rows))
+
+
+@dataclass(frozen=True)
+class CostCurve:
+    """The cost at each sheet for one ``weight`` on effort, and where the law has its least."""
+
+    weight: float
+    costs: tuple[float, ...]
+    best_facets: int
+    optimal_facets: float
+
+
+@dataclass(frozen=True)
+class Tradeoff:
+    """The samples by facets, and what follows from those that converged; the laws are None where
+    fewer than three did.
+
+    ``coefficient`` is c of d = c / n; ``exponent`` what the power of n comes out as if left free
+    (-1 by the law); ``law_error`` the largest relative distance of a sample from c / n.
+    ``area_limit`` and ``area_slope`` are a and b.
+    """
+
+    samples: tuple[Sample, ...]
+    coefficient: float | None
+    exponent: float | None
+    law_error: float | None
+    area_limit: float | None
+    area_slope: float | None
+    curves: tuple[CostCurve, ...]
+
+    @property
+    def found(self) -> tuple[Sample, ...]:
+        """The samples with an exact sheet."""
+        return tuple(s for s in self.samples if s.status == "converged")
+
+    def report(self) -> dict[str, Any]:
+        """Everything, ready for JSON."""
+        return {
+            "samples": [{"facets": s.columns * s.rows, **asdict(s)} for s in self.samples],
+            "law": {
+                "coefficient": self.coefficient,
+                "exponent": self.exponent,
+                "largest_error": self.law_error,
+            },
+            "area_ratio_limit": self.area_limit,
+            "area_ratio_slope": self.area_slope,
+            "costs": [asdict(curve) for curve in self.curves],
+        }
+
+
+def summarise(samples: list[Sample], weights: tuple[float, ...] = WEIGHTS) -> Tradeoff:
+    """The laws and cost curves that follow from ``samples``."""
+    ordered = tuple(sorted(samples, key=lambda s: (s.columns * s.rows, s.columns)))
+    found = [s for s in ordered if s.status == "converged"]
+    if len(found) < ENOUGH:
+        return Tradeoff(ordered, None, None, None, None, None, ())
+    n = np.array([s.side for s in found])
+    d = np.array([s.hausdorff_relative for s in found], dtype=np.float64)
+    area = np.array([s.area_ratio for s in found], dtype=np.float64)
+    coefficient = float(np.exp(np.log(d * n).mean()))
+    exponent = float(np.polyfit(np.log(n), np.log(d), 1)[0])
+    slope, limit = np.polyfit(1 / n, area, 1)
+    curves = []
+    for weight in weights:
+        costs = cost(weight, n, d)
+        curves.append(
+            CostCurve(
+                weight,
+                tuple(costs.tolist()),
+                found[int(np.argmin(costs))].columns * found[int(np.argmin(costs))].rows,
+                optimal_side(weight, coefficient) ** 2,
+            )
+        )
+    return Tradeoff(
+        ordered,
+        coefficient,
+        exponent,
+        float(np.abs(d * n / coefficient - 1).max()),
+        float(limit),
+        float(slope),
+        tuple(curves),
+    )
+
+
+def cost(weight: float, n: Floats, d: Floats) -> Floats:
+    """C_w of sheets with ``n`` facets a side at the relative distances ``d``."""
+    total: Floats = (1 - weight) * d / UNIT_DISTANCE + weight * n**2 / UNIT_FACETS
+    return total
+
+
+def optimal_side(weight: float, coefficient: float) -> float:
+    """The n at which the cost is least, d being ``coefficient`` / n."""
+    scale = UNIT_FACETS * coefficient / (2 * UNIT_DISTANCE)
+    return float(((1 - weight) / weight * scale) ** (1 / 3))

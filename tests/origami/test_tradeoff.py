@@ -1,0 +1,173 @@
+"""The trade-off: laws recovered from samples made by them, and real fits that obey them."""
+
+from __future__ import annotations
+
+import json
+import math
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+import miurafab
+from miurafab.cli import app
+from miurafab.errors import InputError, TargetError
+from miurafab.origami.tradeoff import Sample, Tradeoff, cost, optimal_side, summarise
+
+SIDES = (6, 8, 12)
+
+
+def made(sides, c=0.5, a=1.7, b=-0.2, failed=()) -> list[Sample]:
+    return [
+        Sample(n, n, "stalled")
+        if n in failed
+        else Sample(n, n, "converged", 0.8, 0.6, 100 * c / n, c / n, 0.01, a + b / n, 1.0)
+        for n in sides
+    ]
+
+
+@given(
+    st.lists(st.integers(2, 300), min_size=3, max_size=8, unique=True),
+    st.floats(0.01, 2),
+    st.floats(1, 4),
+    st.floats(-1, 1),
+)
+def test_the_laws_are_recovered(sides, c, a, b):
+    found = summarise(made(sides, c, a, b))
+    assert found.coefficient == pytest.approx(c, rel=1e-9)
+    assert found.exponent == pytest.approx(-1, abs=1e-9)
+    assert found.law_error == pytest.approx(0, abs=1e-9)
+    assert found.area_limit == pytest.approx(a, rel=1e-6)
+    assert found.area_slope == pytest.approx(b, abs=1e-4)
+
+
+@given(st.floats(0.01, 0.99), st.floats(0.01, 2))
+def test_no_n_is_cheaper_than_the_optimal_one(weight, c):
+    best = optimal_side(weight, c)
+    least = cost(weight, np.array([best]), np.array([c / best]))[0]
+    others = best * np.geomspace(0.2, 5, 101)
+    assert least <= cost(weight, others, c / others).min() + 1e-12 * least
+
+
+def test_more_weight_on_effort_asks_for_fewer_facets():
+    curves = summarise(made((8, 16, 32, 64))).curves
+    assert (np.diff([curve.optimal_facets for curve in curves]) < 0).all()
+    assert (np.diff([curve.best_facets for curve in curves]) <= 0).all()
+    assert curves[-1].best_facets == 64 if curves[-1].optimal_facets < 100 else True
+
+
+def test_sheets_that_were_not_found_are_listed_and_left_out():
+    found = summarise(made((8, 12, 16, 24), failed=(12,)))
+    assert [s.status for s in found.samples] == ["converged", "stalled", "converged", "converged"]
+    assert found.coefficient == pytest.approx(0.5)
+    assert summarise(made((8, 12, 16), failed=(12,))).coefficient is None
+
+
+@pytest.fixture(scope="module")
+def hypar() -> Tradeoff:
+    return miurafab.tradeoff("hypar", SIDES)
+
+
+def test_real_sheets_obey_the_law(hypar):
+    assert hypar.exponent == pytest.approx(-1, abs=0.1)
+    assert hypar.law_error < 0.1
+    assert hypar.area_limit > 1
+    held = {(s.amplitude, s.zigzag) for s in hypar.found}
+    assert len(held) == 1
+
+
+def test_a_pool_gives_the_same(hypar):
+    assert miurafab.tradeoff("hypar", SIDES, workers=2) == hypar
+
+
+def test_a_cluster_gives_the_same(hypar):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        distributed = pytest.importorskip("distributed")
+        with distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as cluster:
+            found = miurafab.tradeoff("hypar", SIDES, cluster=cluster.scheduler_address)
+    assert found == hypar
+
+
+def test_the_files(hypar, tmp_path):
+    for name in ("a.csv", "b.csv"):
+        miurafab.write_tradeoff(hypar, tmp_path / name)
+    text = (tmp_path / "a.csv").read_text()
+    assert text == (tmp_path / "b.csv").read_text()
+    lines = [line.split(",") for line in text.splitlines()]
+    assert lines[0][:4] == ["facets", "columns", "rows", "status"]
+    assert [line[0] for line in lines[1:]] == ["36", "64", "144"]
+    assert {len(line) for line in lines} == {9 + len(hypar.curves)}
+    pytest.importorskip("matplotlib")
+    for kind, start in (("png", b"\x89PNG"), ("svg", b"<?xml")):
+        for name in ("a", "b"):
+            miurafab.write_tradeoff(hypar, tmp_path / f"{name}.{kind}", "hypar")
+        content = (tmp_path / f"a.{kind}").read_bytes()
+        assert content.startswith(start)
+        assert content == (tmp_path / f"b.{kind}").read_bytes()
+
+
+def test_the_command(tmp_path, hypar):
+    out = tmp_path / "t.csv"
+    arguments = ["tradeoff", "hypar", "--sides", "6,8,12", "--workers", "1", "-o", str(out)]
+    result = CliRunner().invoke(app, [*arguments, "--json", "--weights", "0.5"])
+    assert result.exit_code == 0, result.output
+    answer = json.loads(result.stdout)
+    assert answer["law"]["coefficient"] == hypar.coefficient
+    assert [curve["weight"] for curve in answer["costs"]] == [0.5]
+    assert answer["file"] == str(out)
+    assert out.exists()
+    shown = CliRunner().invoke(app, [*arguments, "--quiet"])
+    assert "A/A0 tends to" in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--sides", "4,5"], "three different"),
+        (["--sides", "1,5,9"], "three different"),
+        (["--sides", "4,x,9"], "whole numbers"),
+        (["--weights", "0.5,1"], "between 0 and 1"),
+        (["--weights", "half"], "numbers with commas"),
+        (["-o", "picture.gif"], "by the ending"),
+        (["--workers", "-2"], "one or more"),
+    ],
+)
+def test_one_sentence_for_each_mistake(arguments, words):
+    result = CliRunner().invoke(app, ["tradeoff", "hypar", *arguments])
+    assert isinstance(result.exception, InputError)
+    assert words in str(result.exception)
+
+
+def test_a_target_that_is_none():
+    with pytest.raises(TargetError):
+        miurafab.tradeoff("hyper")
+
+
+def test_a_cluster_that_is_not_there():
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match="does not answer"):
+        miurafab.tradeoff("plane", (2, 3, 4), cluster="nonsense://nowhere")
+
+
+def test_without_distributed_the_way_out_is_named(monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"miurafab\[cluster\]"):
+        miurafab.tradeoff("plane", (2, 3, 4), cluster="tcp://localhost:8786")
+    with pytest.raises(InputError, match=r"miurafab\[plot\]"):
+        miurafab.write_tradeoff(summarise(made((8, 16, 32))), "x.png")
+
+
+def test_a_sheet_that_lies_as_far_as_the_law_says_costs_what_the_curve_says():
+    found = summarise(made((8, 16, 32)))
+    for curve in found.curves:
+        n = math.sqrt(curve.optimal_facets)
+        assert n == pytest.approx(optimal_side(curve.weight, found.coefficient))
+        assert curve.costs == tuple(
+            cost(curve.weight, np.array([8.0, 16, 32]), 0.5 / np.array([8.0, 16, 32])).tolist()
+        )
