@@ -23,6 +23,10 @@ def sheets(
     out: Annotated[Path, typer.Option("-o", "--out", help="The job directory to make.")],
     machine: MachineOption = None,
     material: MaterialOption = None,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option("--format", help="Also draw each sheet as dxf, pdf or hpgl; may be repeated."),
+    ] = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -35,6 +39,7 @@ def sheets(
             machine or miurafab.DEFAULT_MACHINE,
             material or miurafab.DEFAULT_MATERIAL,
             progress,
+            formats=formats or (),
         )
     totals = job.layout.totals
     answer: dict[str, Any] = {

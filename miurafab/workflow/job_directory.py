@@ -10,14 +10,19 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from miurafab.errors import InputError, LayoutError
+from miurafab.fabrication.drawing.assembly_guide import assembly_guide
+from miurafab.fabrication.drawing.dxf import sheet_dxf
+from miurafab.fabrication.drawing.hpgl import sheet_hpgl
+from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.layout import read_layout, write_layout
 from miurafab.fabrication.sheets import Layout, lay_out
+from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.job import Job
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fold_format import read_fold
@@ -27,6 +32,13 @@ from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 
 LAYOUT = "layout.json"
+GUIDE = "assembly.pdf"
+FORMATS: Mapping[str, Callable[[Toolpath], bytes]] = {
+    "dxf": lambda toolpath: sheet_dxf(toolpath).encode("ascii"),
+    "pdf": lambda toolpath: sheets_pdf((toolpath,), toolpath.sheet),
+    "hpgl": lambda toolpath: sheet_hpgl(toolpath).encode("ascii"),
+}
+"""The drawings that are made of a sheet on request, by file ending."""
 Progress = Callable[[float, str], None]
 
 
@@ -57,17 +69,24 @@ def write_job(
     machine: str,
     material: str,
     on_progress: Progress | None = None,
+    *,
+    formats: Collection[str] = (),
 ) -> JobDirectory:
     """Lay the pattern of a FOLD file out and write its job directory.
 
-    ``machine`` and ``material`` are shipped names or TOML files. Sheets of an earlier job in the
+    ``machine`` and ``material`` are shipped names or TOML files; ``formats`` are further drawings
+    of each sheet (:data:`FORMATS`). Sheets of an earlier job in the
     same directory are removed; files that are no part of a job are left alone. Raises
     :class:`~miurafab.errors.InputError` where the directory holds something else than a job.
     """
+    unknown = sorted(set(formats) - set(FORMATS))
+    if unknown:
+        raise InputError(f"'{unknown[0]}' is not a drawing format; there are {', '.join(FORMATS)}.")
     tell = on_progress or (lambda fraction, note: None)
     tell(0.0, "patches, tabs, perforation, nesting")
     profile, stock = load_machine(machine), load_material(material)
-    layout = lay_out(read_fold(pattern_file), profile, stock)
+    pattern = read_fold(pattern_file)
+    layout = lay_out(pattern, profile, stock)
     labels = {patch.id: patch.label for patch in layout.patches}
     _make_room(directory)
     jobs, dry_runs = [], []
@@ -79,8 +98,13 @@ def write_job(
         dry_runs.append(dry_run(toolpath.sheet, job, profile, size))
         _write(directory / f"{toolpath.sheet}.nc", job.text)
         _write(directory / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
+        for name in formats:
+            (directory / f"{toolpath.sheet}.{name}").write_bytes(FORMATS[name](toolpath))
     seconds = round(float(sum(sheet.seconds for sheet in dry_runs)), 1)
     layout = replace(layout, totals=replace(layout.totals, seconds=seconds))
+    tell(0.9, "drawing the assembly guide")
+    guide = assembly_guide(layout, pattern, profile, stock, pattern_file.stem)
+    (directory / GUIDE).write_bytes(guide)
     copy = directory / pattern_file.name
     if copy.resolve() != pattern_file.resolve():
         shutil.copyfile(pattern_file, copy)
@@ -151,8 +175,8 @@ def _make_room(directory: Path) -> None:
         ) from None
     layout.unlink()
     for name in names:
-        for suffix in (".nc", ".svg"):
-            (directory / f"{Path(name).name}{suffix}").unlink(missing_ok=True)
+        for suffix in ("nc", "svg", *FORMATS):
+            (directory / f"{Path(name).name}.{suffix}").unlink(missing_ok=True)
 
 
 def _write(path: Path, text: str) -> None:

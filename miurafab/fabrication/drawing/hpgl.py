@@ -1,0 +1,33 @@
+"""Sheets as HPGL, for cutting plotters: absolute moves of a pen or blade, one pen an operation.
+
+A plotter unit is 0.025 mm (HP-GL reference, "plotter units": 40 a millimetre). The file starts with
+``IN`` and ends with the tool lifted and put away (``PU;SP0``), so that it runs alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.profiles import OPERATIONS
+
+UNITS_PER_MM = 40
+PENS = {name: number for number, name in enumerate(OPERATIONS, start=1)}
+"""The pen of each operation; a plotter with one tool holder ignores the number."""
+
+
+def sheet_hpgl(toolpath: Toolpath) -> str:
+    """The strokes of one sheet as HPGL text, in their order, rounded to plotter units."""
+    units = np.rint(toolpath.points * UNITS_PER_MM).astype(np.int64)
+    words = [f"{x},{y}" for x, y in units.tolist()]
+    offsets = toolpath.offsets.tolist()
+    lines = ["IN;PA;"]
+    pen = None
+    for index, operation in enumerate(toolpath.operation.tolist()):
+        if operation != pen:
+            pen = operation
+            lines.append(f"PU;SP{PENS[OPERATIONS[operation]]};")
+        begin, end = offsets[index], offsets[index + 1]
+        lines.append(f"PU{words[begin]};PD{','.join(words[begin + 1 : end])};")
+    lines.append("PU;PU0,0;SP0;")
+    return "\n".join(lines) + "\n"
