@@ -57,7 +57,8 @@ class Toolpath:
         """(S,) lengths of the strokes in mm."""
         steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(steps)])
-        return along[self.offsets[1:] - 1] - along[self.offsets[:-1]]
+        lengths: NDArray[np.float64] = along[self.offsets[1:] - 1] - along[self.offsets[:-1]]
+        return lengths
 
     def length_of(self, operation: str) -> float:
         """The length in mm of all strokes of one operation."""
