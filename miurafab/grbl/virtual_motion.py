@@ -56,7 +56,11 @@ def run_gcode(machine: Machine, line: str, *, jog: bool = False) -> Run:
     except BlockFault as fault:
         machine.answer = fault.code
         return
+    chord = float(cpu.ARC_CHORD) if block.radius else 0.0
+    if chord:
+        yield float(cpu.ARC_SETUP)
     for action in execute(block, machine.parser, settings):
+        yield chord
         yield from _perform(machine, action)
 
 

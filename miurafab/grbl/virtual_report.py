@@ -9,11 +9,12 @@ from miurafab.gcode.words import PROBES
 from miurafab.grbl.codes import setting_codes
 from miurafab.grbl.virtual_state import Machine, State, Suspend
 from miurafab.grbl.virtual_wire import RX_RING
-from miurafab.motion.planner import CAPACITY
 
 BANNER = "\r\nGrbl 1.1h ['$' for help]\r\n"
 HELP = "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n"
 VERSION = "1.1h.20190830"
+PLANNER_BLOCKS = 15
+"""16 slots of which one stays free (``planner.h``)."""
 _INCHES = single(0.0393701)
 _BUSY_OFFSET, _IDLE_OFFSET = 30, 10
 _BUSY_OVERRIDE, _IDLE_OVERRIDE = 20, 10
@@ -114,7 +115,7 @@ def modes(machine: Machine) -> str:
 
 def build_info(note: str) -> str:
     """The answer to ``$I``: version, the note of ``$I=``, and the buffer sizes."""
-    return f"[VER:{VERSION}:{note}]\r\n[OPT:V,{CAPACITY},{RX_RING}]\r\n"
+    return f"[VER:{VERSION}:{note}]\r\n[OPT:V,{PLANNER_BLOCKS},{RX_RING}]\r\n"
 
 
 def status(machine: Machine) -> str:
@@ -132,7 +133,7 @@ def status(machine: Machine) -> str:
         where = f"WPos:{_vector(machine, work)}"
     fields = [_state(machine), where]
     if mask & 2:
-        fields.append(f"Bf:{CAPACITY - len(machine.planner.moves)},{machine.uart.room}")
+        fields.append(f"Bf:{PLANNER_BLOCKS - len(machine.planner.moves)},{machine.uart.room}")
     speed = machine.generator.speed * 60.0 if machine.state in _BUSY else 0.0
     fields.append(f"FS:{rate(machine, speed)},{number(machine.spindle_speed, 0)}")
     pins = _pins(machine)

@@ -83,6 +83,11 @@ PLAN_FORWARD = 2 * COMPARE + 40
 PLAN_FORWARD_RISING = 2 * MULTIPLY + ADD + COMPARE
 """One block in the backward and in the forward pass, the latter more where speed rises."""
 
+ARC_SETUP = 2882 + ROOT + 4 * DIVIDE + 12 * MULTIPLY + 8 * ADD
+"""An arc before its first chord: its angle, and how many chords."""
+ARC_CHORD = 5 * MULTIPLY + 5 * ADD + (4 * MULTIPLY + 2 * ADD + 2 * 1760) // 12 + 200
+"""Turning the radius by one chord, every twelfth time by sine and cosine (``mc_arc``)."""
+
 LOAD_BLOCK = CONVERT + 2 * DIVIDE + ROOT + 350
 LOAD_RATE = DIVIDE
 """Taking up a block for stepping, and more where power follows the speed."""

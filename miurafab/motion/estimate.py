@@ -83,6 +83,7 @@ class _Run:
     def __init__(self, program: Program, parameters: MotionParameters, link: Link) -> None:
         self.program = program
         self.laser = parameters.laser
+        self.slow = parameters.slow_processor
         self.planner = Planner(parameters)
         self.planner.position = tuple(
             round(x * k)
@@ -142,8 +143,11 @@ class _Run:
         ):
             self._receive(size)
             self._work(cpu.LINE_FIXED + cpu.words_cost(words, size - 1, points) + cpu.REALTIME)
+            chord = cpu.ARC_CHORD if len(todo) > 1 else 0
+            self._work(cpu.ARC_SETUP if chord else 0)
             for index in todo:
                 if index >= 0:
+                    self._work(chord)
                     self._line(*moves[index])
                 else:
                     self._event(*events[~index])
@@ -235,7 +239,7 @@ class _Run:
         """Do ``cycles`` of work, and what planner and generator had to do since last time."""
         cycles += self.planner.cycles + self.generator.cycles
         self.planner.cycles = self.generator.cycles = 0
-        if cycles:
+        if cycles and self.slow:
             self.now = self.processor.run(self.now, cycles)
 
     def _begin(self, now: int) -> None:

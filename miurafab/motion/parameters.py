@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from miurafab.errors import ProfileError
 from miurafab.profiles import MachineProfile
 
 _NEEDED = (1, 11, 12, 30, 31, 32, 100, 101, 102, 110, 111, 112, 120, 121, 122)
 Triple = tuple[float, float, float]
+_EIGHT_BIT = ("grbl-1.1", "grbl-0.9")
+"""Dialects that run on an ATmega328P."""
 _COMMON_STEPS = 80.0
 """steps/mm of a belt with 2 mm pitch, 20 teeth and 1/16 steps, the usual laser frame."""
 
@@ -22,6 +24,8 @@ class MotionParameters:
     ($120-$122); ``junction_deviation`` and ``arc_tolerance`` in mm ($11, $12); ``idle_lock`` in s,
     how long the motors are held after each stop before the controller goes on, or None if they
     are held for ever without waiting ($1); ``laser`` mode ($32); ``s_max``, ``s_min`` ($30, $31).
+    ``planner_blocks`` moves are looked ahead; ``slow_processor``: the work of parsing and
+    planning takes the time of GRBL's 8-bit one, else none.
     """
 
     steps_per_mm: Triple
@@ -33,6 +37,8 @@ class MotionParameters:
     laser: bool
     s_max: float
     s_min: float
+    planner_blocks: int = 15
+    slow_processor: bool = True
 
     @classmethod
     def from_settings(cls, settings: Mapping[int, float]) -> MotionParameters:
@@ -70,7 +76,11 @@ class MotionParameters:
         settings |= {120: acceleration_x, 121: acceleration_y, 122: acceleration_x}
         settings |= {30: profile.tool.s_max, 31: profile.tool.s_min}
         settings |= {32: float(profile.tool.kind == "laser")}
-        return cls.from_settings(settings | profile.settings)
+        return replace(
+            cls.from_settings(settings | profile.settings),
+            planner_blocks=profile.controller.planner_blocks,
+            slow_processor=profile.dialect in _EIGHT_BIT,
+        )
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The look-ahead: how fast each of the next fifteen moves may be entered.
+"""The look-ahead: how fast each of the next moves may be entered, fifteen of them on GRBL.
 
 Between two moves of unit directions u and v the speed is bounded by a circle through the corner
 that leaves it by the junction deviation d: with t the angle between -u and v,
@@ -21,8 +21,6 @@ from collections.abc import Callable, Sequence
 from miurafab.motion import cpu
 from miurafab.motion.parameters import MotionParameters
 
-CAPACITY = 15
-"""Moves that can be planned ahead: 16 slots of which one stays free (``planner.h``)."""
 _STRAIGHT = 0.999999
 _UNLIMITED = 1e38
 _MOST_STEPS = 2.0**31 - 1.0
@@ -81,7 +79,7 @@ class Planner:
     @property
     def full(self) -> bool:
         """Whether no further move fits."""
-        return len(self.moves) >= CAPACITY
+        return len(self.moves) >= self.parameters.planner_blocks
 
     def nominal_speed(self, move: Move) -> float:
         """The speed ``move`` is meant to have under the overrides."""

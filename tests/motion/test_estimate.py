@@ -58,6 +58,16 @@ def test_a_slow_wire_starves_the_planner() -> None:
     assert time(text, Link(baud=9600)).seconds > 1.5 * time(text).seconds
 
 
+def test_a_fast_processor_with_a_longer_look_ahead_is_faster() -> None:
+    text = "".join(f"G1 X{x / 10:.1f} F6000\n" for x in range(1, 400))
+    link = Link(baud=1_000_000)
+    slow = time(text, link).seconds
+    quick = time(text, link, slow_processor=False).seconds
+    far = time(text, link, slow_processor=False, planner_blocks=100).seconds
+    assert slow > 1.1 * quick
+    assert quick > 1.2 * far
+
+
 @pytest.mark.parametrize("text", ["", "(nothing)", "M5\nM9", "G1 F600"])
 def test_a_program_without_motion_takes_no_time(text: str) -> None:
     found = time(text)

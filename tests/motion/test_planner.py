@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miurafab.motion.parameters import MotionParameters
-from miurafab.motion.planner import CAPACITY, Planner, along, to_steps
+from miurafab.motion.planner import Planner, along, to_steps
 
 ACCELERATION = 1000.0
 DEVIATION = 0.01
@@ -79,7 +79,7 @@ def test_steps_round_half_away_and_stay_within_32_bits(value: float, steps: int)
 moves = st.lists(
     st.tuples(st.integers(-400, 400), st.integers(-400, 400), st.sampled_from([5, 50, 100, 200])),
     min_size=1,
-    max_size=CAPACITY,
+    max_size=15,
 )
 
 
