@@ -11,7 +11,10 @@ import pytest
 from virtual_player import RECORDED, ready, stream, until_answer
 
 from miurafab.gcode.job import Job, prepare
+from miurafab.gcode.program import parse_program
 from miurafab.grbl.virtual import standing_seconds
+from miurafab.motion.estimate import estimate
+from miurafab.motion.parameters import MotionParameters
 
 DATA = Path(__file__).parent.parent / "data" / "grbl"
 CASES = json.loads((DATA / "transcripts.json").read_text(encoding="utf-8"))
@@ -72,3 +75,23 @@ def test_a_job_takes_as_long_as_it_did(name: str, within: float) -> None:
         assert standing_seconds(device.beam_log) == pytest.approx(600 * 0.025, rel=0.01)
     else:
         assert standing_seconds(device.beam_log) == 0
+
+
+CIRCLE = "".join(f"G2X{20 * (i % 2)}I{-10 * (-1) ** i}F{f}S9\n" for i, f in enumerate((6000, 900)))
+MIXED = {
+    "zigzag": "M4\n" + "".join(f"G1X{7 * i % 31}Y{5 * i % 29}F3000S500\n" for i in range(60)),
+    "arcs": "M4\nG0X20\n" + CIRCLE * 3,
+    "grey": "M4F6000\n" + "".join(f"G1X{i / 10}S{37 * i % 1000}\n" for i in range(1, 300)),
+    "syncs": "".join(f"G0X{i}\nM8\nG4P0.12\nM9\n" for i in range(1, 20)) + "G0X0\n",
+}
+
+
+@pytest.mark.parametrize("name", MIXED)
+def test_the_estimate_foretells_the_virtual_run(name: str) -> None:
+    job = Job(name, MIXED[name])
+    device = ready(RECORDED)
+    seconds = stream(device, [line.data for line in prepare(job)])
+    foretold = estimate(parse_program(job), MotionParameters.from_settings(device.settings))
+    assert seconds == pytest.approx(foretold.seconds, rel=0.01, abs=0.02)
+    burnt = sum(segment.t1 - segment.t0 for segment in device.beam_log)
+    assert burnt == pytest.approx(foretold.beam_on_seconds, rel=0.005, abs=0.001)

@@ -65,10 +65,11 @@ def play(device: VirtualGrbl, *steps: Step) -> str:
 
 
 def stream(device: VirtualGrbl, lines: Sequence[bytes], latency: float = 0.001) -> float:
-    """Send ``lines`` by character counting; the seconds from the first move to the last."""
+    """Send ``lines`` by character counting; the seconds from first to last step."""
     waiting, answered = deque[int](), deque[float]()
     room, sent, done, buffer = 128, 0, 0, b""
     began = ended = None
+    at = device.position
     while done < len(lines) or device.state != "Idle":
         while sent < len(lines) and len(lines[sent]) < room:
             device.receive(lines[sent] + b"\n")
@@ -88,9 +89,9 @@ def stream(device: VirtualGrbl, lines: Sequence[bytes], latency: float = 0.001) 
             answered.popleft()
             room += waiting.popleft()
             done += 1
-        if device.state == "Run":
+        if device.position != at:
             began = device.now if began is None else began
-            ended = device.now
+            at, ended = device.position, device.now
     assert began is not None
     assert ended is not None
-    return ended - began - device.settings[1] * 1e-3
+    return ended - began
