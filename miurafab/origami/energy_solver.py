@@ -41,8 +41,10 @@ Ints = NDArray[np.int64]
 TOLERANCE = 1e-11
 """On every component of F (forces over the stiffest hinge, if that is over 1): convergence is
 judged by what is out of balance, never by the length of a step."""
-EPS = 1e-7
-"""The compliance lent to inextensible bars in K. From 1e-4 to 1e-10 it makes no difference."""
+EPS = 1e-10
+"""The compliance lent to inextensible bars in K. Larger, and large bar forces slow the iteration
+down; smaller, and rounding does.
+"""
 SLOW = 0.2
 """K is factored anew when an iteration leaves more than this of the residual."""
 MAX_ITERATIONS = 40

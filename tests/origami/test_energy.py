@@ -94,7 +94,7 @@ def test_poisson_ratio_of_a_miura_ori(degrees):
 
 def test_elastic_creases_store_what_the_closed_form_says():
     """On its rigid path a Miura-ori with elastic creases has E = sum 1/2 k_c l (rho - rho_0)^2."""
-    pattern = regular()
+    pattern = regular(5, 5)
     model = sheet_model(pattern, crease_ratio=0.3)
     path = folding_path(pattern, 8, model=model)
     angles = angles_along(folding_path(pattern, 8))
