@@ -24,6 +24,7 @@ Ints = NDArray[np.int64]
 TOLERANCE = 1e-4
 """How near ends count as met, as a part of the median line."""
 
+_FAR = 1e9
 # Where two lines lie on each other the one that says more wins.
 _RANK = {"B": 6, "C": 5, "M": 4, "V": 4, "J": 2, "F": 1, "U": 0}
 
@@ -62,8 +63,8 @@ def pattern_from_lines(lines: Lines, tolerance: float | None = None) -> CreasePa
     """
     if not len(lines.ends):
         raise PatternError("The drawing holds no straight line.")
-    if not np.isfinite(lines.ends).all():
-        raise PatternError("The drawing holds a coordinate that is not a finite number.")
+    if not (np.abs(lines.ends) < _FAR).all():
+        raise PatternError("The drawing holds a coordinate that is not a number or is beyond 1e9.")
     lengths = np.linalg.norm(lines.ends[:, 1] - lines.ends[:, 0], axis=1)
     near = TOLERANCE * float(np.median(lengths)) if tolerance is None else tolerance
     points, sides, source = _split(lines.ends, near)

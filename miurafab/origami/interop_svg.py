@@ -110,7 +110,8 @@ def parse_svg(text: str) -> Lines:
             continue
         angle = _fold_angle(element, look, letter)
         for piece in _pieces(element):
-            points = piece @ look.matrix[:, :2].T + look.matrix[:, 2]
+            with np.errstate(invalid="ignore", over="ignore"):
+                points = piece @ look.matrix[:, :2].T + look.matrix[:, 2]
             ends.append(np.stack([points[:-1], points[1:]], axis=1))
             letters += [letter] * (len(points) - 1)
             angles += [angle] * (len(points) - 1)
@@ -324,8 +325,9 @@ def _one_transform(name: str, n: list[float]) -> Matrix:
 
 
 def _composed(outer: Matrix, inner: Matrix) -> Matrix:
-    linear = outer[:, :2] @ inner[:, :2]
-    shift = outer[:, :2] @ inner[:, 2] + outer[:, 2]
+    with np.errstate(invalid="ignore", over="ignore"):
+        linear = outer[:, :2] @ inner[:, :2]
+        shift = outer[:, :2] @ inner[:, 2] + outer[:, 2]
     return np.concatenate([linear, shift[:, None]], axis=1)
 
 

@@ -150,7 +150,7 @@ def read_pattern(
         raise PatternError(f"{path} cannot be read: {fault.strerror}.") from None
     try:
         return pattern_from_lines(DRAWINGS[ending](text), tolerance)
-    except PatternError as fault:
+    except InputError as fault:
         raise PatternError(f"{path}: {fault}") from None
 
 

@@ -24,7 +24,7 @@ _FINE = 2  # canvas pixels for one pixel of the picture, along each axis
 _YAW, _PITCH = -0.6, 0.62
 _MARGIN, _BAR = 26, 4
 _PAGE, _RULE, _DONE, _MARK = (244, 245, 247), (213, 218, 224), (11, 107, 203), (29, 35, 41)
-_FRONT, _BACK = np.array([242.0, 230.0, 207.0]), np.array([127.0, 168.0, 196.0])
+_FRONT, _BACK = np.array([242.0, 230.0, 207.0]), np.array([157.0, 181.0, 161.0])
 _KEY, _FILL = np.array([-0.45, 0.6, 0.66]), np.array([0.7, -0.15, 0.5])
 _MILLISECONDS, _HOLD = 60, 700
 

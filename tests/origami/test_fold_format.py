@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -177,3 +178,20 @@ def test_a_file_that_is_no_fold_file_is_named(tmp_path: Path) -> None:
 
 def test_the_same_pattern_gives_the_same_bytes() -> None:
     assert fold_text(regular(4, 3)) == fold_text(replace(regular(4, 3)))
+
+
+def test_any_value_in_any_place_is_read_or_refused_in_a_sentence() -> None:
+    values = [None, [], {}, "x", -1, 1e400, [1], [[1, 2]], 3.5, True, [None], [[None, None]], "M"]
+    random = Random(1)
+    text = fold_text(regular(4, 3))
+    for _ in range(600):
+        damaged = json.loads(text)
+        key = random.choice(list(damaged))
+        if random.random() < 0.5 or not isinstance(damaged[key], list):
+            damaged[key] = random.choice(values)
+        else:
+            damaged[key][random.randrange(len(damaged[key]))] = random.choice(values)
+        try:
+            assert len(parse_fold(damaged).edges_faces)
+        except PatternError as fault:
+            assert str(fault).endswith(".")

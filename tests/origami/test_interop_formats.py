@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from random import Random
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from problems import fitted, regular
 
-from miurafab.errors import PatternError
+from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.interop_lines import (
     cp_text,
@@ -207,3 +208,24 @@ def test_dxf_polylines_and_colours_are_read() -> None:
     assert read.ends[2].tolist() == [[0, 4], [0, 0]]
     assert read.ends[3].tolist() == [[1, 1], [2, 3]]
     assert read.ends[4].tolist() == [[1, 2], [3, 4]]
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_damaged_file_is_read_or_refused_in_a_sentence(name: str) -> None:
+    write, parse = FORMATS[name]
+    whole = write(lines_of(regular(4, 3)))
+    random = Random(1)
+    read = 0
+    for _ in range(300):
+        text = list(whole)
+        for _ in range(random.randint(1, 5)):
+            at = random.randrange(len(text))
+            text[at : at + random.randint(0, 2)] = random.choice(
+                ["", "-", "9", "e9", "<", "n", " "]
+            )
+        try:
+            pattern_from_lines(parse("".join(text)))
+            read += 1
+        except InputError as fault:
+            assert str(fault).endswith(".")
+    assert 0 < read < 300
