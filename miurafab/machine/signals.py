@@ -55,8 +55,11 @@ class StopSignals:
         if threading.current_thread() is threading.main_thread():
             for name in _WORDS:
                 number = getattr(signal, name, None)
-                # A program started with nohup ignores SIGHUP on purpose.
-                if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+                if number is None:
+                    continue
+                # A program started with nohup ignores SIGHUP on purpose. (That a shell starts a
+                # background job with SIGINT ignored is no wish: who interrupts a laser means it.)
+                if name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
                     self._old[number] = signal.signal(number, self._handle)
         return self
 
