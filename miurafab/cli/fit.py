@@ -20,7 +20,11 @@ def fit(
     target: TargetArgument,
     out: Annotated[Path, typer.Option("-o", "--out", help="The FOLD file to write.")],
     facets: Annotated[
-        str | None, typer.Option(help="Facets as COLUMNSxROWS [default: 20x20].")
+        str | None,
+        typer.Option(
+            help="Facets as COLUMNSxROWS [default: 20x20; with both --max-deviation and "
+            "--min-edge, the coarsest sheet that meets them]."
+        ),
     ] = None,
     size: Annotated[
         str | None,
@@ -66,6 +70,24 @@ def fit(
             "one facet), or seam (all round, to be glued) [default: sector]."
         ),
     ] = None,
+    follow: Annotated[
+        str | None,
+        typer.Option(help="What lies on the target: middle, top or bottom [default: middle]."),
+    ] = None,
+    min_angle: Annotated[str | None, typer.Option(help="The least sector angle allowed.")] = None,
+    max_angle: Annotated[
+        str | None, typer.Option(help="The greatest sector angle allowed.")
+    ] = None,
+    max_aspect: Annotated[
+        str | None, typer.Option(help="The greatest ratio of two sides of a facet.")
+    ] = None,
+    polish: Annotated[
+        str | None,
+        typer.Option(
+            help="Bring the sheet as close to the target as it goes: on, off, or auto (where a "
+            "limit is not met or flat-foldability is asked for) [default: auto]."
+        ),
+    ] = None,
     report: Annotated[
         Path | None, typer.Option(help="Also write the report to this JSON file.")
     ] = None,
@@ -87,6 +109,11 @@ def fit(
         region=region,
         rotate=rotate,
         close=close,
+        follow=follow,
+        min_angle=min_angle,
+        max_angle=max_angle,
+        max_aspect=max_aspect,
+        polish=polish,
     )
     for remark in wanted.remarks:
         console.remark(remark)

@@ -71,8 +71,8 @@ class Candidate:
         """The smaller the better: the number of faults, then whether it strays from the target."""
         assert self.pattern.folded_coords is not None
         extent = np.ptp(self.pattern.folded_coords, axis=0)
-        stray = (self.measurements.hausdorff_midsurface_mm or 0.0) > FAR * np.linalg.norm(extent)
-        return len(self.faults), bool(stray)
+        off = min(self.measurements.hausdorff_midsurface_mm or 0.0, self.deviation_mm)
+        return len(self.faults), bool(off > FAR * np.linalg.norm(extent))
 
 
 @dataclass(frozen=True)
@@ -124,8 +124,7 @@ class Plan:
         asked = request.flat_foldable is not None or plain.rank != (0, False)
         if request.polish == "off" or (request.polish == "auto" and not asked):
             return plain
-        crumpled = plain.measurements.overlaps > 0
-        if crumpled:
+        if plain.measurements.overlaps:
             return plain  # so far from a sheet that polishing it is lost work
         closer = self._polished(request, unknowns, solution, plain)
         if (closer.rank, closer.deviation_mm) < (plain.rank, plain.deviation_mm):
@@ -200,11 +199,7 @@ class Plan:
         scale = 1.0 if request.size_mm is None else request.size_mm / extent
         pattern = unfold(sheet.scaled(scale), scale=scale, target=request.target | self.layout)
         measured = measure(pattern, self.surface)
-        deviation = measured.hausdorff_midsurface_mm or 0.0
-        if request.follow != "middle":
-            points = followers(sheet.grid, self._follow(request)) @ sheet.vertices
-            gap = np.linalg.norm(points - self.surface.closest_point(points), axis=1)
-            deviation = float(gap.max()) * scale
+        deviation = _deviation(sheet, self.surface, self._follow(request)) * scale
         limits = replace(
             request.bounds(Unknowns(unknowns.columns, unknowns.rows, unknowns.length), scale),
             min_edge=None,
@@ -331,6 +326,20 @@ def _shaken(start: Tessellation, seed_number: int) -> Tessellation:
 
 def _worst_kawasaki(sheet: Tessellation) -> float:
     return float(np.abs(flat_foldability(sheet.vertices, sheet.grid)).max(initial=0.0))
+
+
+def _deviation(sheet: Tessellation, surface: TargetSurface, follow: Follow) -> float:
+    """How far the surface that follows the target lies from it at most: its points, the middles of
+    neighbours and of each four, so that a few points on the target do not pass for a close sheet.
+    """
+    points = (followers(sheet.grid, follow) @ sheet.vertices).reshape(
+        -1, sheet.grid.columns - (follow == "middle"), 3
+    )
+    between = (points[:, 1:] + points[:, :-1]) / 2
+    rows = (points[1:] + points[:-1]) / 2
+    centres = (between[1:] + between[:-1]) / 2
+    samples = np.concatenate([part.reshape(-1, 3) for part in (points, between, rows, centres)])
+    return float(np.linalg.norm(samples - surface.closest_point(samples), axis=1).max())
 
 
 def _faults(

@@ -71,8 +71,9 @@ class Bounds:
     def _blocks(self, points: Floats) -> list[tuple[str, tuple[Floats, sparse.csr_array]]]:
         blocks: list[tuple[str, tuple[Floats, sparse.csr_array]]] = []
         if self.min_edge is not None:
-            lengths, rows = _lengths(points, self.grid.edges_vertices)
-            blocks.append(("edge", ((lengths - self.min_edge) / self.length, rows / self.length)))
+            lengths, along = _lengths(points, self.grid.edges_vertices)
+            gradient = sparse.csr_array(along / self.length)
+            blocks.append(("edge", ((lengths - self.min_edge) / self.length, gradient)))
         if self.angles is not None:
             low, high = self.angles
             alpha, rows = self._corner_angles(points)

@@ -21,44 +21,60 @@ served, what to change.
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable
 
 from miurafab.origami.attempts import Candidate, plans
 from miurafab.origami.fit_request import Attempt, FitRequest, FitResult
+from miurafab.origami.search import coarsest
 
 __all__ = ["Attempt", "FitRequest", "FitResult", "fit"]
 
 
-def fit(request: FitRequest, on_progress: Callable[[float, str], None] | None = None) -> FitResult:
+def fit(
+    request: FitRequest,
+    on_progress: Callable[[float, str], None] | None = None,
+) -> FitResult:
     """The tessellation asked for; ``on_progress`` gets a fraction and a word on what is tried.
 
     Non-convergence is a result with advice. Raises :class:`~miurafab.errors.InputError` only for a
     request that makes no sense.
     """
+    if request.search:
+        return coarsest(request, lambda one, attempts: _fit(one, None, attempts), on_progress)
+    return _fit(request, on_progress)
+
+
+def _fit(
+    request: FitRequest,
+    on_progress: Callable[[float, str], None] | None,
+    attempts: int | None = None,
+) -> FitResult:
+    """One size, in at most ``attempts`` attempts."""
     started = time.perf_counter()
-    attempts: list[Attempt] = []
+    made: list[Attempt] = []
     best: Candidate | None = None
-    for number, plan in enumerate(plans(request)):
+    for number, plan in enumerate(itertools.islice(plans(request), attempts)):
         if on_progress is not None:
             # how many attempts it takes is not known; most sheets need one or two
             on_progress(1 - 0.9**number, plan.describe())
         outcome = plan.run(request)
         if isinstance(outcome, Attempt):
-            attempts.append(outcome)
+            made.append(outcome)
             continue
-        attempts.append(outcome.attempt)
+        made.append(outcome.attempt)
         if best is None or outcome.rank < best.rank:
             best = outcome
         if outcome.rank == (0, False):
             break
     if on_progress is not None:
         on_progress(1.0, "done")
-    iterations = sum(a.iterations for a in attempts)
+    iterations = sum(a.iterations for a in made)
     seconds = time.perf_counter() - started
     if best is None:
-        advice = _advice_when_stalled(attempts)
-        return FitResult("stalled", advice, None, None, tuple(attempts), iterations, seconds)
+        advice = _advice_when_stalled(made)
+        return FitResult("stalled", advice, None, None, tuple(made), iterations, seconds)
     status = "infeasible" if best.faults else "converged"
     place = best.attempt.place
     remarks = [f"On the whole rectangle no sheet was found; this one has {place}."] if place else []
@@ -69,7 +85,7 @@ def fit(request: FitRequest, on_progress: Callable[[float, str], None] | None = 
         " ".join((*best.faults, *remarks)),
         best.pattern,
         best.measurements,
-        tuple(attempts),
+        tuple(made),
         iterations,
         seconds,
         best.deviation_mm,

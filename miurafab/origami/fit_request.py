@@ -32,6 +32,8 @@ class FitRequest:
     vertices (top is the side of the target's normal). ``min_angle`` and ``max_angle`` bound the
     sector angles, radians; ``max_aspect`` the ratio of two sides of a facet. ``polish`` is ``on``,
     ``off``, or ``auto``: where a limit is not met or flat-foldability is asked for.
+    With ``search``, ``columns`` and ``rows`` give only the proportion, and the coarsest sheet that
+    meets all limits is looked for.
     """
 
     surface: TargetSurface
@@ -50,6 +52,7 @@ class FitRequest:
     max_angle: float | None = None
     max_aspect: float | None = None
     polish: str = "auto"
+    search: bool = False
 
     def __post_init__(self) -> None:
         if self.columns < 2 or self.rows < 2:

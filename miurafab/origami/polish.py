@@ -9,8 +9,9 @@ n_k the normal there, and u = x - x0 the way from the first solution, each round
 linearised (Gauss-Newton), over the steps that keep the constraints and held bounds to first order.
 That is a quadratic problem in the null space of J, solved by projected conjugate gradients whose
 projection I - J^T (J J^T)^-1 J uses the solver's own factor (Gould, Hribar and Nocedal, SIAM J.
-Sci. Comput. 23 (2001), algorithm 6.2); no KKT matrix is ever formed. The solver then takes the sheet
-back onto the constraints exactly; a round that brought it no closer is taken back and shortened.
+Sci. Comput. 23 (2001), algorithm 6.2); no KKT matrix is ever formed. The solver then takes the
+sheet back onto the constraints exactly; a round that brought it no closer is taken back and tried
+again shorter.
 """
 
 from __future__ import annotations

@@ -106,7 +106,7 @@ def catenary(waist: float, height: float) -> ProfileCurve:
 
 
 def ellipse(radius: float, height: float, latitude: float) -> ProfileCurve:
-    """The ellipse (r, z) of half axes ``radius`` and ``height`` between latitudes +-``latitude``."""
+    """The ellipse (r, z) of half axes ``radius`` and ``height`` up to +-``latitude``."""
 
     def position(t: Floats) -> Floats:
         phi = (2 * t - 1) * latitude

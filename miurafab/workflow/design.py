@@ -12,12 +12,13 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from miurafab.errors import InputError, PatternError, TargetError
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fit import FitRequest
 from miurafab.origami.fold_format import read_fold, write_fold
+from miurafab.origami.polish import Follow
 from miurafab.profiles import Table, find_file, read_toml
 from miurafab.surfaces.analytic import Revolution
 from miurafab.surfaces.catalogue import make_surface, parse_target
@@ -122,6 +123,11 @@ _OPTIONS = (
     "region",
     "rotate",
     "close",
+    "follow",
+    "min_angle",
+    "max_angle",
+    "max_aspect",
+    "polish",
 )
 
 
@@ -191,6 +197,13 @@ def _request(
         max_deviation_mm=_length("max_deviation", given),
         seed=_whole("seed", given),
         target=description,
+        follow=cast(Follow, given.get("follow") or "middle"),
+        min_angle=_angle("min_angle", given),
+        max_angle=_angle("max_angle", given),
+        max_aspect=_number("max_aspect", given),
+        polish=given.get("polish") or "auto",
+        search=all(given.get(key) for key in ("min_edge", "max_deviation"))
+        and not given.get("facets"),
     )
 
 
@@ -209,6 +222,11 @@ def _whole(key: str, given: Mapping[str, str | None]) -> int:
     if not text.isdigit():
         raise InputError(f"--{key} is '{text}', not a whole number from 0 up.")
     return int(text)
+
+
+def _angle(key: str, given: Mapping[str, str | None]) -> float | None:
+    text = given.get(key)
+    return None if text is None else parse_angle(text)
 
 
 def _length(key: str, given: Mapping[str, str | None]) -> float | None:
