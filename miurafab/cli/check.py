@@ -16,7 +16,10 @@ def check(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Recompute every invariant of a pattern from its file alone; exit 1 if one fails."""
+    """Recompute every invariant of a pattern from its file.
+
+    Exit 1 if one fails.
+    """
     console = Console(as_json, quiet)
     pattern, surface, missing = miurafab.load_pattern(file)
     if missing is not None:

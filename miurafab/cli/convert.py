@@ -39,7 +39,10 @@ def convert(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Convert a pattern between FOLD, SVG, DXF, CP, OPX, OBJ, STL and GLB."""
+    """Convert a pattern between FOLD and other formats.
+
+    SVG, DXF, CP, OPX, OBJ, STL and GLB.
+    """
     console = Console(as_json, quiet)
     near = None if tolerance is None else parse_length(tolerance)
     done = miurafab.convert(source, target, folded=folded, form=form, tolerance=near)

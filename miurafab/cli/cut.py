@@ -50,7 +50,10 @@ def cut(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Cut a job, or whatever a job can be made from, on a machine or the virtual one."""
+    """Cut a job, making whatever is missing on the way.
+
+    On a machine at a port, or on the virtual one. Ctrl-C stops with the beam off.
+    """
     console = Console(as_json, quiet)
     with console.progress("preparing") as progress:
         prepared = miurafab.prepare(

@@ -9,7 +9,10 @@ from miurafab.cli.console import Console, JsonOption, QuietOption
 
 
 def doctor(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
-    """Say what is installed, which ports exist, and what would stop a job; exit 1 if anything."""
+    """Say what is installed and what would stop a job.
+
+    Sends nothing to any port. Exit 1 if there is anything that would stop a job.
+    """
     console = Console(as_json, quiet)
     report = miurafab.examine()
 

@@ -35,7 +35,10 @@ def energy(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """The energy on the way from folded to flat: barrier, stable states, stiffness."""
+    """Measure the energy on the way from folded to flat.
+
+    The barrier and where it is, the stable states, and the stiffness at the target.
+    """
     console = Console(as_json, quiet)
     if out is not None:
         miurafab.check_energy_file(out)

@@ -33,7 +33,10 @@ def fold(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Fold a pattern: rigidly where it can be, else by bending its facets as little as possible."""
+    """Fold a pattern and write its motion.
+
+    Rigidly where it can be, else by bending its facets as little as possible.
+    """
     console = Console(as_json, quiet)
     if colour not in ("side", "strain"):
         raise typer.BadParameter(f"'{colour}' is neither side nor strain.", param_hint="--colour")

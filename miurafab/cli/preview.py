@@ -29,7 +29,10 @@ def preview(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Show what a job would do, how long it takes, and what is wrong with it; open no port."""
+    """Show what a job would do; opens no port.
+
+    Pictures, times, lengths, and what is wrong with it.
+    """
     console = Console(as_json, quiet)
     profile = None if machine is None else miurafab.load_machine(machine)
     with console.progress("dry run") as progress:

@@ -30,7 +30,10 @@ def sheets(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Lay a pattern out on sheets: patches, tabs, perforation, nesting, drawings, G-code."""
+    """Lay a pattern out on sheets, with drawings and G-code.
+
+    Patches, tabs, perforation, nesting and order, for one machine and one material.
+    """
     console = Console(as_json, quiet)
     with console.progress("laying out") as progress:
         job = miurafab.write_job(

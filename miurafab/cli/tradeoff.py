@@ -50,7 +50,10 @@ def tradeoff(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Accuracy against effort: fit a target with more and more facets and compare."""
+    """Trade accuracy against effort for a target.
+
+    Fit it with more and more facets and compare distances, area and cost.
+    """
     console = Console(as_json, quiet)
     if out is not None:
         miurafab.check_tradeoff_file(out)
