@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from miurafab.profiles.material import OPERATIONS
 from miurafab.profiles.shipped import find_file
 from miurafab.profiles.table import Table, read_toml
 
@@ -37,13 +38,31 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class Knife:
+    """A blade that trails behind the axis of its holder, as the wheel of a caster does.
+
+    ``offset_mm`` is how far its tip trails, 0 where the machine corrects for that itself.
+    At a corner that turns by more than ``corner_angle`` (rad) the blade is swivelled about its tip.
+    A closed outline is cut on over its beginning by ``overcut_mm``. ``s_shallow`` is the S of a
+    depth that marks the sheet and does not part it, for scores and engravings; None if there is
+    no such depth. ``leave_out`` are the operations that this knife is not asked to make.
+    """
+
+    offset_mm: float
+    corner_angle: float
+    overcut_mm: float
+    s_shallow: int | None
+    leave_out: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Tool:
     """What marks the sheet. S values run from ``s_min`` to ``s_max`` (``$31``, ``$30``).
 
     ``beam_mode`` is the word that arms a laser: M4 scales the power with the speed and goes dark
     whenever motion stops; M3 keeps burning and must be allowed explicitly.
     For a pen or knife ``s_down`` and ``s_up`` are the servo positions and ``settle_s`` the time
-    each takes.
+    each takes; on an HPGL machine ``s_down`` is the force of its ``FS`` instruction.
     """
 
     kind: str
@@ -54,6 +73,7 @@ class Tool:
     s_down: int
     s_up: int
     settle_s: float
+    knife: Knife | None = None
 
 
 @dataclass(frozen=True)
@@ -150,9 +170,20 @@ def _tool(table: Table) -> Tool:
         s_down=table.whole("s_down", s_max, low=0, high=s_max),
         s_up=table.whole("s_up", 0, low=0, high=s_max),
         settle_s=table.number("settle", 0.0, low=0, high=10),
+        knife=_knife(table, s_max) if kind == "knife" else None,
     )
     table.finish()
     return tool
+
+
+def _knife(table: Table, s_max: int) -> Knife:
+    return Knife(
+        offset_mm=table.length("offset", low=0, high=5),
+        corner_angle=table.angle("corner_angle", math.radians(20), low=0.02, high=math.pi),
+        overcut_mm=table.length("overcut", 0.0, low=0, high=20),
+        s_shallow=table.whole("s_shallow", low=0, high=s_max) if table.has("s_shallow") else None,
+        leave_out=table.choices("leave_out", OPERATIONS, ()),
+    )
 
 
 def _controller(table: Table) -> Controller:

@@ -79,6 +79,18 @@ class Table:
             raise self.fault(key, f"is {value!r}; it must be one of {', '.join(choices)}")
         return str(value)
 
+    def choices(
+        self, key: str, choices: Sequence[str], default: Sequence[str] = _REQUIRED
+    ) -> tuple[str, ...]:
+        """A list of some of the strings ``choices``."""
+        values = self._take(key, default)
+        if not isinstance(values, list | tuple):
+            raise self.fault(key, f"must be a list, not {values!r}")
+        for value in values:
+            if value not in choices:
+                raise self.fault(key, f"holds {value!r}; it may hold {', '.join(choices)}")
+        return tuple(values)
+
     def flag(self, key: str, default: bool = _REQUIRED) -> bool:
         """A boolean."""
         value = self._take(key, default)

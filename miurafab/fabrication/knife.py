@@ -1,0 +1,147 @@
+"""The way of a drag knife's holder, so that the blade's tip goes where the strokes are.
+
+A drag knife is a caster: its tip T trails at the distance d behind the holder's axis C and can move
+only along the blade, towards C. So for the tip to move in direction u, the axis must be at
+C = T + d u, and
+
+* along a straight piece the axis runs parallel to it, d ahead;
+* at a corner from u to v the tip must stand while the blade turns: the axis goes on a circle of
+  radius d about the corner, from T + d u to T + d v. A chord of that circle over an angle s pushes
+  the tip back along the blade by at most d (1 - cos s/2) and lets it forth again;
+* at a turn too small to matter, such as those of a curve, that circle is a single chord;
+* a stroke begins with the blade where the stroke before left it: the axis comes down d ahead of
+  the first point in the *old* direction, and swivels there into the new one.
+
+Nobody knows how the blade stands before the first stroke. A straight cut in the margin of the sheet
+turns it: on such a cut tan(a/2) of the angle a between blade and cut falls by exp(-1) every d
+(the tractrix), so a length of 20 d leaves nothing of any angle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import LayoutError
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.profiles import OPERATIONS, Knife
+
+ALIGNING_OFFSETS = 20
+"""The length of the cut that turns the blade, in offsets."""
+_MM = 1e-3  # what is shorter cannot be told apart in the file
+_PUSH = 1e-3  # mm, how far the tip may be pushed back in a swivel
+_STRAIGHT = 1e-9  # rad, below which there is no turn
+_Points = NDArray[np.float64]
+
+
+def trailing(toolpath: Toolpath, knife: Knife, margin_mm: float) -> Toolpath:
+    """``toolpath`` as the axis of ``knife`` must go, its strokes in the same order.
+
+    A cut that turns the blade along +X comes first, in the margin of ``margin_mm`` at the sheet's
+    lower edge. Closed strokes are cut on over their beginning by the overcut. An offset of 0
+    leaves the points as they are, but for the overcut. Raises
+    :class:`~miurafab.errors.LayoutError` if the margin has no room for the first cut, and for a
+    stroke without length.
+    """
+    tip = _overcut(_distinct(toolpath), knife.overcut_mm)
+    if knife.offset_mm == 0 or not len(tip):
+        return tip
+    return _axis(_with_aligning(tip, knife.offset_mm, margin_mm), knife)
+
+
+def _distinct(toolpath: Toolpath) -> Toolpath:
+    """``toolpath`` without the points that repeat the one before in their stroke."""
+    keep = np.ones(len(toolpath.points), dtype=bool)
+    keep[1:] = np.linalg.norm(np.diff(toolpath.points, axis=0), axis=1) >= _MM
+    keep[toolpath.offsets[:-1][np.diff(toolpath.offsets) > 0]] = True
+    stroke = np.repeat(np.arange(len(toolpath)), np.diff(toolpath.offsets))
+    kept = np.bincount(stroke[keep], minlength=len(toolpath))
+    if kept.min(initial=2) < 2:
+        raise LayoutError(
+            f"Stroke {int(np.argmax(kept < 2)) + 1} of {toolpath.sheet} is shorter than 0.001 mm "
+            "and cannot be cut; remove it from the layout."
+        )
+    return replace(toolpath, points=toolpath.points[keep], offsets=_offsets(kept))
+
+
+def _overcut(toolpath: Toolpath, overcut: float) -> Toolpath:
+    """Each closed stroke led on over its beginning by ``overcut``."""
+    if overcut <= 0 or not len(toolpath):
+        return toolpath
+    closed = np.linalg.norm(toolpath.ends - toolpath.starts, axis=1) < _MM
+    closed &= np.diff(toolpath.offsets) > 3
+    lines = np.split(toolpath.points, toolpath.offsets[1:-1])
+    for stroke in np.flatnonzero(closed).tolist():
+        lines[stroke] = _led_on(lines[stroke], overcut)
+    return replace(
+        toolpath, points=np.concatenate(lines), offsets=_offsets(np.array([*map(len, lines)]))
+    )
+
+
+def _led_on(points: _Points, overcut: float) -> _Points:
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    end = min(overcut, float(along[-1]))
+    inner = points[1:][along[1:] < end - _MM]
+    last = [np.interp(end, along, points[:, 0]), np.interp(end, along, points[:, 1])]
+    return np.concatenate([points, inner, [last]])
+
+
+def _with_aligning(toolpath: Toolpath, d: float, margin_mm: float) -> Toolpath:
+    """``toolpath`` with the cut that turns the blade before it, in the middle of the margin."""
+    y = margin_mm / 2
+    length = ALIGNING_OFFSETS * d
+    if y < 2 * d or 2 * y + length + 2 * d > toolpath.width_mm:
+        raise LayoutError(
+            f"The margin of {margin_mm:g} mm of {toolpath.sheet} has no room for the cut that "
+            f"turns a blade with an offset of {d:g} mm; write a margin of at least {4 * d:g} mm "
+            "under [bed]."
+        )
+    return replace(
+        toolpath,
+        points=np.concatenate([[[y, y], [y + length, y]], toolpath.points]),
+        offsets=np.concatenate([[0], toolpath.offsets + 2]),
+        operation=np.concatenate([[OPERATIONS.index("cut")], toolpath.operation]),
+        patch=np.concatenate([[-1], toolpath.patch]),
+        edge=np.concatenate([[-1], toolpath.edge]),
+    )
+
+
+def _axis(toolpath: Toolpath, knife: Knife) -> Toolpath:
+    """The axis's way for the tip's way ``toolpath``, the blade standing along +X before it."""
+    d, points = knife.offset_mm, toolpath.points
+    last = toolpath.offsets[1:] - 1
+    begins = np.ones(len(points), dtype=bool)
+    begins[last] = False
+    corners = np.flatnonzero(begins)  # where a straight piece begins
+    steps = points[corners + 1] - points[corners]
+    along = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+    before = np.vstack([[1.0, 0.0], along[:-1]])
+    turn = np.arctan2(
+        before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], (before * along).sum(axis=1)
+    )
+    # At each corner a fan of points about the tip, ``count`` chords from ``before`` to ``along``.
+    chord = 2.0 * np.arccos(max(0.5, 1.0 - _PUSH / d))
+    first = np.isin(corners, toolpath.offsets[:-1])
+    swivels = first | (np.abs(turn) > knife.corner_angle)
+    count = np.where(swivels, np.ceil(np.abs(turn) / chord), 1.0)
+    count[np.abs(turn) < _STRAIGHT] = 0.0
+    size = count.astype(np.int64) + 1
+    corner = np.repeat(np.arange(len(corners)), size)
+    step = np.arange(len(corner)) - np.repeat(np.cumsum(size) - size, size)
+    angle = np.arctan2(before[corner, 1], before[corner, 0])
+    angle += turn[corner] * step / np.maximum(count[corner], 1.0)
+    fan = points[corners[corner]] + d * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    stroke = np.searchsorted(toolpath.offsets, corners[corner], side="right") - 1
+    lengths = np.bincount(stroke, minlength=len(toolpath)) + 1
+    offsets = _offsets(lengths)
+    way = np.empty((int(offsets[-1]), 2))
+    way[np.arange(len(fan)) + stroke] = fan
+    way[offsets[1:] - 1] = points[last] + d * along[np.searchsorted(corners, last) - 1]
+    return replace(toolpath, points=way, offsets=offsets)
+
+
+def _offsets(lengths: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
