@@ -71,7 +71,7 @@ def _set_home(machine: Machine, axis: int) -> None:
     at = -pull_off if direction > 0 else -values[130 + axis] + pull_off
     position[axis] = to_steps(at, steps_per_mm)
     machine.switches[axis] = (direction, position[axis] + gap)
-    machine.position = tuple(position)
+    machine.count_from(tuple(position))
 
 
 def _leg(
@@ -120,7 +120,7 @@ def _count_from_zero(machine: Machine, axes: tuple[int, ...]) -> None:
         direction, switch = machine.home_switch(axis)
         machine.switches[axis] = (direction, switch - position[axis])
         position[axis] = 0
-    machine.position = tuple(position)
+    machine.count_from(tuple(position))
 
 
 def _pressed(machine: Machine, axis: int) -> bool:

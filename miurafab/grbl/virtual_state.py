@@ -123,6 +123,7 @@ class Machine:
         self.stepper.on_settled = self._on_settled
         self.parser = ModalState()
         self.beam = BeamLog()
+        self.position: tuple[int, ...] = (0, 0, 0)
         self.limit_pins: set[str] = set()
         self.control_pins: set[str] = set()
         self.probe_pin = False
@@ -132,17 +133,17 @@ class Machine:
 
     def power_up(self) -> None:
         """Power comes on: only the EEPROM and the switches remember anything."""
+        self.set_pwm(0)
+        self.stepper.halt()
+        self.count_from((0, 0, 0))
         homing = bool(self.settings.values[22])
         self.state = State.ALARM if homing else State.IDLE
-        self.position: tuple[int, ...] = (0, 0, 0)
         self.switches: list[tuple[int, int] | None] = [None, None, None]
         self.line = bytearray(LINE_SIZE)
         self.clockwise = True
         self._follows = False
         self.flood = False
-        self.stepper.halt()
         self.clear()
-        self.set_pwm(0)
 
     def clear(self) -> None:
         """What every reset clears, the state itself excepted (``main.c``)."""
@@ -276,6 +277,12 @@ class Machine:
         self.now = now
         if self._follows:
             self.set_pwm(0)
+
+    def count_from(self, position: tuple[int, ...]) -> None:
+        """Where the machine stands is called ``position`` from now on; nothing moves."""
+        self.set_pwm(self.beam.pwm)
+        self.position = position
+        self.set_pwm(self.beam.pwm)
 
     # What the main program sees
 

@@ -59,7 +59,7 @@ class Stepper:
     def wake(self, now: int) -> None:
         """Start stepping at ``now`` unless it is under way."""
         if not self.running:
-            self.running = True
+            self.running, self.settling = True, None
             self._begin(now)
 
     def next_change(self) -> int | None:

@@ -90,3 +90,13 @@ def test_g28_in_laser_mode_keeps_the_power_of_the_feed_mode() -> None:
     device = ready(LASER)
     play(device, "M3", "G1X2F3000S500", 1.0, "G28", 1.0)
     assert any(s.x1 < s.x0 for s in burnt(device))
+
+
+def test_the_log_stays_true_when_positions_are_counted_anew() -> None:
+    device = ready(LASER | {22: 1, 23: 3, 130: 20, 131: 20, 132: 2, 25: 2000})
+    play(device, "$X", "M3", "G1X5F3000S500", 1.0, "$H", 20.0)
+    assert device.state == "Idle"
+    play(device, "$X", "G1X-10S500", 2.0)
+    device.power_cycle()
+    assert all(s.x0 == s.x1 or 0 < (s.t1 - s.t0) < 0.1 for s in device.beam_log)
+    assert {round(abs(s.x1 - s.x0) / (s.t1 - s.t0)) <= 51 for s in device.beam_log} == {True}
