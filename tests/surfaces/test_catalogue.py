@@ -1,0 +1,118 @@
+"""Named surfaces: each what its name says, smooth a little beyond its domain, found again."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from miurafab.errors import TargetError
+from miurafab.surfaces.catalogue import CATALOGUE, make_surface, parse_target
+from miurafab.surfaces.surface import Bent, Swapped, curvature_along_u, tangents, unit
+
+
+@pytest.mark.parametrize("name", list(CATALOGUE))
+class TestEverySurface:
+    def test_normals_are_unit_and_across_both_tangents(self, name: str) -> None:
+        surface, _ = make_surface(name, {})
+        uv = surface.domain.lattice(13, 11)
+        normal = surface.normal(uv)
+        assert np.allclose(np.linalg.norm(normal, axis=-1), 1)
+        for tangent in tangents(surface, uv):
+            assert np.abs(np.einsum("ijk,ijk->ij", normal, unit(tangent))).max() < 1e-6
+
+    def test_the_nearest_point_of_a_point_off_the_surface_is_its_foot(self, name: str) -> None:
+        surface, _ = make_surface(name, {})
+        uv = surface.domain.lattice(7, 7)[1:-1, 1:-1]
+        foot = surface.point(uv).reshape(-1, 3)
+        off = foot + 0.01 * surface.normal(uv).reshape(-1, 3)
+        assert np.abs(surface.closest_point(off) - foot).max() < 1e-6
+
+    def test_it_goes_on_a_little_beyond_its_domain(self, name: str) -> None:
+        surface, _ = make_surface(name, {})
+        d = surface.domain
+        beyond = np.array([[d.u0 - 0.04 * d.width, d.v0 - 0.04 * d.height]])
+        assert np.isfinite(surface.point(beyond)).all()
+
+    def test_swapping_and_bending_keep_the_points(self, name: str) -> None:
+        surface, _ = make_surface(name, {})
+        uv = surface.domain.lattice(5, 5)
+        assert np.array_equal(Swapped(surface).point(uv[..., ::-1]), surface.point(uv))
+        assert np.allclose(Bent(surface, 1.0).point(uv), surface.point(uv))
+        flat = Bent(surface, 0.0).normal(uv)
+        assert np.abs(flat - flat[0, 0]).max() < 1e-6
+
+    def test_every_default_lies_within_its_range(self, name: str) -> None:
+        for parameter in CATALOGUE[name].parameters.values():
+            assert parameter.low <= parameter.default <= parameter.high
+
+
+def gauss(name: str) -> np.ndarray:
+    """The sign of the Gaussian curvature along the middle profile of a surface of revolution:
+    that of the two principal curvatures, along the profile and around.
+    """
+    surface, _ = make_surface(name, {})
+    u = np.linspace(0.02, 0.98, 49)
+    uv = np.stack([u, np.zeros_like(u)], axis=1)
+    along = curvature_along_u(surface, uv)
+    around = curvature_along_u(Swapped(surface), uv[:, ::-1])
+    return -along * around  # the swapped surface has the opposite normal
+
+
+@pytest.mark.parametrize(
+    ("name", "signs"),
+    [
+        ("pill", {0, 1}),
+        ("candlestick", {0, -1}),
+        ("vase", {1, -1}),
+        ("hyperboloid", {-1}),
+        ("catenoid", {-1}),
+        ("ellipsoid", {1}),
+    ],
+)
+def test_curvature_has_the_signs_of_the_name(name: str, signs: set[int]) -> None:
+    curvature = gauss(name)
+    size = np.abs(curvature).max()
+    found = np.where(np.abs(curvature) < 1e-6 * size, 0, np.sign(curvature))
+    interior = np.abs(np.diff(found, prepend=found[0])) + np.abs(np.diff(found, append=found[-1]))
+    assert {int(s) for s in found[interior == 0]} == signs
+
+
+def test_a_sphere_has_its_curvature() -> None:
+    surface, _ = make_surface("sphere", {"radius": 2.0})
+    uv = surface.domain.lattice(5, 5)
+    assert np.allclose(np.linalg.norm(surface.point(uv), axis=-1), 2.0)
+    meridian = curvature_along_u(Swapped(surface), uv[..., ::-1])
+    assert np.allclose(np.abs(meridian), 0.5, rtol=1e-5)
+
+
+def test_a_drawn_profile_is_turned_as_drawn() -> None:
+    points = [[0.5, 0.0], [0.8, 0.5], [0.6, 1.0]]
+    surface, values = make_surface("revolution", {"profile": points, "angle": "90deg"})
+    assert math.isclose(values["angle"], math.pi / 2)
+    ends = surface.point(np.array([[0.0, 0.0], [1.0, 0.0]]))
+    assert np.allclose(ends[:, [0, 2]], [points[0], points[-1]])
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "word"),
+    [
+        ("hipar", {}, "hypar"),
+        ("hypar", {"hight": "1"}, "hight"),
+        ("sphere", {"width": "400deg"}, "between"),
+        ("pill", {"waist": "wide"}, "not a number"),
+        ("revolution", {"profile": [[-1, 0], [1, 1]]}, "axis"),
+        ("revolution", {"profile": [[1, 0], [1, 0]]}, "same point"),
+        ("helicoid", {"inner": "2"}, "inner"),
+    ],
+)
+def test_a_mistake_is_named(name: str, given: dict[str, object], word: str) -> None:
+    with pytest.raises(TargetError, match=word):
+        make_surface(name, given)
+
+
+def test_a_target_is_parsed_into_name_and_parameters() -> None:
+    assert parse_target("hypar:height=0.5, width=3") == ("hypar", {"height": "0.5", "width": "3"})
+    with pytest.raises(TargetError, match="parameter=value"):
+        parse_target("hypar:height")
