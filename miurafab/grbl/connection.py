@@ -36,8 +36,6 @@ from miurafab.grbl.states import KEEPS_ACCOUNT, TRANSITIONS, Input, State
 SOFT_RESET = b"\x18"
 STATUS_QUERY = b"?"
 FEED_HOLD = b"!"
-CYCLE_START = b"~"
-JOG_CANCEL = b"\x85"
 
 MAX_REPLY = 1024
 """Bytes without a line end after which the stream is taken for noise; GRBL's longest report has

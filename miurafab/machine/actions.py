@@ -17,10 +17,8 @@ from miurafab.grbl.events import Options, StatusReport, Version
 from miurafab.grbl.settings import Settings, parse_dump
 from miurafab.machine.session import Session
 from miurafab.machine.signals import StopSignals
-from miurafab.machine.transport import open_port
+from miurafab.machine.transport import BAUD, open_port
 
-BAUD = 115_200
-"""What nearly every GRBL board speaks."""
 _POLL_S = 0.1
 
 

@@ -23,6 +23,8 @@ from miurafab.grbl.virtual import VirtualGrbl
 
 VIRTUAL = "virtual"
 """The port name of the controller in memory."""
+BAUD = 115_200
+"""What nearly every GRBL board speaks."""
 
 # What pyserial lets through when a port goes away: a TypeError for a descriptor that is None by
 # now, a termios.error (no OSError) for a request to a line that has hung up.

@@ -30,10 +30,11 @@ from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.actions import read_dump
 from miurafab.machine.signals import StopSignals
+from miurafab.machine.transport import BAUD
 from miurafab.profiles import load_machine
 
 STOCK = "stock"
-BAUD = 115_200
+_BOOT_S = 0.1  # from the opening to the banner: senders flush what came while they set up the port
 _TICK_S = 0.01  # the longest sleep: how late a client's coming or a signal is seen
 _CHUNK = 4096
 
@@ -211,6 +212,7 @@ def _serve(
     reset_on_open: bool,
 ) -> None:
     start = time.monotonic()
+    boot_at = math.inf
     while True:
         check()
         upcoming = device.next_event_in()
@@ -218,11 +220,14 @@ def _serve(
         data, opened = wire.wait(timeout)
         device.advance(max(0.0, (time.monotonic() - start) * speed - device.now))
         if opened and reset_on_open:
+            boot_at = time.monotonic() + _BOOT_S
+        if time.monotonic() >= boot_at:
+            boot_at = math.inf
             device.power_cycle()
         if data:
             device.receive(data)
         output = device.take_output()
-        if output:
+        if output and boot_at == math.inf:
             wire.write(output)
         log.update()
 
