@@ -38,8 +38,12 @@ STRETCHES = ((1.3, 1.3), (1.15, 1.6), (1.6, 1.3), (1.3, 1.6), (2.0, 1.3), (2.6, 
 """The stretches along and across the rows that are tried in turn. Strong curvature along the rows
 wants more of the first, strong twist less of the first and more of the second.
 """
-BENDS_ELSEWHERE = 4
-"""How many of those stretches are bent step by step where a sheet is laid elsewhere on a mesh."""
+MESH_BENDS = 3
+SEEDS_ELSEWHERE = 4
+BENDS_ELSEWHERE = 2
+"""How many of those stretches are tried on meshes, first as they lie, then laid elsewhere: enough
+to find a sheet where there is one, and an answer within a minute where there is none.
+"""
 BEND_STEPS = 12
 STEP_CAP = 0.25
 """The farthest that a coordinate moves in one step, in mean edge lengths."""
@@ -225,8 +229,10 @@ def plans(request: FitRequest) -> Iterator[Plan]:
         for corrugation in corrugations:
             yield Plan("direct", request.surface, "u", corrugation)
         return
-    oriented = [(request.surface, "u"), (Swapped(request.surface), "v")]
-    oriented.sort(key=lambda pair: _turning(pair[0]))
+    if isinstance(request.surface, MeshSurface):
+        yield from _on_mesh(request.surface, corrugations)
+        return
+    oriented = _oriented(request.surface)
     if isinstance(request.surface, Revolution):
         for corrugation in corrugations:
             yield Plan("strip", request.surface, "u", corrugation)
@@ -236,19 +242,27 @@ def plans(request: FitRequest) -> Iterator[Plan]:
         for corrugation in corrugations:
             for surface, name in oriented:
                 yield Plan(way, surface, name, corrugation)
-    if isinstance(request.surface, MeshSurface):
-        yield from _elsewhere(request.surface, corrugations)
 
 
-def _elsewhere(surface: MeshSurface, corrugations: list[Corrugation]) -> Iterator[Plan]:
-    """The same ways with the sheet laid elsewhere on the mesh; each layout is made when needed."""
-    for place, other in surface.alternatives():
-        oriented: list[tuple[TargetSurface, str]] = [(other, "u"), (Swapped(other), "v")]
-        oriented.sort(key=lambda pair: _turning(pair[0]))
-        for way, some in (("seed", corrugations), ("bent", corrugations[:BENDS_ELSEWHERE])):
-            for corrugation in some:
+def _oriented(surface: TargetSurface) -> list[tuple[TargetSurface, str]]:
+    """Both directions of the rows, the one along which the normal turns less first."""
+    both: list[tuple[TargetSurface, str]] = [(surface, "u"), (Swapped(surface), "v")]
+    return sorted(both, key=lambda pair: _turning(pair[0]))
+
+
+def _on_mesh(surface: MeshSurface, corrugations: list[Corrugation]) -> Iterator[Plan]:
+    """Seeds and bends on the mesh as it lies, then with the sheet laid elsewhere on it; each
+    layout is made when it is needed.
+    """
+    seeds, bends = len(corrugations), MESH_BENDS
+    for place, laid in itertools.chain([("", surface)], surface.alternatives()):
+        oriented = _oriented(laid)
+        layout = laid.description if place else {}
+        for way, some in (("seed", seeds), ("bent", bends)):
+            for corrugation in corrugations[:some]:
                 for turned, name in oriented:
-                    yield Plan(way, turned, name, corrugation, place, other.description)
+                    yield Plan(way, turned, name, corrugation, place, layout)
+        seeds, bends = SEEDS_ELSEWHERE, BENDS_ELSEWHERE
 
 
 def _corrugations(request: FitRequest) -> list[Corrugation]:

@@ -108,7 +108,8 @@ class Layout:
 @dataclass(frozen=True, eq=False)
 class MeshSurface:
     """A rectangle of a mesh. ``spline`` maps a little more than ``domain`` to space; ``triangles``
-    (T, 3, 3) are the mesh itself. ``remarks`` say what the user might want to know of the file.
+    (T, 3, 3) are the mesh itself. ``remarks`` say what the user might want to know of the file;
+    ``free`` whether the rectangle may be laid elsewhere.
     """
 
     spline: NdBSpline
@@ -118,6 +119,7 @@ class MeshSurface:
     stiffness: float
     layout: Layout = field(repr=False)
     remarks: tuple[str, ...] = ()
+    free: bool = True
 
     def point(self, uv: Floats) -> Floats:
         """Within reach the spline, beyond it the spline continued straight on."""
@@ -150,9 +152,12 @@ class MeshSurface:
 
     def alternatives(self) -> Iterator[tuple[str, MeshSurface]]:
         """Other ways to lay a sheet on the same mesh, each with a word on it, the gentlest first:
-        smoother, the grid turned, smaller parts of the same rectangle.
+        smoother, the grid turned, smaller parts of the same rectangle. A rectangle that the user
+        asked for stays where it is.
         """
-        yield "the scan smoothed more", self.layout.surface(self.placement, SMOOTHER)
+        yield "the mesh smoothed more", self.layout.surface(self.placement, SMOOTHER)
+        if not self.free:
+            return
         others = placements(self.layout.vertices, self.layout.flat, self.layout.faces)
         kept = [self.placement.angle]
         for _, other in others:
@@ -208,7 +213,8 @@ def load_mesh(
         surface = layout.surface(placement, stiffness)
     else:
         surface = layout.surface(_placement(layout, region, rotate))
-    return replace(surface, remarks=remarks), hashlib.sha256(content).hexdigest()
+    free = place is None and region is None and rotate is None
+    return replace(surface, remarks=remarks, free=free), hashlib.sha256(content).hexdigest()
 
 
 def mesh_surface(vertices: Floats, faces: Ints, name: str = "The mesh") -> MeshSurface:
