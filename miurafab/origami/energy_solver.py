@@ -47,8 +47,10 @@ down; smaller, and rounding does.
 """
 SLOW = 0.2
 """K is factored anew when an iteration leaves more than this of the residual."""
-MAX_ITERATIONS = 40
+MAX_ITERATIONS = 25
 SHORTEST_STEP = 1.0 / 64
+ENOUGH = 0.1
+"""A step counts if it lowers the residual by this part of what a linear problem would give."""
 
 
 class State(NamedTuple):
@@ -310,13 +312,14 @@ def solve(
                 break
         step = driven.step(factored, residual)
         length = 1.0
-        trial = state.plus(step, length)
-        left = driven.residual(trial, target)
-        while fresh and not driven.size(left) < size and length > SHORTEST_STEP:
-            length /= 2
+        while True:
             trial = state.plus(step, length)
             left = driven.residual(trial, target)
-        if driven.size(left) < size:
+            better = driven.size(left) < (1 - ENOUGH * length) * size
+            if better or not fresh or length <= SHORTEST_STEP:
+                break
+            length /= 2
+        if better:
             stale = driven.size(left) > SLOW * size
             state, residual, size = trial, left, driven.size(left)
         elif fresh:

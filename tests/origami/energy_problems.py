@@ -26,13 +26,20 @@ SURFACES = {
 
 
 @cache
-def nearly_foldable(name: str, worst: float | None, facets: int = 12) -> CreasePattern:
-    """One of ``SURFACES`` fitted, and its Kawasaki residuals all scaled so that the largest is
-    ``worst`` radians; None leaves them as they are.
-    """
+def developable(name: str, facets: int) -> CreasePattern:
+    """One of ``SURFACES`` fitted, with nothing asked about flat-foldability."""
     surface, _ = make_surface(name, SURFACES[name])
     pattern = fit(FitRequest(surface, facets, facets, size_mm=200.0)).pattern
     assert pattern is not None
+    return pattern
+
+
+@cache
+def nearly_foldable(name: str, worst: float | None, facets: int = 10) -> CreasePattern:
+    """One of ``SURFACES`` fitted, and its Kawasaki residuals all scaled so that the largest is
+    ``worst`` radians; None leaves them as they are.
+    """
+    pattern = developable(name, facets)
     if worst is None:
         return pattern
     columns, rows = pattern.grid
