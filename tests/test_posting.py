@@ -293,8 +293,8 @@ def test_a_firmware_without_laser_mode_switches_at_each_stroke() -> None:
 @pytest.mark.parametrize(
     ("machine", "complaint"),
     [
-        (replace(LASER, dialect="hpgl"), "not for the dialect 'hpgl'"),
-        (with_tool(LASER, kind="knife"), "not for a knife"),
+        (replace(LASER, dialect="hpgl"), "cannot set a laser's power"),
+        (replace(with_tool(LASER, kind="pen"), dialect="marlin", settings={}), "not for a pen"),
         (replace(LASER, settings={}), r'write "\$32" = 1'),
         (with_tool(LASER, kind="pen"), r'write "\$32" = 0'),
         (replace(LASER, dialect="grbl-0.9"), 'write beam_mode = "M3"'),

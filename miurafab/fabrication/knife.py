@@ -36,19 +36,18 @@ _STRAIGHT = 1e-9  # rad, below which there is no turn
 _Points = NDArray[np.float64]
 
 
-def trailing(toolpath: Toolpath, knife: Knife, margin_mm: float) -> Toolpath:
-    """``toolpath`` as the axis of ``knife`` must go, its strokes in the same order.
+def tip_way(toolpath: Toolpath, knife: Knife, margin_mm: float) -> Toolpath:
+    """What the tip of ``knife`` has to cut for ``toolpath``, its strokes in the same order.
 
     A cut that turns the blade along +X comes first, in the margin of ``margin_mm`` at the sheet's
-    lower edge. Closed strokes are cut on over their beginning by the overcut. An offset of 0
-    leaves the points as they are, but for the overcut. Raises
-    :class:`~miurafab.errors.LayoutError` if the margin has no room for the first cut, and for a
-    stroke without length.
+    lower edge, unless the blade's offset is 0. Closed strokes are cut on over their beginning by
+    the overcut. Raises :class:`~miurafab.errors.LayoutError` if the margin has no room for the
+    first cut, and for a stroke without length.
     """
     tip = _overcut(_distinct(toolpath), knife.overcut_mm)
     if knife.offset_mm == 0 or not len(tip):
         return tip
-    return _axis(_with_aligning(tip, knife.offset_mm, margin_mm), knife)
+    return _with_aligning(tip, knife.offset_mm, margin_mm)
 
 
 def _distinct(toolpath: Toolpath) -> Toolpath:
@@ -109,9 +108,14 @@ def _with_aligning(toolpath: Toolpath, d: float, margin_mm: float) -> Toolpath:
     )
 
 
-def _axis(toolpath: Toolpath, knife: Knife) -> Toolpath:
-    """The axis's way for the tip's way ``toolpath``, the blade standing along +X before it."""
+def axis_way(toolpath: Toolpath, knife: Knife) -> Toolpath:
+    """The way of the axis of ``knife`` for the tip's way ``toolpath``, stroke by stroke.
+
+    The blade stands along +X before; every stroke has a length.
+    """
     d, points = knife.offset_mm, toolpath.points
+    if d == 0 or not len(toolpath):
+        return toolpath
     last = toolpath.offsets[1:] - 1
     begins = np.ones(len(points), dtype=bool)
     begins[last] = False

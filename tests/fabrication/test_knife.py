@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.knife import ALIGNING_OFFSETS, trailing
+from miurafab.fabrication.knife import ALIGNING_OFFSETS, axis_way, tip_way
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.profiles import OPERATIONS, Knife
 
@@ -35,6 +35,10 @@ def toolpath(polylines: Sequence[Sequence[tuple[float, float]]]) -> Toolpath:
         patch=np.zeros(count, dtype=np.int64),
         edge=np.zeros(count, dtype=np.int64),
     )
+
+
+def trailing(path: Toolpath, knife: Knife, margin: float) -> Toolpath:
+    return axis_way(tip_way(path, knife, margin), knife)
 
 
 def drag(way: np.ndarray, angle: float, d: float, step: float = 0.01) -> tuple[np.ndarray, float]:

@@ -6,6 +6,8 @@ A plotter unit is 0.025 mm (HP-GL reference, "plotter units": 40 a millimetre). 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from miurafab.fabrication.toolpath import Toolpath
@@ -16,8 +18,11 @@ PENS = {name: number for number, name in enumerate(OPERATIONS, start=1)}
 """The pen of each operation; a plotter with one tool holder ignores the number."""
 
 
-def sheet_hpgl(toolpath: Toolpath) -> str:
-    """The strokes of one sheet as HPGL text, in their order, rounded to plotter units."""
+def sheet_hpgl(toolpath: Toolpath, setup: Mapping[str, str] | None = None) -> str:
+    """The strokes of one sheet as HPGL text, in their order, rounded to plotter units.
+
+    ``setup`` are the instructions that set speed and force, by operation, given with its pen.
+    """
     units = np.rint(toolpath.points * UNITS_PER_MM).astype(np.int64)
     words = [f"{x},{y}" for x, y in units.tolist()]
     offsets = toolpath.offsets.tolist()
@@ -26,7 +31,8 @@ def sheet_hpgl(toolpath: Toolpath) -> str:
     for index, operation in enumerate(toolpath.operation.tolist()):
         if operation != pen:
             pen = operation
-            lines.append(f"PU;SP{PENS[OPERATIONS[operation]]};")
+            name = OPERATIONS[operation]
+            lines.append(f"PU;SP{PENS[name]};{(setup or {}).get(name, '')}")
         begin, end = offsets[index], offsets[index + 1]
         lines.append(f"PU{words[begin]};PD{','.join(words[begin + 1 : end])};")
     lines.append("PU;PU0,0;SP0;")

@@ -1,0 +1,152 @@
+"""What each kind of controller is told around the strokes: the words that use its tool.
+
+What they mean (gnea/grbl 1.1, doc/markdown/laser_mode.md and gcode.c; MarlinFirmware/Marlin,
+gcode/control/M3-M5.cpp and gcode/gcode.cpp):
+
+* ``M4 S0`` once arms the laser: in laser mode (``$32=1``) it burns during ``G1`` only, scaled by
+  the speed, and is dark in every ``G0`` and whenever motion stops. Each ``M3``, ``M4`` or ``M5``
+  stops the motion, so there is none between the strokes. grblHAL and FluidNC do the same.
+* GRBL 0.9 has no laser mode: its spindle output stays on in ``G0``. There the beam is switched
+  at both ends of each stroke, as a pen is lowered and lifted.
+* A servo on the spindle output would be pulled up by laser mode in every ``G0``: pens and knives
+  need ``$32=0``. ``G4`` waits until the servo has come to rest.
+* Marlin takes the power with the moves after ``M4 I`` (scaled by the speed) or ``M3 I``. Its ``G0``
+  sets it to 0, in some versions only if told so by ``S0``, and the next ``G1`` must say it again.
+  ``G0`` and ``G1`` share one feed, so each says its own.
+* ``M2`` waits for the last move, then sets spindle, coolant and modal state to their defaults.
+  Marlin has no ``M2``, and needs no ``G17`` and ``G94``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from miurafab.errors import LayoutError, ProfileError
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.posting.text import trimmed
+from miurafab.profiles import OPERATIONS, Knife, MachineProfile, Material
+
+_GRBL = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc")
+_LASER_MODE_IS_SETTING_32 = ("grbl-1.1", "grblhal")
+_SHALLOW = ("engrave", "score")
+"""The operations that mark the sheet and must not part it."""
+
+
+@dataclass(frozen=True)
+class Words:
+    """How the tool is used.
+
+    ``begin`` and ``end``: the lines before and after all strokes. ``travel``: what a stroke's
+    ``G0`` says besides its place; ``down`` (by operation) and ``up``: what follows that ``G0``
+    and the stroke's last ``G1``. ``s`` and ``feed``: the words of each operation, ``s`` None where
+    ``down`` sets it; with ``restated`` every stroke says them. ``chains`` says whether the gap
+    between two strokes may be a ``G1 S0`` as well as a ``G0``.
+    """
+
+    begin: tuple[str, ...]
+    end: tuple[str, ...]
+    down: tuple[str, ...]
+    up: str
+    s: tuple[int, ...] | None
+    feed: tuple[str, ...]
+    travel: str = ""
+    restated: bool = False
+    chains: bool = False
+
+
+def words_of(machine: MachineProfile, material: Material) -> Words:
+    """How ``machine`` makes the operations of ``material``.
+
+    Raises :class:`~miurafab.errors.ProfileError` for a machine that G-code is not written for.
+    """
+    kind, dialect = machine.tool.kind, machine.dialect
+    if dialect not in _GRBL and dialect != "marlin":
+        raise ProfileError(
+            f"{machine.name}: G-code is written for {', '.join(_GRBL)} and marlin, not for the "
+            f"dialect '{dialect}'; choose another machine."
+        )
+    feed = tuple(trimmed(material.operations[name].feed_mm_min) for name in OPERATIONS)
+    if kind == "laser":
+        s = tuple(machine.power_to_s(material.operations[name].power) for name in OPERATIONS)
+        return _marlin(machine, s, feed) if dialect == "marlin" else _laser(machine, s, feed)
+    if dialect == "marlin":
+        raise ProfileError(
+            f"{machine.name}: for marlin, G-code is written for a laser, not for a {kind}; choose "
+            "another machine."
+        )
+    return _servo(machine, feed)
+
+
+def _air(machine: MachineProfile) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    return (("M8",), ("M9",)) if machine.tool.air_assist else ((), ())
+
+
+_MODES = ("M5", "G21", "G90", "G17", "G94")
+_HOME = ("G0 X0 Y0", "M2")
+
+
+def _laser(machine: MachineProfile, s: tuple[int, ...], feed: tuple[str, ...]) -> Words:
+    tool = machine.tool
+    air_on, air_off = _air(machine)
+    end = ("M5", *air_off, *_HOME)
+    if machine.dialect == "grbl-0.9":
+        if tool.beam_mode != "M3":
+            raise ProfileError(
+                f'{machine.name}: GRBL 0.9 has no M4 for lasers; write beam_mode = "M3" under '
+                "[tool] if the beam may burn on wherever the job stops."
+            )
+        down = tuple(f"\nM3 S{value}" for value in s)
+        return Words((*_MODES, *air_on), end, down, "\nM5", None, feed)
+    if machine.dialect in _LASER_MODE_IS_SETTING_32 and machine.settings.get(32) != 1:
+        raise ProfileError(
+            f"{machine.name}: without laser mode the beam would burn along every travel; write "
+            '"$32" = 1 under [settings].'
+        )
+    begin = (*_MODES, f"{tool.beam_mode} S0", *air_on)
+    return Words(begin, end, ("",) * len(feed), "", s, feed, chains=True)
+
+
+def _marlin(machine: MachineProfile, s: tuple[int, ...], feed: tuple[str, ...]) -> Words:
+    air_on, air_off = _air(machine)
+    travel = f" S0 F{trimmed(min(machine.motion.max_rate_mm_min))}"
+    begin = ("M5", "G21", "G90", f"{machine.tool.beam_mode} I S0", *air_on)
+    end = ("M5 I", "M5", *air_off, f"G0 X0 Y0{travel}")
+    return Words(begin, end, ("",) * len(feed), "", s, feed, travel=travel, restated=True)
+
+
+def _servo(machine: MachineProfile, feed: tuple[str, ...]) -> Words:
+    tool = machine.tool
+    if machine.settings.get(32, 0) != 0:
+        raise ProfileError(
+            f'{machine.name}: "$32" = {machine.settings[32]:g} lifts a servo {tool.kind} in every '
+            'travel; write "$32" = 0 under [settings].'
+        )
+    air_on, air_off = _air(machine)
+    settle = f"\nG4 P{trimmed(tool.settle_s)}" if tool.settle_s > 0 else ""
+    up = f"M3 S{tool.s_up}{settle}"
+    down = tuple(f"\nM3 S{depth(machine, name)}{settle}" for name in OPERATIONS)
+    return Words((*_MODES, up, *air_on), ("M5", *air_off, *_HOME), down, "\n" + up, None, feed)
+
+
+def depth(machine: MachineProfile, operation: str) -> int:
+    """The S of a pen or knife that is down for ``operation``: shallow for what must only mark."""
+    knife = machine.tool.knife
+    if knife is not None and knife.s_shallow is not None and operation in _SHALLOW:
+        return knife.s_shallow
+    return machine.tool.s_down
+
+
+def made_by_knife(toolpath: Toolpath, knife: Knife, machine: MachineProfile) -> tuple[str, ...]:
+    """The operations of ``toolpath`` that ``knife`` leaves out, as its profile says.
+
+    Raises :class:`~miurafab.errors.LayoutError` for one that it would cut right through.
+    """
+    present = [OPERATIONS[code] for code in sorted(set(toolpath.operation.tolist()))]
+    for name in present:
+        if name in _SHALLOW and knife.s_shallow is None and name not in knife.leave_out:
+            raise LayoutError(
+                f"{toolpath.sheet} has strokes to {name}, which the knife of {machine.name} would "
+                f"cut right through; write s_shallow, a depth that only marks the sheet, or "
+                f'leave_out = ["{name}"] under [tool].'
+            )
+    return tuple(name for name in present if name in knife.leave_out)
