@@ -251,13 +251,18 @@ class Machine:
         return direction, direction * round(0.5 * values[130 + axis] * values[100 + axis])
 
     def engaged_limits(self) -> set[str]:
-        """The axes whose limit pin reads as pressed, under $5."""
+        """The axes whose limit pin reads as pressed, under $5.
+
+        The homing switches stand aside except in homing, so that a job may use the whole bed
+        of a machine that was never homed.
+        """
         position = self.position_now()
+        homing = self.homing_switches and self.state is State.HOMING
         inverted = bool(self.settings.values[5])
         engaged = set()
         for axis, name in enumerate(AXES):
             direction, switch = self.home_switch(axis)
-            reached = self.homing_switches and direction * (position[axis] - switch) >= 0
+            reached = homing and direction * (position[axis] - switch) >= 0
             if (reached or name in self.limit_pins) != inverted:
                 engaged.add(name)
         return engaged

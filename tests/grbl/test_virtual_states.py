@@ -286,3 +286,8 @@ def test_buttons_are_the_realtime_commands() -> None:
     play(device, lambda d: d.press_button("hold", False), lambda d: d.press_button("start"))
     assert device.state == "Idle"
     assert play(device, lambda d: d.press_button("reset"), 0.1) == BANNER
+
+
+def test_an_unhomed_machine_may_use_its_whole_bed() -> None:
+    device = ready(LASER | {110: 60000, 120: 5000, 130: 40, 21: 1})
+    assert "|Pn:" not in play(device, "G0X39", 2.0, b"?", "G0X-39", 2.0, b"?")
