@@ -58,6 +58,17 @@ class GridShape:
             self.top_mm[:, row:],
         )
 
+    def part(self, r0: int, r1: int, c0: int, c1: int) -> GridShape:
+        """The rows from ``r0`` to ``r1`` and columns from ``c0`` to ``c1``, the ends excluded."""
+        here = (slice(c0, c1), slice(r0, r1))
+        return GridShape(
+            self.body[here],
+            self.right[here],
+            self.top[here],
+            self.right_mm[here],
+            self.top_mm[here],
+        )
+
     def exchanged(self) -> GridShape:
         """The same grid with rows and columns exchanged."""
 

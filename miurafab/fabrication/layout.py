@@ -34,6 +34,7 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
         "totals": dataclasses.asdict(layout.totals),
         "untabbed": list(layout.untabbed),
         "unlettered": layout.unlettered,
+        "remarks": list(layout.remarks),
     }
     return json.dumps(document, separators=(",", ":")) + "\n"
 
@@ -59,6 +60,7 @@ def read_layout(text: str) -> Layout:
             totals=Totals(**document["totals"]),
             untabbed=tuple(document.get("untabbed", ())),
             unlettered=document.get("unlettered", 0),
+            remarks=tuple(str(remark) for remark in document.get("remarks", ())),
         )
     except KeyError as fault:
         raise LayoutError(f"The layout lacks {fault}.") from None
@@ -80,6 +82,7 @@ def _patch_table(patch: Patch) -> dict[str, Any]:
                 "number": tab.number,
                 "edge": tab.edge,
                 "mate_patch": tab.mate_patch,
+                "fold": tab.fold,
                 "polygon_mm": tab.polygon_mm.tolist(),
             }
             for tab in patch.tabs
@@ -103,6 +106,7 @@ def _patch(table: dict[str, Any]) -> Patch:
                 edge=int(tab["edge"]),
                 mate_patch=int(tab["mate_patch"]),
                 polygon_mm=_points(tab["polygon_mm"]),
+                fold=str(tab.get("fold", "flat")),
             )
             for tab in table["tabs"]
         ),
@@ -115,6 +119,7 @@ def _sheet(table: dict[str, Any]) -> Sheet:
         width_mm=float(table["width_mm"]),
         height_mm=float(table["height_mm"]),
         placements=tuple(Placement(**placement) for placement in table["placements"]),
+        back=table.get("back"),
     )
 
 

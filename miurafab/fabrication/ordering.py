@@ -6,8 +6,9 @@ perforate, cut. Within one:
 - creases go by the postman's route (:mod:`~miurafab.fabrication.routing`), the dashes of a crease
   in turn, in the direction of the route;
 - lettering goes text by text, each time to the nearest one that is left;
-- cuts within patches go first, then rings around waste, then the outlines, each time to the
-  nearest one left; a closed stroke is begun at its nearest point.
+- small holes go first of all cuts, by their middles; then cuts within patches, rings around waste,
+  and the outlines, each time to the nearest one left; a closed stroke is begun at its nearest
+  point.
 
 The strokes are the same before and after, but for their direction and where a closed one begins.
 """
@@ -22,6 +23,9 @@ from numpy.typing import NDArray
 from miurafab.fabrication.routing import find_route
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.profiles import OPERATIONS
+
+HOLE = 0
+"""The rank of closed strokes so small that their middle says where they are."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -52,6 +56,8 @@ def order_strokes(strokes: Strokes, edges_vertices: NDArray[np.int64]) -> Toolpa
             chosen = np.flatnonzero((raw.operation == operation) & (strokes.rank == rank))
             if name in ("score", "perforate"):
                 part = _creases(raw, chosen, strokes.group[chosen], edges_vertices, here)
+            elif name == "cut" and rank == HOLE:
+                part = _holes(raw, chosen, here)
             else:
                 part = _nearest(raw, chosen, strokes.group[chosen], here)
             order = _Order(
@@ -129,6 +135,22 @@ def _creases(
     member = _unrolled(begin[route.order], count[route.order], route.backwards)
     back = np.repeat(route.backwards, count[route.order])
     return _Order(chosen[member], back, np.zeros(len(member), dtype=np.int64))
+
+
+def _holes(raw: Toolpath, chosen: NDArray[np.int64], here: NDArray[np.float64]) -> _Order:
+    """Small closed strokes, each time the nearest one left."""
+    middle = np.array([raw.stroke(int(k))[:-1].mean(axis=0) for k in chosen])
+    left = np.arange(len(chosen))
+    taken, begin = [], []
+    while len(left):
+        k = int(np.argmin(((middle[left] - here) ** 2).sum(axis=1)))
+        ring = raw.stroke(int(chosen[left[k]]))[:-1]
+        corner = int(np.argmin(((ring - here) ** 2).sum(axis=1)))
+        taken.append(int(left[k]))
+        begin.append(corner)
+        here = ring[corner]
+        left = np.delete(left, k)
+    return _Order(chosen[taken], np.zeros(len(taken), dtype=bool), np.array(begin))
 
 
 def _nearest(

@@ -8,6 +8,7 @@ one that does is grown again in halves until none does.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +16,10 @@ import shapely
 from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.bands import GridShape, split_grid
+from miurafab.fabrication.bands import GridShape, Rectangle, split_grid
 from miurafab.fabrication.boxes import best_turn, box_of, fan, fits, support
 from miurafab.fabrication.growing import grow_patches, is_disk
+from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.tabs import TabRegions, tab_regions
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
@@ -37,45 +39,127 @@ class Boundary:
 
 
 def split(
-    pattern: CreasePattern, width: float, height: float, material: Material
+    pattern: CreasePattern,
+    width: float,
+    height: float,
+    material: Material,
+    options: LayoutOptions | None = None,
 ) -> NDArray[np.int64]:
     """(F,) the patch of each facet, from 0, so that each fits ``width`` x ``height`` mm.
 
-    Tabs are counted in, and stand on the patch with the lower number. Raises
-    :class:`~miurafab.errors.LayoutError` naming the facet if one is not a simple polygon or does
-    not fit alone.
+    Tabs are counted in, and stand on the patch that ``options`` say, usually the one with the
+    lower number. Raises :class:`~miurafab.errors.LayoutError` naming the facet if one is not a
+    simple polygon or does not fit alone, and where ``options`` want seams along grid lines that
+    the pattern does not have.
     """
+    options = options or LayoutOptions()
     check_facets(pattern)
+    cells = _cells(pattern)
+    blocks = _blocks(cells, options)
     faces = len(pattern.faces_vertices)
-    whole = np.zeros(faces, dtype=np.int64)
-    if _fits_whole(pattern, width, height):
-        return whole
+    if len(blocks) == 1 and _fits_whole(pattern, width, height):
+        return np.zeros(faces, dtype=np.int64)
     directions = fan(_TURNS)
     corners = pattern.faces_vertices
     body = support(pattern.vertices_coords[corners], corners >= 0, directions)
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
-    cells = _cells(pattern)
-    if cells is None:
-        # Which patch is the lower one is not known yet: every tab that may stand is counted in.
+    turned = options.tab_side == "upper"
+    if turned and cells is not None:
+        # Seen from the other corner of the grid the upper patch is the lower one.
+        cells = cells[::-1, ::-1]
+        rows, columns = cells.shape
+        blocks = [(rows - r1, rows - r0, columns - c1, columns - c0) for r0, r1, c0, c1 in blocks]
+    both = cells is None or options.tab_side == "alternate"
+    if cells is None or both:
+        # Which patch bears a tab is not known yet: every tab that may stand is counted in.
         edges = np.concatenate([inner, inner])
         sides = np.repeat([0, 1], len(inner))
     else:
         place = _places(cells)[pattern.edges_faces[inner]]
         edges, sides = inner, (place[:, 0] < place[:, 1]).astype(np.int64)
-    tabs = tab_regions(pattern, edges, sides, material)
+    tabs = tab_regions(pattern, edges, sides, material, full_facet=options.full_facet)
     tab_values = support(tabs.points, tabs.present, directions)
-    reach = body.copy()
-    np.maximum.at(reach, tabs.own_face, tab_values)
+    reach = _with_tabs(body, tabs, tab_values)
     _check_alone(pattern, ~fits(reach, width, height), tabs, width, height)
 
-    if cells is None:
-        found = grow_patches(pattern, reach, width, height)
+    room = _tab_room(pattern, tabs) if both else 0.0
+    small = (width - room, height - room)
+    if cells is None or (both and not fits(reach, *small).all()):
+        if cells is not None and len(blocks) > 1:
+            found = np.empty(faces, dtype=np.int64)
+            count = 0
+            for r0, r1, c0, c1 in blocks:
+                part = cells[r0:r1, c0:c1].ravel()
+                grown = grow_patches(pattern, reach, width, height, part)[part]
+                found[part] = grown + count
+                count += int(grown.max()) + 1
+        else:
+            found = grow_patches(pattern, reach, width, height)
     else:
+        if both:
+            place = _places(cells)[pattern.edges_faces[edges, sides]]
+            own = _places(cells)[tabs.own_face]
+            upward = place > own
+            tabs, tab_values = tabs.take(upward), tab_values[upward]
         shape = _grid_shape(pattern, cells, body, tabs, tab_values)
         found = np.empty(faces, dtype=np.int64)
-        for patch, (r0, r1, c0, c1) in enumerate(split_grid(shape, width, height)):
-            found[cells[r0:r1, c0:c1]] = patch
-    return _without_overlaps(pattern, found, reach, width, height)
+        count = 0
+        for r0, r1, c0, c1 in sorted(blocks):
+            for a0, a1, b0, b1 in split_grid(shape.part(r0, r1, c0, c1), *small):
+                found[cells[r0 + a0 : r0 + a1, c0 + b0 : c0 + b1]] = count
+                count += 1
+    found = _without_overlaps(pattern, found, reach, width, height)
+    return found.max() - found if turned else found
+
+
+def _blocks(cells: NDArray[np.int64] | None, options: LayoutOptions) -> list[Rectangle]:
+    """The parts of the grid between the seams that ``options`` ask for."""
+    wanted = {"row": options.seam_rows, "column": options.seam_columns}
+    if cells is None:
+        for name, lines in wanted.items():
+            if lines:
+                raise LayoutError(
+                    f"A seam along {name} {lines[0]} was asked for, but the facets of this pattern "
+                    "do not form a grid; leave the seams to the program."
+                )
+        return [(0, 0, 0, 0)]
+    for (name, lines), count in zip(wanted.items(), cells.shape, strict=True):
+        if lines and lines[-1] >= count:
+            raise LayoutError(
+                f"A seam along {name} {lines[-1]} was asked for, but a seam must lie between the "
+                f"{count} {name}s of facets, at 1 to {count - 1}."
+            )
+    ends = [
+        list(itertools.pairwise([0, *lines, count]))
+        for lines, count in zip(wanted.values(), cells.shape, strict=True)
+    ]
+    return [(r0, r1, c0, c1) for r0, r1 in ends[0] for c0, c1 in ends[1]]
+
+
+def _with_tabs(
+    body: NDArray[np.float32], tabs: TabRegions, tab_values: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """(F, D) the support values of facets with their tabs."""
+    reach = body.copy()
+    order = np.argsort(tabs.own_face, kind="stable")
+    own = tabs.own_face[order]
+    place = np.arange(len(own)) - np.searchsorted(own, own)
+    for turn in range(int(place.max(initial=-1)) + 1):
+        # One tab of each facet at a time.
+        tab = order[place == turn]
+        face = tabs.own_face[tab]
+        reach[face] = np.maximum(reach[face], tab_values[tab])
+    return reach
+
+
+def _tab_room(pattern: CreasePattern, tabs: TabRegions) -> float:
+    """How far in mm any of the tabs stands out from the facet that bears it."""
+    base = pattern.vertices_coords[pattern.edges_vertices[tabs.edge]]
+    way = base[:, 1] - base[:, 0]
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    off = tabs.points - base[:, :1]
+    depth = np.abs(off[..., 0] * -way[:, None, 1] + off[..., 1] * way[:, None, 0])
+    return float(depth.max(initial=0.0, where=tabs.present))
 
 
 def boundaries(pattern: CreasePattern, face_patch: NDArray[np.int64]) -> list[Boundary]:

@@ -1,14 +1,19 @@
 """Perforation: the dashes that let a crease fold, as real segments.
 
-Along a crease of length L, with u = L - 2 end_bridge, n dashes and n - 1 gaps fill u exactly:
+Along a crease of length L, with u = L - 2 bridge, n dashes and n - 1 gaps fill u exactly, and the
+crease is the same seen from either end. What gives way is the material's choice:
 
-    u = 2 e + (n - 2) cut + (n - 1) gap,
+* ``centre``: all inner dashes are ``cut`` and all gaps ``gap`` long, and both end dashes of the
+  equal length e >= min_end, u = 2 e + (n - 2) cut + (n - 1) gap. The largest such n is taken, so
+  e < min_end + (cut + gap) / 2.
+* ``stretch_cut``: all gaps are ``gap`` long and all dashes c = (u - (n - 1) gap) / n, for the n
+  that brings c nearest to the asked-for dash by whole periods, and c >= min_end.
+* ``stretch_gap``: all dashes are ``cut`` long and all gaps g = (u - n cut) / (n - 1), for the
+  largest n with g >= gap, so that no crease is weaker than asked.
 
-all inner dashes being ``cut`` and all gaps ``gap`` long, and both end dashes of the equal length
-e >= min_end. The largest such n is taken, so e < min_end + (cut + gap) / 2, and the crease is the
-same seen from either end. A crease too short for two dashes has one, which fills u; one too short
-even for a dash of min_end has one in its middle, min_end long but never more than half of L, and
-the bridges give way. So every crease has at least one dash.
+A crease too short for two dashes has one, which fills u; one too short even for a dash of min_end
+has one in its middle, min_end long but never more than half of L, and the bridges give way. So
+every crease has at least one dash. A crease that is scored or cut has just one.
 
 All of these are lengths *burnt*. The beam is as wide as the kerf, so a stroke of length s burns
 s + kerf, and each stroke is drawn shorter than its dash by kerf / 2 at both ends.
@@ -23,6 +28,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.profiles import Material
+from miurafab.profiles.material import Perforation
 
 MIN_STROKE_MM = 0.05
 """A shorter stroke is a dot to every controller (GRBL reports and plans to 0.001 mm; judged)."""
@@ -43,33 +49,71 @@ class Dashes:
         return len(self.crease)
 
 
-def perforate(starts: NDArray[np.float64], ends: NDArray[np.float64], material: Material) -> Dashes:
-    """The dashes of N creases from ``starts`` (N, 2) to ``ends`` (N, 2), in mm.
+def perforate(
+    starts: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    material: Material,
+    kind: str = "mountain",
+) -> Dashes:
+    """The dashes of N creases of one ``kind`` from ``starts`` (N, 2) to ``ends`` (N, 2), in mm.
 
     Raises :class:`~miurafab.errors.LayoutError` if the material asks for dashes that its kerf
     would fill.
     """
-    rule, kerf = material.perforation, material.kerf_mm
+    rule, kerf = material.perforation_of(kind), material.kerf_mm
     least = kerf + MIN_STROKE_MM
     if rule.cut_mm < least:
         raise LayoutError(
             f"The material '{material.name}' asks for dashes of {rule.cut_mm:g} mm, which a kerf "
             f"of {kerf:g} mm cannot draw; make 'cut' at least {least:g} mm."
         )
-    if not len(starts):
-        return Dashes(np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=np.int64))
     length = np.linalg.norm(ends - starts, axis=1)
-    count, bridge, end = _fit(
-        length, rule.cut_mm, rule.gap_mm, rule.end_bridge_mm, max(rule.min_end_mm, least)
-    )
-    crease = np.repeat(np.arange(len(count)), count)
-    index = np.arange(len(crease)) - np.repeat(np.cumsum(count) - count, count)
-    last = index == count[crease] - 1
-    period = rule.cut_mm + rule.gap_mm
-    begin = bridge + end + rule.gap_mm - period
-    at = np.where(index == 0, bridge[crease], begin[crease] + index * period)
-    at = np.where(last, (length - bridge - end)[crease], at)
-    to = np.where((index == 0) | last, at + end[crease], at + rule.cut_mm)
+    return _drawn(starts, ends, length, _FITS[rule.fit](length, rule, least), kerf)
+
+
+def unbroken(
+    starts: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    material: Material,
+    kind: str = "mountain",
+) -> Dashes:
+    """One stroke along each of N creases of one ``kind``, but for the bridges at its ends."""
+    rule, least = material.perforation_of(kind), material.kerf_mm + MIN_STROKE_MM
+    length = np.linalg.norm(ends - starts, axis=1)
+    nothing = np.zeros_like(length)
+    ones = np.ones(len(length), dtype=np.int64)
+    bridge, end = _single(length, rule, least)
+    return _drawn(starts, ends, length, _Fit(ones, bridge, end, nothing, nothing), material.kerf_mm)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """(N,) of each crease: the number of dashes, the bridge at each end, the length of the end
+    dashes, of the other dashes, and of the gaps.
+    """
+
+    count: NDArray[np.int64]
+    bridge: NDArray[np.float64]
+    end: NDArray[np.float64]
+    cut: NDArray[np.float64]
+    gap: NDArray[np.float64]
+
+
+def _drawn(
+    starts: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    length: NDArray[np.float64],
+    fit: _Fit,
+    kerf: float,
+) -> Dashes:
+    crease = np.repeat(np.arange(len(length)), fit.count)
+    index = np.arange(len(crease)) - np.repeat(np.cumsum(fit.count) - fit.count, fit.count)
+    last = index == fit.count[crease] - 1
+    begin, period = fit.bridge + fit.end + fit.gap, fit.cut + fit.gap
+    inner = begin[crease] + (index - 1) * period[crease]
+    at = np.where(index == 0, fit.bridge[crease], inner)
+    at = np.where(last, (length - fit.bridge - fit.end)[crease], at)
+    to = at + np.where((index == 0) | last, fit.end[crease], fit.cut[crease])
     # A dash in a crease shorter than two kerfs stays a stroke, in the middle of the crease.
     shorten = np.minimum(kerf, np.maximum(to - at - MIN_STROKE_MM, 0.0)) / 2
     part = np.stack([at + shorten, to - shorten], axis=1) / length[crease, None]
@@ -78,17 +122,61 @@ def perforate(starts: NDArray[np.float64], ends: NDArray[np.float64], material: 
     return Dashes(drawn[:, 0], drawn[:, 1], crease)
 
 
-def _fit(
-    length: NDArray[np.float64], cut: float, gap: float, end_bridge: float, min_end: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """(N,) number of dashes, bridge at each end, and length of the end dashes."""
-    used = length - 2 * end_bridge
-    # The slack keeps a crease that is an exact fit from losing a dash to rounding.
-    count = np.floor((used + 2 * cut + gap - 2 * min_end) / (cut + gap) + 1e-9).astype(np.int64)
+def _single(
+    length: NDArray[np.float64], rule: Perforation, least: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(N,) the bridge at each end and the length of a crease's only dash."""
+    used = length - 2 * rule.bridge_mm
+    min_end = max(rule.min_end_mm, least)
+    end = np.where(used < min_end, np.minimum(min_end, length / 2), used)
+    return np.where(used < min_end, (length - end) / 2, rule.bridge_mm), end
+
+
+def _fitted(
+    length: NDArray[np.float64],
+    rule: Perforation,
+    least: float,
+    count: NDArray[np.int64],
+    end: NDArray[np.float64],
+    cut: NDArray[np.float64],
+    gap: NDArray[np.float64],
+) -> _Fit:
+    """The fit where it has two dashes or more, a single dash elsewhere."""
+    bridge, alone = _single(length, rule, least)
     single = count < 2
-    count = np.where(single, 1, count)
-    end = np.where(single, used, (used - (count - 2) * cut - (count - 1) * gap) / 2)
-    short = used < min_end
-    end = np.where(short, np.minimum(min_end, length / 2), end)
-    bridge = np.where(short, (length - end) / 2, end_bridge)
-    return count, bridge, end
+    return _Fit(np.where(single, 1, count), bridge, np.where(single, alone, end), cut, gap)
+
+
+# The slack keeps a crease that is an exact fit from losing a dash to rounding.
+_SLACK = 1e-9
+
+
+def _centre(length: NDArray[np.float64], rule: Perforation, least: float) -> _Fit:
+    cut, gap, min_end = rule.cut_mm, rule.gap_mm, max(rule.min_end_mm, least)
+    used = length - 2 * rule.bridge_mm
+    count = np.floor((used + 2 * cut + gap - 2 * min_end) / (cut + gap) + _SLACK).astype(np.int64)
+    end = (used - (count - 2) * cut - (count - 1) * gap) / 2
+    same = np.ones_like(length)
+    return _fitted(length, rule, least, count, end, cut * same, gap * same)
+
+
+def _stretch_cut(length: NDArray[np.float64], rule: Perforation, least: float) -> _Fit:
+    cut, gap, min_end = rule.cut_mm, rule.gap_mm, max(rule.min_end_mm, least)
+    used = length - 2 * rule.bridge_mm
+    nearest = np.floor((used + gap) / (cut + gap) + 0.5)
+    most = np.floor((used + gap) / (min_end + gap) + _SLACK)
+    count = np.minimum(nearest, most).astype(np.int64)
+    dash = (used - (count - 1) * gap) / np.maximum(count, 1)
+    return _fitted(length, rule, least, count, dash, dash, np.full_like(length, gap))
+
+
+def _stretch_gap(length: NDArray[np.float64], rule: Perforation, least: float) -> _Fit:
+    cut, gap = rule.cut_mm, rule.gap_mm
+    used = length - 2 * rule.bridge_mm
+    count = np.floor((used + gap) / (cut + gap) + _SLACK).astype(np.int64)
+    space = (used - count * cut) / np.maximum(count - 1, 1)
+    dash = np.full_like(length, cut)
+    return _fitted(length, rule, least, count, dash, dash, space)
+
+
+_FITS = {"centre": _centre, "stretch_cut": _stretch_cut, "stretch_gap": _stretch_gap}

@@ -17,6 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from miurafab.fabrication.boxes import best_turn
 from miurafab.fabrication.kerf import allowance, cut_lines
+from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.patches import Boundary, boundaries, split
 from miurafab.fabrication.tabs import TabRegions, choose_tabs
 from miurafab.origami.crease_pattern import CreasePattern
@@ -50,14 +51,25 @@ class Pieces:
     untabbed: NDArray[np.int64]
 
 
-def make_pieces(pattern: CreasePattern, width: float, height: float, material: Material) -> Pieces:
+def make_pieces(
+    pattern: CreasePattern,
+    width: float,
+    height: float,
+    material: Material,
+    options: LayoutOptions | None = None,
+) -> Pieces:
     """The pattern split into pieces that each fit ``width`` x ``height`` mm, cut lines included.
 
     Raises :class:`~miurafab.errors.LayoutError` as :func:`~miurafab.fabrication.patches.split`.
     """
+    options = options or LayoutOptions()
+    if options.max_patch_mm is not None:
+        long, short = options.max_patch_mm
+        along, across = (long, short) if width >= height else (short, long)
+        width, height = min(width, along), min(height, across)
     room = 2 * allowance(material.kerf_mm)
-    face_patch = split(pattern, width - room, height - room, material)
-    tabs, swapped, untabbed = choose_tabs(pattern, face_patch, material)
+    face_patch = split(pattern, width - room, height - room, material, options)
+    tabs, swapped, untabbed = choose_tabs(pattern, face_patch, material, options)
     around = boundaries(pattern, face_patch)
     size = (width - room, height - room)
     kept = _without_misfits(pattern, face_patch, around, tabs, swapped, size)

@@ -11,7 +11,7 @@ origin, and from there to its sheet. A point p of the pattern lies on the sheet 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -21,10 +21,11 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.boxes import best_turn
 from miurafab.fabrication.labels import place_texts
 from miurafab.fabrication.nesting import Slot, Stock, nest, turned
+from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.ordering import order_strokes
 from miurafab.fabrication.pieces import Piece, Pieces, make_pieces
-from miurafab.fabrication.strokes import Motion, sheet_strokes
-from miurafab.fabrication.tabs import Tab
+from miurafab.fabrication.strokes import Blank, Motion, sheet_strokes
+from miurafab.fabrication.tabs import FOLDS, Tab
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, Material
@@ -74,12 +75,21 @@ class Placement:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A sheet as large as the machine's bed, and what lies on it."""
+    """A sheet as large as the machine's bed, and what lies on it.
+
+    ``back`` is the name of what is made on its back before its front, or None.
+    """
 
     name: str
     width_mm: float
     height_mm: float
     placements: tuple[Placement, ...]
+    back: str | None = None
+
+    @property
+    def passes(self) -> tuple[str, ...]:
+        """The names of what is made of this sheet, in turn."""
+        return (self.name,) if self.back is None else (self.back, self.name)
 
 
 @dataclass(frozen=True)
@@ -101,11 +111,12 @@ class Totals:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A pattern on sheets. ``toolpaths`` holds one for each sheet, and none if the layout was
-    read from a file.
+    """A pattern on sheets. ``toolpaths`` holds one for each sheet and ``backs`` one for each back
+    that is worked on; both are empty if the layout was read from a file.
 
-    ``untabbed`` are the pattern edges of seams on which no tab could stand, and
-    ``unlettered`` is how many names and numbers found no room; both are for the assembly.
+    ``untabbed`` are the pattern edges of seams on which no tab could stand, ``unlettered`` is how
+    many names and numbers found no room, and ``remarks`` are sentences on what else could not be
+    had; all are for the assembly.
     """
 
     machine: str
@@ -115,27 +126,47 @@ class Layout:
     totals: Totals
     untabbed: tuple[int, ...] = ()
     unlettered: int = 0
+    remarks: tuple[str, ...] = ()
     toolpaths: tuple[Toolpath, ...] = ()
+    backs: tuple[Toolpath, ...] = ()
+
+    @property
+    def passes(self) -> tuple[Toolpath, ...]:
+        """All toolpaths in turn, the back of a sheet before its front."""
+        behind = {back.sheet: back for back in self.backs}
+        return tuple(
+            each
+            for sheet, front in zip(self.sheets, self.toolpaths, strict=True)
+            for each in ([] if sheet.back is None else [behind[sheet.back]]) + [front]
+        )
 
 
 def lay_out(
-    pattern: CreasePattern, machine: MachineProfile, material: Material, *, gap_mm: float = 2.0
+    pattern: CreasePattern,
+    machine: MachineProfile,
+    material: Material,
+    *,
+    options: LayoutOptions | None = None,
 ) -> Layout:
-    """The pattern laid out on sheets of the machine's bed, with ``gap_mm`` between patches.
+    """The pattern laid out on sheets of the machine's bed as ``options`` want it.
 
     Deterministic. Raises :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed, or
-    is not a simple polygon, or the material's dashes cannot be drawn.
+    is not a simple polygon, or the material's dashes cannot be drawn, or an option asks for what
+    the pattern or the material does not have.
     """
+    options = options or LayoutOptions()
+    material = _with_own_tabs(material, options)
     bed = machine.bed
     width, height = bed.width_mm - 2 * bed.margin_mm, bed.height_mm - 2 * bed.margin_mm
-    pieces = make_pieces(pattern, width, height, material)
+    pieces = make_pieces(pattern, width, height, material, options)
     numbers = _numbers(pieces)
     patches = tuple(
-        _patch(number, piece, pieces, numbers, (width, height))
+        _patch(pattern, number, piece, pieces, numbers, (width, height))
         for number, piece in enumerate(pieces.pieces)
     )
     slots = nest(
-        [patch.outline_mm for patch in patches], Stock(width, height, gap_mm, (0, 90, 180, 270))
+        [patch.outline_mm for patch in patches],
+        Stock(width, height, options.gap_mm, (0, 90, 180, 270)),
     )
     placements = [
         Placement(
@@ -151,19 +182,61 @@ def lay_out(
     turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
     names = [patch.label for patch in patches]
     texts, unlettered = place_texts(pattern, pieces.face_patch, names, pieces.tabs, numbers, turns)
-    described = [(sheet.name, sheet.width_mm, sheet.height_mm) for sheet in sheets]
-    strokes = sheet_strokes(pattern, pieces, texts, motion, material, described)
-    toolpaths = tuple(order_strokes(each, pattern.edges_vertices) for each in strokes)
+    drawn = sheet_strokes(
+        pattern,
+        pieces,
+        texts,
+        motion,
+        material,
+        [Blank(each.name, each.width_mm, each.height_mm, bed.margin_mm) for each in sheets],
+        two_sided=options.two_sided,
+    )
+    ways = pattern.edges_vertices
+    toolpaths = tuple(order_strokes(each, ways) for each in drawn.fronts)
+    backs = [None if each is None else order_strokes(each, ways) for each in drawn.backs]
+    sheets = tuple(
+        replace(sheet, back=None if back is None else back.sheet)
+        for sheet, back in zip(sheets, backs, strict=True)
+    )
+    behind = tuple(back for back in backs if back is not None)
     return Layout(
         machine=machine.name,
         material=material.name,
         patches=patches,
         sheets=sheets,
-        totals=_totals(pattern, pieces, patches, toolpaths, width * height),
+        totals=_totals(pattern, pieces, patches, sheets, toolpaths + behind, width * height),
         untabbed=tuple(pieces.untabbed.tolist()),
         unlettered=unlettered,
+        remarks=_remarks(pieces, numbers, drawn.unrelieved, material),
         toolpaths=toolpaths,
+        backs=behind,
     )
+
+
+def _with_own_tabs(material: Material, options: LayoutOptions) -> Material:
+    rule = material.tabs
+    if options.tab_height_mm is not None:
+        rule = replace(rule, height_mm=options.tab_height_mm)
+    if options.tab_inset_mm is not None:
+        rule = replace(rule, inset_mm=options.tab_inset_mm)
+    return replace(material, tabs=rule)
+
+
+def _remarks(
+    pieces: Pieces, numbers: NDArray[np.int64], unrelieved: int, material: Material
+) -> tuple[str, ...]:
+    found = []
+    weak = numbers[pieces.tabs.areas < material.tabs.min_area_mm2]
+    if len(weak):
+        shown = ", ".join(str(number) for number in np.sort(weak)[:8].tolist())
+        more = f" and {len(weak) - 8} more" if len(weak) > 8 else ""
+        found.append(
+            f"{len(weak)} of {len(numbers)} tabs have less than {material.tabs.min_area_mm2:g} mm2 "
+            f"of glue: number {shown}{more}."
+        )
+    if unrelieved:
+        found.append(f"At {unrelieved} vertices a crease is too short for a relief hole.")
+    return tuple(found)
 
 
 def _numbers(pieces: Pieces) -> NDArray[np.int64]:
@@ -175,6 +248,7 @@ def _numbers(pieces: Pieces) -> NDArray[np.int64]:
 
 
 def _patch(
+    pattern: CreasePattern,
     number: int,
     piece: Piece,
     pieces: Pieces,
@@ -207,6 +281,7 @@ def _patch(
                 edge=int(tabs.edge[tab]),
                 mate_patch=int(pieces.face_patch[tabs.mate_face[tab]]),
                 polygon_mm=framed(tabs.polygon(tab)),
+                fold=FOLDS.get(str(pattern.edges_assignment[tabs.edge[tab]]), "flat"),
             )
             for tab in piece.tabs.tolist()
         ),
@@ -245,6 +320,7 @@ def _totals(
     pattern: CreasePattern,
     pieces: Pieces,
     patches: tuple[Patch, ...],
+    sheets: tuple[Sheet, ...],
     toolpaths: tuple[Toolpath, ...],
     usable: float,
 ) -> Totals:
@@ -255,10 +331,10 @@ def _totals(
     area = sum(shapely.Polygon(patch.outline_mm).area for patch in patches)
     return Totals(
         patches=len(patches),
-        sheets=len(toolpaths),
+        sheets=len(sheets),
         seam_mm=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()),
         tabs=len(pieces.tabs),
-        density=float(area / (len(toolpaths) * usable)),
+        density=float(area / (len(sheets) * usable)),
         cut_mm=sum(toolpath.length_of("cut") for toolpath in toolpaths),
         perforated_mm=sum(toolpath.length_of("perforate") for toolpath in toolpaths),
         travel_mm=sum(toolpath.travel_mm for toolpath in toolpaths),

@@ -1,35 +1,68 @@
-"""What is drawn on the pieces: creases as dashes, texts, and cut lines, on the sheet they lie on.
+"""What is drawn on the pieces: creases, relief holes, texts, and cut lines, on their sheets.
 
 Everything is made in the pattern's plane, where a crease is one edge, and then moved with its
-piece. A crease within a piece is perforated there. A seam is perforated on the piece that bears
-its tab, along the tab's base, and cut on the other one; a seam without a tab is cut on both. So
-every crease is perforated once or not at all, and nothing is drawn twice.
+piece. A crease within a piece is made there, as the material wants creases of its kind: mountain
+(M, and U, which is not assigned yet) or valley (V). A seam is made on the piece that bears its
+tab, along the tab's base, as the fold of a tab, and cut on the other one; a seam without a tab is
+cut on both. So every crease is made once or not at all, and nothing is drawn twice.
 
-Mountains, valleys and creases not yet assigned (M, V, U) are perforated; flat edges and joins
-(F, J) are left alone; a cut within a piece (C, or a border between two facets) is cut in full.
+Flat edges and joins (F, J) are left alone; a cut within a piece (C, or a border between two
+facets) is cut in full.
+
+Scored paper folds away from its score, so a valley may be scored from the back. The back of a
+sheet is the sheet turned over about its upright axis, x becoming width - x; it is made first,
+with three holes in the margin by which the sheet is laid down again when it is turned.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from miurafab.errors import LayoutError
 from miurafab.fabrication.labels import Text
-from miurafab.fabrication.ordering import Strokes
-from miurafab.fabrication.perforation import perforate
+from miurafab.fabrication.ordering import HOLE, Strokes
+from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
 from miurafab.fabrication.pieces import Pieces
+from miurafab.fabrication.relief import Holes, circles, relief_holes
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import OPERATIONS, Material
+from miurafab.profiles.material import CREASE_KINDS
 
 FOLDED = ("M", "V", "U")
 SLIT = ("B", "C")
 
-_INNER, _WASTE, _OUTER = 0, 1, 2
-"""Ranks among cuts: slits within a piece, rings around waste, outlines."""
+_INNER, _WASTE, _OUTER = 1, 2, 3
+"""Ranks among cuts after :data:`HOLE`: slits in a piece, rings around waste, outlines."""
+
+PIN_MM = 2.0
+"""The diameter of a registration hole; it lies in the middle of the margin."""
+
+
+@dataclass(frozen=True)
+class Blank:
+    """A sheet to draw on: its name, size and free margin in mm."""
+
+    name: str
+    width: float
+    height: float
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """The strokes of each sheet in no order yet, and of each back (None where it is blank).
+
+    ``unrelieved`` is how many vertices have no room for their relief hole.
+    """
+
+    fronts: list[Strokes]
+    backs: list[Strokes | None]
+    unrelieved: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +82,22 @@ def sheet_strokes(
     texts: Sequence[Text],
     motion: Motion,
     material: Material,
-    sheets: Sequence[tuple[str, float, float]],
-) -> list[Strokes]:
-    """The strokes of each sheet, in no order yet; ``sheets`` are names, widths and heights."""
+    sheets: Sequence[Blank],
+    *,
+    two_sided: bool = False,
+) -> Drawn:
+    """The strokes of each sheet. With ``two_sided`` scored valleys are on the backs.
+
+    Raises :class:`~miurafab.errors.LayoutError` where there are none, or no margin for the
+    registration holes.
+    """
+    if two_sided:
+        _check_two_sided(material, sheets)
+    creases, holes = _creases(pattern, pieces, material)
     parts = [
         _engraved(texts),
-        _perforated(pattern, pieces, material),
+        *(_made(creases[kind], kind, material) for kind in CREASE_KINDS),
+        _relief(pattern, holes, material),
         _slits(pattern, pieces),
         _outlines(pieces),
     ]
@@ -66,22 +109,88 @@ def sheet_strokes(
     operation = np.repeat([part.operation for part in parts], [len(part.count) for part in parts])
     edge = np.concatenate([part.edge for part in parts])
     rank = np.concatenate([part.rank for part in parts])
-    group = np.concatenate([part.group for part in parts])
-    found = []
-    for number, (name, width, height) in enumerate(sheets):
-        here = motion.sheet[patch] == number
+    steps = np.cumsum([0, *(int(part.group.max(initial=-1)) + 1 for part in parts)])
+    group = np.concatenate([part.group + step for part, step in zip(parts, steps, strict=False)])
+    behind = np.zeros(len(patch), dtype=bool)
+    if two_sided:
+        scored = operation == OPERATIONS.index("score")
+        behind[scored] = pattern.edges_assignment[edge[scored]] == "V"
+
+    def taken(chosen: NDArray[np.bool_], blank: Blank, name: str) -> Strokes:
         toolpath = Toolpath(
             sheet=name,
-            width_mm=width,
-            height_mm=height,
-            points=moved[np.repeat(here, count)],
-            offsets=np.concatenate([[0], np.cumsum(count[here])]),
-            operation=operation[here],
-            patch=patch[here],
-            edge=edge[here],
+            width_mm=blank.width,
+            height_mm=blank.height,
+            points=moved[np.repeat(chosen, count)],
+            offsets=np.concatenate([[0], np.cumsum(count[chosen])]),
+            operation=operation[chosen],
+            patch=patch[chosen],
+            edge=edge[chosen],
         )
-        found.append(Strokes(toolpath, group[here], rank[here]))
-    return found
+        return Strokes(toolpath, group[chosen], rank[chosen])
+
+    fronts: list[Strokes] = []
+    backs: list[Strokes | None] = []
+    for number, blank in enumerate(sheets):
+        here = motion.sheet[patch] == number
+        fronts.append(taken(here & ~behind, blank, blank.name))
+        back = here & behind
+        if back.any():
+            drawn = _turned_over(taken(back, blank, f"{blank.name}-back"))
+            backs.append(_with_pins(drawn, blank, material))
+        else:
+            backs.append(None)
+    return Drawn(fronts, backs, holes.left_out)
+
+
+def _check_two_sided(material: Material, sheets: Sequence[Blank]) -> None:
+    if material.creases["valley"].mode != "score":
+        raise LayoutError(
+            "Two-sided working scores the valleys from the back, but the material "
+            f"'{material.name}' does not score them; write mode = 'score' under [creases.valley]."
+        )
+    if any(blank.margin < PIN_MM + 1.0 for blank in sheets):
+        raise LayoutError(
+            f"Two-sided working needs a margin of {PIN_MM + 1.0:g} mm for its registration holes, "
+            f"and the machine's is {sheets[0].margin:g} mm; make it wider in the machine's file."
+        )
+
+
+def _turned_over(strokes: Strokes) -> Strokes:
+    """The strokes seen from the back of the sheet, turned over about its upright axis."""
+    front = strokes.toolpath
+    points = front.points * np.array([-1.0, 1.0]) + np.array([front.width_mm, 0.0])
+    return replace(strokes, toolpath=replace(front, points=points))
+
+
+def pin_centres(width: float, height: float, margin: float) -> NDArray[np.float64]:
+    """(3, 2) where the registration holes lie on the front of a sheet, in mm: at unequal distances
+    from all corners, so that a sheet turned over or about in a wrong way does not match.
+    """
+    near = margin / 2
+    return np.array([[near, near], [width - near, near], [near, height * 0.7]])
+
+
+def _with_pins(back: Strokes, blank: Blank, material: Material) -> Strokes:
+    """The strokes of a back with its registration holes."""
+    centres = pin_centres(blank.width, blank.height, blank.margin) * [-1.0, 1.0]
+    moved = centres + np.array([blank.width, 0.0])
+    points, count = circles(moved, PIN_MM - material.kerf_mm)
+    path, pins = back.toolpath, len(centres)
+    return Strokes(
+        replace(
+            path,
+            points=np.concatenate([path.points, points]),
+            offsets=np.concatenate(
+                [path.offsets, path.offsets[-1] + count * np.arange(1, 1 + pins)]
+            ),
+            operation=np.append(path.operation, np.full(pins, OPERATIONS.index("cut"))),
+            patch=np.append(path.patch, np.full(pins, -1)),
+            edge=np.append(path.edge, np.full(pins, -1)),
+        ),
+        np.append(back.group, back.group.max(initial=-1) + 1 + np.arange(pins)),
+        np.append(back.rank, np.full(pins, HOLE)),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,26 +221,85 @@ def _engraved(texts: Sequence[Text]) -> _Part:
     )
 
 
-def _perforated(pattern: CreasePattern, pieces: Pieces, material: Material) -> _Part:
+@dataclass(frozen=True, eq=False)
+class _Creases:
+    """N creases of one kind: ``ends`` (N, 2, 2) in mm from the first vertex of ``edge`` (N,) to
+    the second, on ``patch`` (N,).
+    """
+
+    ends: NDArray[np.float64]
+    edge: NDArray[np.int64]
+    patch: NDArray[np.int64]
+
+
+def _creases(
+    pattern: CreasePattern, pieces: Pieces, material: Material
+) -> tuple[dict[str, _Creases], Holes]:
+    """The creases of each kind, shortened where they meet in a relief hole, and the holes."""
     edges, patch = _inner_edges(pattern, pieces, FOLDED)
+    valley = pattern.edges_assignment[edges] == "V"
+    kind = np.where(valley, "valley", "mountain")
+    made = np.array([material.creases[name].mode != "none" for name in kind.tolist()], dtype=bool)
+    edges, patch, kind = edges[made], patch[made], kind[made]
     ends = pattern.vertices_coords[pattern.edges_vertices[edges]]
+
+    least = {
+        name: 2 * material.perforation_of(name).bridge_mm + material.kerf_mm + MIN_STROKE_MM
+        for name in CREASE_KINDS
+    }
+    room = np.where(kind == "valley", least["valley"], least["mountain"])
+    diameter = material.relief_hole_mm
+    holes = relief_holes(pattern, pieces.face_patch, edges, room, diameter)
+    holed = np.zeros(len(pattern.vertices_coords), dtype=bool)
+    holed[holes.vertex] = True
+    way = ends[:, 1] - ends[:, 0]
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    back = holed[pattern.edges_vertices[edges]] * (diameter / 2)
+    ends = ends + np.stack([way * back[:, :1], -way * back[:, 1:]], axis=1)
+
     tabs = pieces.tabs.take(np.isin(pattern.edges_assignment[pieces.tabs.edge], FOLDED))
     base = tabs.points[:, :2]
-    way = np.diff(pattern.vertices_coords[pattern.edges_vertices[tabs.edge]], axis=1)[:, 0]
-    backwards = np.einsum("ni,ni->n", base[:, 1] - base[:, 0], way) < 0
+    along = np.diff(pattern.vertices_coords[pattern.edges_vertices[tabs.edge]], axis=1)[:, 0]
+    backwards = np.einsum("ni,ni->n", base[:, 1] - base[:, 0], along) < 0
     base = np.where(backwards[:, None, None], base[:, ::-1], base)
-    ends = np.concatenate([ends, base])
-    edges = np.concatenate([edges, tabs.edge])
-    patch = np.concatenate([patch, pieces.face_patch[tabs.own_face]])
-    dashes = perforate(ends[:, 0], ends[:, 1], material)
+    owner = pieces.face_patch[tabs.own_face]
+    found = {
+        name: _Creases(ends[kind == name], edges[kind == name], patch[kind == name])
+        for name in ("mountain", "valley")
+    }
+    return found | {"tab": _Creases(base, tabs.edge, owner)}, holes
+
+
+def _made(creases: _Creases, kind: str, material: Material) -> _Part:
+    """The strokes of all creases of one kind."""
+    mode = material.creases[kind].mode
+    start, end = creases.ends[:, 0], creases.ends[:, 1]
+    if mode == "none":
+        start, end = start[:0], end[:0]
+    draw = perforate if mode == "perforate" else unbroken
+    dashes = draw(start, end, material, kind)
     return _Part(
-        operation=OPERATIONS.index("perforate"),
+        operation=OPERATIONS.index("perforate" if mode == "none" else mode),
         points=np.stack([dashes.starts, dashes.ends], axis=1).reshape(-1, 2),
         count=np.full(len(dashes), 2),
-        patch=patch[dashes.crease],
-        edge=edges[dashes.crease],
+        patch=creases.patch[dashes.crease],
+        edge=creases.edge[dashes.crease],
         group=dashes.crease,
-        rank=np.zeros(len(dashes), dtype=np.int64),
+        rank=np.full(len(dashes), _INNER),
+    )
+
+
+def _relief(pattern: CreasePattern, holes: Holes, material: Material) -> _Part:
+    diameter = max(material.relief_hole_mm - material.kerf_mm, 0.0)
+    points, count = circles(pattern.vertices_coords[holes.vertex], diameter)
+    return _Part(
+        operation=OPERATIONS.index("cut"),
+        points=points,
+        count=np.full(len(holes.vertex), count),
+        patch=holes.patch,
+        edge=holes.edge,
+        group=np.arange(len(holes.vertex)),
+        rank=np.full(len(holes.vertex), HOLE),
     )
 
 

@@ -11,16 +11,22 @@ line splits g on the bisector of its two seam edges. So a tab touches nothing bu
 edge, in the flat pattern and, after folding, inside g; it crosses no crease of g because g has
 none. For a facet that is not convex the region is smaller than it might be, and still right.
 
-The base of a tab is the piece of e that it stands on, and its fold; the rest of e is cut.
+With an asked-for largest angle at the base, the two lines through its ends at that angle bound the
+tab too; a tab that takes the full facet has no height of its own.
+
+The base of a tab is the piece of e that it stands on, and its fold; the rest of e is cut. The fold
+goes the way of the crease that the seam runs along.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from miurafab.fabrication.options import LayoutOptions
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -30,6 +36,9 @@ MIN_SIDE_MM = 1.0
 MIN_AREA_MM2 = 2.0
 """A tab with less glue area does not hold (judged)."""
 
+FOLDS = {"M": "mountain", "V": "valley", "U": "unassigned"}
+"""Which way the fold of a tab goes, by the assignment of its edge; flat for all others."""
+
 NO_LIMIT = -1e12
 """A limit below every p·n in mm; finite, so that differences of depths stay numbers."""
 
@@ -38,13 +47,15 @@ NO_LIMIT = -1e12
 class Tab:
     """A tab of one patch. ``number`` is engraved on both sides of the seam; ``edge`` is the pattern
     edge of the seam, ``mate_patch`` the id of the patch it is glued to, and ``polygon_mm`` (n, 2)
-    its outline in the patch frame, counter-clockwise, the first side being the base.
+    its outline in the patch frame, counter-clockwise, the first side being the base. ``fold`` is
+    one of :data:`FOLDS`, or flat.
     """
 
     number: int
     edge: int
     mate_patch: int
     polygon_mm: NDArray[np.float64]
+    fold: str = "flat"
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +126,8 @@ def tab_regions(
     sides: NDArray[np.int64],
     material: Material,
     bearing: NDArray[np.bool_] | None = None,
+    *,
+    full_facet: bool = False,
 ) -> TabRegions:
     """The tabs on ``edges`` (N,), each glued to the facet ``edges_faces[edge, side]``.
 
@@ -146,7 +159,7 @@ def tab_regions(
     inset = inset_of(material)
     other = real & (pattern.faces_edges[mate] != edges[:, None])
     reach = np.abs(local).max(axis=(1, 2), initial=0.0) + 1.0
-    height = np.full(len(edges), material.tabs.height_mm)
+    height = reach if full_facet else np.full(len(edges), material.tabs.height_mm)
     zero = np.zeros(len(edges))
     points = np.stack(
         [
@@ -168,34 +181,74 @@ def tab_regions(
         limit = offset[:, k] + inset * np.linalg.norm(towards, axis=1)
         points, count = clip_convex(points, count, towards, np.where(shared, limit, NO_LIMIT))
     points, count = _base_first(points, count)
+    if material.tabs.max_angle < math.pi:
+        points, count = _not_steeper(points, count, material.tabs.max_angle)
     placed = a[:, None] + np.einsum("nij,nki->nkj", frame, points)
     own = pattern.edges_faces[edges, 1 - sides]
     return TabRegions(edges, own, mate, placed, count)
 
 
 def choose_tabs(
-    pattern: CreasePattern, face_patch: NDArray[np.int64], material: Material
+    pattern: CreasePattern,
+    face_patch: NDArray[np.int64],
+    material: Material,
+    options: LayoutOptions | None = None,
 ) -> tuple[TabRegions, NDArray[np.bool_], NDArray[np.int64]]:
     """One tab for each seam edge of the split ``face_patch`` (F,), the patch id of each facet.
 
-    The patch with the lower id bears the tab; where its tab would be too small, the other one.
+    The patch that ``options`` name bears the tab; where its tab would be too small, the other one.
     Returns the tabs, (N,) which of them stand on the other patch, and (M,) the seam edges where
     neither patch can bear one. Cuts in the pattern (assignment C) get none.
     """
+    options = options or LayoutOptions()
     faces = pattern.edges_faces
     inner = (faces >= 0).all(axis=1)
     patch = np.where(faces >= 0, face_patch[faces], -1)
     seam = inner & (patch[:, 0] != patch[:, 1])
     edges = np.flatnonzero(seam & (pattern.edges_assignment != "C"))
-    usual = np.where(patch[edges, 0] < patch[edges, 1], 1, 0)
+    lower = patch[edges, 0] < patch[edges, 1]
+    usual = np.where(_by_lower(patch[edges], options.tab_side) == lower, 1, 0)
 
-    tabs = tab_regions(pattern, edges, usual, material, _bearing(pattern, edges, usual))
+    def made(sides: NDArray[np.int64]) -> TabRegions:
+        bearing = _bearing(pattern, edges, sides)
+        return tab_regions(pattern, edges, sides, material, bearing, full_facet=options.full_facet)
+
+    tabs = made(usual)
     swapped = ~tabs.usable
     if swapped.any():
-        sides = np.where(swapped, 1 - usual, usual)
-        tabs = tab_regions(pattern, edges, sides, material, _bearing(pattern, edges, sides))
+        tabs = made(np.where(swapped, 1 - usual, usual))
     kept = tabs.usable
     return tabs.take(kept), swapped[kept], edges[~kept]
+
+
+def _by_lower(patch: NDArray[np.int64], side: str) -> NDArray[np.bool_]:
+    """(N,) whether the lower one of two patches ``patch`` (N, 2) bears the tab."""
+    if side != "alternate":
+        return np.full(len(patch), side == "lower")
+    # Every other edge of each seam, in the order of the edges.
+    order = np.lexsort((np.arange(len(patch)), patch.max(axis=1), patch.min(axis=1)))
+    pair = np.sort(patch, axis=1)[order]
+    fresh = np.append(True, (pair[1:] != pair[:-1]).any(axis=1))[: len(patch)]
+    place = np.arange(len(patch))
+    first = np.maximum.accumulate(np.where(fresh, place, 0))
+    found = np.empty(len(patch), dtype=bool)
+    found[order] = (place - first) % 2 == 0
+    return found
+
+
+def _not_steeper(
+    points: NDArray[np.float64], count: NDArray[np.int64], angle: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The polygons with their inner angles at the base, on y = 0, cut to ``angle`` at most."""
+    c, s = math.cos(angle), math.sin(angle)
+    none = count < 3
+    for end, normal in ((0, np.array([s, -c])), (1, np.array([-s, -c]))):
+        limit = np.where(none, NO_LIMIT, points[:, end] @ normal)
+        points, count = clip_convex(
+            points, count, np.broadcast_to(normal, (len(points), 2)), limit - 1e-12
+        )
+        points, count = _base_first(points, count)
+    return points, count
 
 
 def _bearing(

@@ -1,0 +1,130 @@
+"""What a user may ask of a layout beyond machine and material, as one value.
+
+The same options stand in the ``[layout]`` table of a design file and on the command line; either
+way they come through :func:`read_options`, which refuses what it does not know by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from miurafab.errors import InputError
+from miurafab.profiles import Table
+from miurafab.units import parse_length
+
+TAB_SIDES = ("lower", "upper", "alternate")
+
+
+@dataclass(frozen=True)
+class LayoutOptions:
+    """How a pattern is laid out.
+
+    ``gap_mm`` is kept between patches on a sheet. ``max_patch_mm`` (longer, shorter side) limits
+    patches more than the bed does. ``seam_rows`` and ``seam_columns`` are lines of the vertex grid
+    along which the pattern is cut in any case, from 1.
+
+    ``tab_height_mm`` and ``tab_inset_mm`` stand in for the material's. ``tab_side`` says which
+    patch of a seam bears its tabs: the one with the ``lower`` or the ``upper`` number, or both in
+    turn, edge by edge (``alternate``). With ``full_facet`` a tab is the whole facet that it is
+    glued to, less the inset.
+
+    ``two_sided`` has valleys that are scored made from the back of the sheet. ``bridges`` is the
+    number of places, ``bridge_mm`` long, in which each outline is left whole so that nothing
+    falls out; ``spread_heat`` has patches next to each other cut far apart in time.
+    """
+
+    gap_mm: float = 2.0
+    max_patch_mm: tuple[float, float] | None = None
+    seam_rows: tuple[int, ...] = ()
+    seam_columns: tuple[int, ...] = ()
+    tab_height_mm: float | None = None
+    tab_inset_mm: float | None = None
+    tab_side: str = "lower"
+    full_facet: bool = False
+    two_sided: bool = False
+    bridges: int = 0
+    bridge_mm: float = 0.5
+    spread_heat: bool = False
+
+
+OPTION_KEYS = (
+    "gap",
+    "max_patch",
+    "seam_rows",
+    "seam_columns",
+    "tab_height",
+    "tab_inset",
+    "tab_side",
+    "full_facet",
+    "two_sided",
+    "bridges",
+    "bridge",
+    "spread_heat",
+)
+"""The keys of the options in files, which are those of the command line too."""
+
+
+def read_options(table: Table) -> LayoutOptions:
+    """The options in ``table``; its other keys are left to the caller, who finishes it.
+
+    Raises the error of the table, naming the key.
+    """
+    usual = LayoutOptions()
+
+    def length_or_none(key: str, low: float) -> float | None:
+        return table.length(key, low=low, high=100) if table.has(key) else None
+
+    bridges = table.whole("bridges", usual.bridges, low=0, high=12)
+    if bridges == 1:
+        raise table.fault("bridges", "is 1, on which a piece would swing; use 0, or 2 and more")
+    return LayoutOptions(
+        gap_mm=table.length("gap", usual.gap_mm, low=0, high=100),
+        max_patch_mm=_size(table, "max_patch"),
+        seam_rows=_lines(table, "seam_rows"),
+        seam_columns=_lines(table, "seam_columns"),
+        tab_height_mm=length_or_none("tab_height", 0.5),
+        tab_inset_mm=length_or_none("tab_inset", 0.0),
+        tab_side=table.choice("tab_side", TAB_SIDES, usual.tab_side),
+        full_facet=table.flag("full_facet", usual.full_facet),
+        two_sided=table.flag("two_sided", usual.two_sided),
+        bridges=bridges,
+        bridge_mm=table.length("bridge", usual.bridge_mm, low=0.1, high=20),
+        spread_heat=table.flag("spread_heat", usual.spread_heat),
+    )
+
+
+def layout_options(given: Mapping[str, Any], where: str = "The layout options") -> LayoutOptions:
+    """The options in ``given``, keys as in a file.
+
+    Raises :class:`~miurafab.errors.InputError` naming the key.
+    """
+    table = Table(dict(given), where, InputError)
+    options = read_options(table)
+    table.finish()
+    return options
+
+
+def _size(table: Table, key: str) -> tuple[float, float] | None:
+    if not table.has(key):
+        return None
+    text = table.text(key)
+    sides = text.lower().replace("×", "x").split("x")
+    try:
+        one, other = (parse_length(side.strip()) for side in sides)
+    except (ValueError, InputError):
+        raise table.fault(key, f"is '{text}'; write two lengths such as '300mm x 200mm'") from None
+    if min(one, other) <= 0:
+        raise table.fault(key, f"is '{text}'; both sides must be longer than 0")
+    return max(one, other), min(one, other)
+
+
+def _lines(table: Table, key: str) -> tuple[int, ...]:
+    if not table.has(key):
+        return ()
+    text = table.scalar(key)
+    parts = text.split(",")
+    if not all(part.strip().isdigit() and int(part) > 0 for part in parts):
+        raise table.fault(key, f"is '{text}'; write line numbers from 1 up, such as '10,20'")
+    return tuple(sorted({int(part) for part in parts}))

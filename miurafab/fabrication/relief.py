@@ -1,0 +1,76 @@
+"""Relief holes: a small circle burnt out where creases meet, so that no fold tears the paper.
+
+A hole of diameter d is a circle of diameter d - kerf for the beam. The creases that meet there
+begin at its rim, d / 2 from the vertex, so nothing is burnt twice. Vertices on the border of a
+patch are opened by its outline already and get none, nor do those where a crease is too short to
+keep a dash and its bridges between the holes; these are counted, never dropped in silence.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.origami.crease_pattern import CreasePattern
+
+_SIDE_MM = 0.15
+"""The least side of the polygon drawn for a circle: importers merge what is under 0.1 mm."""
+
+
+@dataclass(frozen=True, eq=False)
+class Holes:
+    """``vertex`` (H,) int64 the pattern vertices with a hole, ``patch`` (H,) the patch of each and
+    ``edge`` (H,) one of its creases; ``left_out`` is how many found no room.
+    """
+
+    vertex: NDArray[np.int64]
+    patch: NDArray[np.int64]
+    edge: NDArray[np.int64]
+    left_out: int
+
+
+def relief_holes(
+    pattern: CreasePattern,
+    face_patch: NDArray[np.int64],
+    edges: NDArray[np.int64],
+    room: NDArray[np.float64],
+    diameter: float,
+) -> Holes:
+    """The holes of ``diameter`` mm where the creases ``edges`` (n,) meet.
+
+    ``face_patch`` (F,) is the patch of each facet, ``room`` (n,) what each crease needs between
+    two holes, in mm.
+    """
+    if diameter == 0.0 or not len(edges):
+        none = np.empty(0, dtype=np.int64)
+        return Holes(none, none, none, 0)
+    vertices = len(pattern.vertices_coords)
+    faces = pattern.edges_faces
+    patch = np.where(faces >= 0, face_patch[faces], -1)
+    open_side = (patch[:, 0] != patch[:, 1]) | (patch[:, 0] < 0)
+    closed = np.ones(vertices, dtype=bool)
+    closed[pattern.edges_vertices[open_side]] = False
+    ends = pattern.edges_vertices[edges]
+    meeting = np.bincount(ends.ravel(), minlength=vertices)
+    wanted = closed & (meeting >= 2)
+    span = np.diff(pattern.vertices_coords[ends], axis=1)[:, 0]
+    short = np.linalg.norm(span, axis=1) < diameter + room
+    cramped = np.zeros(vertices, dtype=bool)
+    cramped[ends[short]] = True
+    vertex = np.flatnonzero(wanted & ~cramped)
+    first = np.full(vertices, len(pattern.edges_vertices))
+    np.minimum.at(first, ends.ravel(), np.repeat(edges, 2))
+    return Holes(vertex, patch[first[vertex], 0], first[vertex], int((wanted & cramped).sum()))
+
+
+def circles(centres: NDArray[np.float64], diameter: float) -> tuple[NDArray[np.float64], int]:
+    """The closed polygons drawn for circles of ``diameter`` mm around ``centres`` (n, 2): their
+    points (n * count, 2), first and last of each the same, and the count.
+    """
+    sides = min(max(int(math.pi * diameter / _SIDE_MM), 6), 48)
+    angle = np.arange(sides + 1) % sides * (2 * math.pi / sides)
+    ring = diameter / 2 * np.column_stack([np.cos(angle), np.sin(angle)])
+    return (centres[:, None] + ring).reshape(-1, 2), sides + 1
