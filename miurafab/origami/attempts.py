@@ -51,6 +51,8 @@ FAR = 0.02
 """A mid-surface farther from the target than this part of the diagonal makes the search go on."""
 SHAKE = 0.03
 """The standard deviation of a random attempt's coordinates, in mean edge lengths."""
+SCALINGS = 4
+"""How often a sheet is polished again because its scale has changed."""
 BOUND_MARGIN = 2e-3
 """Limits are tightened by this part while polishing, since the scale of the sheet still changes."""
 LEVELS: Mapping[Follow, float] = {"middle": 0.0, "top": -0.5, "bottom": 0.5}
@@ -69,6 +71,14 @@ class Candidate:
     deviation_mm: float
     polished: bool = False
     active_bounds: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def settles(self) -> bool:
+        """Whether this is a sheet whose only faults are limits, which other ways from the same
+        target will not meet either.
+        """
+        m = self.measurements
+        return not (m.self_intersections or m.overlaps or self.rank[1])
 
     @property
     def rank(self) -> tuple[int, bool]:
@@ -166,34 +176,43 @@ class Plan:
         self, request: FitRequest, unknowns: Unknowns, solution: Projection, plain: Candidate
     ) -> Candidate:
         """The sheet ``solution`` brought within the limits and as close to the target as it goes;
-        ``plain`` where that fails.
+        ``plain`` where that fails. Limits in mm move with the scale, which follows from the sheet:
+        hence the repetition.
         """
         constraints = unknowns.constraints(request.exactly_flat_foldable)
-        limits = request.bounds(unknowns, plain.pattern.scale, BOUND_MARGIN)
-        bounds = unknowns.on_unknowns(limits) if limits.any else None
-        iterations = plain.attempt.iterations
-        if bounds is not None:
-            solution = project(
+        found = plain
+        for _ in range(SCALINGS):
+            limits = request.bounds(unknowns, found.pattern.scale, BOUND_MARGIN)
+            bounds = unknowns.on_unknowns(limits) if limits.any else None
+            iterations = found.attempt.iterations
+            if bounds is not None:
+                solution = project(
+                    constraints,
+                    solution.x,
+                    unknowns.places,
+                    inequalities=bounds,
+                    cap=STEP_CAP * unknowns.length,
+                )
+                iterations += solution.iterations
+                if not solution.converged:
+                    break
+            better = polish(
+                solution,
+                self.surface,
+                unknowns,
                 constraints,
-                solution.x,
-                unknowns.places,
-                inequalities=bounds,
-                cap=STEP_CAP * unknowns.length,
+                follow=self._follow(request),
+                bounds=bounds,
             )
-            iterations += solution.iterations
-            if not solution.converged:
-                return plain
-        better = polish(
-            solution,
-            self.surface,
-            unknowns,
-            constraints,
-            follow=self._follow(request),
-            bounds=bounds,
-        )
-        found = self._candidate(request, unknowns, better.projection, iterations + better.rounds)
-        active = limits.count(better.projection.active) if bounds is not None else {}
-        return replace(found, polished=True, active_bounds=active)
+            solution = better.projection
+            found = replace(
+                self._candidate(request, unknowns, solution, iterations + better.rounds),
+                polished=True,
+                active_bounds=limits.count(solution.active) if bounds is not None else {},
+            )
+            if bounds is None or not found.faults:
+                break
+        return found
 
     def _candidate(
         self, request: FitRequest, unknowns: Unknowns, solution: Projection, iterations: int

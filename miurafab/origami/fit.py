@@ -29,6 +29,9 @@ from miurafab.origami.attempts import Candidate, plans
 from miurafab.origami.fit_request import Attempt, FitRequest, FitResult
 from miurafab.origami.search import coarsest
 
+LAST_RESORTS = ("bent", "shaken")
+"""The ways to a sheet where the seed alone finds none."""
+
 __all__ = ["Attempt", "FitRequest", "FitResult", "fit"]
 
 
@@ -56,6 +59,8 @@ def _fit(
     made: list[Attempt] = []
     best: Candidate | None = None
     for number, plan in enumerate(itertools.islice(plans(request), attempts)):
+        if best is not None and best.settles and plan.way in LAST_RESORTS:
+            break
         if on_progress is not None:
             # how many attempts it takes is not known; most sheets need one or two
             on_progress(1 - 0.9**number, plan.describe())
