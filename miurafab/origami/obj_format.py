@@ -13,15 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
-from miurafab.geometry.angles import fold_angles
 from miurafab.origami.collisions import doubled_areas, triangulate
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.unfold import with_angles_of_the_folded_form
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-FLAT_ANGLE = 1e-9
-"""Fold angles below this many radians are flat."""
 
 
 def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
@@ -47,30 +44,19 @@ def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
     areas = np.bincount(owner, doubled_areas(plane, triangles), minlength=len(faces))
     if areas.sum() < 0:
         faces = _reversed(faces)
-        triangles = triangles[:, ::-1]
     edges = _edges(faces)
-    normals = _normals(shape, triangles, owner, len(faces))
     pattern = CreasePattern(
         vertices_coords=plane,
         edges_vertices=edges,
-        edges_assignment=np.full(len(edges), "B"),
+        edges_assignment=np.full(len(edges), "U"),
         edges_fold_angle=np.zeros(len(edges)),
         faces_vertices=faces,
         folded_coords=shape,
     )
     try:
-        sides = pattern.edges_faces
+        return with_angles_of_the_folded_form(pattern)
     except PatternError as fault:
         raise PatternError(f"{flat}: {fault}") from None
-    inner = np.flatnonzero((sides >= 0).all(axis=1))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        angle = fold_angles(shape, edges[inner], normals[sides[inner, 0]], normals[sides[inner, 1]])
-    angle = np.nan_to_num(angle)
-    pattern.edges_fold_angle[inner] = angle
-    pattern.edges_assignment[inner] = np.where(
-        angle > FLAT_ANGLE, "V", np.where(angle < -FLAT_ANGLE, "M", "F")
-    )
-    return pattern
 
 
 def _read_obj(path: Path) -> tuple[Floats, Ints]:
@@ -126,13 +112,3 @@ def _edges(faces: Ints) -> Ints:
     after = np.where(slot + 1 < sizes, slot + 1, 0)
     sides = np.stack([faces, np.take_along_axis(faces, after, axis=1)], axis=-1)
     return np.unique(np.sort(sides[faces >= 0], axis=1), axis=0)
-
-
-def _normals(points: Floats, triangles: Ints, owner: Ints, count: int) -> Floats:
-    """(count, 3) unit normals of facets by the sum of their triangles' area vectors."""
-    p = points[triangles]
-    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    total = np.stack([np.bincount(owner, area[:, k], minlength=count) for k in range(3)], axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        unit: Floats = total / np.linalg.norm(total, axis=1, keepdims=True)
-    return unit

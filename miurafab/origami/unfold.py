@@ -54,14 +54,17 @@ def unfold(
 def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
     """``pattern`` with its fold angles measured in its folded form, for facets of any shape.
 
-    Mountains and valleys follow from their signs; borders, cuts and joins stay what they are.
+    Mountains and valleys follow from their signs; borders, cuts and joins stay what they are. A
+    crease or facet without extent, about which nothing can turn, is flat.
     """
     assert pattern.folded_coords is not None
     normals = _polygon_normals(pattern.folded_coords, pattern.faces_vertices)
     inner = (pattern.edges_faces >= 0).all(axis=1)
     left, right = (normals[pattern.edges_faces[inner, side]] for side in (0, 1))
     angle = np.zeros(len(pattern.edges_vertices))
-    angle[inner] = fold_angles(pattern.folded_coords, pattern.edges_vertices[inner], left, right)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        turned = fold_angles(pattern.folded_coords, pattern.edges_vertices[inner], left, right)
+    angle[inner] = np.nan_to_num(turned)
     letter = np.where(angle > FLAT_ANGLE, "V", np.where(angle < -FLAT_ANGLE, "M", "F"))
     folds = inner & ~np.isin(pattern.edges_assignment, ("B", "C", "J"))
     kept = np.where(~inner & (pattern.edges_assignment != "C"), "B", pattern.edges_assignment)
