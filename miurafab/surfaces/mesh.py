@@ -57,7 +57,7 @@ _ROUGH_SPANS = 24
 class Layout:
     """A mesh laid flat. ``faces`` (F, 3) are all triangles, of which the first ``real`` are of the
     mesh and the others fill holes; the first ``known`` of ``vertices`` (V, 3) are of the mesh.
-    ``flat`` (V, 2) are their places.
+    ``flat`` (V, 2) are their places; ``rough`` says that the mesh is a noisy scan.
     """
 
     vertices: Floats
@@ -65,6 +65,7 @@ class Layout:
     real: int
     known: int
     flat: Floats
+    rough: bool
     name: str
 
     def surface(self, placement: Placement, stiffness: float = 0.0) -> MeshSurface:
@@ -155,7 +156,8 @@ class MeshSurface:
         smoother, the grid turned, smaller parts of the same rectangle. A rectangle that the user
         asked for stays where it is.
         """
-        yield "the mesh smoothed more", self.layout.surface(self.placement, SMOOTHER)
+        if self.layout.rough:
+            yield "the mesh smoothed more", self.layout.surface(self.placement, SMOOTHER)
         if not self.free:
             return
         others = placements(self.layout.vertices, self.layout.flat, self.layout.faces)
@@ -266,11 +268,12 @@ def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[Layout, tuple[str
     flat = flatten(vertices, faces)
     smoothed = _smoothed(vertices[:known], flat[:known], faces)
     edge = float(np.median(_side_lengths(vertices, faces[:real])))
-    if smoothed.roughness > ROUGH * edge:
+    rough = smoothed.roughness > ROUGH * edge
+    if rough:
         even = np.asarray(smoothed.spline(flat), dtype=np.float64)
         if _doubled_areas(even, faces).min() > 1e-6 * np.median(_doubled_areas(even, faces)):
             flat = flatten(even, faces)
-    return Layout(vertices, faces, real, known, flat, name), remarks
+    return Layout(vertices, faces, real, known, flat, rough, name), remarks
 
 
 def _smoothed(points: Floats, flat: Floats, faces: Ints) -> Smoothed:

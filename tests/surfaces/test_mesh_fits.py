@@ -67,12 +67,13 @@ def test_where_no_sheet_is_found_a_smaller_part_is_taken_and_said(monkeypatch):
     assert result.status == "converged"
     assert "the middle 85 % of the rectangle" in result.advice
     places = list(dict.fromkeys(attempt.place for attempt in result.attempts))
-    assert places[:2] == ["", "the mesh smoothed more"]
-    assert places[2].startswith("the grid turned by")
+    assert places[0] == ""
+    assert places[1].startswith("the grid turned by")
     u0, u1, _, _ = result.pattern.target["rectangle"]
     assert u1 - u0 == pytest.approx(0.85 * surface.domain.width)
 
 
 def test_a_rectangle_that_was_asked_for_stays():
-    surface = replace(mesh_surface(*benchmark().meshes()["saddle-disc"]), free=False)
-    assert [place for place, _ in surface.alternatives()] == ["the mesh smoothed more"]
+    for name, others in (("saddle-disc", []), ("saddle-noisy", ["the mesh smoothed more"])):
+        surface = replace(mesh_surface(*benchmark().meshes()[name]), free=False)
+        assert [place for place, _ in surface.alternatives()] == others
