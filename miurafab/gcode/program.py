@@ -42,6 +42,7 @@ from miurafab.gcode.parser import ModalState, parse_block
 __all__ = ["Context", "Program", "Strokes", "parse_program", "strokes"]
 
 _COMMENT = re.compile(r"\s*\(\s*(sheet|patch|operation)\s+([^()]*?)\s*\)\s*")
+_INLINE = re.compile(r"(M0*[345])I0*(?![\d.])")
 _NO_LETTERS = str.maketrans("", "", "0123456789.+-")
 
 
@@ -51,17 +52,21 @@ class _ReaderRules:
     arc_tolerance: float
     mist: bool = True
     single_precision: bool = False
+    inline: bool = False
 
 
-def parse_program(job: Job, *, laser: bool = True, arc_tolerance_mm: float = 0.002) -> Program:
+def parse_program(
+    job: Job, *, laser: bool = True, arc_tolerance_mm: float = 0.002, inline: bool = False
+) -> Program:
     """Read ``job`` back as the controller would run it from power-up, at machine position 0.
 
     ``laser`` is the controller's laser mode ($32), which darkens G0 and lets S change in motion.
-    Arcs become chords that stay within ``arc_tolerance_mm`` of the arc ($12). Raises
+    Arcs become chords that stay within ``arc_tolerance_mm`` of the arc ($12). With ``inline`` the
+    program is one for Marlin, whose ``M3 I``, ``M4 I`` and ``M5 I`` do what laser mode does. Raises
     :class:`~miurafab.errors.GcodeError` naming file and line for what the controller would
     refuse, and for a ``$`` command, which is no part of a program.
     """
-    return _Reader(_ReaderRules(laser, arc_tolerance_mm)).read(job)
+    return _Reader(_ReaderRules(laser, arc_tolerance_mm, inline=inline)).read(job)
 
 
 class _Reader:
@@ -101,6 +106,8 @@ class _Reader:
                 f"{name}, line {number}: {code!r} is a command to the controller and no part of "
                 "a program; remove it."
             )
+        if self.rules.inline:
+            code = _INLINE.sub(r"\1", code)
         try:
             block = parse_block(code, self.state, self.stored.__getitem__, self.rules)
         except BlockFault as fault:

@@ -103,6 +103,11 @@ class MachineProfile:
     controller: Controller
     settings: dict[int, float]
 
+    @property
+    def job_suffix(self) -> str:
+        """How the name of a file for this machine ends."""
+        return ".plt" if self.dialect == "hpgl" else ".nc"
+
     def power_to_s(self, fraction: float) -> int:
         """The S word for a power ``fraction`` (0 to 1) of the laser's full power."""
         tool = self.tool

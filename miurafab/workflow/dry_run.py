@@ -6,7 +6,7 @@ foreign file are worth as much as those of our own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
+from miurafab.gcode.hpgl import parse_hpgl
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program, parse_program, strokes
 from miurafab.motion.estimate import estimate
@@ -92,7 +93,7 @@ def dry_run(
     Raises :class:`~miurafab.errors.GcodeError`, naming the line, for a program that the
     controller would refuse.
     """
-    program = parse_program(job, laser=has_laser_mode(machine))
+    program = read_program(job, machine)
     controller = machine.controller
     link = Link(baud=controller.baud, rx_bytes=controller.rx_bytes)
     times = estimate(program, MotionParameters.from_profile(machine), link)
@@ -119,6 +120,20 @@ def dry_run(
         paper_mm=paper_mm,
         view_mm=_box(np.vstack([program.start[:1, :2], program.end[:, :2], (0, 0), bed, paper_mm])),
     )
+
+
+def read_program(job: Job, machine: MachineProfile) -> Program:
+    """``job`` as ``machine`` would run it, in the dialect that it speaks.
+
+    What a pen or knife does while it is up has no power, whatever S holds it up. Raises
+    :class:`~miurafab.errors.GcodeError`, naming the line, for what the machine would refuse.
+    """
+    if machine.dialect == "hpgl":
+        return parse_hpgl(job)
+    program = parse_program(job, laser=has_laser_mode(machine), inline=machine.dialect == "marlin")
+    if machine.tool.kind == "laser":
+        return program
+    return replace(program, power=np.where(program.power == machine.tool.s_up, 0.0, program.power))
 
 
 def read_gcode(path: Path) -> Job:

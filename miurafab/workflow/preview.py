@@ -19,9 +19,8 @@ from miurafab.profiles import MachineProfile, load_machine
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 
 ASSUMED_MACHINE = "grbl-laser-400"
-"""The machine assumed for a file that names none; the preview says so."""
-
-
+"""The machine assumed for a G-code file that names none; the preview says so."""
+_ASSUMED_CUTTER = "hpgl-cutter-a3"
 _MACHINE = re.compile(r"^\(machine ([^()]+)\)$", re.MULTILINE)
 
 
@@ -150,8 +149,10 @@ def _read_layout(path: Path) -> _Layout | None:
             pattern_file=str(layout["pattern"]["file"]),
             pattern_sha256=str(layout["pattern"]["sha256"]),
             papers={
-                str(sheet["name"]): (float(sheet["width_mm"]), float(sheet["height_mm"]))
+                str(name): (float(sheet["width_mm"]), float(sheet["height_mm"]))
                 for sheet in layout["sheets"]
+                for name in (sheet.get("back"), sheet["name"])
+                if name
             },
         )
     except (ValueError, KeyError, TypeError) as fault:
@@ -166,7 +167,8 @@ def _job_files(path: Path, layout: _Layout | None) -> list[Path]:
     if layout is None:
         files = sorted(path.glob("*.nc"))
     else:
-        files = [path / f"{name}.nc" for name in layout.papers]
+        suffix = _own_or_shipped(layout.machine, path).job_suffix
+        files = [path / f"{name}{suffix}" for name in layout.papers]
     if not files:
         raise InputError(f"{path} holds no G-code (*.nc); make it with 'miurafab sheets'.")
     return files
@@ -194,11 +196,17 @@ def _made_for(path: Path, layout: _Layout | None, job: Job, remarks: list[str]) 
     named = named_machine(job, folder)
     if named is not None:
         return named
+    assumed = assumed_machine(path)
     remarks.append(
-        f"No machine is named, so times and limits hold for {ASSUMED_MACHINE}; give --machine or "
+        f"No machine is named, so times and limits hold for {assumed.name}; give --machine or "
         "--settings for another."
     )
-    return load_machine(ASSUMED_MACHINE)
+    return assumed
+
+
+def assumed_machine(path: Path) -> MachineProfile:
+    """The machine assumed for a file that names none: a cutter for HPGL, else a common laser."""
+    return load_machine(_ASSUMED_CUTTER if path.suffix.lower() == ".plt" else ASSUMED_MACHINE)
 
 
 def _pattern(path: Path, layout: _Layout, remarks: list[str]) -> CreasePattern | None:

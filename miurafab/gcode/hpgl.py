@@ -1,0 +1,140 @@
+"""A plotter's HPGL file read back to a :class:`~miurafab.gcode.moves.Program`.
+
+Read is what a cutter needs of HP-GL: ``IN``, ``PA``, ``PR``, ``PU``, ``PD``, ``SP``, ``VS`` and
+``FS``. A plotter unit is 0.025 mm, ``VS`` is in cm/s, and the pen's number says which operation a
+stroke belongs to, as in the files written here (HP-GL reference, "plotter units" and "velocity
+select"). Anything else is refused by name, since what it draws would be left out of the picture.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import GcodeError
+from miurafab.gcode.job import Job
+from miurafab.gcode.moves import BEAM_M3, FEED, RAPID, Context, Program
+from miurafab.profiles import OPERATIONS
+
+MM_PER_UNIT = 0.025
+_MM_MIN_PER_CM_S = 600.0
+_SPEED = 40.0  # cm/s, before any VS; that of common cutters
+_INSTRUCTION = re.compile(r"\s*([A-Za-z]{2})([-+0-9.,\s]*);?\s*")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
+
+
+def parse_hpgl(job: Job) -> Program:
+    """Read ``job`` back as the plotter would draw it, from the origin, the pen up.
+
+    The power of a move is the force last set by ``FS`` (1 if none was) with the pen down, 0 with
+    it up. Raises :class:`~miurafab.errors.GcodeError` naming the line for an instruction that is
+    not read, or coordinates that do not come in pairs.
+    """
+    return _Reader(job.name).read(job)
+
+
+class _Reader:
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.at = (0.0, 0.0)
+        self.down = self.relative = False
+        self.force = 1.0
+        self.feed = _SPEED * _MM_MIN_PER_CM_S
+        self.contexts: dict[Context, int] = {Context(): 0}
+        self.context = 0
+        self.moves: list[tuple[float, ...]] = []
+        self.sent: list[tuple[int, int]] = []
+
+    def read(self, job: Job) -> Program:
+        for number, line in enumerate(job.iter_lines(), 1):
+            place = 0
+            while place < len(line):
+                match = _INSTRUCTION.match(line, place)
+                if match is None:
+                    raise GcodeError(
+                        f"{self.name}, line {number}: {line[place : place + 12]!r} is not HPGL; "
+                        "preview and cut HPGL files with an HPGL machine, G-code with another."
+                    )
+                self.sent.append((number, match.end() - place))
+                self._do(number, match[1].upper(), [*map(float, _NUMBER.findall(match[2]))])
+                place = match.end()
+        return self._program()
+
+    def _do(self, number: int, name: str, values: list[float]) -> None:
+        if name == "IN":
+            self.down = self.relative = False
+        elif name in ("PA", "PR"):
+            self.relative = name == "PR"
+            self._go(number, name, values)
+        elif name in ("PU", "PD"):
+            self.down = name == "PD"
+            self._go(number, name, values)
+        elif name == "SP":
+            pen = int(values[0]) if values else 0
+            operation = OPERATIONS[pen - 1] if 1 <= pen <= len(OPERATIONS) else ""
+            context = Context(operation=operation)
+            self.context = self.contexts.setdefault(context, len(self.contexts))
+        elif name == "VS":
+            self.feed = (values[0] if values else _SPEED) * _MM_MIN_PER_CM_S
+        elif name == "FS":
+            self.force = max(1.0, values[0]) if values else 1.0
+        else:
+            raise GcodeError(
+                f"{self.name}, line {number}: {name} is an HPGL instruction that is not read here; "
+                "draw with PU and PD alone."
+            )
+
+    def _go(self, number: int, name: str, values: list[float]) -> None:
+        if len(values) % 2:
+            raise GcodeError(
+                f"{self.name}, line {number}: {name} has {len(values)} coordinates, which are not "
+                "pairs of X and Y."
+            )
+        for x, y in zip(values[::2], values[1::2], strict=True):
+            begin = self.at if self.relative else (0.0, 0.0)
+            target = (begin[0] + x * MM_PER_UNIT, begin[1] + y * MM_PER_UNIT)
+            if target != self.at:
+                motion, feed, power = (
+                    (FEED, self.feed, self.force) if self.down else (RAPID, 0.0, 0.0)
+                )
+                self.moves.append((*self.at, *target, motion, feed, power, number, self.context))
+            self.at = target
+
+    def _program(self) -> Program:
+        moves = np.array(self.moves, dtype=np.float64).reshape(-1, 9)
+        flat = np.zeros((len(moves), 1))
+        none = np.zeros(0)
+        lines = _lines(self.sent)
+        return Program(
+            name=self.name,
+            start=np.hstack([moves[:, 0:2], flat]),
+            end=np.hstack([moves[:, 2:4], flat]),
+            motion=moves[:, 4].astype(np.int8),
+            feed_mm_min=moves[:, 5].copy(),
+            power=moves[:, 6].copy(),
+            spindle=np.where(moves[:, 6] > 0, BEAM_M3, 0).astype(np.int8),
+            line=moves[:, 7].astype(np.int64),
+            context=moves[:, 8].astype(np.int64),
+            contexts=tuple(self.contexts),
+            event_move=none.astype(np.int64),
+            event_kind=none.astype(np.int8),
+            event_seconds=none.copy(),
+            event_power=none.copy(),
+            event_line=none.astype(np.int64),
+            line_number=lines[:, 0].copy(),
+            line_bytes=lines[:, 1].copy(),
+            line_words=np.zeros(len(lines), dtype=np.int64),
+            line_points=np.zeros(len(lines), dtype=np.int64),
+        )
+
+
+def _lines(sent: list[tuple[int, int]]) -> NDArray[np.int64]:
+    """(L, 2) int64: the file's lines that hold instructions, and the bytes of these."""
+    pairs = np.array(sent, dtype=np.int64).reshape(-1, 2)
+    number, first = np.unique(pairs[:, 0], return_index=True)
+    bounds = [*first.tolist(), len(pairs)]
+    size = [int(pairs[a:b, 1].sum()) + 1 for a, b in pairwise(bounds)]
+    return np.stack([number, np.array(size, dtype=np.int64)], axis=1)
