@@ -76,6 +76,12 @@ class VirtualGrbl:
         self._seconds += max(seconds, 0.0)
         self._run(round(self._seconds * cpu.CLOCK))
 
+    def advance_to_line(self, seconds: float) -> None:
+        """Let time pass until a line of output has come out whole, ``seconds`` at the most."""
+        target = round((self._seconds + max(seconds, 0.0)) * cpu.CLOCK)
+        reached = self._run(target, stop_at_line=True)
+        self._seconds = reached / cpu.CLOCK if reached < target else self._seconds + seconds
+
     def next_event_in(self) -> float | None:
         """Seconds until something changes by itself; None if nothing will without input.
 
@@ -186,13 +192,20 @@ class VirtualGrbl:
             return None
         return wait.time if isinstance(wait, Until) else self._processor.finish()
 
-    def _run(self, target: int) -> None:
-        """Let everything happen that is due by ``target``, in its order."""
+    def _run(self, target: int, stop_at_line: bool = False) -> int:
+        """Let everything happen that is due by ``target``, in its order; returns the time reached.
+
+        With ``stop_at_line`` it ends where a line of output is out.
+        """
         machine, processor = self._machine, self._processor
         stepper, uart = machine.stepper, machine.uart
         if self._wait is None and machine.pending():
             self._resume()
         while True:
+            if stop_at_line:
+                line = uart.next_line()
+                if line is not None:
+                    target = min(target, max(line, machine.now))
             change, arrival, due = stepper.next_change(), uart.next_arrival(), self._due()
             now = target + 1
             for event in (change, arrival, due):
@@ -209,6 +222,7 @@ class VirtualGrbl:
             if due == now or self._wait is None:
                 self._resume()
         machine.now = max(machine.now, target)
+        return target
 
     def _resume(self) -> None:
         """The main program goes on until it has to wait."""

@@ -17,6 +17,7 @@ from miurafab.motion import cpu
 RX_RING = 128
 TX_RING = 104
 _DEAF_BYTES = 3
+_NEWLINE = 10
 REALTIME = frozenset(b"!?~\x18")
 
 
@@ -98,6 +99,10 @@ class Uart:
     def next_departure(self, now: int) -> int | None:
         """When the next byte that is not out by ``now`` will be out."""
         return next((done for done, _ in self._going if done > now), None)
+
+    def next_line(self) -> int | None:
+        """When the first line that is not taken yet will be out, or was."""
+        return next((done for done, byte in self._going if byte == _NEWLINE), None)
 
     def power_cycle(self, now: int) -> None:
         """Switched off and on: all bytes on their way are lost."""
