@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_CHUNK = 500_000
+_CHUNK = 50_000
 
 
 def closest_on_triangle(points: Floats, triangles: Floats) -> Floats:

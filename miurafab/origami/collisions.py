@@ -31,7 +31,7 @@ IN_PLANE = 1e-9
 TOUCH = 1e-6
 """Facets that reach into each other by less than this part of the mean side only touch."""
 
-_CHUNK = 400_000
+_CHUNK = 30_000
 _SIDES = ((0, 1), (1, 2), (2, 0))
 
 
@@ -86,6 +86,8 @@ class _Triangles:
 
     def __init__(self, index: Ints, corners: Floats, normals: Floats, size: float) -> None:
         self.index, self.corners, self.normals, self.size = index, corners, normals, size
+        self.sound = np.isfinite(normals).all(axis=1)
+        self.flat = not corners[..., 2].any()
 
     @classmethod
     def of(cls, points: Floats, triangles: Ints) -> _Triangles:
@@ -102,7 +104,10 @@ class _Triangles:
     def meet(self, one: Ints, other: Ints) -> Bools:
         """(n,) whether the insides of triangles ``one`` (n,) and ``other`` (n,) meet."""
         result = np.zeros(len(one), dtype=bool)
-        left = np.flatnonzero(np.isfinite(self.normals[one] + self.normals[other]).all(axis=1))
+        left = np.flatnonzero(self.sound[one] & self.sound[other])
+        if self.flat:
+            result[left] = self._overlap(one[left], other[left])
+            return result
         above = self._heights(one[left], other[left])
         near = ~_one_sided(above)
         left, above = left[near], above[near]
