@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,8 +12,6 @@ import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
 from miurafab.cli.fit import TargetArgument
 from miurafab.errors import InputError
-from miurafab.origami.tradeoff import WEIGHTS
-from miurafab.workflow.tradeoff import SIDES
 
 
 def tradeoff(
@@ -57,11 +55,15 @@ def tradeoff(
     console = Console(as_json, quiet)
     if out is not None:
         miurafab.check_tradeoff_file(out)
+    asked: dict[str, Any] = {}
+    if sides is not None:
+        asked["sides"] = _whole_numbers(sides)
+    if weights is not None:
+        asked["weights"] = _numbers(weights)
     with console.progress("fitting") as progress:
         found = miurafab.tradeoff(
             target,
-            SIDES if sides is None else _whole_numbers(sides),
-            weights=WEIGHTS if weights is None else _numbers(weights),
+            **asked,
             options={
                 "size": size,
                 "amplitude": amplitude,
