@@ -1,8 +1,9 @@
 """What of a job the controller has taken, on disk while it runs, so that a job can be resumed.
 
 The journal is a file of JSON objects, one a line; each run of a job appends its own. First a
-header: ``schema``, ``job``, ``sha256`` of the program's text, ``machine``, ``port``, ``lines``.
-Then, four times a second of the wire's clock at most, ``{"taken": n, "line": k, "seconds": t}``:
+header: ``schema``, ``job``, ``sha256`` of the whole program's text, ``machine``, ``port``,
+``lines``, and ``from_line``, where the run began (1 unless it resumed another). Then, when the
+controller has said so, ``{"blocks": n}``: it plans n moves ahead. Then, four times a second of the wire's clock at most, ``{"taken": n, "line": k, "seconds": t}``:
 n lines were acknowledged, the last of them line k of the file. At the end ``{"ended": how,
 "why": sentence}``, how being ``done``, ``stopped`` or ``failed``.
 
@@ -29,23 +30,38 @@ _PERIOD = 0.25  # s between two records
 class Journal:
     """The journal of one run, open for writing.
 
-    Raises :class:`~miurafab.errors.InputError` if ``path`` cannot be written.
+    A run that resumes another begins at ``from_line`` and has the ``sha256`` of the whole. Raises :class:`~miurafab.errors.InputError` if ``path`` cannot be written.
     """
 
-    def __init__(self, path: Path, job: Job, machine: str, port: str, lines: int) -> None:
+    def __init__(
+        self,
+        path: Path,
+        job: Job,
+        machine: str,
+        port: str,
+        lines: int,
+        *,
+        from_line: int = 1,
+        sha256: str | None = None,
+    ) -> None:
         header = {
             "schema": SCHEMA,
             "job": job.name,
-            "sha256": job_digest(job),
+            "sha256": sha256 or job_digest(job),
             "machine": machine,
             "port": port,
             "lines": lines,
+            "from_line": from_line,
         }
         # The blank line parts this run from what a power loss may have torn.
         self._file = DurableFile(path, "journal", b"\n" + _record(header), append=True)
         self._count = 0
         self._due = 0.0
         self._pending: dict[str, Any] | None = None
+
+    def plans_ahead(self, blocks: int) -> None:
+        """Note that the controller plans ``blocks`` moves ahead."""
+        self._file.append(_record({"blocks": blocks}))
 
     def taken(self, count: int, line: int, seconds: float) -> None:
         """Note that ``count`` lines were acknowledged, the last being ``line`` of the file."""
@@ -89,6 +105,8 @@ class JournalRun:
     machine: str
     port: str
     lines: int
+    from_line: int = 1
+    blocks: int | None = None
     taken: int = 0
     line: int = 0
     seconds: float = 0.0

@@ -32,7 +32,7 @@ from miurafab.errors import (
 from miurafab.gcode.job import Job, prepare_lines
 from miurafab.gcode.program import Program, parse_program
 from miurafab.grbl.connection import Connection
-from miurafab.grbl.events import Error, Event, Ok, StatusReport
+from miurafab.grbl.events import Error, Event, Ok, Options, StatusReport
 from miurafab.grbl.settings import Settings, virtual_settings
 from miurafab.grbl.streamer import LineRefused, Refusal, Streamer
 from miurafab.machine.journal import Journal
@@ -46,6 +46,7 @@ from miurafab.machine.preflight import (
     raise_findings,
     require_known,
 )
+from miurafab.machine.resume import Resumption
 from miurafab.machine.session import ANSWER_S, Session
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transcript import Transcript
@@ -99,6 +100,8 @@ class Plan:
     force: frozenset[str]
     check_mode: bool
     home: bool
+    at: tuple[float, float] | None
+    resumption: Resumption | None
     remarks: tuple[str, ...]
 
 
@@ -114,6 +117,8 @@ def stream_job(
     allow_m3: bool = False,
     check_mode: bool = False,
     home: bool = False,
+    at: tuple[float, float] | None = None,
+    resumption: Resumption | None = None,
     virtual_speed: float | None = None,
 ) -> StreamResult:
     """Send ``job`` to ``machine`` at ``port`` and wait until it is done.
@@ -124,14 +129,25 @@ def stream_job(
     (:data:`~miurafab.machine.preflight.CHECKS`). With ``check_mode`` the controller only reads
     the job (``$C``): nothing moves, and refused lines are gathered in the result. With ``home``
     the machine is homed first, in the same conversation: most boards forget where they are when
-    the port is opened.
+    the port is opened. ``at`` states where the head stands (X, Y in mm, in the job's
+    coordinates), for a machine without homing switches. With ``resumption`` the rest of ``job``
+    is sent; it needs one of the two.
 
     Raises :class:`~miurafab.errors.InputError` for a job or option at fault,
     :class:`~miurafab.errors.PortError` and :class:`~miurafab.errors.ControllerError` for what the
     machine did, :class:`~miurafab.errors.JobStopped` after Ctrl-C, SIGTERM or SIGHUP. Whichever
     it is, the controller was reset if a line of the job had been sent.
     """
-    plan = plan_job(job, machine, force=force, allow_m3=allow_m3, check_mode=check_mode, home=home)
+    plan = plan_job(
+        job,
+        machine,
+        force=force,
+        allow_m3=allow_m3,
+        check_mode=check_mode,
+        home=home,
+        at=at,
+        resumption=resumption,
+    )
     with StopSignals() as signals:
         try:
             transport = open_port(
@@ -158,8 +174,20 @@ def plan_job(
     allow_m3: bool = False,
     check_mode: bool = False,
     home: bool = False,
+    at: tuple[float, float] | None = None,
+    resumption: Resumption | None = None,
 ) -> Plan:
     """Check ``job`` by itself; raises :class:`~miurafab.errors.InputError` for what is wrong."""
+    if resumption is not None:
+        if check_mode:
+            raise InputError("A job is resumed or read in check mode, not both.")
+        if not home and at is None:
+            raise InputError(
+                f"To go on with {job.name} the machine must know where it is: home it first "
+                "(--home), or put the head at a known place and state it (--at 0,0 is the origin "
+                "of the job)."
+            )
+        job = resumption.job
     require_known(force)
     if machine.dialect not in _GRBL:
         raise InputError(
@@ -178,7 +206,7 @@ def plan_job(
     else:
         findings.extend(check_program(program, machine))
     remarks = raise_findings(findings, force)
-    return Plan(job, machine, count, program, force, check_mode, home, remarks)
+    return Plan(job, machine, count, program, force, check_mode, home, at, resumption, remarks)
 
 
 def deliver(
@@ -198,8 +226,17 @@ def deliver(
         if transcript_path is not None:
             transcript = Transcript(transcript_path, f"{job.name} to {transport.name}")
             at_end.callback(transcript.close)
-        if journal_path is not None:
-            journal = Journal(journal_path, job, machine.name, transport.name, plan.lines)
+        if journal_path is not None and not plan.check_mode:
+            rest = plan.resumption
+            journal = Journal(
+                journal_path,
+                job,
+                machine.name,
+                transport.name,
+                plan.lines,
+                from_line=rest.line if rest else 1,
+                sha256=rest.sha256 if rest else None,
+            )
             at_end.callback(journal.close)
         connection = Connection(machine.controller.rx_bytes)
         session = Session(transport, connection, transcript, signals.check)
@@ -286,8 +323,13 @@ class _Delivery:
             self._at_risk = True
             session.home()
             self._at_risk = False
+        if plan.at is not None:
+            session.command("G92X{:.3f}Y{:.3f}".format(*plan.at))
         remarks = raise_findings(check_status(session.wait_status()), plan.force)
-        session.command("$I")
+        options = (event for event in session.command("$I") if isinstance(event, Options))
+        for option in options:
+            if self._journal is not None and option.planner_blocks is not None:
+                self._journal.plans_ahead(option.planner_blocks)
         settings = Settings.from_events(session.command("$$"))
         findings = list(check_settings(plan.machine, settings))
         if plan.program is not None:

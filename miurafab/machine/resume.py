@@ -1,0 +1,200 @@
+"""Where a job that was interrupted goes on: at a stroke boundary, with nothing left out.
+
+An acknowledged line is planned, not burnt. GRBL keeps at most 15 moves in its planner and one in
+the stepper, and an acknowledgement follows when the move of its line is in: so of the lines that
+move, the 17th before the last acknowledged one is behind it for certain. A controller that says
+in ``$I`` that it plans further ahead is believed. Lines are counted, not chords: an arc has as
+many moves on the controller as its ``$12`` gives it, one at the least.
+
+At the other end, what may have been burnt already reaches past the last acknowledged line by
+what the receive buffer can hold, and, when the sender itself died, by what the wire can carry in
+the time that the journal may be behind. The strokes between the two may be burnt twice.
+
+The rest of the job keeps the line numbers of the whole. The lines that bring back its modes take
+the place of the first ones: a dark move to where the stroke begins, then units, distance mode,
+plane, feed, air, beam and motion mode as they were there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from miurafab.errors import GcodeError, InputError
+from miurafab.gcode.execution import Jog, OffsetsChanged, Probe, Store, execute
+from miurafab.gcode.job import Job, bare_code
+from miurafab.gcode.parser import ModalState, parse_block
+from miurafab.gcode.program import Program, parse_program, strokes
+from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST, NO_MOTION
+from miurafab.machine.journal import JournalRun, job_digest
+from miurafab.profiles import MachineProfile
+
+MOVES_BACK = 17
+"""How many moves before the last acknowledged one the job goes on, at least: 15 in GRBL's planner
+(``planner.h``), one in the stepper, one to be sure."""
+JOURNAL_LAG_S = 1.0
+"""How far the journal on the disk may be behind the wire when the sender dies: a quarter of a
+second to the record, another to the disk, and twice that for a slow disk."""
+
+_REAL_MOVE_MM = 0.05  # a shorter line may round to no step and take no place in the planner
+_MOTION_WORDS = {0: "G0", 1: "G1", 2: "G2", 3: "G3"}
+
+
+@dataclass(frozen=True)
+class Resumption:
+    """The rest of a job: ``job`` to send, with the line numbers and the ``sha256`` of the whole.
+
+    ``line`` is the first of the whole that is sent again, 1 if all of it is. Of the ``strokes``
+    in all, those from ``stroke`` to before ``new_stroke`` (0-based) may be burnt a second time.
+    """
+
+    job: Job
+    sha256: str
+    line: int
+    stroke: int
+    new_stroke: int
+    strokes: int
+
+    @property
+    def sentence(self) -> str:
+        """What will be done, for the user."""
+        start = f"{self.job.name} goes on at stroke {self.stroke + 1} of {self.strokes}"
+        if self.new_stroke <= self.stroke:
+            return f"{start} (line {self.line}); no stroke is burnt twice."
+        return (
+            f"{start} (line {self.line}); strokes {self.stroke + 1} to {self.new_stroke} may be "
+            "burnt twice."
+        )
+
+
+def resume(job: Job, machine: MachineProfile, runs: Sequence[JournalRun]) -> Resumption:
+    """Where ``job`` goes on after the last of the ``runs`` that its journal tells of.
+
+    Raises :class:`~miurafab.errors.InputError` when there is nothing to resume: the last run was
+    of another text, or was done; and for a job that cannot be taken up in its middle.
+    """
+    _require_resumable(job, machine, runs[-1])
+    program = parse_program(job)
+    burnt = strokes(program)
+    certain, possible = _reach(program, machine, runs)
+    first = program.line[burnt.first_move]
+    last = program.line[burnt.last_move]
+    stroke = int(np.searchsorted(last, certain))
+    if stroke == len(burnt):
+        raise InputError(
+            f"Every stroke of {job.name} was burnt before it was interrupted; nothing is left."
+        )
+    # Where one operation follows another without a travel, the beam is on at the boundary.
+    while stroke and program.beam_on[burnt.first_move[stroke] - 1]:
+        stroke -= 1
+    move = int(burnt.first_move[stroke])
+    line = int(program.line[move - 1]) + 1 if move else 1
+    rest, line = _rest(job, line)
+    if line == 1:
+        stroke = 0
+    new_stroke = int(np.searchsorted(first, possible, side="right"))
+    return Resumption(rest, job_digest(job), line, stroke, max(stroke, new_stroke), len(burnt))
+
+
+def _require_resumable(job: Job, machine: MachineProfile, run: JournalRun) -> None:
+    if run.sha256 != job_digest(job):
+        raise InputError(
+            f"The journal tells of another text of {run.job} than the one that is there now, so it "
+            "cannot be resumed; cut it from the beginning on fresh material."
+        )
+    if run.ended == "done":
+        raise InputError(f"{job.name} was cut to its end; nothing is left to resume.")
+    if machine.tool.kind != "laser" or machine.dialect == "grbl-0.9":
+        raise InputError(
+            f"{machine.name} has no laser mode, so {job.name} cannot be taken up in its middle; "
+            "cut it from the beginning."
+        )
+
+
+def _reach(
+    program: Program, machine: MachineProfile, runs: Sequence[JournalRun]
+) -> tuple[int, int]:
+    """Up to before which line all is done for certain, and the last line that may have been begun.
+
+    Only the last cut from the beginning and what resumed it count: before that was other material.
+    """
+    moved = np.bincount(program.line, program.lengths)
+    moving = np.flatnonzero(moved > _REAL_MOVE_MM)
+    certain, possible = 1, 0
+    for run in runs:
+        if run.from_line <= 1:
+            certain, possible = 1, 0
+        blocks = max(machine.controller.planner_blocks, run.blocks or 0)
+        back = max(MOVES_BACK, blocks + 2)
+        behind = int(np.searchsorted(moving, run.line, side="right")) - back
+        if behind >= 0:
+            certain = max(certain, int(moving[behind]))
+        unseen = machine.controller.rx_bytes
+        if run.ended is None:
+            unseen += round(JOURNAL_LAG_S * machine.controller.baud / 10)
+        taken = max(run.line, run.from_line - 1)
+        at = int(np.searchsorted(program.line_number, taken, side="right"))
+        held = np.cumsum(program.line_bytes[at:]) <= unseen
+        more = program.line_number[at:][held]
+        possible = max(possible, int(more[-1]) if len(more) else taken)
+    return certain, possible
+
+
+def _rest(job: Job, line: int) -> tuple[Job, int]:
+    """``job`` from ``line`` on with its modes brought back, and the line: 1 if it is too early."""
+    if line == 1:
+        return job, 1
+    modes = list(_modes(_state_before(job, line)))
+    if len(modes) >= line:
+        return job, 1
+    blank = [""] * (line - 1 - len(modes))
+    return Job(job.name, "\n".join([*modes, *blank, *job.lines[line - 1 :], ""])), line
+
+
+@dataclass(frozen=True, slots=True)
+class _Rules:
+    laser: bool = True
+    arc_tolerance: float = 0.002
+    mist: bool = True
+    single_precision: bool = False
+
+
+def _state_before(job: Job, line: int) -> ModalState:
+    """The modes before ``line``; raises ``InputError`` for what no preamble can bring back."""
+    state, rules = ModalState(), _Rules()
+    for number, text in zip(range(1, line), job.iter_lines(), strict=False):
+        code = bare_code(job.name, number, text).upper().replace("/", "")
+        if not code:
+            continue
+        block = parse_block(code, state, lambda index: (0.0, 0.0, 0.0), rules)
+        lost = block.action in (GO_G28, GO_G30) or block.offset or block.inverse_time
+        for action in execute(block, state, rules):
+            lost = lost or isinstance(action, Store | OffsetsChanged | Probe | Jog)
+        if lost:
+            raise GcodeError(
+                f"{job.name}, line {number} ({code}) counts positions anew, measures, or uses "
+                "inverse time, so the job cannot be taken up in its middle; cut it from the "
+                "beginning on fresh material."
+            )
+    return state
+
+
+def _modes(state: ModalState) -> Iterator[str]:
+    x, y, z = state.position
+    yield "G21G90G17G94M5"
+    yield f"G0X{x:.4f}Y{y:.4f}"
+    if z:
+        yield f"G0Z{z:.4f}"
+    if state.coolant & FLOOD:
+        yield "M8"
+    if state.coolant & MIST:
+        yield "M7"
+    # The motion mode is G0 here, in which laser mode keeps the beam dark whatever S is.
+    yield f"M{state.spindle or 5}S{state.speed:g}" + (f"F{state.feed:.4f}" if state.feed else "")
+    yield f"G{20 if state.inches else 21}G{91 if state.distance else 90}G{17 + state.plane}"
+    if state.motion in _MOTION_WORDS:
+        yield _MOTION_WORDS[state.motion]
+    elif state.motion == NO_MOTION:
+        yield "G80"

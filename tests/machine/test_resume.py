@@ -1,0 +1,236 @@
+"""A job interrupted anywhere goes on: nothing is left out, and only what was stated burns twice."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from wires import FakeWire
+
+from miurafab.errors import GcodeError, InputError, JobStopped, MachineError
+from miurafab.gcode.job import Job
+from miurafab.gcode.program import parse_program, strokes
+from miurafab.grbl.settings import virtual_settings
+from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.machine.journal import JournalRun, job_digest, read_journal
+from miurafab.machine.resume import Resumption, resume
+from miurafab.machine.sender import deliver, plan_job, stream_job
+from miurafab.machine.signals import StopSignals
+from miurafab.profiles import load_machine
+
+MACHINE = load_machine("grbl-laser-400")
+STROKES = 200
+KINDS = ("cable", "reset", "interrupt", "power")
+
+
+def dashes(style: str) -> Job:
+    """200 strokes of 2 mm in rows of 20, each at a place of its own."""
+    lines = ["G21", "G90", "M4 S0", "M8"]
+    x0, y0 = 0.0, 0.0
+    for n in range(STROKES):
+        x, y = 5 + 3 * (n % 20), 5 + n // 20
+        if style == "absolute":
+            lines += [f"G0 X{x} Y{y}", f"G1 X{x + 2} S500 F3000"]
+        else:
+            dx, dy = x - x0, y - y0
+            words = "G91 G1 F3000 " if n == 0 else ""
+            lines += [f"{words}X{dx:g} Y{dy:g} S0", "X2 S500"]
+        x0, y0 = x + 2, y
+    return Job(f"{style}.nc", "\n".join([*lines, "M5", "G90", "G0 X0 Y0", ""]))
+
+
+def new_device() -> VirtualGrbl:
+    return VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud)
+
+
+def run(
+    job: Job, wire: FakeWire, journal: Path | None, resumption: Resumption | None = None
+) -> None:
+    """One run on a machine whose head stands at the origin of the job."""
+    plan = plan_job(job, MACHINE, at=(0.0, 0.0), resumption=resumption)
+    deliver(plan, wire, StopSignals(), journal_path=journal)
+
+
+def fault(wire: FakeWire, kind: str, at: float) -> None:
+    """Let the run over ``wire`` end so at ``at`` s of the controller's time."""
+    if kind == "cable":
+        wire.cut_at = at
+        return
+
+    def before_call(call: int) -> None:
+        if wire.device.now < at:
+            return
+        wire.before_call = lambda call: None
+        if kind == "interrupt":
+            raise KeyboardInterrupt
+        if kind == "reset":
+            wire.device.receive(b"\x18")
+        else:
+            wire.device.power_cycle()
+
+    wire.before_call = before_call
+
+
+def burnt(job: Job, devices: list[VirtualGrbl]) -> Counter[int]:
+    """How often each stroke of ``job`` was burnt in full length, rounded up."""
+    table = strokes(parse_program(job))
+    place = {}
+    for index in range(len(table)):
+        (x0, y0), (x1, _) = table.stroke(index)[0][:2], table.stroke(index)[-1][:2]
+        place[index] = (x0, x1, y0)
+    counts: Counter[int] = Counter()
+    for device in devices:
+        assert not any(segment.standing for segment in device.beam_log)
+        seen: dict[int, list[tuple[float, float]]] = {}
+        for segment in device.beam_log:
+            left, right = sorted((segment.x0, segment.x1))
+            row, column = round(segment.y0) - 5, int((left + 0.02 - 5) // 3)
+            seen.setdefault(20 * row + column, []).append((left, right))
+        for index, pieces in seen.items():
+            x0, x1, _ = place[index]
+            length = sum(right - left for left, right in pieces)
+            assert min(left for left, _ in pieces) >= x0 - 0.02
+            assert max(right for _, right in pieces) <= x1 + 0.02
+            whole = length >= (x1 - x0) - 0.03
+            counts[index] += 1 if whole else 0
+            if not whole:
+                counts[1000 + index] += 1
+    return counts
+
+
+def interrupted_and_resumed(
+    job: Job, kinds: list[tuple[str, float]], tmp_path: Path
+) -> tuple[Counter[int], list[Resumption]]:
+    journal = tmp_path / "journal"
+    journal.unlink(missing_ok=True)
+    devices: list[VirtualGrbl] = []
+    rests: list[Resumption] = []
+    rest = None
+    for kind, at in kinds:
+        wire = FakeWire(new_device())
+        devices.append(wire.device)
+        fault(wire, kind, at)
+        with pytest.raises((MachineError, JobStopped)):
+            run(job, wire, journal, rest)
+        wire.settle(5.0)
+        assert not wire.device.beam_on
+        rest = resume(job, MACHINE, read_journal(journal))
+        rests.append(rest)
+    wire = FakeWire(new_device())
+    devices.append(wire.device)
+    run(job, wire, journal, rest)
+    assert read_journal(journal)[-1].ended == "done"
+    with pytest.raises(InputError, match="nothing is left"):
+        resume(job, MACHINE, read_journal(journal))
+    return burnt(job, devices), rests
+
+
+def stroke_ends(job: Job) -> list[float]:
+    """When each stroke ends in an undisturbed run, on the controller's clock."""
+    wire = FakeWire(new_device())
+    run(job, wire, None)
+    ends = {(round(s.y1), int((s.x1 - 4.98) // 3)): s.t1 for s in wire.device.beam_log}
+    return list(ends.values())
+
+
+def check(job: Job, kinds: list[tuple[str, float]], tmp_path: Path) -> None:
+    counts, rests = interrupted_and_resumed(job, kinds, tmp_path)
+    missing = [index for index in range(STROKES) if counts[index] == 0]
+    assert missing == [], (kinds, rests)
+    stated = {n for rest in rests for n in range(rest.stroke, rest.new_stroke)}
+    twice = {n % 1000 for n, c in counts.items() if c > 1 or n >= 1000}
+    assert twice <= stated, (kinds, rests)
+    for rest in rests:
+        # 17 moves, and what 128 bytes hold of the shortest lines: 9 strokes each.
+        assert rest.new_stroke - rest.stroke <= 19
+
+
+@pytest.mark.parametrize("style", ["absolute", "relative"])
+@pytest.mark.parametrize("first", [0, 1, 2, 50, 121, 198, 199])
+def test_a_fault_after_a_stroke(style: str, first: int, tmp_path: Path) -> None:
+    job = dashes(style)
+    ends = stroke_ends(job)
+    assert len(ends) == STROKES
+    check(job, [(KINDS[first % 4], ends[first] + 0.001)], tmp_path)
+
+
+@pytest.mark.large
+@pytest.mark.parametrize("style", ["absolute", "relative"])
+def test_a_fault_after_every_stroke(style: str, tmp_path: Path) -> None:
+    job = dashes(style)
+    for index, end in enumerate(stroke_ends(job)):
+        for kind in KINDS if index % 10 == 0 else (KINDS[index % 4],):
+            check(job, [(kind, end + 0.001)], tmp_path)
+
+
+def test_a_resumed_job_is_interrupted_again(tmp_path: Path) -> None:
+    job = dashes("absolute")
+    ends = stroke_ends(job)
+    kinds = [("cable", ends[60]), ("power", ends[3]), ("interrupt", ends[40]), ("reset", ends[0])]
+    check(job, kinds, tmp_path)
+
+
+def test_the_modes_are_those_of_the_whole(tmp_path: Path) -> None:
+    """The rest alone, read back, burns exactly what the whole burns from its stroke on."""
+    for style in ("absolute", "relative"):
+        job = dashes(style)
+        whole = strokes(parse_program(job))
+        made = replace(record(job), line=260, taken=260)
+        rest = resume(job, MACHINE, [made])
+        again = strokes(parse_program(rest.job))
+        assert len(again) == rest.strokes - rest.stroke
+        for index in range(len(again)):
+            assert again.stroke(index) == pytest.approx(whole.stroke(rest.stroke + index), abs=1e-3)
+        first, second = parse_program(job), parse_program(rest.job)
+        tail = first.line >= rest.line
+        for name in ("motion", "feed_mm_min", "power", "spindle", "line"):
+            theirs = getattr(second, name)[second.line >= rest.line]
+            assert (theirs == getattr(first, name)[tail]).all(), name
+        assert "M8" in rest.job.text
+
+
+def record(job: Job, **changes: object) -> JournalRun:
+    made = JournalRun(job.name, job_digest(job), MACHINE.name, "virtual", len(job.lines))
+    return replace(made, ended="failed", **changes)  # type: ignore[arg-type]
+
+
+def test_seventeen_moves_back_or_as_many_as_the_controller_plans() -> None:
+    job = dashes("absolute")
+    moved = parse_program(job).line
+    # The travel to the stroke, the first of these moves, is made by the modes brought back.
+    stock = resume(job, MACHINE, [record(job, line=204, taken=204)])
+    deep = resume(job, MACHINE, [record(job, line=204, taken=204, blocks=100)])
+    assert (moved <= 204).sum() - (moved < stock.line).sum() >= 17 - 1
+    assert (moved <= 204).sum() - (moved < deep.line).sum() >= 102 - 1
+
+
+def test_a_sender_that_died_may_have_sent_more_than_it_wrote_down() -> None:
+    job = dashes("absolute")
+    told = resume(job, MACHINE, [record(job, line=100, taken=100)])
+    silent = resume(job, MACHINE, [replace(record(job, line=100, taken=100), ended=None)])
+    assert silent.stroke == told.stroke
+    assert silent.new_stroke > told.new_stroke
+
+
+def test_only_the_last_cut_from_the_beginning_counts() -> None:
+    job = dashes("absolute")
+    runs = [record(job, line=300, taken=300), record(job, line=0)]
+    assert resume(job, MACHINE, runs).line == 1
+    runs[1] = replace(runs[1], from_line=280)
+    assert resume(job, MACHINE, runs).line > 200
+
+
+def test_what_cannot_be_resumed_is_said() -> None:
+    job = dashes("absolute")
+    with pytest.raises(InputError, match="another text"):
+        resume(Job(job.name, job.text + "G4P1\n"), MACHINE, [record(job)])
+    shifted = Job("shift.nc", job.text.replace("G90\n", "G90\nG92 X5\n", 1))
+    with pytest.raises(GcodeError, match=r"shift\.nc, line 3 \(G92X5\)"):
+        resume(shifted, MACHINE, [record(shifted, line=200, taken=200)])
+    rest = resume(job, MACHINE, [record(job, line=200, taken=200)])
+    with pytest.raises(InputError, match=r"--home.*--at"):
+        stream_job(job, MACHINE, "virtual", resumption=rest)
+    with pytest.raises(InputError, match="check mode"):
+        stream_job(job, MACHINE, "virtual", resumption=rest, check_mode=True)
