@@ -113,7 +113,8 @@ def summarise(samples: list[Sample], weights: tuple[float, ...] = WEIGHTS) -> Tr
     area = np.array([s.area_ratio for s in found], dtype=np.float64)
     coefficient = float(np.exp(np.log(d * n).mean()))
     exponent = float(np.polyfit(np.log(n), np.log(d), 1)[0])
-    slope, limit = np.polyfit(1 / n, area, 1)
+    # weighed by n: the fine sheets tell more of the limit
+    slope, limit = np.polyfit(1 / n, area, 1, w=n)
     curves = []
     for weight in weights:
         costs = cost(weight, n, d)
