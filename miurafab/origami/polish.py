@@ -47,6 +47,8 @@ INNER = 60
 """Conjugate gradient iterations in one round."""
 CAP = 0.25
 """The farthest that a coordinate moves in one round, in mean edge lengths."""
+CLOSE = 0.003
+"""A sheet this close to the target, in mean edge lengths, is close enough: paper is thicker."""
 ENOUGH = 0.98
 """A round that lowers the objective by less than 1 - ENOUGH of it is the last."""
 
@@ -92,7 +94,8 @@ def polish(
     """
     places, length = unknowns.places, unknowns.length
     problem = _Objective.of(start.x, surface, unknowns, follow)
-    now, value = start, problem.value(start.x)
+    now = start
+    value, _ = problem.value(start.x)
     before = value
     cap = CAP
     rounds = 0
@@ -111,11 +114,11 @@ def polish(
             cap=CAP * length,
             max_iterations=25,
         )
-        reached = problem.value(back.x) if back.converged else np.inf
+        reached, farthest = problem.value(back.x) if back.converged else (np.inf, np.inf)
         if reached >= value:
             cap = min(cap, longest / length) / 3
             continue
-        done = reached > ENOUGH * value
+        done = reached > ENOUGH * value or farthest < CLOSE * length
         now, value = back, reached
         if done:
             break
@@ -151,10 +154,11 @@ class _Objective:
         points = followers(grid, follow, unknowns.first_row)
         return cls(surface, of_unknowns(points), of_unknowns(ends), x.copy())
 
-    def value(self, x: Floats) -> float:
+    def value(self, x: Floats) -> tuple[float, float]:
+        """The objective, and the greatest distance."""
         gap, _ = self._gaps(x)
         fair = self.differences @ (x - self.origin)
-        return float((gap**2).sum() + FAIRNESS * (fair**2).sum()) / 2
+        return float((gap**2).sum() + FAIRNESS * (fair**2).sum()) / 2, float(gap.max())
 
     def _gaps(self, x: Floats) -> tuple[Floats, Floats]:
         """The distances (K,) and the directions (K, 3) in which they grow."""
