@@ -32,11 +32,8 @@ def chains(
     assert words.s is not None
     xy, first = points.xy, points.first
     count = len(first)
-    begins = np.zeros(count, dtype=bool)
-    begins[run_first] = True
-    gap = np.zeros((count, 2), dtype=np.int64)
-    gap[1:] = xy[first[1:]] - xy[points.last[:-1]]
-    begins |= np.hypot(gap[:, 0], gap[:, 1]) > LONGEST_GAP
+    gap = gaps(points)
+    begins = apart(points, run_first)
     since = np.arange(count) - np.maximum.accumulate(np.where(begins, np.arange(count), 0))
     begins |= since % LONGEST_CHAIN == 0
     meets = ~begins & ~gap.any(axis=1)
@@ -71,6 +68,20 @@ def chains(
     # Where two strokes meet there is no gap to say.
     rows[first[meets]] = 0
     return rows, first
+
+
+def gaps(points: Points) -> NDArray[np.int64]:
+    """(T, 2) micrometres from the end of the stroke before to the start of each."""
+    gap = np.zeros((len(points.first), 2), dtype=np.int64)
+    gap[1:] = points.xy[points.first[1:]] - points.xy[points.last[:-1]]
+    return gap
+
+
+def apart(points: Points, run_first: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(T,) whether a stroke is too far from the one before, or parted by comments, for a chain."""
+    begins: NDArray[np.bool_] = np.linalg.norm(gaps(points), axis=1) > LONGEST_GAP
+    begins[run_first] = True
+    return begins
 
 
 def _axis(

@@ -16,7 +16,7 @@ from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
-from miurafab.posting.chains import chains
+from miurafab.posting.chains import apart, chains
 from miurafab.posting.dialects import depth, made_by_knife, words_of
 from miurafab.posting.hops import hops
 from miurafab.posting.strokes import Points, Runs, points_of, repeated, runs_of
@@ -122,7 +122,7 @@ def _hpgl(made: Toolpath, machine: MachineProfile, material: Material) -> Job:
 def _wire_is_short(
     points: Points, runs: Runs, rows: ByteRows, machine: MachineProfile, material: Material
 ) -> bool:
-    """Whether in some run the lines take longer on the wire than the motion does at full speed.
+    """Whether the lines of some chain take longer on the wire than its motion does at full speed.
 
     A bound that needs no planner: where it says no, the wire is not the limit.
     """
@@ -136,7 +136,9 @@ def _wire_is_short(
     feed = np.repeat(feeds[points.operation], np.diff(np.append(points.first, len(points.xy))))
     step = np.linalg.norm(np.diff(points.xy, axis=0, prepend=points.xy[:1]), axis=1) / 1000.0
     motion = step / np.where(points.starts, rapid, feed) * 60.0
-    at = points.first[runs.first]
+    at = points.first[apart(points, runs.first)]
+    motion[at] = 0.0
+    wire[at] = 0.0
     return bool((np.add.reduceat(wire, at) > np.add.reduceat(motion, at)).any())
 
 
