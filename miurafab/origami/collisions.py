@@ -86,7 +86,7 @@ class _Triangles:
 
     def __init__(self, index: Ints, corners: Floats, normals: Floats, size: float) -> None:
         self.index, self.corners, self.normals, self.size = index, corners, normals, size
-        self.sound: Bools = np.isfinite(normals).all(axis=1)
+        self.sound: Bools = np.asarray(np.isfinite(normals).all(axis=1))
         self.flat = not corners[..., 2].any()
 
     @classmethod
