@@ -78,7 +78,8 @@ class Candidate:
         target will not meet either.
         """
         m = self.measurements
-        return not (m.self_intersections or m.overlaps or self.rank[1])
+        inexact = max(m.max_planarity or 0.0, m.max_developability or 0.0, m.max_isometry or 0.0)
+        return not (m.self_intersections or m.overlaps or self.rank[1] or inexact > EXACT)
 
     @property
     def rank(self) -> tuple[int, bool]:
