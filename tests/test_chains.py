@@ -15,6 +15,8 @@ from test_posting import CARD, LASER, PERFORATE, joined, toolpath, toolpaths
 import miurafab.posting.job as posting
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.program import parse_program, strokes
+from miurafab.machine.journal import JournalRun, job_digest
+from miurafab.machine.resume import resume
 from miurafab.machine.sender import stream_job
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
@@ -142,3 +144,15 @@ def test_the_virtual_controller_takes_chains() -> None:
     job = post(perforation(200, 0.3, 0.2), machine, perforated_at(6000))
     assert "G91" in job.text
     assert stream_job(job, machine, "virtual").errors == ()
+
+
+@pytest.mark.parametrize("taken", [40, 130, 131, 180, 300])
+def test_a_chain_can_be_taken_up_in_its_middle(taken: int) -> None:
+    with always_chained():
+        job = post(perforation(200, 0.3, 0.2), LASER, CARD)
+    whole = strokes(parse_program(job))
+    run = JournalRun(job.name, job_digest(job), LASER.name, "virtual", 400, taken=taken, line=taken)
+    rest = resume(job, LASER, [run])
+    made = strokes(parse_program(rest.job))
+    assert len(made) == len(whole) - rest.stroke
+    assert made.points == pytest.approx(whole.points[whole.offsets[rest.stroke] :], abs=1e-3)

@@ -36,6 +36,7 @@ from miurafab.grbl.events import Error, Event, Ok, Options, StatusReport
 from miurafab.grbl.settings import Settings, virtual_settings
 from miurafab.grbl.streamer import LineRefused, Refusal, Streamer
 from miurafab.machine.journal import Journal
+from miurafab.machine.keys import ABORT, KEYS, Keys, NoKeys
 from miurafab.machine.preflight import (
     Finding,
     check_lines,
@@ -56,11 +57,18 @@ from miurafab.profiles import MachineProfile
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # and when only the last moves are awaited
 _GRBL = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc")
+_ELSEWHERE = {
+    "marlin": "a program that waits for Marlin's ok after every line, or from its SD card",
+    "hpgl": "the cutter's own program, or to its port with flow control on",
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where a running job is; ``position`` in work coordinates, ``in_flight`` in bytes."""
+    """Where a running job is; ``position`` in work coordinates, ``in_flight`` in bytes.
+
+    ``line`` is the last acknowledged one of the file (0: none); ``feed_override`` in percent.
+    """
 
     lines_acknowledged: int
     lines_total: int
@@ -68,6 +76,8 @@ class Progress:
     state: str
     position: tuple[float, ...] | None
     in_flight: int
+    line: int
+    feed_override: int
 
 
 @dataclass(frozen=True)
@@ -119,6 +129,8 @@ def stream_job(
     home: bool = False,
     at: tuple[float, float] | None = None,
     resumption: Resumption | None = None,
+    most_power: float = 1.0,
+    keys: Keys | None = None,
     virtual_speed: float | None = None,
 ) -> StreamResult:
     """Send ``job`` to ``machine`` at ``port`` and wait until it is done.
@@ -131,7 +143,8 @@ def stream_job(
     the machine is homed first, in the same conversation: most boards forget where they are when
     the port is opened. ``at`` states where the head stands (X, Y in mm, in the job's
     coordinates), for a machine without homing switches. With ``resumption`` the rest of ``job``
-    is sent; it needs one of the two.
+    is sent; it needs one of the two. ``most_power`` is the most that the material takes, as a
+    fraction of full power; ``keys`` may hold, resume, abort and override while the job runs.
 
     Raises :class:`~miurafab.errors.InputError` for a job or option at fault,
     :class:`~miurafab.errors.PortError` and :class:`~miurafab.errors.ControllerError` for what the
@@ -147,6 +160,7 @@ def stream_job(
         home=home,
         at=at,
         resumption=resumption,
+        most_power=most_power,
     )
     with StopSignals() as signals:
         try:
@@ -161,6 +175,7 @@ def stream_job(
                 journal_path=journal_path,
                 transcript_path=transcript_path,
                 on_progress=on_progress,
+                keys=keys,
             )
         except KeyboardInterrupt:
             raise JobStopped(f"{job.name} was stopped by {signals.reason}.") from None
@@ -176,6 +191,7 @@ def plan_job(
     home: bool = False,
     at: tuple[float, float] | None = None,
     resumption: Resumption | None = None,
+    most_power: float = 1.0,
 ) -> Plan:
     """Check ``job`` by itself; raises :class:`~miurafab.errors.InputError` for what is wrong."""
     if resumption is not None:
@@ -191,9 +207,29 @@ def plan_job(
     require_known(force)
     if machine.dialect not in _GRBL:
         raise InputError(
-            f"{machine.name} speaks {machine.dialect}, which cannot be streamed; choose a profile "
-            f"with one of the dialects {', '.join(_GRBL)}."
+            f"{machine.name} speaks {machine.dialect}, which cannot be streamed from here; send "
+            f"the file with {_ELSEWHERE[machine.dialect]}, or choose a machine that speaks "
+            f"{', '.join(_GRBL)}."
         )
+    count, program, findings = examine_job(
+        job, machine, allow_m3=allow_m3, check_mode=check_mode, most_power=most_power
+    )
+    remarks = raise_findings(findings, force)
+    return Plan(job, machine, count, program, force, check_mode, home, at, resumption, remarks)
+
+
+def examine_job(
+    job: Job,
+    machine: MachineProfile,
+    *,
+    allow_m3: bool = False,
+    check_mode: bool = False,
+    most_power: float = 1.0,
+) -> tuple[int, Program | None, list[Finding]]:
+    """The number of lines of ``job``, what it does, and all that speaks against starting it.
+
+    Raises :class:`~miurafab.errors.GcodeError` for a line that cannot be sent at all.
+    """
     lines = prepare_lines(job.name, job.iter_lines(), machine.controller.line_chars)
     count, findings = check_lines(job.name, lines, machine, allow_m3=allow_m3 or check_mode)
     program: Program | None = None
@@ -204,9 +240,8 @@ def plan_job(
         if not check_mode:
             findings.append(Finding("program", error))
     else:
-        findings.extend(check_program(program, machine))
-    remarks = raise_findings(findings, force)
-    return Plan(job, machine, count, program, force, check_mode, home, at, resumption, remarks)
+        findings.extend(check_program(program, machine, most_power=most_power))
+    return count, program, findings
 
 
 def deliver(
@@ -217,6 +252,7 @@ def deliver(
     journal_path: Path | None = None,
     transcript_path: Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
+    keys: Keys | None = None,
 ) -> StreamResult:
     """Send a planned job over an open wire and close it; see :func:`stream_job`."""
     job, machine = plan.job, plan.machine
@@ -240,7 +276,7 @@ def deliver(
             at_end.callback(journal.close)
         connection = Connection(machine.controller.rx_bytes)
         session = Session(transport, connection, transcript, signals.check)
-        delivery = _Delivery(plan, session, transcript, journal, on_progress)
+        delivery = _Delivery(plan, session, transcript, journal, on_progress, keys or NoKeys())
         # A signal between an exception and its handling would skip the handling, not this.
         at_end.callback(delivery.make_safe)
         try:
@@ -256,6 +292,10 @@ def deliver(
             raise
 
 
+class JobAborted(JobStopped):
+    """The job was ended at the keyboard, with time for the machine to come to rest."""
+
+
 class _Delivery:
     """One job on its way over one session."""
 
@@ -266,7 +306,10 @@ class _Delivery:
         transcript: Transcript | None,
         journal: Journal | None,
         on_progress: Callable[[Progress], None] | None,
+        keys: Keys,
     ) -> None:
+        self._keys = keys
+        self._orders: list[bytes] = []
         self._plan = plan
         self._session = session
         self._records = [record for record in (transcript, journal) if record is not None]
@@ -361,8 +404,21 @@ class _Delivery:
                     self._report(event)
                     if asked_last and event.state in ("Idle", "Check"):
                         return
+                    if event.state in ("Hold", "Door"):
+                        answered = session.now()
                     self._watch_for_loss(event, answered)
             self._after(events)
+            self._obey()
+
+    def _obey(self) -> None:
+        """Do what was asked for at the keyboard."""
+        self._orders += [KEYS[key] for key in self._keys.pressed() if key in KEYS]
+        if ABORT in self._orders:
+            raise JobAborted(f"{self._plan.job.name} was stopped at the keyboard.")
+        if not self._session.connection.writing_eeprom:
+            for order in self._orders:
+                self._session.write(self._session.connection.send_realtime(order))
+            self._orders.clear()
 
     def _after(self, events: list[Event]) -> None:
         session, streamer = self._session, self._streamer
@@ -399,6 +455,8 @@ class _Delivery:
                     status.state,
                     session.position,
                     session.connection.in_flight_bytes,
+                    streamer.last.number if streamer.last else 0,
+                    session.feed_override,
                 )
             )
 
@@ -408,7 +466,7 @@ class _Delivery:
         """Stop the machine if it is at risk, and raise ``error`` with what became of it."""
         sentence = str(error)
         if self._at_risk:
-            gently = isinstance(error, LineRefused)
+            gently = isinstance(error, LineRefused | JobAborted)
             off = self._session.hold_and_stop() if gently else self._session.stop()
             self._at_risk = False
             count = self._streamer.acknowledged
@@ -427,7 +485,8 @@ class _Delivery:
         if self._journal is not None:
             how = "stopped" if isinstance(error, JobStopped) else "failed"
             self._journal.ended(how, sentence)
-        raise type(error)(sentence) from None
+        kind = JobStopped if isinstance(error, JobAborted) else type(error)
+        raise kind(sentence) from None
 
     def make_safe(self) -> None:
         """Stop the machine if nothing else has: the last line of defence, on every way out."""
