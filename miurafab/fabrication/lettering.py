@@ -1,7 +1,7 @@
 """Single-line lettering for engraving: one stroke of the beam per pen stroke of a letter.
 
 The letters are drawn on a grid 4 wide and 6 high, two digits "xy" a point, spaces between the
-points of a stroke and commas between strokes. Capital letters, digits and the hyphen.
+points of a stroke and commas between strokes. Capital letters, digits and ``- . / %``.
 """
 
 from __future__ import annotations
@@ -53,6 +53,9 @@ _LETTERS = {
     "Y": "06 23 46,23 20",
     "Z": "06 46 00 40",
     "-": "13 33",
+    ".": "20 21",
+    "/": "00 46",
+    "%": "00 46,05 15 16 06 05,30 40 41 31 30",
 }
 
 _STROKES = {
@@ -79,7 +82,7 @@ def text_strokes(text: str) -> list[NDArray[np.float64]]:
         if letter not in _STROKES:
             raise LayoutError(
                 f"The label '{text}' holds '{letter}', which cannot be engraved; use capital "
-                "letters, digits and '-'."
+                "letters, digits and '-./%'."
             )
         middle = np.array([text_width(text) / 2, 0.5])
         shift = np.array([place * _ADVANCE / _HEIGHT, 0.0]) - middle

@@ -15,7 +15,7 @@ from miurafab.fabrication.pieces import make_pieces
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tabs import choose_tabs
 
-ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ-"
+ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ-./%"
 
 
 def test_every_letter_is_within_its_box_and_unlike_every_other():

@@ -1,0 +1,49 @@
+"""Several settings in one file: strokes posted section by section, each with its own material.
+
+Each section is a job that starts and ends dark and states its S and F before its first stroke, so
+the sections of one sheet are joined by leaving out what stands around the strokes of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from miurafab.errors import ProfileError
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.gcode.job import Job
+from miurafab.posting.dialects import words_of
+from miurafab.posting.job import post
+from miurafab.profiles import MachineProfile, Material
+
+_NAMES = 3
+"""Comments that a job begins with: sheet, machine, material."""
+
+
+def post_sections(
+    sections: Sequence[tuple[Toolpath, Material]],
+    machine: MachineProfile,
+    *,
+    patch_labels: Mapping[int, str] | None = None,
+) -> Job:
+    """One file for a laser that makes ``sections`` in turn, each with the powers, feeds and passes
+    of its own material. The job is called as the first of them.
+
+    Raises what :func:`~miurafab.posting.job.post` raises, and
+    :class:`~miurafab.errors.ProfileError` for a machine that is no laser.
+    """
+    if machine.tool.kind != "laser":
+        raise ProfileError(
+            f"{machine.name}: a {machine.tool.kind} has no power to try; choose a laser."
+        )
+    head: list[str] = []
+    body: list[str] = []
+    foot: list[str] = []
+    for toolpath, material in sections:
+        words = words_of(machine, material)
+        job = post(toolpath, machine, material, patch_labels=patch_labels)
+        lines = job.text.splitlines(keepends=True)
+        first, last = _NAMES + len(words.begin), len(lines) - len(words.end)
+        head = head or lines[:first]
+        body += lines[first:last]
+        foot = lines[last:]
+    return Job(sections[0][0].sheet, "".join([*head, *body, *foot]))
