@@ -15,8 +15,17 @@ from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.program import strokes
 from miurafab.machine.sender import plan_job, stream_job
 from miurafab.posting import post
-from miurafab.profiles import OPERATIONS, load_machine, load_material, shipped_names
+from miurafab.profiles import (
+    OPERATIONS,
+    load_machine,
+    load_material,
+    shipped_directory,
+    shipped_names,
+)
+from miurafab.workflow.design import save_pattern
 from miurafab.workflow.dry_run import dry_run, read_program
+from miurafab.workflow.job_directory import read_job, write_job
+from miurafab.workflow.preview import preview
 
 MACHINES = shipped_names("firmware_profiles")
 CARD = load_material("card-250")
@@ -202,3 +211,43 @@ def test_a_cutter_is_told_speed_and_force_with_each_pen() -> None:
     ]  # fmt: skip
     with pytest.raises(ProfileError, match="cannot set a laser's power"):
         post(strokes_of(("cut", SQUARE)), replace(CUTTER, tool=MARLIN.tool), CARD)
+
+
+def test_a_plotter_is_told_its_pen_and_speed_alone() -> None:
+    plotter = replace(CUTTER, tool=load_machine("grbl-pen-a4").tool)
+    job = post(strokes_of(("cut", SQUARE)), plotter, CARD)
+    assert "FS" not in job.text
+    read = strokes(read_program(job, plotter))
+    assert read.stroke(0)[:, :2] == pytest.approx(np.array(SQUARE))
+
+
+def test_a_job_for_a_cutter_is_a_directory_like_any_other(tmp_path, pattern) -> None:
+    save_pattern(pattern, tmp_path / "flat.fold", "flat")
+    made = write_job(tmp_path / "flat.fold", tmp_path / "job", "hpgl-cutter-a3", "card-250")
+    assert (tmp_path / "job" / "sheet-01.plt").read_text() == made.jobs[0].text
+    assert not list((tmp_path / "job").glob("*.nc"))
+    assert read_job(tmp_path / "job").jobs[0].text == made.jobs[0].text
+    assert preview(tmp_path / "job").sheets[0].warnings == ()
+    alone = preview(tmp_path / "job" / "sheet-01.plt")
+    assert alone.machine.name == "hpgl-cutter-a3"
+    # Made again for another machine, nothing of the first is left behind.
+    write_job(tmp_path / "flat.fold", tmp_path / "job", "grbl-laser-400", "card-250")
+    assert not list((tmp_path / "job").glob("*.plt"))
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "complaint"),
+    [
+        ("grbl-laser-400", "s_min = 0", 's_min = 0\noffset = "1mm"', "'offset' is not a known key"),
+        ("grbl-knife-a3", 'offset = "0.25mm"', "", "'offset' is missing"),
+        ("grbl-knife-a3", 'overcut = "0.5mm"', 'leave_out = ["scores"]', "holds 'scores'"),
+        ("grbl-knife-a3", 'overcut = "0.5mm"', 'leave_out = "score"', "must be a list"),
+        ("grbl-knife-a3", '"20deg"', '"0.5deg"', "'corner_angle' is .* must lie between"),
+    ],
+)
+def test_a_fault_in_a_knife_is_named(tmp_path, name, old, new, complaint) -> None:
+    text = (shipped_directory("firmware_profiles") / f"{name}.toml").read_text()
+    assert old in text
+    (tmp_path / "mine.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(ProfileError, match=rf"mine\.toml \[tool\]: .*{complaint}"):
+        load_machine(tmp_path / "mine.toml")
