@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from miurafab.origami.thickness import thick_panels
     from miurafab.posting import post
     from miurafab.profiles import load_machine, load_material
+    from miurafab.workflow.calibrate import add_material, calibrate
     from miurafab.workflow.convert import convert, read_pattern
-    from miurafab.workflow.cut import DEFAULT_MATERIAL, cut, prepare
+    from miurafab.workflow.cut import DEFAULT_MATERIAL, prepare
+    from miurafab.workflow.cut_sheets import cut
     from miurafab.workflow.design import design, load_pattern, save_pattern
     from miurafab.workflow.doctor import examine
     from miurafab.workflow.energy import check_writable as check_energy_file
@@ -39,7 +41,7 @@ if TYPE_CHECKING:
         write_angles,
         write_motion,
     )
-    from miurafab.workflow.job_directory import read_job, sheets, write_job
+    from miurafab.workflow.job_directory import layout_options, read_job, sheets, write_job
     from miurafab.workflow.page import write_page
     from miurafab.workflow.picture import write_pictures
     from miurafab.workflow.preview import ASSUMED_MACHINE as DEFAULT_MACHINE
@@ -50,18 +52,21 @@ if TYPE_CHECKING:
 _HOMES = {
     "DEFAULT_MACHINE": ("miurafab.workflow.preview", "ASSUMED_MACHINE"),
     "DEFAULT_MATERIAL": ("miurafab.workflow.cut", "DEFAULT_MATERIAL"),
+    "add_material": ("miurafab.workflow.calibrate", "add_material"),
+    "calibrate": ("miurafab.workflow.calibrate", "calibrate"),
     "check": ("miurafab.origami.audit", "audit"),
     "check_energy_file": ("miurafab.workflow.energy", "check_writable"),
     "check_motion_file": ("miurafab.workflow.fold", "check_motion_file"),
     "check_tradeoff_file": ("miurafab.workflow.tradeoff", "check_writable"),
     "convert": ("miurafab.workflow.convert", "convert"),
-    "cut": ("miurafab.workflow.cut", "cut"),
+    "cut": ("miurafab.workflow.cut_sheets", "cut"),
     "design": ("miurafab.workflow.design", "design"),
     "energy": ("miurafab.workflow.energy", "energy"),
     "examine": ("miurafab.workflow.doctor", "examine"),
     "fit": ("miurafab.origami.fit", "fit"),
     "fold": ("miurafab.workflow.fold", "fold"),
     "load_machine": ("miurafab.profiles", "load_machine"),
+    "layout_options": ("miurafab.workflow.job_directory", "layout_options"),
     "load_material": ("miurafab.profiles", "load_material"),
     "load_pattern": ("miurafab.workflow.design", "load_pattern"),
     "post": ("miurafab.posting", "post"),
@@ -87,6 +92,8 @@ __all__ = [
     "DEFAULT_MACHINE",
     "DEFAULT_MATERIAL",
     "__version__",
+    "add_material",
+    "calibrate",
     "check",
     "check_energy_file",
     "check_motion_file",
@@ -98,6 +105,7 @@ __all__ = [
     "examine",
     "fit",
     "fold",
+    "layout_options",
     "load_machine",
     "load_material",
     "load_pattern",

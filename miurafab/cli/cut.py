@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,10 +12,12 @@ import typer
 import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
 from miurafab.cli.sheets import MachineOption, MaterialOption
+from miurafab.errors import InputError
+from miurafab.units import parse_length
 
 if TYPE_CHECKING:
-    from miurafab.machine.sender import Progress
-    from miurafab.workflow.cut import CutSheet, Prepared
+    from miurafab.workflow.cut import Prepared
+    from miurafab.workflow.cut_sheets import CutOptions, CutSheet, SheetProgress
 
 
 def cut(
@@ -23,8 +26,12 @@ def cut(
         typer.Argument(help="A job directory, a .nc file, a pattern .fold, a design, or a target."),
     ],
     port: Annotated[
-        str, typer.Option(help="A serial device, a pyserial URL (socket://...), or 'virtual'.")
-    ],
+        list[str] | None,
+        typer.Option(
+            help="A serial device, a pyserial URL (socket://...), or 'virtual'; given more than "
+            "once, the machines share the sheets of a job directory."
+        ),
+    ] = None,
     machine: MachineOption = None,
     material: MaterialOption = None,
     out: Annotated[
@@ -37,6 +44,26 @@ def cut(
     check_mode: Annotated[
         bool, typer.Option("--check-mode", help="Let the controller only read the job ($C).")
     ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would be done; opens no port.")
+    ] = False,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume", help="Go on with what was interrupted; needs --home or --at, once stopped."
+        ),
+    ] = False,
+    home: Annotated[bool, typer.Option("--home", help="Home the machine first.")] = False,
+    at: Annotated[
+        str | None,
+        typer.Option(help="Where the head stands, in the job's coordinates: 0,0 is its origin."),
+    ] = None,
+    frame: Annotated[
+        bool, typer.Option("--frame", help="Trace the box around each sheet before it, then wait.")
+    ] = False,
+    pointer: Annotated[
+        float, typer.Option(help="Power of the frame in percent, 5 at most; 0 keeps it dark.")
+    ] = 0.0,
     allow_m3: Annotated[
         bool, typer.Option("--allow-m3", help="Cut with M3, which burns on if the link is lost.")
     ] = False,
@@ -47,43 +74,178 @@ def cut(
         bool | None,
         typer.Option(help="Wait for Enter before each further sheet [default: in a terminal]."),
     ] = None,
+    watched: Annotated[
+        bool,
+        typer.Option(
+            "--watched",
+            help="Stop with the beam off when standard input closes or is silent for 5 s: for a "
+            "program that starts this one and writes a byte a second.",
+        ),
+    ] = False,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
     """Cut a job, making whatever is missing on the way.
 
-    On a machine at a port, or on the virtual one. Ctrl-C stops with the beam off.
+    On a machine at a port, or on the virtual one. Ctrl-C stops with the beam off. In a terminal,
+    space holds, r resumes, q aborts, + - 0 change the feed and ] [ p the power.
     """
+    from miurafab.machine.keys import terminal_keys
+    from miurafab.machine.watchdog import watched_by_parent
+    from miurafab.workflow.cut_sheets import CutOptions
+
     console = Console(as_json, quiet)
+    options = CutOptions(
+        force=frozenset(force or ()),
+        allow_m3=allow_m3,
+        check_mode=check_mode,
+        home=home,
+        at=None if at is None else parse_point(at),
+        resume=resume,
+        frame=frame,
+        pointer=pointer / 100,
+    )
+    if not port and not dry_run:
+        raise InputError(
+            "Name the machine's --port ('virtual' needs no machine), or ask for --dry-run."
+        )
     with console.progress("preparing") as progress:
         prepared = miurafab.prepare(
             thing, machine=machine, material=material, out=out, on_progress=progress
         )
     if prepared.refusal is not None:
         _refuse(console, prepared)
-    waits = pause if pause is not None else port != "virtual" and sys.stdin.isatty()
-    with console.progress("cutting") as bar:
+    if dry_run:
+        _report_dry_run(console, prepared, allow_m3)
+        return
+    assert port is not None
+    if len(port) > 1:
+        _share(console, prepared, port, sheet, options)
+        return
+    waits = pause if pause is not None else port[0] != "virtual" and sys.stdin.isatty()
+    guard = watched_by_parent() if watched else nullcontext()
+    with guard, console.progress("cutting") as bar:
 
-        def show_progress(number: int, now: Progress) -> None:
-            done = now.lines_acknowledged / max(now.lines_total, 1)
-            bar(done, f"sheet {number} of {len(prepared.jobs)}, {now.state}")
+        def show_progress(now: SheetProgress) -> None:
+            share = now.stream.lines_acknowledged / max(now.stream.lines_total, 1)
+            bar(
+                share,
+                f"sheet {now.number} of {len(prepared.jobs)}, stroke {now.stroke} of "
+                f"{now.strokes}, {clock(now.seconds_left)} left, {now.stream.state}",
+            )
 
         def before(number: int, count: int) -> None:
-            if waits and number > 1:
-                console.remark(f"Sheet {number} of {count}: put in fresh material, press Enter.")
+            if waits and number > 1 and not resume:
+                console.remark(
+                    f"Sheet {number} of {count}: {_put_in(prepared, number)}, press Enter."
+                )
                 sys.stdin.readline()
 
-        done = miurafab.cut(
-            prepared,
-            port=port,
-            sheets=sheet,
-            force=frozenset(force or ()),
-            allow_m3=allow_m3,
-            check_mode=check_mode,
-            before_sheet=before,
-            on_progress=show_progress,
+        def after_frame(number: int) -> None:
+            if waits:
+                console.remark(f"That is the frame of sheet {number}; Enter cuts, Ctrl-C does not.")
+                sys.stdin.readline()
+
+        with terminal_keys() as keys:
+            done = miurafab.cut(
+                prepared,
+                port=port[0],
+                sheets=sheet,
+                options=options,
+                keys=keys,
+                before_sheet=before,
+                after_frame=after_frame,
+                on_progress=show_progress,
+            )
+    _report(console, prepared, done, port[0])
+
+
+def parse_point(text: str) -> tuple[float, float]:
+    """``X,Y`` in mm or with units, such as ``0,0`` or ``10mm,1in``."""
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise InputError(f"'{text}' is not a point; write X,Y such as 0,0 or 10mm,5mm.")
+    x, y = (float(p) if p.strip() in ("0", "0.0") else parse_length(p) for p in parts)
+    return x, y
+
+
+def _share(
+    console: Console,
+    prepared: Prepared,
+    ports: list[str],
+    sheet: list[int] | None,
+    options: CutOptions,
+) -> None:
+    """Cut on several machines at once, and say which sheet went where."""
+    from miurafab.workflow.several import share_sheets
+
+    with console.progress("cutting") as bar:
+        outcome = share_sheets(prepared, ports, sheet, options, on_progress=bar)
+    rows = [(each.sheet, each.port, "done" if each.done else each.why) for each in outcome]
+    whole = all(each.done for each in outcome)
+    console.answer(
+        {
+            "status": "done" if whole else "failed",
+            "job": prepared.name,
+            "sheets": [
+                {"sheet": each.sheet, "port": each.port, "done": each.done, "why": each.why}
+                for each in outcome
+            ],
+        },
+        lambda: console.rows(("sheet", "port", "what came of it"), rows),
+    )
+    if not whole:
+        raise typer.Exit(3)
+
+
+def _report_dry_run(console: Console, prepared: Prepared, allow_m3: bool) -> None:
+    """What would be cut, and what the pre-flight checks say; exit code 1 if they refuse it."""
+    from miurafab.workflow.cut_sheets import findings
+
+    found = findings(prepared, allow_m3=allow_m3)
+    answer = {
+        "status": "refused" if found else "ready",
+        "job": prepared.name,
+        "machine": prepared.machine.name,
+        "seconds": round(sum(sheet.seconds for sheet in prepared.dry_runs), 3),
+        "sheets": [sheet.figures() for sheet in prepared.dry_runs],
+        "findings": [
+            {"sheet": sheet, "check": finding.name, "why": str(finding.error)}
+            for sheet, finding in found
+        ],
+    }
+
+    def show() -> None:
+        console.rows(
+            ("sheet", "lines", "burnt m", "travel m", "estimated"),
+            [
+                (
+                    each.name,
+                    each.lines,
+                    round(each.cut_mm / 1000, 2),
+                    round(each.travel_mm / 1000, 2),
+                    clock(each.seconds),
+                )
+                for each in prepared.dry_runs
+            ],
+            title=f"{prepared.name} on {prepared.machine.title}; no port was opened",
         )
-    _report(console, prepared, done, port)
+        for each in prepared.dry_runs:
+            for warning in each.warnings:
+                console.line(f"{each.name}: {warning}")
+        for sheet, finding in found:
+            console.line(f"{sheet}: refused by the check '{finding.name}': {finding.error}.")
+
+    console.answer(answer, show)
+    if found:
+        raise typer.Exit(1)
+
+
+def _put_in(prepared: Prepared, number: int) -> str:
+    """What to do before sheet ``number``, which is not the first."""
+    if prepared.jobs[number - 2].name == f"{prepared.jobs[number - 1].name}-back":
+        return "turn the sheet over, left to right, and lay it by its three holes"
+    return "put in fresh material"
 
 
 def _refuse(console: Console, prepared: Prepared) -> None:
@@ -115,6 +277,7 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
             "seconds": each.result.seconds,
             "refused_lines": len(each.result.errors),
             "remarks": list(each.result.remarks),
+            "resumed": each.resumed,
         }
         for each in done
     ]
@@ -138,6 +301,8 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
         for each in done:
             for remark in each.result.remarks:
                 console.line(f"{each.name}: {remark}")
+            if each.resumed is not None:
+                console.line(each.resumed)
 
     console.answer(answer, show)
     if any(each.result.errors for each in done):

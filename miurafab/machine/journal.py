@@ -3,9 +3,10 @@
 The journal is a file of JSON objects, one a line; each run of a job appends its own. First a
 header: ``schema``, ``job``, ``sha256`` of the whole program's text, ``machine``, ``port``,
 ``lines``, and ``from_line``, where the run began (1 unless it resumed another). Then, when the
-controller has said so, ``{"blocks": n}``: it plans n moves ahead. Then, four times a second of the wire's clock at most, ``{"taken": n, "line": k, "seconds": t}``:
-n lines were acknowledged, the last of them line k of the file. At the end ``{"ended": how,
-"why": sentence}``, how being ``done``, ``stopped`` or ``failed``.
+controller has said so, ``{"blocks": n}``: it plans n moves ahead. Then, four times a second of
+the wire's clock at most, ``{"taken": n, "line": k, "seconds": t}``: n lines were acknowledged, the
+last of them line k of the file. At the end ``{"ended": how, "why": sentence}``, how being
+``done``, ``stopped`` or ``failed``.
 
 What it says was taken, was taken; a little more may have been when a run ends without a last
 word (power loss). *Taken* is not *burnt*: the planner and the receive buffer still held lines.
@@ -30,7 +31,8 @@ _PERIOD = 0.25  # s between two records
 class Journal:
     """The journal of one run, open for writing.
 
-    A run that resumes another begins at ``from_line`` and has the ``sha256`` of the whole. Raises :class:`~miurafab.errors.InputError` if ``path`` cannot be written.
+    A run that resumes another begins at ``from_line`` and has the ``sha256`` of the whole. Raises
+    :class:`~miurafab.errors.InputError` if ``path`` cannot be written.
     """
 
     def __init__(

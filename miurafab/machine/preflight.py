@@ -16,6 +16,7 @@ import numpy as np
 
 from miurafab.errors import ControllerError, GcodeError, InputError, MiurafabError
 from miurafab.gcode.job import SendLine
+from miurafab.gcode.moves import BEAM_M3, DWELL
 from miurafab.gcode.program import Program
 from miurafab.grbl.events import StatusReport
 from miurafab.grbl.settings import Settings, profile_settings
@@ -25,7 +26,9 @@ CHECKS = {
     "m3": "the job arms the laser with M4, which goes dark whenever motion stops",
     "program": "the job is a program that GRBL 1.1 would run without an error",
     "bounds": "every move of the job lies on the bed",
+    "dwell": "the beam is off in every dwell (G4)",
     "power": "no S word is above the machine's largest",
+    "material": "no S word is above the most that the material takes",
     "idle": "the controller is idle",
     "beam": "the beam is off",
     "laser-mode": "laser mode ($32) suits the tool",
@@ -87,9 +90,18 @@ def check_lines(
     return count, findings
 
 
-def check_program(program: Program, machine: MachineProfile) -> Iterator[Finding]:
-    """The checks ``bounds`` and ``power``, which need no controller."""
+def check_program(
+    program: Program, machine: MachineProfile, *, most_power: float = 1.0
+) -> Iterator[Finding]:
+    """The checks ``bounds``, ``dwell``, ``power`` and ``material``, which need no controller.
+
+    ``most_power`` is the most that the material takes, as a fraction of full power.
+    """
     yield from _bounds(program, machine)
+    if machine.tool.kind == "laser":
+        yield from _dwells(program)
+        if most_power < 1.0:
+            yield from _material(program, most_power * machine.tool.s_max)
     too_much = program.power > machine.tool.s_max
     if too_much.any():
         index = int(np.argmax(too_much))
@@ -114,6 +126,46 @@ def _bounds(program: Program, machine: MachineProfile) -> Iterator[Finding]:
             GcodeError(
                 f"{program.name}, line {program.line[index]} moves to X{x:g} Y{y:g}, off the bed "
                 f"of {machine.name} ({size[0]:g} x {size[1]:g} mm)"
+            ),
+        )
+
+
+def _dwells(program: Program) -> Iterator[Finding]:
+    """A dwell burns in place with what the last event set, or the last M3 move if it came later."""
+    at, power = 0, 0.0
+    for move, kind, new, line in zip(
+        program.event_move.tolist(),
+        program.event_kind.tolist(),
+        program.event_power.tolist(),
+        program.event_line.tolist(),
+        strict=True,
+    ):
+        if move > at:
+            at = move
+            still = program.spindle[move - 1] == BEAM_M3
+            power = float(program.power[move - 1]) if still else 0.0
+        if new == new:  # NaN: as before
+            power = new
+        if kind == DWELL and power > 0:
+            yield Finding(
+                "dwell",
+                GcodeError(
+                    f"{program.name}, line {line} waits with the beam on at S{power:g}, which "
+                    "burns a hole or starts a fire; switch it off (M5) before the G4"
+                ),
+            )
+            return
+
+
+def _material(program: Program, most: float) -> Iterator[Finding]:
+    too_much = program.power > most + 0.5
+    if too_much.any():
+        index = int(np.argmax(too_much))
+        yield Finding(
+            "material",
+            GcodeError(
+                f"{program.name}, line {program.line[index]} asks for S{program.power[index]:g}, "
+                f"more than the S{most:.0f} that the material takes (its max_power)"
             ),
         )
 

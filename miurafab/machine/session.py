@@ -54,6 +54,7 @@ class Session:
         self.banner = Banner("", "")
         self.status: StatusReport | None = None
         self.work_offset: tuple[float, ...] | None = None
+        self.feed_override = 100
         self.heard = 0.0
         self._transport = transport
         self._transcript = transcript
@@ -109,6 +110,8 @@ class Session:
             if isinstance(event, StatusReport):
                 self.status = event
                 self.work_offset = event.work_offset or self.work_offset
+                if event.overrides is not None:
+                    self.feed_override = event.overrides[0]
                 self._asked_at = None
             elif isinstance(event, Banner):
                 self.banner = event

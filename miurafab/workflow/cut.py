@@ -1,29 +1,26 @@
-"""Cutting: whatever is missing on the way from a THING to a finished cut is made, then streamed.
+"""Before cutting: whatever is missing on the way from a THING to the G-code of its sheets is made.
 
-THING is a job directory, a G-code file, a pattern (.fold), a design (.toml) or a TARGET. Everything
-is made and checked before the port is opened; then the sheets go one after another.
+THING is a job directory, a G-code file, a pattern (.fold), a design (.toml) or a TARGET.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from miurafab.errors import InputError
+from miurafab.fabrication.options import LayoutOptions
 from miurafab.gcode.job import Job
-from miurafab.machine.sender import Progress as StreamProgress
-from miurafab.machine.sender import StreamResult, plan_job, stream_job
 from miurafab.origami.audit import audit
 from miurafab.origami.fit import fit
-from miurafab.profiles import MachineProfile, load_machine
+from miurafab.profiles import MachineProfile, load_machine, load_material
 from miurafab.workflow.design import design, load_pattern, save_pattern
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 from miurafab.workflow.job_directory import JobDirectory, read_job, write_job
-from miurafab.workflow.preview import ASSUMED_MACHINE, named_machine
+from miurafab.workflow.preview import ASSUMED_MACHINE, assumed_machine, named_machine
 
-GCODE_SUFFIXES = (".nc", ".gcode", ".ngc", ".tap")
+GCODE_SUFFIXES = (".nc", ".gcode", ".ngc", ".tap", ".plt")
 DEFAULT_MATERIAL = "card-250"
 JOBS = Path("jobs")
 """Where jobs are made unless told otherwise."""
@@ -33,8 +30,9 @@ JOBS = Path("jobs")
 class Prepared:
     """What will be cut: the jobs with their dry runs and the machine, and how they were made.
 
-    ``report`` is that of the fit or the check, None for what came as G-code or a job directory;
-    ``refusal`` says why nothing will be cut (a fit that failed, a pattern that is not valid).
+    ``folder`` is where the journals go. ``report`` is that of the fit or the check, None for what
+    came as G-code or a job directory; ``refusal`` says why nothing will be cut (a fit that failed,
+    a pattern that is not valid).
     """
 
     name: str
@@ -42,8 +40,17 @@ class Prepared:
     jobs: tuple[Job, ...]
     dry_runs: tuple[SheetPreview, ...]
     directory: JobDirectory | None = None
+    folder: Path | None = None
     report: dict[str, Any] | None = None
     refusal: str | None = None
+
+    @property
+    def most_power(self) -> float:
+        """The material's ``max_power``, 1 where no material is known."""
+        if self.directory is None:
+            return 1.0
+        own = self.directory.path / f"{self.directory.layout.material}.toml"
+        return load_material(own if own.is_file() else self.directory.layout.material).max_power
 
 
 def prepare(
@@ -69,12 +76,14 @@ def prepare(
         dry_runs = job.dry_runs
         if machine is not None:
             dry_runs = tuple(_dry_run(each, profile) for each in job.jobs)
-        return Prepared(path.resolve().name, profile, job.jobs, dry_runs, job)
+        return Prepared(path.resolve().name, profile, job.jobs, dry_runs, job, path)
     if path.suffix.lower() in GCODE_SUFFIXES:
         gcode = read_gcode(path)
         named = named_machine(gcode, path.parent) if machine is None else load_machine(machine)
-        profile = named or load_machine(ASSUMED_MACHINE)
-        return Prepared(path.name, profile, (gcode,), (_dry_run(gcode, profile),))
+        profile = named or assumed_machine(path)
+        return Prepared(
+            path.name, profile, (gcode,), (_dry_run(gcode, profile),), None, path.parent
+        )
     if path.suffix.lower() == ".fold":
         pattern, surface, _ = load_pattern(path)
         tell(0.1, "checking the pattern")
@@ -108,6 +117,7 @@ def prepare(
         material or wanted.material,
         directory,
         tell,
+        wanted.layout,
     )
 
 
@@ -120,6 +130,7 @@ def _from_pattern(
     material: str | None,
     out: Path | None,
     tell: Callable[[float, str], None],
+    options: LayoutOptions | None = None,
 ) -> Prepared:
     chosen = machine or ASSUMED_MACHINE
     if not valid:
@@ -132,98 +143,19 @@ def _from_pattern(
         chosen,
         material or DEFAULT_MATERIAL,
         lambda fraction, note: tell(0.4 + 0.6 * fraction, note),
+        options=options,
     )
-    return Prepared(name, directory.machine, directory.jobs, directory.dry_runs, directory, report)
+    return Prepared(
+        name,
+        directory.machine,
+        directory.jobs,
+        directory.dry_runs,
+        directory,
+        directory.path,
+        report,
+    )
 
 
 def _dry_run(job: Job, machine: MachineProfile) -> SheetPreview:
     bed = (machine.bed.width_mm, machine.bed.height_mm)
     return dry_run(Path(job.name).stem, job, machine, bed)
-
-
-@dataclass(frozen=True)
-class CutSheet:
-    """One sheet that was cut: ``estimated_s`` before, and what the sender says after."""
-
-    name: str
-    lines: int
-    cut_mm: float
-    travel_mm: float
-    estimated_s: float
-    result: StreamResult
-
-
-def cut(
-    prepared: Prepared,
-    *,
-    port: str,
-    sheets: Sequence[int] | None = None,
-    force: frozenset[str] = frozenset(),
-    allow_m3: bool = False,
-    check_mode: bool = False,
-    virtual_speed: float | None = None,
-    before_sheet: Callable[[int, int], None] | None = None,
-    on_progress: Callable[[int, StreamProgress], None] | None = None,
-) -> tuple[CutSheet, ...]:
-    """Stream the sheets of ``prepared`` (or those numbered in ``sheets``, from 1) to ``port``.
-
-    Every sheet is checked before the first is started. ``before_sheet`` is called with the number
-    of the sheet and how many there are, before each: the place to ask for fresh material. The
-    journal and the transcript go beside the job. Raises what
-    :func:`~miurafab.machine.sender.stream_job` raises.
-    """
-    if prepared.refusal is not None:
-        raise InputError(f"{prepared.name} cannot be cut: {prepared.refusal}")
-    chosen = list(sheets) if sheets else list(range(1, len(prepared.jobs) + 1))
-    for number in chosen:
-        if not 1 <= number <= len(prepared.jobs):
-            raise InputError(f"{prepared.name} has no sheet {number}; it has {len(prepared.jobs)}.")
-    for number in chosen:
-        plan_job(
-            prepared.jobs[number - 1],
-            prepared.machine,
-            force=force,
-            allow_m3=allow_m3,
-            check_mode=check_mode,
-        )
-    done = []
-    for number in chosen:
-        job = prepared.jobs[number - 1]
-        expected = prepared.dry_runs[number - 1]
-        if before_sheet is not None:
-            before_sheet(number, len(prepared.jobs))
-        result = stream_job(
-            job,
-            prepared.machine,
-            port,
-            journal_path=_beside(prepared, job, ".journal"),
-            transcript_path=_beside(prepared, job, ".transcript"),
-            on_progress=None if on_progress is None else _numbered(on_progress, number),
-            force=force,
-            allow_m3=allow_m3,
-            check_mode=check_mode,
-            virtual_speed=virtual_speed,
-        )
-        done.append(
-            CutSheet(
-                expected.name,
-                result.lines,
-                expected.cut_mm,
-                expected.travel_mm,
-                expected.seconds,
-                result,
-            )
-        )
-    return tuple(done)
-
-
-def _numbered(
-    on_progress: Callable[[int, StreamProgress], None], number: int
-) -> Callable[[StreamProgress], None]:
-    return lambda progress: on_progress(number, progress)
-
-
-def _beside(prepared: Prepared, job: Job, suffix: str) -> Path | None:
-    if prepared.directory is None:
-        return None
-    return prepared.directory.path / f"{Path(job.name).stem}{suffix}"

@@ -1,0 +1,249 @@
+"""Cutting: the sheets of a prepared job, one after another, to one machine.
+
+Every sheet is checked before the port is opened for the first. The journal and the transcript of
+each go beside it, and by its journal a sheet that was interrupted goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from miurafab.errors import InputError
+from miurafab.gcode.job import Job
+from miurafab.machine.framing import frame_job
+from miurafab.machine.journal import read_journal
+from miurafab.machine.keys import Keys
+from miurafab.machine.preflight import Finding
+from miurafab.machine.resume import Resumption, resume
+from miurafab.machine.sender import Progress as StreamProgress
+from miurafab.machine.sender import StreamResult, examine_job, plan_job, stream_job
+from miurafab.profiles import MachineProfile
+from miurafab.workflow.cut import Prepared
+from miurafab.workflow.dry_run import SheetPreview
+from miurafab.workflow.timeline import Timeline
+
+
+@dataclass(frozen=True)
+class CutSheet:
+    """One sheet that was cut: ``estimated_s`` before, and what the sender says after.
+
+    ``resumed`` says where a sheet that had been interrupted went on, None for one cut whole.
+    """
+
+    name: str
+    lines: int
+    cut_mm: float
+    travel_mm: float
+    estimated_s: float
+    result: StreamResult
+    resumed: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SheetProgress:
+    """Where sheet ``number`` (from 1) is: strokes done of all, and the seconds left."""
+
+    number: int
+    stroke: int
+    strokes: int
+    seconds_left: float
+    stream: StreamProgress
+
+
+@dataclass(frozen=True)
+class CutOptions:
+    """How sheets are sent; see :func:`~miurafab.machine.sender.stream_job`.
+
+    ``resume`` goes on with what was interrupted; ``frame`` traces the box around each sheet
+    before it, with the ``pointer`` power (a fraction of full power, 0: dark), and waits.
+    """
+
+    force: frozenset[str] = frozenset()
+    allow_m3: bool = False
+    check_mode: bool = False
+    home: bool = False
+    at: tuple[float, float] | None = None
+    resume: bool = False
+    frame: bool = False
+    pointer: float = 0.0
+    virtual_speed: float | None = None
+
+
+DEFAULT_OPTIONS = CutOptions()
+
+
+def cut(
+    prepared: Prepared,
+    *,
+    port: str,
+    sheets: Sequence[int] | None = None,
+    options: CutOptions = DEFAULT_OPTIONS,
+    keys: Keys | None = None,
+    before_sheet: Callable[[int, int], None] | None = None,
+    after_frame: Callable[[int], None] | None = None,
+    on_progress: Callable[[SheetProgress], None] | None = None,
+) -> tuple[CutSheet, ...]:
+    """Stream the sheets of ``prepared`` (or those numbered in ``sheets``, from 1) to ``port``.
+
+    Every sheet is checked before the first is started. ``before_sheet`` is called with the number
+    of the sheet and how many there are, before each: the place to ask for fresh material;
+    ``after_frame`` with its number when its frame was traced. The journal and the transcript go
+    beside the job. Raises what :func:`~miurafab.machine.sender.stream_job` raises.
+    """
+    plans = _plans(prepared, _chosen(prepared, sheets), options)
+    done = []
+    at = options.at
+    for number, resumption in plans:
+        job = prepared.jobs[number - 1]
+        expected = prepared.dry_runs[number - 1]
+        if before_sheet is not None:
+            before_sheet(number, len(prepared.jobs))
+        if options.frame:
+            frame(prepared, number, port=port, options=replace(options, at=at))
+            if after_frame is not None:
+                after_frame(number)
+        result = stream_job(
+            job,
+            prepared.machine,
+            port,
+            journal_path=journal_path(prepared, job),
+            transcript_path=_beside(prepared, job, ".transcript"),
+            on_progress=_placed(on_progress, number, expected, prepared.machine),
+            force=options.force,
+            allow_m3=options.allow_m3,
+            check_mode=options.check_mode,
+            home=options.home,
+            at=at,
+            resumption=resumption,
+            most_power=prepared.most_power,
+            keys=keys,
+            virtual_speed=options.virtual_speed,
+        )
+        if at is not None and len(expected.program):
+            x, y, _ = expected.program.end[-1].tolist()
+            at = (x, y)  # where this sheet left the head; the port forgets it when it is closed
+        done.append(
+            CutSheet(
+                expected.name,
+                result.lines,
+                expected.cut_mm,
+                expected.travel_mm,
+                expected.seconds,
+                result,
+                None if resumption is None else resumption.sentence,
+            )
+        )
+    return tuple(done)
+
+
+def _chosen(prepared: Prepared, sheets: Sequence[int] | None) -> list[int]:
+    if prepared.refusal is not None:
+        raise InputError(f"{prepared.name} cannot be cut: {prepared.refusal}")
+    chosen = list(sheets) if sheets else list(range(1, len(prepared.jobs) + 1))
+    for number in chosen:
+        if not 1 <= number <= len(prepared.jobs):
+            raise InputError(f"{prepared.name} has no sheet {number}; it has {len(prepared.jobs)}.")
+    return chosen
+
+
+def _plans(
+    prepared: Prepared, chosen: list[int], options: CutOptions
+) -> list[tuple[int, Resumption | None]]:
+    """The sheets to send, each checked by itself, with where those interrupted go on."""
+    plans: list[tuple[int, Resumption | None]] = []
+    for number in chosen:
+        job = prepared.jobs[number - 1]
+        resumption = None
+        if options.resume:
+            path = journal_path(prepared, job)
+            runs = read_journal(path) if path is not None and path.exists() else []
+            if runs and runs[-1].ended == "done":
+                continue
+            if runs:
+                resumption = resume(job, prepared.machine, runs)
+        plan_job(
+            job,
+            prepared.machine,
+            force=options.force,
+            allow_m3=options.allow_m3,
+            check_mode=options.check_mode,
+            home=options.home,
+            at=options.at,
+            resumption=resumption,
+            most_power=prepared.most_power,
+        )
+        plans.append((number, resumption))
+    if options.resume and not any(resumption for _, resumption in plans):
+        raise InputError(
+            f"No sheet of {prepared.name} was interrupted, by the journals beside it; leave "
+            "--resume out to cut."
+        )
+    return plans
+
+
+def frame(
+    prepared: Prepared,
+    number: int,
+    *,
+    port: str,
+    options: CutOptions = DEFAULT_OPTIONS,
+) -> StreamResult:
+    """Trace the box around what sheet ``number`` (from 1) burns, beam off or as a pointer."""
+    (number,) = _chosen(prepared, [number])
+    bounds = prepared.dry_runs[number - 1].bounds_mm
+    name = prepared.jobs[number - 1].name
+    if bounds is None:
+        raise InputError(f"{name} burns nothing, so there is no frame to trace.")
+    box = frame_job(
+        name, bounds, prepared.machine, pointer=options.pointer, back_to=options.at or (0.0, 0.0)
+    )
+    return stream_job(
+        box,
+        prepared.machine,
+        port,
+        force=options.force,
+        home=options.home,
+        at=options.at,
+        virtual_speed=options.virtual_speed,
+    )
+
+
+def findings(prepared: Prepared, *, allow_m3: bool = False) -> list[tuple[str, Finding]]:
+    """All that speaks against starting each sheet, by the checks that need no machine."""
+    return [
+        (expected.name, finding)
+        for job, expected in zip(prepared.jobs, prepared.dry_runs, strict=True)
+        for finding in examine_job(
+            job, prepared.machine, allow_m3=allow_m3, most_power=prepared.most_power
+        )[2]
+    ]
+
+
+def _placed(
+    on_progress: Callable[[SheetProgress], None] | None,
+    number: int,
+    expected: SheetPreview,
+    machine: MachineProfile,
+) -> Callable[[StreamProgress], None] | None:
+    if on_progress is None:
+        return None
+    timeline = Timeline(expected, machine.controller.planner_blocks)
+
+    def tell(now: StreamProgress) -> None:
+        done, left = timeline.place(now)
+        on_progress(SheetProgress(number, done, timeline.strokes, left, now))
+
+    return tell
+
+
+def journal_path(prepared: Prepared, job: Job) -> Path | None:
+    """Where the journal of ``job`` is."""
+    return _beside(prepared, job, ".journal")
+
+
+def _beside(prepared: Prepared, job: Job, suffix: str) -> Path | None:
+    if prepared.folder is None:
+        return None
+    return prepared.folder / f"{Path(job.name).stem}{suffix}"
