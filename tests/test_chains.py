@@ -71,7 +71,7 @@ def seconds(text_of: Toolpath, machine: MachineProfile, material: Material) -> f
 
 
 @given(toolpaths().map(joined))
-@settings(max_examples=80, derandomize=True, deadline=None)
+@settings(max_examples=40, derandomize=True, deadline=None)
 def test_read_back_it_is_the_same_strokes(path: Toolpath) -> None:
     with always_chained():
         program = parse_program(post(path, LASER, CARD))

@@ -122,9 +122,10 @@ def _hpgl(made: Toolpath, machine: MachineProfile, material: Material) -> Job:
 def _wire_is_short(
     points: Points, runs: Runs, rows: ByteRows, machine: MachineProfile, material: Material
 ) -> bool:
-    """Whether the lines of some chain take longer on the wire than its motion does at full speed.
+    """Whether chains wait for the wire so long that shorter lines could be worth it.
 
-    A bound that needs no planner: where it says no, the wire is not the limit.
+    A bound that needs no planner: how much longer the lines of each chain take on the wire than
+    its motion does at full speed, summed, against all motion at full speed.
     """
     if not len(points.first):
         return False
@@ -136,10 +137,11 @@ def _wire_is_short(
     feed = np.repeat(feeds[points.operation], np.diff(np.append(points.first, len(points.xy))))
     step = np.linalg.norm(np.diff(points.xy, axis=0, prepend=points.xy[:1]), axis=1) / 1000.0
     motion = step / np.where(points.starts, rapid, feed) * 60.0
+    total = float(motion.sum())
     at = points.first[apart(points, runs.first)]
-    motion[at] = 0.0
-    wire[at] = 0.0
-    return bool((np.add.reduceat(wire, at) > np.add.reduceat(motion, at)).any())
+    motion[at] = wire[at] = 0.0
+    wait = np.add.reduceat(wire, at) - np.add.reduceat(motion, at)
+    return float(wait[wait > 0].sum()) > (1.0 - _WORTH_IT) * total
 
 
 def _seconds(job: Job, machine: MachineProfile) -> float:
