@@ -120,6 +120,8 @@ def _sheet(table: dict[str, Any]) -> Sheet:
         height_mm=float(table["height_mm"]),
         placements=tuple(Placement(**placement) for placement in table["placements"]),
         back=table.get("back"),
+        travel_mm=float(table.get("travel_mm", 0.0)),
+        travel_bound_mm=float(table.get("travel_bound_mm", 0.0)),
     )
 
 

@@ -1,14 +1,12 @@
 """What a user may ask of a layout beyond machine and material, as one value.
 
 The same options stand in the ``[layout]`` table of a design file and on the command line; either
-way they come through :func:`read_options`, which refuses what it does not know by name.
+way they come through :func:`read_options`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from miurafab.errors import InputError
 from miurafab.profiles import Table
@@ -49,23 +47,6 @@ class LayoutOptions:
     spread_heat: bool = False
 
 
-OPTION_KEYS = (
-    "gap",
-    "max_patch",
-    "seam_rows",
-    "seam_columns",
-    "tab_height",
-    "tab_inset",
-    "tab_side",
-    "full_facet",
-    "two_sided",
-    "bridges",
-    "bridge",
-    "spread_heat",
-)
-"""The keys of the options in files, which are those of the command line too."""
-
-
 def read_options(table: Table) -> LayoutOptions:
     """The options in ``table``; its other keys are left to the caller, who finishes it.
 
@@ -93,17 +74,6 @@ def read_options(table: Table) -> LayoutOptions:
         bridge_mm=table.length("bridge", usual.bridge_mm, low=0.1, high=20),
         spread_heat=table.flag("spread_heat", usual.spread_heat),
     )
-
-
-def layout_options(given: Mapping[str, Any], where: str = "The layout options") -> LayoutOptions:
-    """The options in ``given``, keys as in a file.
-
-    Raises :class:`~miurafab.errors.InputError` naming the key.
-    """
-    table = Table(dict(given), where, InputError)
-    options = read_options(table)
-    table.finish()
-    return options
 
 
 def _size(table: Table, key: str) -> tuple[float, float] | None:

@@ -10,6 +10,8 @@ perforate, cut. Within one:
   and the outlines, each time to the nearest one left; a closed stroke is begun at its nearest
   point.
 
+With heat to be spread, the outline that is made next is the one farthest from the two before it.
+
 The strokes are the same before and after, but for their direction and where a closed one begins.
 """
 
@@ -18,6 +20,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import scipy.spatial
 from numpy.typing import NDArray
 
 from miurafab.fabrication.routing import find_route
@@ -42,7 +45,13 @@ class Strokes:
     rank: NDArray[np.int64]
 
 
-def order_strokes(strokes: Strokes, edges_vertices: NDArray[np.int64]) -> Toolpath:
+OUTLINE = 3
+"""The rank of the outlines of patches, last of all."""
+
+
+def order_strokes(
+    strokes: Strokes, edges_vertices: NDArray[np.int64], *, spread_heat: bool = False
+) -> Toolpath:
     """The toolpath of ``strokes`` in order. ``edges_vertices`` (E, 2) of the pattern tells which
     creases meet; a crease's strokes run from its first vertex to its second.
     """
@@ -59,7 +68,8 @@ def order_strokes(strokes: Strokes, edges_vertices: NDArray[np.int64]) -> Toolpa
             elif name == "cut" and rank == HOLE:
                 part = _holes(raw, chosen, here)
             else:
-                part = _nearest(raw, chosen, strokes.group[chosen], here)
+                spread = spread_heat and name == "cut" and rank == OUTLINE
+                part = _nearest(raw, chosen, strokes.group[chosen], here, spread)
             order = _Order(
                 np.concatenate([order.stroke, part.stroke]),
                 np.concatenate([order.backwards, part.backwards]),
@@ -154,10 +164,15 @@ def _holes(raw: Toolpath, chosen: NDArray[np.int64], here: NDArray[np.float64]) 
 
 
 def _nearest(
-    raw: Toolpath, chosen: NDArray[np.int64], group: NDArray[np.int64], here: NDArray[np.float64]
+    raw: Toolpath,
+    chosen: NDArray[np.int64],
+    group: NDArray[np.int64],
+    here: NDArray[np.float64],
+    spread: bool = False,
 ) -> _Order:
     """Groups by the nearest entry: the beginning of a text, either end of an open stroke on its
-    own, and any corner of a closed one.
+    own, and any corner of a closed one. With ``spread`` each time the group farthest from the two
+    before it, by its nearest entry.
     """
     begin, count = _groups(group)
     entries, exits, item, back, corner = [], [], [], [], []
@@ -177,9 +192,16 @@ def _nearest(
             corner.append(n)
     points, leaves, owner = np.array(entries), np.array(exits), np.array(item)
     left = np.ones(len(points), dtype=bool)
-    taken = []
+    taken: list[int] = []
+    middles = _middles(raw, chosen, begin, count)
     for _ in range(len(begin)):
-        way = np.where(left, np.hypot(*(points - here).T), np.inf)
+        open_now = left
+        if spread and taken:
+            waiting = np.unique(owner[left])
+            last = middles[owner[taken[-2:]]]
+            apart = np.linalg.norm(middles[waiting][:, None] - last, axis=2).min(axis=1)
+            open_now = owner == waiting[int(np.argmax(np.round(apart, 6)))]
+        way = np.where(open_now, np.hypot(*(points - here).T), np.inf)
         at = int(np.argmin(way))
         taken.append(at)
         left[owner == owner[at]] = False
@@ -188,3 +210,42 @@ def _nearest(
     member = _unrolled(begin[which], count[which], np.zeros(len(which), dtype=bool))
     reverse = np.repeat(np.array(back)[taken], count[which])
     return _Order(chosen[member], reverse, np.repeat(np.array(corner)[taken], count[which]))
+
+
+def _middles(
+    raw: Toolpath,
+    chosen: NDArray[np.int64],
+    begin: NDArray[np.int64],
+    count: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """(G, 2) the middle of the box around each group of strokes."""
+    found = []
+    for at, strokes in zip(begin.tolist(), count.tolist(), strict=True):
+        points = np.concatenate([raw.stroke(int(k)) for k in chosen[at : at + strokes]])
+        found.append((points.min(axis=0) + points.max(axis=0)) / 2)
+    return np.array(found)
+
+
+def travel_bound(toolpath: Toolpath) -> float:
+    """A length in mm below which no order of these strokes, by any route, can bring the travel.
+
+    Every leg has two ends, and an end of an open stroke, or the origin, is at least as far from
+    the other end of its leg as from the nearest place where another stroke may be entered or left.
+    Of closed strokes it is only said that they may be entered anywhere.
+    """
+    if not len(toolpath):
+        return 0.0
+    owner = np.repeat(np.arange(len(toolpath)), np.diff(toolpath.offsets))
+    place = np.zeros(len(owner), dtype=bool)
+    place[toolpath.offsets[:-1]] = True
+    place[toolpath.offsets[1:] - 1] = True
+    closed = (toolpath.starts == toolpath.ends).all(axis=1)[owner]
+    ends = np.flatnonzero(place & ~closed)
+    places = np.concatenate([ends, np.flatnonzero(closed)])
+    points = np.concatenate([toolpath.points[places], np.zeros((1, 2))])
+    owners = np.append(owner[places], -1)
+    # Of three places at most two are the stroke's own.
+    asking = np.append(np.arange(len(ends)), len(points) - 1)
+    way, near = scipy.spatial.KDTree(points).query(points[asking], k=min(3, len(points)))
+    way = np.where(owners[near] == owners[asking, None], np.inf, way).min(axis=1)
+    return float(way[:-1].sum() + 2 * way[-1]) / 2

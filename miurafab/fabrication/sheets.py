@@ -22,7 +22,7 @@ from miurafab.fabrication.boxes import best_turn
 from miurafab.fabrication.labels import place_texts
 from miurafab.fabrication.nesting import Slot, Stock, nest, turned
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.ordering import order_strokes
+from miurafab.fabrication.ordering import order_strokes, travel_bound
 from miurafab.fabrication.pieces import Piece, Pieces, make_pieces
 from miurafab.fabrication.strokes import Blank, Motion, sheet_strokes
 from miurafab.fabrication.tabs import FOLDS, Tab
@@ -77,7 +77,8 @@ class Placement:
 class Sheet:
     """A sheet as large as the machine's bed, and what lies on it.
 
-    ``back`` is the name of what is made on its back before its front, or None.
+    ``back`` is the name of what is made on its back before its front, or None. ``travel_mm`` is
+    what is moved with the beam off, and ``travel_bound_mm`` what no order could do with less than.
     """
 
     name: str
@@ -85,6 +86,8 @@ class Sheet:
     height_mm: float
     placements: tuple[Placement, ...]
     back: str | None = None
+    travel_mm: float = 0.0
+    travel_bound_mm: float = 0.0
 
     @property
     def passes(self) -> tuple[str, ...]:
@@ -189,15 +192,14 @@ def lay_out(
         motion,
         material,
         [Blank(each.name, each.width_mm, each.height_mm, bed.margin_mm) for each in sheets],
-        two_sided=options.two_sided,
+        options,
     )
     ways = pattern.edges_vertices
-    toolpaths = tuple(order_strokes(each, ways) for each in drawn.fronts)
-    backs = [None if each is None else order_strokes(each, ways) for each in drawn.backs]
-    sheets = tuple(
-        replace(sheet, back=None if back is None else back.sheet)
-        for sheet, back in zip(sheets, backs, strict=True)
+    toolpaths = tuple(
+        order_strokes(each, ways, spread_heat=options.spread_heat) for each in drawn.fronts
     )
+    backs = [None if each is None else order_strokes(each, ways) for each in drawn.backs]
+    sheets = tuple(_with_passes(*made) for made in zip(sheets, toolpaths, backs, strict=True))
     behind = tuple(back for back in backs if back is not None)
     return Layout(
         machine=machine.name,
@@ -210,6 +212,16 @@ def lay_out(
         remarks=_remarks(pieces, numbers, drawn.unrelieved, material),
         toolpaths=toolpaths,
         backs=behind,
+    )
+
+
+def _with_passes(sheet: Sheet, front: Toolpath, back: Toolpath | None) -> Sheet:
+    made = [front] if back is None else [back, front]
+    return replace(
+        sheet,
+        back=None if back is None else back.sheet,
+        travel_mm=round(sum(each.travel_mm for each in made), 3),
+        travel_bound_mm=round(sum(travel_bound(each) for each in made), 3),
     )
 
 

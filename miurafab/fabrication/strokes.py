@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.labels import Text
-from miurafab.fabrication.ordering import HOLE, Strokes
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.ordering import HOLE, OUTLINE, Strokes
 from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
 from miurafab.fabrication.pieces import Pieces
 from miurafab.fabrication.relief import Holes, circles, relief_holes
@@ -36,8 +37,8 @@ from miurafab.profiles.material import CREASE_KINDS
 FOLDED = ("M", "V", "U")
 SLIT = ("B", "C")
 
-_INNER, _WASTE, _OUTER = 1, 2, 3
-"""Ranks among cuts after :data:`HOLE`: slits in a piece, rings around waste, outlines."""
+_INNER, _WASTE = 1, 2
+"""Ranks among cuts between :data:`HOLE` and :data:`OUTLINE`: slits in a piece, rings of waste."""
 
 PIN_MM = 2.0
 """The diameter of a registration hole; it lies in the middle of the margin."""
@@ -83,15 +84,15 @@ def sheet_strokes(
     motion: Motion,
     material: Material,
     sheets: Sequence[Blank],
-    *,
-    two_sided: bool = False,
+    options: LayoutOptions | None = None,
 ) -> Drawn:
-    """The strokes of each sheet. With ``two_sided`` scored valleys are on the backs.
+    """The strokes of each sheet, with backs and holding bridges as ``options`` want them.
 
     Raises :class:`~miurafab.errors.LayoutError` where there are none, or no margin for the
     registration holes.
     """
-    if two_sided:
+    options = options or LayoutOptions()
+    if options.two_sided:
         _check_two_sided(material, sheets)
     creases, holes = _creases(pattern, pieces, material)
     parts = [
@@ -99,7 +100,7 @@ def sheet_strokes(
         *(_made(creases[kind], kind, material) for kind in CREASE_KINDS),
         _relief(pattern, holes, material),
         _slits(pattern, pieces),
-        _outlines(pieces),
+        _outlines(pieces, options, material.kerf_mm),
     ]
     count = np.concatenate([part.count for part in parts])
     patch = np.concatenate([part.patch for part in parts])
@@ -112,7 +113,7 @@ def sheet_strokes(
     steps = np.cumsum([0, *(int(part.group.max(initial=-1)) + 1 for part in parts)])
     group = np.concatenate([part.group + step for part, step in zip(parts, steps, strict=False)])
     behind = np.zeros(len(patch), dtype=bool)
-    if two_sided:
+    if options.two_sided:
         scored = operation == OPERATIONS.index("score")
         behind[scored] = pattern.edges_assignment[edge[scored]] == "V"
 
@@ -316,22 +317,63 @@ def _slits(pattern: CreasePattern, pieces: Pieces) -> _Part:
     )
 
 
-def _outlines(pieces: Pieces) -> _Part:
-    rings, patch, rank = [], [], []
+def _outlines(pieces: Pieces, options: LayoutOptions, kerf: float) -> _Part:
+    lines, patch, rank, group = [], [], [], []
+    rings = 0
     for number, piece in enumerate(pieces.pieces):
         for place, ring in enumerate(piece.cut_lines):
-            rings.append(np.concatenate([ring, ring[:1]]))
-            patch.append(number)
-            rank.append(_WASTE if place else _OUTER)
+            closed = np.concatenate([ring, ring[:1]])
+            # A gap left between two cuts is longer in the path by half a kerf at each end.
+            wanted = 0 if place else options.bridges
+            made = bridged(closed, wanted, options.bridge_mm + kerf)
+            lines += made
+            patch += [number] * len(made)
+            rank += [_WASTE if place else OUTLINE] * len(made)
+            group += [rings] * len(made)
+            rings += 1
     return _Part(
         operation=OPERATIONS.index("cut"),
-        points=np.concatenate(rings),
-        count=np.array([len(ring) for ring in rings]),
+        points=np.concatenate(lines),
+        count=np.array([len(line) for line in lines]),
         patch=np.array(patch),
-        edge=np.full(len(rings), -1),
-        group=np.arange(len(rings)),
+        edge=np.full(len(lines), -1),
+        group=np.array(group),
         rank=np.array(rank),
     )
+
+
+def bridged(ring: NDArray[np.float64], count: int, gap: float) -> list[NDArray[np.float64]]:
+    """The closed ``ring`` (n, 2) in ``count`` pieces with gaps of ``gap`` mm between them.
+
+    Each gap lies in the middle of a side, so that no corner hangs on it; sides shorter than three
+    gaps bear none. So there may be fewer gaps than asked for, and no fewer than two unless the
+    ring stays whole.
+    """
+    side = np.linalg.norm(np.diff(ring, axis=0), axis=1)
+    able = np.flatnonzero(side >= 3 * gap)
+    if min(count, len(able)) < 2:
+        return [ring]
+    middle = np.cumsum(side) - side / 2
+    chosen: list[int] = []
+    for k in range(count):
+        # The middles of sides nearest to evenly spaced points of the ring, from its longest side.
+        target = (middle[able[np.argmax(side[able])]] + k * side.sum() / count) % side.sum()
+        off = np.abs(middle[able] - target)
+        chosen.append(int(able[np.argmin(np.minimum(off, side.sum() - off))]))
+    at = np.unique(chosen)
+    if len(at) < 2:
+        return [ring]
+    way = (ring[at + 1] - ring[at]) / side[at, None] * (gap / 2)
+    centre = (ring[at + 1] + ring[at]) / 2
+    before, after = centre - way, centre + way
+    corners = ring[:-1]
+    found = []
+    for k, start in enumerate(at.tolist()):
+        stop = int(at[(k + 1) % len(at)])
+        between = np.arange(start + 1, stop + 1 + (len(corners) if stop <= start else 0))
+        ends = (after[k], corners[between % len(corners)], before[(k + 1) % len(at)])
+        found.append(np.vstack(ends))
+    return found
 
 
 def _inner_edges(

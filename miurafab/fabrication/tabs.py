@@ -241,12 +241,14 @@ def _not_steeper(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """The polygons with their inner angles at the base, on y = 0, cut to ``angle`` at most."""
     c, s = math.cos(angle), math.sin(angle)
-    none = count < 3
+    row = np.arange(len(points))
     for end, normal in ((0, np.array([s, -c])), (1, np.array([-s, -c]))):
-        limit = np.where(none, NO_LIMIT, points[:, end] @ normal)
-        points, count = clip_convex(
-            points, count, np.broadcast_to(normal, (len(points), 2)), limit - 1e-12
-        )
+        beyond = points[row, 2 if end else np.maximum(count, 1) - 1]
+        limit = points[:, end] @ normal
+        # Only where the side is too steep: elsewhere the clip would double the corner.
+        steep = (count >= 3) & (beyond @ normal < limit - 1e-9)
+        limit = np.where(steep, limit + 1e-9, NO_LIMIT)
+        points, count = clip_convex(points, count, np.broadcast_to(normal, (len(points), 2)), limit)
         points, count = _base_first(points, count)
     return points, count
 

@@ -10,8 +10,10 @@ import pytest
 from flat_patterns import bed, card, miura, triangles, zigzag
 
 from miurafab.fabrication import sheets
-from miurafab.fabrication.ordering import Strokes, order_strokes
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.ordering import Strokes, order_strokes, travel_bound
 from miurafab.fabrication.sheets import lay_out
+from miurafab.fabrication.toolpath import Toolpath
 from miurafab.profiles import OPERATIONS
 
 CASES = {
@@ -29,9 +31,9 @@ def before_and_after(request):
     taken: list[Strokes] = []
     kept = sheets.order_strokes
 
-    def spy(strokes, edges_vertices):
+    def spy(strokes, edges_vertices, **wanted):
         taken.append(strokes)
-        return kept(strokes, edges_vertices)
+        return kept(strokes, edges_vertices, **wanted)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sheets, "order_strokes", spy)
@@ -100,6 +102,51 @@ def test_travel_is_little(before_and_after):
         far = legs[vertex] > through
         # Only the ends of creases at the outline need a jump, and n creases have about 4 sqrt n.
         assert far.sum() <= 5 * np.sqrt(len(np.unique(toolpath.edge[creases])))
+
+
+def test_no_order_has_less_travel_than_the_bound(before_and_after):
+    taken, layout, _ = before_and_after
+    rng = np.random.default_rng(5)
+    for strokes, toolpath, sheet in zip(taken, layout.toolpaths, layout.sheets, strict=True):
+        bound = travel_bound(toolpath)
+        assert 0.0 < bound <= toolpath.travel_mm
+        assert travel_bound(strokes.toolpath) == pytest.approx(bound, rel=0.02)
+        assert (sheet.travel_mm, sheet.travel_bound_mm) == pytest.approx(
+            (toolpath.travel_mm, bound), abs=1e-3
+        )
+        ends = np.stack([toolpath.starts, toolpath.ends], axis=1)[rng.permutation(len(toolpath))]
+        legs = np.linalg.norm(ends[1:, 0] - ends[:-1, 1], axis=1).sum()
+        assert bound <= legs
+
+
+def test_the_bound_of_strokes_in_a_row_is_their_travel():
+    starts = np.column_stack([np.arange(5) * 3.0 + 1.0, np.zeros(5)])
+    points = np.stack([starts, starts + np.array([2.0, 0.0])], axis=1).reshape(-1, 2)
+    minus = np.full(5, -1)
+    row = Toolpath("s", 99.0, 99.0, points, np.arange(0, 11, 2), minus + 3, minus, minus)
+    # Both ends of four gaps; the way from the origin, from both ends; back to it; the last end.
+    assert travel_bound(row) == pytest.approx((4 * 2 * 1.0 + 2 * 1.0 + 1.0 + 3.0) / 2)
+    assert travel_bound(row) <= row.travel_mm
+
+
+def test_spread_heat_cuts_far_from_where_it_just_cut():
+    pattern = miura(30, 4, 12.0, 12.0)
+    options = LayoutOptions(max_patch_mm=(70.0, 60.0))
+    usual = lay_out(pattern, MACHINE, card(), options=options)
+    spread = lay_out(
+        pattern, MACHINE, card(), options=dataclasses.replace(options, spread_heat=True)
+    )
+    (one,), (other,) = usual.toolpaths, spread.toolpaths
+    assert canonical(one) == canonical(other)
+
+    def apart(toolpath):
+        cuts = np.flatnonzero(toolpath.operation == OPERATIONS.index("cut"))
+        middles = np.array([toolpath.stroke(k).mean(axis=0) for k in cuts])
+        return np.linalg.norm(np.diff(middles, axis=0), axis=1)
+
+    assert len(apart(one)) >= 6
+    assert apart(other)[0] > 100.0
+    assert apart(other).mean() > 1.5 * apart(one).mean()
 
 
 def test_ordering_again_changes_nothing_but_the_beginning(before_and_after):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from flat_patterns import card
@@ -9,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate
+from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
 
 
 def burnt(length: float, material) -> np.ndarray:
@@ -97,3 +99,56 @@ def test_dashes_that_the_kerf_would_fill_are_refused_by_name():
         LayoutError, match=r"'test-card' asks for dashes of 0\.15 mm.*kerf of 0\.15"
     ):
         perforate(np.zeros((1, 2)), np.ones((1, 2)), card(cut=0.15, kerf=0.15))
+
+
+@settings(derandomize=True, max_examples=300, deadline=None)
+@given(
+    st.floats(0.5, 200.0),
+    st.floats(0.3, 5.0),
+    st.floats(0.1, 5.0),
+    st.floats(0.0, 3.0),
+    st.floats(0.0, 4.0),
+    st.sampled_from(["bridge", "cut"]),
+    st.sampled_from(["stretch_cut", "stretch_gap"]),
+)
+def test_stretched_dashes_are_equal_and_so_are_their_gaps(
+    length, cut, gap, bridge, least, ends, fit
+):
+    material = card(cut=cut, gap=gap, end_bridge=bridge, min_end=least, kerf=0.1)
+    rule = dataclasses.replace(material.perforation, start_end=ends, fit=fit)
+    dashes = burnt(length, dataclasses.replace(material, perforation=rule))
+    lengths, gaps = np.diff(dashes, axis=1)[:, 0], dashes[1:, 0] - dashes[:-1, 1]
+    np.testing.assert_allclose(dashes, (length - dashes)[::-1, ::-1], atol=1e-6)
+    if len(dashes) == 1:
+        return
+    bridge = bridge if ends == "bridge" else 0.0
+    assert dashes[0, 0] == pytest.approx(bridge, abs=1e-6)
+    assert length - dashes[-1, 1] == pytest.approx(bridge, abs=1e-6)
+    np.testing.assert_allclose(lengths, lengths[0], atol=1e-6)
+    np.testing.assert_allclose(gaps, gaps[0], atol=1e-6)
+    if fit == "stretch_cut":
+        assert gaps[0] == pytest.approx(gap, abs=1e-6)
+        assert lengths[0] >= least - 1e-6
+    else:
+        assert lengths[0] == pytest.approx(cut, abs=1e-6)
+        assert gap - 1e-6 <= gaps[0]
+        assert (len(dashes) + 1) * cut + len(dashes) * gap > length - 2 * bridge - 1e-6
+
+
+def test_each_fit_of_one_crease_by_hand():
+    # u = 10.8; centre: see above. 10.8 = 6 c + 5 x 0.8, c = 1.1333; and = 5 x 1.2 + 4 g, g = 1.2.
+    def fitted(fit):
+        material = card(cut=1.2, gap=0.8, end_bridge=0.6, min_end=0.5)
+        rule = dataclasses.replace(material.perforation, fit=fit)
+        dashes = burnt(12.0, dataclasses.replace(material, perforation=rule))
+        return len(dashes), np.ptp(dashes[0]), dashes[1, 0] - dashes[0, 1]
+
+    assert fitted("stretch_cut") == pytest.approx((6, 6.8 / 6, 0.8))
+    assert fitted("stretch_gap") == pytest.approx((5, 1.2, 1.2))
+
+
+def test_a_score_runs_from_bridge_to_bridge():
+    start, end = np.zeros((2, 2)), np.array([[12.0, 0.0], [0.9, 0.0]])
+    drawn = unbroken(start, end, card(end_bridge=0.6, kerf=0.1))
+    np.testing.assert_allclose(drawn.starts[:, 0], [0.65, 0.275])
+    np.testing.assert_allclose(drawn.ends[:, 0], [11.35, 0.625])
