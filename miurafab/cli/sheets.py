@@ -27,6 +27,46 @@ def sheets(
         list[str] | None,
         typer.Option("--format", help="Also draw each sheet as dxf, pdf or hpgl; may be repeated."),
     ] = None,
+    design: Annotated[
+        Path | None,
+        typer.Option(help="A design file whose [layout] holds options; those given here win."),
+    ] = None,
+    gap: Annotated[str | None, typer.Option(help="Kept between patches [default: 2mm].")] = None,
+    max_patch: Annotated[
+        str | None, typer.Option(help="The largest patch, as 300mmx200mm [default: the bed].")
+    ] = None,
+    seam_rows: Annotated[
+        str | None, typer.Option(help="Rows of facets after which to cut in any case: 10,20.")
+    ] = None,
+    seam_columns: Annotated[
+        str | None, typer.Option(help="Columns of facets after which to cut in any case.")
+    ] = None,
+    tab_height: Annotated[
+        str | None, typer.Option(help="Height of the tabs [default: the material's].")
+    ] = None,
+    tab_inset: Annotated[
+        str | None, typer.Option(help="Inset of the tabs [default: the material's].")
+    ] = None,
+    tab_side: Annotated[
+        str | None,
+        typer.Option(help="The patch that bears the tabs: lower, upper, alternate [lower]."),
+    ] = None,
+    full_facet: Annotated[
+        bool | None, typer.Option("--full-facet", help="Tabs as large as the facets under them.")
+    ] = None,
+    two_sided: Annotated[
+        bool | None, typer.Option("--two-sided", help="Score the valleys from the back.")
+    ] = None,
+    bridges: Annotated[
+        int | None, typer.Option(help="Holding bridges on each outline, 2 or more [default: 0].")
+    ] = None,
+    bridge: Annotated[
+        str | None, typer.Option(help="Length of a holding bridge [default: 0.5mm].")
+    ] = None,
+    spread_heat: Annotated[
+        bool | None,
+        typer.Option("--spread-heat", help="Cut patches beside each other far apart in time."),
+    ] = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -35,6 +75,23 @@ def sheets(
     Patches, tabs, perforation, nesting and order, for one machine and one material.
     """
     console = Console(as_json, quiet)
+    given = {
+        "gap": gap,
+        "max_patch": max_patch,
+        "seam_rows": seam_rows,
+        "seam_columns": seam_columns,
+        "tab_height": tab_height,
+        "tab_inset": tab_inset,
+        "tab_side": tab_side,
+        "full_facet": full_facet,
+        "two_sided": two_sided,
+        "bridges": bridges,
+        "bridge": bridge,
+        "spread_heat": spread_heat,
+    }
+    options = miurafab.layout_options(
+        {key: value for key, value in given.items() if value is not None}, design
+    )
     with console.progress("laying out") as progress:
         job = miurafab.write_job(
             file,
@@ -43,6 +100,7 @@ def sheets(
             material or miurafab.DEFAULT_MATERIAL,
             progress,
             formats=formats or (),
+            options=options,
         )
     totals = job.layout.totals
     answer: dict[str, Any] = {
@@ -62,6 +120,7 @@ def sheets(
         },
         "untabbed": list(job.layout.untabbed),
         "unlettered": job.layout.unlettered,
+        "remarks": list(job.layout.remarks),
     }
 
     def show() -> None:
@@ -69,6 +128,8 @@ def sheets(
         console.facts(answer["totals"])
         if job.layout.untabbed:
             console.line(f"No tab could stand on {len(job.layout.untabbed)} seam edges.")
+        for remark in job.layout.remarks:
+            console.line(remark)
         console.line(f"Look at it first: miurafab preview {out}")
 
     console.answer(answer, show)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from miurafab.errors import InputError, PatternError, TargetError
+from miurafab.fabrication.options import LayoutOptions, read_options
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fit import FitRequest
 from miurafab.origami.fold_format import read_fold, write_fold
@@ -35,7 +36,7 @@ DEFAULT_SIZE_MM = 200.0
 @dataclass(frozen=True)
 class Design:
     """A request with a title, the machine and material that its file names, if any, and remarks on
-    the target that the user might want to know.
+    the target that the user might want to know. ``layout`` is what the file asks of the sheets.
     """
 
     request: FitRequest
@@ -43,6 +44,7 @@ class Design:
     machine: str | None = None
     material: str | None = None
     remarks: tuple[str, ...] = ()
+    layout: LayoutOptions | None = None
 
 
 def parse_facets(text: str) -> tuple[int, int]:
@@ -139,6 +141,7 @@ def _from_file(path: Path, given: Mapping[str, str | None]) -> Design:
     layout = table.table("layout", {})
     machine = layout.text("machine") if layout.has("machine") else None
     material = layout.text("material") if layout.has("material") else None
+    options = read_options(layout)
     layout.finish()
     table.finish(known=_OPTIONS)
     defaults: dict[str, str | None] = {}
@@ -158,7 +161,7 @@ def _from_file(path: Path, given: Mapping[str, str | None]) -> Design:
         request = _request(surface, description, defaults | written | dict(given))
     except InputError as fault:
         raise TargetError(f"{path.name}: {fault}") from None
-    return Design(request, title, machine, material, remarks)
+    return Design(request, title, machine, material, remarks, options)
 
 
 def _mesh(path: Path, given: Mapping[str, str | None]) -> tuple[MeshSurface, dict[str, Any]]:

@@ -13,6 +13,7 @@ import shutil
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from miurafab.errors import InputError, LayoutError
 from miurafab.fabrication.drawing.assembly_guide import assembly_guide
@@ -21,13 +22,21 @@ from miurafab.fabrication.drawing.hpgl import sheet_hpgl
 from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.layout import read_layout, write_layout
+from miurafab.fabrication.options import LayoutOptions, read_options
 from miurafab.fabrication.sheets import Layout, lay_out
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.job import Job
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fold_format import read_fold
 from miurafab.posting import post
-from miurafab.profiles import MachineProfile, find_file, load_machine, load_material
+from miurafab.profiles import (
+    MachineProfile,
+    Table,
+    find_file,
+    load_machine,
+    load_material,
+    read_toml,
+)
 from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 
@@ -55,12 +64,32 @@ class JobDirectory:
     dry_runs: tuple[SheetPreview, ...]
 
 
-def sheets(pattern: CreasePattern, machine: str, material: str) -> Layout:
+def sheets(
+    pattern: CreasePattern, machine: str, material: str, options: LayoutOptions | None = None
+) -> Layout:
     """``pattern`` laid out for the machine and material of these names (or TOML files).
 
     Raises :class:`~miurafab.errors.LayoutError` or ``ProfileError``.
     """
-    return lay_out(pattern, load_machine(machine), load_material(material))
+    return lay_out(pattern, load_machine(machine), load_material(material), options=options)
+
+
+def layout_options(given: Mapping[str, Any], design_file: Path | None = None) -> LayoutOptions:
+    """The options ``given``, by the keys of a design file's ``[layout]``, and for the rest those
+    of ``design_file``.
+
+    Raises :class:`~miurafab.errors.InputError` naming the key.
+    """
+    values: dict[str, Any] = {}
+    if design_file is not None:
+        written = Table(read_toml(design_file, InputError), design_file.name, InputError)
+        values = written.table("layout", {}).rest()
+        for key in ("machine", "material"):
+            values.pop(key, None)
+    table = Table(values | dict(given), "The layout options", InputError)
+    options = read_options(table)
+    table.finish()
+    return options
 
 
 def write_job(
@@ -71,12 +100,13 @@ def write_job(
     on_progress: Progress | None = None,
     *,
     formats: Collection[str] = (),
+    options: LayoutOptions | None = None,
 ) -> JobDirectory:
     """Lay the pattern of a FOLD file out and write its job directory.
 
     ``machine`` and ``material`` are shipped names or TOML files; ``formats`` are further drawings
-    of each sheet (:data:`FORMATS`). Sheets of an earlier job in the
-    same directory are removed; files that are no part of a job are left alone. Raises
+    of each sheet (:data:`FORMATS`), ``options`` what is asked of the layout. Sheets of an earlier
+    job in the same directory are removed; files that are no part of a job are left alone. Raises
     :class:`~miurafab.errors.InputError` where the directory holds something else than a job.
     """
     unknown = sorted(set(formats) - set(FORMATS))
@@ -86,17 +116,17 @@ def write_job(
     tell(0.0, "patches, tabs, perforation, nesting")
     profile, stock = load_machine(machine), load_material(material)
     pattern = read_fold(pattern_file)
-    layout = lay_out(pattern, profile, stock)
+    layout = lay_out(pattern, profile, stock, options=options)
     labels = {patch.id: patch.label for patch in layout.patches}
     _make_room(directory)
     jobs, dry_runs = [], []
-    for number, toolpath in enumerate(layout.toolpaths):
-        tell(0.4 + 0.5 * number / len(layout.toolpaths), f"drawing {toolpath.sheet}")
+    for number, toolpath in enumerate(layout.passes):
+        tell(0.4 + 0.5 * number / len(layout.passes), f"drawing {toolpath.sheet}")
         job = post(toolpath, profile, stock, patch_labels=labels)
         jobs.append(job)
         size = (toolpath.width_mm, toolpath.height_mm)
         dry_runs.append(dry_run(toolpath.sheet, job, profile, size))
-        _write(directory / f"{toolpath.sheet}.nc", job.text)
+        _write(directory / f"{toolpath.sheet}{profile.job_suffix}", job.text)
         _write(directory / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
         for name in formats:
             (directory / f"{toolpath.sheet}.{name}").write_bytes(FORMATS[name](toolpath))
@@ -130,17 +160,18 @@ def read_job(directory: Path) -> JobDirectory:
         layout = read_layout(path.read_text(encoding="utf-8"))
     except LayoutError as fault:
         raise InputError(f"{path}: {fault}") from None
+    own = directory / f"{layout.machine}.toml"
+    machine = load_machine(own if own.is_file() else layout.machine)
+    made = [(name, sheet) for sheet in layout.sheets for name in sheet.passes]
     jobs = []
-    for sheet in layout.sheets:
-        file = directory / f"{sheet.name}.nc"
+    for name, _ in made:
+        file = directory / f"{name}{machine.job_suffix}"
         if not file.is_file():
             raise InputError(f"{file} is missing; make the job again with 'miurafab sheets'.")
         jobs.append(read_gcode(file))
-    own = directory / f"{layout.machine}.toml"
-    machine = load_machine(own if own.is_file() else layout.machine)
     dry_runs = (
-        dry_run(sheet.name, job, machine, (sheet.width_mm, sheet.height_mm))
-        for sheet, job in zip(layout.sheets, jobs, strict=True)
+        dry_run(name, job, machine, (sheet.width_mm, sheet.height_mm))
+        for (name, sheet), job in zip(made, jobs, strict=True)
     )
     return JobDirectory(directory, layout, machine, tuple(jobs), tuple(dry_runs))
 
@@ -168,14 +199,16 @@ def _make_room(directory: Path) -> None:
         directory.mkdir(parents=True, exist_ok=True)
         return
     try:
-        names = [str(sheet["name"]) for sheet in json.loads(layout.read_text())["sheets"]]
+        made = json.loads(layout.read_text())["sheets"]
+        names = [str(sheet["name"]) for sheet in made]
+        names += [str(sheet["back"]) for sheet in made if sheet.get("back")]
     except (ValueError, KeyError, TypeError):
         raise InputError(
             f"{layout} is not a layout of this version; choose another directory or remove it."
         ) from None
     layout.unlink()
     for name in names:
-        for suffix in ("nc", "svg", *FORMATS):
+        for suffix in ("nc", "plt", "svg", *FORMATS):
             (directory / f"{Path(name).name}.{suffix}").unlink(missing_ok=True)
 
 
