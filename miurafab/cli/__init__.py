@@ -12,6 +12,7 @@ from typing import NoReturn
 import typer
 
 from miurafab.cli import (
+    calibrate,
     check,
     convert,
     cut,
@@ -51,7 +52,8 @@ app.command("cut")(cut.cut)
 app.add_typer(machine.app, name="machine")
 app.command("virtual")(virtual.virtual)
 app.command("profiles")(profiles.profiles)
-app.command("materials")(profiles.materials)
+app.add_typer(profiles.materials, name="materials")
+app.command("calibrate")(calibrate.calibrate)
 app.command("doctor")(doctor.doctor)
 
 

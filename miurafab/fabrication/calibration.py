@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError, ProfileError
 from miurafab.fabrication.lettering import text_strokes, text_width
+from miurafab.fabrication.ordering import Strokes, order_strokes
 from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
@@ -120,7 +121,8 @@ def calibration_sheet(machine: MachineProfile, material: Material) -> Calibratio
 
     margin = machine.bed.margin_mm
     width, height = size[0] + 2 * margin, size[1] + 2 * margin
-    cells, squares = [], []
+    cells: list[Cell] = []
+    squares: list[Square] = []
     engraved, flaps, plain = _Pen(), _Pen(), _Pen()
     burnt = [_Pen() for _ in burns]
     tried = [_Pen() for _ in cuts]
@@ -135,12 +137,12 @@ def calibration_sheet(machine: MachineProfile, material: Material) -> Calibratio
             cell = Cell(f"{chr(ord('A') + row)}{column + 1}", rule, operation)
             patch = len(cells)
             cells.append(cell)
-            hinge = corner + [[0.0, 0.0], [_FLAP[0], 0.0]]
+            hinge = corner + np.array([[0.0, 0.0], [_FLAP[0], 0.0]])
             dashes = perforate(hinge[:1], hinge[1:], _with(material, rule))
             burnt[column].add(np.stack([dashes.starts, dashes.ends], axis=1), "perforate", patch)
-            way = corner + [[0, 0], [0, _FLAP[1]], list(_FLAP), [_FLAP[0], 0]]
+            way = corner + np.array([(0.0, 0.0), (0.0, _FLAP[1]), _FLAP, (_FLAP[0], 0.0)])
             flaps.add([way], "cut", patch)
-            _write(engraved, cell.label, corner + [_FLAP[0] / 2, _FLAP[1] / 2], 3.0)
+            _write(engraved, cell.label, corner + np.array(_FLAP) / 2, 3.0)
     for row, rule in enumerate(rules):
         y = at[1] + trial[1] - _HEAD - _PITCH[1] * row - _FLAP[1] / 2
         text = f"{rule.cut_mm:g}/{rule.gap_mm:g}"
@@ -151,7 +153,7 @@ def calibration_sheet(machine: MachineProfile, material: Material) -> Calibratio
         patch = len(cells) + len(squares)
         squares.append(square)
         ring = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * _SQUARE / 2
-        tried[column].add([ring + [x, at[1] + 12.0]], "cut", patch)
+        tried[column].add([ring + np.array([x, at[1] + 12.0])], "cut", patch)
         _write(engraved, square.label, (x, at[1] + 12.0), 3.0)
         _write(engraved, _percent(operation), (x, at[1] + 5.2), 2.2)
         _write(engraved, _feed(operation), (x, at[1] + 1.4), 2.2)
@@ -163,7 +165,7 @@ def calibration_sheet(machine: MachineProfile, material: Material) -> Calibratio
         own = replace(material, operations={**material.operations, **operations})
         return pen.toolpath(width, height, margin), own
 
-    made = [section(engraved), section(folds)]
+    made = [section(engraved), (_routed(section(folds)[0], coupon), material)]
     made += [section(pen, perforate=use) for pen, use in zip(burnt, burns, strict=True)]
     made.append(section(flaps))
     made += [section(pen, cut=use) for pen, use in zip(tried, cuts, strict=True)]
@@ -294,7 +296,7 @@ def gauge_mark(kerf: float) -> float:
 
 def _gauge(engraved: _Pen, cut: _Pen, corner: Points) -> None:
     wide, high = _WINDOW
-    low = corner + [12.0, 0.0]
+    low = corner + np.array([12.0, 0.0])
     for strip in range(1, STRIPS):
         x = low[0] + wide * strip / STRIPS
         ends = np.array([[x, low[1]], [x, low[1] + high]])
@@ -308,8 +310,14 @@ def _gauge(engraved: _Pen, cut: _Pen, corner: Points) -> None:
         tall = 2.4 if twentieth % 2 == 0 else 1.4
         engraved.add([np.array([[x, top], [x, top + tall]])], "engrave")
         if twentieth % 4 == 0:
-            _write(engraved, f"{kerf:g}", (x, top + 4.6), 2.0)
+            _write(engraved, f"{kerf:g}".removeprefix("0") or "0", (x, top + 4.4), 1.8)
     _write(engraved, "KERF", (corner[0] + 5.0, low[1] + high / 2), 2.4)
+
+
+def _routed(folds: Toolpath, coupon: CreasePattern) -> Toolpath:
+    """The strokes of the coupon in an order with little travel."""
+    nowhere = np.zeros(len(folds), dtype=np.int64)
+    return order_strokes(Strokes(folds, folds.edge, nowhere), coupon.edges_vertices)
 
 
 def _coupon(

@@ -1,0 +1,239 @@
+"""Calibration: a sheet that tries settings out, and the material made of the ones chosen.
+
+The sheet is a job directory like any other; ``calibration.json`` in it says what each label on it
+stands for, so that a choice can be named by its label.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from miurafab.errors import InputError, ProfileError
+from miurafab.fabrication.calibration import (
+    SHEET,
+    STRIPS,
+    CalibrationSheet,
+    calibration_sheet,
+)
+from miurafab.fabrication.drawing.calibration_guide import calibration_guide
+from miurafab.fabrication.drawing.svg import sheet_svg
+from miurafab.fabrication.layout import write_layout
+from miurafab.fabrication.perforation import MIN_STROKE_MM
+from miurafab.fabrication.sheets import Layout, Sheet, Totals
+from miurafab.origami.fold_format import fold_text
+from miurafab.posting.sections import post_sections
+from miurafab.profiles import (
+    Material,
+    find_file,
+    load_machine,
+    load_material,
+    read_toml,
+)
+from miurafab.units import parse_length
+from miurafab.workflow.dry_run import dry_run
+from miurafab.workflow.job_directory import (
+    LAYOUT,
+    JobDirectory,
+    _keep_own_profile,
+    _make_room,
+    _write,
+)
+
+CHOICES = "calibration.json"
+GUIDE = "calibration.pdf"
+SCHEMA = "miurafab-calibration/1"
+_COUPON = "coupon.fold"
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+
+
+@dataclasses.dataclass(frozen=True)
+class Calibration:
+    """A calibration sheet and the job directory that it was written to."""
+
+    job: JobDirectory
+    sheet: CalibrationSheet
+
+
+def calibrate(machine: str, material: str, directory: Path) -> Calibration:
+    """Write the job directory of a calibration sheet of ``material`` for ``machine``.
+
+    Both are shipped names or TOML files. Raises :class:`~miurafab.errors.ProfileError` for a
+    machine that is no laser, :class:`~miurafab.errors.LayoutError` for a bed that is too small,
+    and :class:`~miurafab.errors.InputError` for a directory that holds something else.
+    """
+    profile, stock = load_machine(machine), load_material(material)
+    sheet = calibration_sheet(profile, stock)
+    toolpath = sheet.toolpath
+    job = post_sections(sheet.sections, profile, patch_labels=sheet.labels)
+    _make_room(directory)
+    timed = dry_run(SHEET, job, profile, (sheet.width_mm, sheet.height_mm))
+    _write(directory / f"{SHEET}{profile.job_suffix}", job.text)
+    _write(directory / f"{SHEET}.svg", sheet_svg(toolpath))
+    guide = calibration_guide(sheet, profile, stock, directory.name or str(directory))
+    (directory / GUIDE).write_bytes(guide)
+    coupon = fold_text(sheet.coupon, "Fold coupon")
+    _write(directory / _COUPON, coupon)
+    _keep_own_profile("firmware_profiles", machine, directory)
+    _keep_own_profile("materials", material, directory)
+    choices = {
+        "schema": SCHEMA,
+        "machine": profile.name,
+        "material": stock.name,
+        "cells": [dataclasses.asdict(cell) for cell in sheet.cells],
+        "squares": [dataclasses.asdict(square) for square in sheet.squares],
+        "kerf_gauge": {"strips": STRIPS},
+    }
+    _write(directory / CHOICES, json.dumps(choices, indent=1) + "\n")
+    layout = Layout(
+        machine=profile.name,
+        material=stock.name,
+        patches=(),
+        sheets=(Sheet(SHEET, sheet.width_mm, sheet.height_mm, ()),),
+        totals=Totals(
+            patches=0,
+            sheets=1,
+            seam_mm=0.0,
+            tabs=0,
+            density=0.0,
+            cut_mm=toolpath.length_of("cut"),
+            perforated_mm=toolpath.length_of("perforate"),
+            travel_mm=toolpath.travel_mm,
+            seconds=round(timed.seconds, 1),
+        ),
+        toolpaths=(toolpath,),
+    )
+    digest = hashlib.sha256(coupon.encode("utf-8")).hexdigest()
+    _write(directory / LAYOUT, write_layout(layout, _COUPON, digest))
+    return Calibration(JobDirectory(directory, layout, profile, (job,), (timed,)), sheet)
+
+
+def add_material(
+    name: str,
+    directory: Path,
+    *,
+    cell: str | None = None,
+    cut: str | None = None,
+    kerf: str | float | None = None,
+    title: str | None = None,
+) -> tuple[Path, Material]:
+    """Write ``NAME.toml``: the material of the calibration in ``directory`` with what was chosen.
+
+    ``cell`` is the label of a flap: its dash and gap then hold for all creases, and its power and
+    feed for perforating. ``cut`` is the label of a square, ``kerf`` a length. ``name`` may be a
+    path; the file is not overwritten. Raises :class:`~miurafab.errors.InputError` for a label that
+    is not on the sheet and for a name that cannot be one, and
+    :class:`~miurafab.errors.ProfileError` where the choices do not make a material.
+    """
+    path = Path(name) if name.endswith(".toml") else Path(f"{name}.toml")
+    if not _NAME.fullmatch(path.stem):
+        raise InputError(f"'{path.stem}' cannot name a material; use letters, digits, '-' and '_'.")
+    if path.exists():
+        raise InputError(f"{path} exists already; choose another name or remove it.")
+    if cell is None and cut is None and kerf is None:
+        raise InputError("Nothing was chosen; give a --cell, a --cut or a --kerf.")
+    choices = _choices(directory)
+    own = directory / f"{choices['material']}.toml"
+    base = own if own.is_file() else find_file("materials", str(choices["material"]))
+    values = read_toml(base)
+    values["title"] = title or f"{values['title']}, calibrated"
+    if kerf is not None:
+        values["kerf"] = _mm(parse_length(kerf))
+    if cell is not None:
+        chosen = _labelled(choices["cells"], cell, directory)
+        _take_dashes(values, chosen["perforation"])
+        values["operations"]["perforate"] = _written(chosen["operation"])
+    if cut is not None:
+        chosen = _labelled(choices["squares"], cut, directory)
+        values["operations"]["cut"] = _written(chosen["operation"])
+    said = ", ".join(
+        f"{what} {value}"
+        for what, value in (("flap", cell), ("square", cut), ("kerf", kerf))
+        if value is not None
+    )
+    head = f"# {choices['material']} calibrated on {choices['machine']}: {said}.\n"
+    _write(path, head + _toml(values))
+    try:
+        material = load_material(path)
+        _drawable(material)
+    except ProfileError:
+        path.unlink()
+        raise
+    return path, material
+
+
+def _choices(directory: Path) -> dict[str, Any]:
+    file = directory / CHOICES
+    if not file.is_file():
+        raise InputError(
+            f"{directory} holds no calibration ({CHOICES} is missing); make one with "
+            "'miurafab calibrate'."
+        )
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        if found["schema"] != SCHEMA:
+            raise InputError(f"{file} has schema {found['schema']!r}; this reads '{SCHEMA}'.")
+        return {key: found[key] for key in ("machine", "material", "cells", "squares")}
+    except (ValueError, KeyError, TypeError):
+        raise InputError(f"{file} is damaged; make the calibration again.") from None
+
+
+def _labelled(entries: list[dict[str, Any]], label: str, directory: Path) -> dict[str, Any]:
+    for entry in entries:
+        if entry["label"] == label.upper():
+            return entry
+    raise InputError(
+        f"'{label}' is not on the sheet in {directory}, where there are "
+        f"{entries[0]['label']} to {entries[-1]['label']}."
+    )
+
+
+def _take_dashes(values: dict[str, Any], rule: Mapping[str, Any]) -> None:
+    """Put the dashes of ``rule`` in place of all others, whatever kind of crease they are for."""
+    names = {"cut": "cut_mm", "gap": "gap_mm", "min_end": "min_end_mm"}
+    values["perforation"].update({key: _mm(rule[name]) for key, name in names.items()})
+    for kind in values.get("creases", {}).values():
+        if isinstance(kind, dict):
+            for key in names:
+                kind.pop(key, None)
+
+
+def _mm(length: float) -> str:
+    return f"{length:g}mm"
+
+
+def _written(operation: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "power": operation["power"],
+        "feed": f"{operation['feed_mm_min']:g}mm/min",
+        "passes": operation["passes"],
+    }
+
+
+def _drawable(material: Material) -> None:
+    least = material.kerf_mm + MIN_STROKE_MM
+    if material.perforation.cut_mm < least:
+        raise ProfileError(
+            f"With a kerf of {material.kerf_mm:g} mm, dashes of {material.perforation.cut_mm:g} mm "
+            f"cannot be drawn; choose a cell with dashes of at least {least:g} mm."
+        )
+
+
+def _toml(values: Mapping[str, Any], heads: tuple[str, ...] = ()) -> str:
+    """``values`` as TOML: what stands by itself first, then the tables below."""
+    lines = [
+        f"{key} = {json.dumps(value, ensure_ascii=False)}\n"
+        for key, value in values.items()
+        if not isinstance(value, dict)
+    ]
+    head = f"[{'.'.join(heads)}]\n" if heads and lines else ""
+    parts = [head + "".join(lines)] if lines else []
+    for key, value in values.items():
+        if isinstance(value, dict):
+            parts.append(_toml(value, (*heads, key)))
+    return "\n".join(part for part in parts if part)

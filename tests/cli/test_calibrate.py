@@ -1,0 +1,92 @@
+"""``miurafab calibrate`` and ``miurafab materials add``: from a sheet to a material."""
+
+import json
+
+import pytest
+from command_line import sentence
+
+from miurafab.profiles import load_material
+
+
+@pytest.fixture
+def sheet(run):
+    done = run("calibrate", "--material", "card-250", "-o", "trial", "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_sheet_is_a_job_that_can_be_previewed_and_cut(run, sheet, tmp_path):
+    seen = run("preview", "trial", "--json")
+    assert seen.returncode == 0, seen.stderr
+    (figures,) = json.loads(seen.stdout)["sheets"]
+    assert figures["warnings"] == []
+    assert json.loads(seen.stdout)["remarks"] == []
+    assert figures["seconds"] == pytest.approx(sheet["seconds"], abs=0.1)
+    assert (tmp_path / "trial" / "calibration.pdf").read_bytes().startswith(b"%PDF")
+    layout = json.loads((tmp_path / "trial" / "layout.json").read_text())
+    assert layout["patches"] == []
+    cut = run("cut", "trial", "--dry-run", "--json")
+    assert cut.returncode == 0, cut.stderr
+
+
+def test_what_was_chosen_becomes_a_material(run, sheet, tmp_path):
+    cell = next(entry for entry in sheet["cells"] if entry["label"] == "C4")
+    square = next(entry for entry in sheet["squares"] if entry["label"] == "X3")
+    chosen = ("--cell", "c4", "--cut", "X3", "--kerf", "0.2mm")
+    done = run("materials", "add", "mine", "--from", "trial", *chosen, "--json")
+    assert done.returncode == 0, done.stderr
+    mine, base = load_material(tmp_path / "mine.toml"), load_material("card-250")
+    assert mine.kerf_mm == 0.2
+    assert (mine.perforation.cut_mm, mine.perforation.gap_mm) == (cell["cut_mm"], cell["gap_mm"])
+    assert mine.operations["perforate"].power == cell["power"]
+    assert mine.operations["perforate"].feed_mm_min == cell["feed_mm_min"]
+    assert mine.operations["cut"].power == square["power"]
+    assert mine.operations["cut"].feed_mm_min == square["feed_mm_min"]
+    assert mine.operations["score"] == base.operations["score"]
+    assert mine.tabs == base.tabs
+    again = run("calibrate", "--material", "mine.toml", "-o", "second")
+    assert again.returncode == 0, again.stderr
+    assert (tmp_path / "second" / "mine.toml").is_file()
+    third = run("materials", "add", "third", "--from", "second", "--cell", "B1", "--quiet")
+    assert third.returncode == 0, third.stderr
+    assert load_material(tmp_path / "third.toml").kerf_mm == 0.2
+
+
+def test_what_is_finer_for_one_kind_of_crease_gives_way_to_the_choice(run, tmp_path):
+    import miurafab.profiles as profiles
+
+    text = (profiles.shipped_directory("materials") / "card-250.toml").read_text()
+    (tmp_path / "own.toml").write_text(text + '\n[creases.valley]\ncut = "2mm"\nfit = "centre"\n')
+    run("calibrate", "--material", tmp_path / "own.toml", "-o", "trial")
+    run("materials", "add", "mine", "--from", "trial", "--cell", "B2")
+    mine = load_material(tmp_path / "mine.toml")
+    assert mine.perforation_of("valley") == mine.perforation
+
+
+def test_wrong_choices_are_one_sentence(run, sheet, tmp_path):
+    (tmp_path / "there.toml").write_text("")
+    (tmp_path / "empty").mkdir()
+    for arguments, named in (
+        (("mine", "--from", "trial", "--cell", "Z9"), "there are A1 to"),
+        (("mine", "--from", "trial", "--cut", "B1"), "there are X1 to"),
+        (("mine", "--from", "trial"), "Nothing was chosen"),
+        (("mine", "--from", "empty", "--cell", "A1"), "holds no calibration"),
+        (("there", "--from", "trial", "--cell", "A1"), "exists already"),
+        (("my card", "--from", "trial", "--cell", "A1"), "cannot name a material"),
+        (("mine", "--from", "trial", "--kerf", "3mm"), "between 0 and 2"),
+        (("mine", "--from", "trial", "--cell", "A1", "--kerf", "0.9mm"), "cannot be drawn"),
+    ):
+        assert named in sentence(run("materials", "add", *arguments), 2)
+        assert not (tmp_path / "mine.toml").exists()
+
+
+def test_materials_still_lists_and_shows(run):
+    listed = json.loads(run("materials", "--json").stdout)
+    assert "card-250" in [entry["name"] for entry in listed["materials"]]
+    assert json.loads(run("materials", "card-250", "--json").stdout)["name"] == "card-250"
+    assert json.loads(run("materials", "--json", "card-250").stdout)["name"] == "card-250"
+    assert "not a known material" in sentence(run("materials", "card-25"), 2)
+
+
+def test_a_machine_without_a_laser_is_refused(run):
+    assert "laser" in sentence(run("calibrate", "--machine", "hpgl-cutter-a3", "-o", "x"), 2)

@@ -1,0 +1,134 @@
+"""The calibration sheet: every label stands for what is burnt beside it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import shapely
+from flat_patterns import bed, card
+
+from miurafab.errors import LayoutError, ProfileError
+from miurafab.fabrication.calibration import STRIPS, calibration_sheet, gauge_mark
+from miurafab.gcode.program import parse_program, strokes
+from miurafab.posting.sections import post_sections
+from miurafab.profiles import OPERATIONS, load_machine, load_material, shipped_names
+
+LASERS = [
+    name for name in shipped_names("firmware_profiles") if load_machine(name).tool.kind == "laser"
+]
+MATERIALS = shipped_names("materials")
+
+
+def burnt(machine, sheet):
+    """(operation, patch, S, F, points) of each stroke, from the G-code alone."""
+    job = post_sections(sheet.sections, machine, patch_labels=sheet.labels)
+    program = parse_program(job, inline=machine.dialect == "marlin")
+    made = strokes(program)
+    found = []
+    for number, move in enumerate(made.first_move.tolist()):
+        context = program.contexts[program.context[move]]
+        points = made.points[made.offsets[number] : made.offsets[number + 1], :2]
+        power, feed = float(program.power[move]), float(program.feed_mm_min[move])
+        found.append((context.operation, context.patch, power, feed, points))
+    return found
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("laser", ["grbl-laser-400", "grbl09-laser-300", "fluidnc-laser-600"])
+def test_each_stroke_carries_the_power_and_feed_of_its_label(laser, material):
+    machine, stock = load_machine(laser), load_material(material)
+    sheet = calibration_sheet(machine, stock)
+    cells = {cell.label: cell for cell in sheet.cells}
+    squares = {square.label: square for square in sheet.squares}
+    drawn = burnt(machine, sheet)
+    assert len(drawn) == sum(
+        int(stock.operations[OPERATIONS[code]].passes)
+        for toolpath, _ in sheet.sections
+        for code in toolpath.operation
+    )
+    tried = dict.fromkeys([*cells, *squares], 0)
+    for operation, patch, power, feed, _ in drawn:
+        wanted = stock.operations[operation]
+        if operation == "perforate" and patch in cells:
+            wanted = cells[patch].operation
+            tried[patch] += 1
+        if patch in squares:
+            wanted = squares[patch].operation
+            tried[patch] += 1
+        assert power == machine.power_to_s(wanted.power)
+        assert feed == pytest.approx(wanted.feed_mm_min)
+    assert all(tried.values())
+
+
+@pytest.mark.parametrize("laser", LASERS)
+def test_it_fits_every_shipped_laser_or_says_what_it_needs(laser):
+    machine = load_machine(laser)
+    sheet = calibration_sheet(machine, load_material("card-250"))
+    points, margin = sheet.toolpath.points, machine.bed.margin_mm
+    assert (points >= margin - 1e-9).all()
+    assert (points <= [sheet.width_mm - margin, sheet.height_mm - margin]).all()
+    assert sheet.width_mm <= machine.bed.width_mm
+    assert sheet.height_mm <= machine.bed.height_mm
+
+
+def test_the_dashes_of_a_flap_are_those_of_its_row_and_no_two_flaps_are_alike():
+    stock = card()
+    sheet = calibration_sheet(bed(400, 400), stock)
+    whole = sheet.toolpath
+    settings = set()
+    for number, cell in enumerate(sheet.cells):
+        mine = (whole.patch == number) & (whole.operation == OPERATIONS.index("perforate"))
+        inner = np.sort(whole.lengths[mine])[::-1][: mine.sum() - 2]
+        np.testing.assert_allclose(inner + stock.kerf_mm, cell.perforation.cut_mm, atol=1e-9)
+        settings.add((cell.perforation, cell.operation))
+        assert cell.operation.power <= stock.max_power
+    assert len(settings) == len(sheet.cells) >= 20
+
+
+@pytest.mark.parametrize("kerf", [0.0, 0.08, 0.15, 0.37])
+def test_the_gauge_reads_the_kerf_that_is_burnt(kerf):
+    sheet = calibration_sheet(bed(400, 400), card())
+    path, _ = sheet.sections[-1]
+    lines = [path.stroke(n) for n in range(STRIPS)]
+    window = shapely.box(*shapely.LineString(lines[-1]).bounds)
+    low, _, high, _ = window.bounds
+    burn = shapely.union_all(
+        [shapely.LineString(line).buffer(kerf / 2 + 1e-9, cap_style="square") for line in lines]
+    )
+    strips = [part for part in window.difference(burn).geoms if part.area > 1]
+    assert len(strips) == STRIPS
+    widths = [part.bounds[2] - part.bounds[0] for part in strips]
+    ends = low - kerf / 2 + sum(widths)
+    assert high - ends == pytest.approx(gauge_mark(kerf), abs=1e-6)
+
+
+def test_nothing_but_the_sheet_itself_touches_a_caption():
+    whole = calibration_sheet(bed(400, 400), card()).toolpath
+    lines = [shapely.LineString(whole.stroke(n)) for n in range(len(whole))]
+    text = [line for line, code in zip(lines, whole.operation, strict=True) if code == 0]
+    other = [line for line, code in zip(lines, whole.operation, strict=True) if code != 0]
+    near = shapely.STRtree(other).query(text, predicate="dwithin", distance=0.2)
+    assert near.shape[1] == 0
+
+
+def test_a_bed_too_small_and_a_knife_are_refused():
+    with pytest.raises(LayoutError, match=r"needs 2\d\d mm x \d+ mm or .* is 90 mm x 90 mm"):
+        calibration_sheet(bed(100, 100), card())
+    with pytest.raises(ProfileError, match="knife"):
+        calibration_sheet(load_machine("grbl-knife-a3"), card())
+
+
+def test_what_is_scored_is_scored_on_the_coupon():
+    stock = card()
+    creases = {
+        **stock.creases,
+        "valley": dataclasses.replace(stock.creases["valley"], mode="score"),
+    }
+    sheet = calibration_sheet(bed(400, 400), dataclasses.replace(stock, creases=creases))
+    whole = sheet.toolpath
+    scored = np.unique(whole.edge[whole.operation == OPERATIONS.index("score")])
+    assert set(scored.tolist()) == set(
+        np.flatnonzero(sheet.coupon.edges_assignment == "V").tolist()
+    )
