@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.cli.sheets import MachineOption
 from miurafab.units import parse_feed, parse_length
 
 if TYPE_CHECKING:
@@ -164,6 +166,53 @@ def jog(
         baud=baud,
     )
     _stands(Console(as_json, quiet), report)
+
+
+@app.command()
+def frame(
+    thing: Annotated[str, typer.Argument(help="A job directory or a G-code file.")],
+    port: PortOption,
+    sheet: Annotated[int, typer.Option(help="The sheet of a job directory, from 1.")] = 1,
+    pointer: Annotated[
+        float, typer.Option(help="Power in percent, 5 at most; 0 keeps the beam off.")
+    ] = 0.0,
+    machine: MachineOption = None,
+    home: Annotated[bool, typer.Option("--home", help="Home the machine first.")] = False,
+    at: Annotated[
+        str | None, typer.Option(help="Where the head stands, in the job's coordinates.")
+    ] = None,
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Trace the box around what a sheet burns, with the beam off or as a pointer."""
+    import miurafab
+    from miurafab.cli.cut import parse_point
+    from miurafab.workflow import cut_sheets
+
+    prepared = miurafab.prepare(thing, machine=machine)
+    options = cut_sheets.CutOptions(
+        home=home, at=None if at is None else parse_point(at), pointer=pointer / 100
+    )
+    cut_sheets.frame(prepared, sheet, port=port, options=options)
+    Console(as_json, quiet).answer(
+        {
+            "sheet": prepared.dry_runs[sheet - 1].name,
+            "bounds_mm": prepared.dry_runs[sheet - 1].bounds_mm,
+            "pointer_percent": pointer,
+        }
+    )
+
+
+@app.command()
+def console(port: PortOption, baud: BaudOption = 115_200) -> None:
+    """Talk to the controller line by line, until the end of the input (Ctrl-D).
+
+    ?, ! and ~ alone on a line are sent at once, 'reset' resets. The controller is reset at the
+    end unless it stands idle with the beam off.
+    """
+    from miurafab.machine import actions
+
+    actions.talk(port, sys.stdin, lambda line: print(line, flush=True), baud=baud)
 
 
 def _stands(console: Console, report: StatusReport) -> None:

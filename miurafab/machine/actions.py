@@ -6,16 +6,17 @@ that move the machine reset it first on every way out but success, as the sender
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from miurafab.errors import ControllerError, InputError, JobStopped, ProfileError
+from miurafab.errors import ControllerError, GcodeError, InputError, JobStopped, ProfileError
+from miurafab.gcode.job import prepare_lines
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Options, StatusReport, Version
 from miurafab.grbl.settings import Settings, parse_dump
-from miurafab.machine.session import Session
+from miurafab.machine.session import HOMING_S, Session
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import BAUD, open_port
 
@@ -189,3 +190,49 @@ def jog(
             if status.state != "Jog":
                 raise ControllerError(f"The jog ended in state {status.state}.")
             session.pause(_POLL_S)
+
+
+def talk(
+    port: str,
+    lines: Iterable[str],
+    tell: Callable[[str], None],
+    *,
+    baud: int = BAUD,
+    settings: Mapping[int, float] | None = None,
+) -> None:
+    """Send ``lines`` one at a time as they come, and ``tell`` what the controller answers.
+
+    ``?``, ``!`` and ``~`` alone on a line are the realtime bytes, ``reset`` is a soft reset. A
+    refused line is told and does not end the conversation. At the end, and on every way out, the
+    controller is reset unless it stands idle with the beam off.
+    """
+    with conversation(port, baud=baud, settings=settings, moves=True) as session:
+        heard = bytearray()
+
+        def hear(data: bytes) -> None:
+            heard.extend(data)
+            while b"\n" in heard:
+                line, _, rest = heard.partition(b"\n")
+                heard[:] = rest
+                if line.strip():
+                    tell(line.decode("ascii", "backslashreplace").strip())
+
+        session.on_data = hear
+        for line in lines:
+            text = line.strip()
+            try:
+                if text in _REALTIME:
+                    session.write(session.connection.send_realtime(_REALTIME[text]))
+                    session.pause(_POLL_S)
+                elif text:
+                    bare = next(prepare_lines("The console", [text]), None)
+                    if bare is not None:
+                        session.command(bare.data.decode("ascii"), HOMING_S)
+            except (ControllerError, GcodeError) as error:
+                tell(str(error))
+        status = session.wait_status()
+        if status.beam_on or status.state != "Idle":
+            session.stop()
+
+
+_REALTIME = {"?": b"?", "!": b"!", "~": b"~", "reset": b"\x18"}

@@ -41,6 +41,7 @@ class Session:
     """A conversation over ``transport``; mutable, for one thread.
 
     ``check`` is called before every read: it raises what should interrupt the conversation.
+    ``on_data`` is called with all that arrives, as it came.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class Session:
         self.work_offset: tuple[float, ...] | None = None
         self.feed_override = 100
         self.heard = 0.0
+        self.on_data: Callable[[bytes], None] = lambda data: None
         self._transport = transport
         self._transcript = transcript
         self._check = check
@@ -104,6 +106,7 @@ class Session:
         self.heard = self.now()
         if self._transcript is not None:
             self._transcript.came(self.heard, data)
+        self.on_data(data)
         self.connection.receive_data(data)
         events = list(self.connection.events())
         for event in events:

@@ -134,3 +134,63 @@ def test_a_pattern_that_is_not_valid_is_not_cut(run, job, tmp_path):
     assert answer["status"] == "refused"
     assert "not the same flat and folded" in answer["advice"]
     assert not (tmp_path / "jobs" / "torn").exists()
+
+
+def test_a_dry_run_opens_no_port_and_names_what_it_refuses(run, job, tmp_path):
+    done = run("cut", "job", "--dry-run", "--json")
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert answer["status"] == "ready"
+    assert answer["sheets"][0]["cut_mm"] > 100
+    assert not (job / "sheet-01.journal").exists()
+    (tmp_path / "bad.nc").write_text("G1 F600 X1\nM3 S1200\nG4 P1\nG1 X900\nM5\n")
+    done = run("cut", "bad.nc", "--dry-run", "--json")
+    assert done.returncode == 1
+    named = [finding["check"] for finding in json.loads(done.stdout)["findings"]]
+    assert named == ["m3", "bounds", "dwell", "power"]
+    assert "--dry-run" in sentence(run("cut", "job", "--quiet"), 2)
+
+
+def test_an_interrupted_sheet_is_resumed_from_its_journal(run, job):
+    whole = json.loads(run("cut", "job/sheet-01.nc", "--port", "virtual", "--json").stdout)
+    journal = job / "sheet-01.journal"
+    assert '"ended": "done"' in journal.read_text()
+    assert "interrupted" in sentence(
+        run("cut", "job", "--port", "virtual", "--resume", "--at", "0,0", "--quiet"), 2
+    )
+    # What a power loss leaves: a journal that breaks off.
+    head, _, rest = journal.read_text().lstrip().partition("\n")
+    cut_off = [line for line in rest.splitlines() if '"taken"' in line][3]
+    journal.write_text(f"\n{head}\n{cut_off}\n")
+    arguments = ("cut", "job", "--port", "virtual", "--resume")
+    assert "--at 0,0" in sentence(run(*arguments, "--quiet"), 2)
+    done = run(*arguments, "--at", "0,0", "--json")
+    assert done.returncode == 0, done.stderr
+    (sheet,) = json.loads(done.stdout)["sheets"]
+    assert "goes on at stroke" in sheet["resumed"]
+    assert "may be burnt twice" in sheet["resumed"]
+    assert 0 < sheet["seconds"] < whole["sheets"][0]["seconds"]
+
+
+def test_machines_share_the_sheets_and_one_failing_hurts_no_other(run, job):
+    layout = json.loads((job / "layout.json").read_text())
+    (first,) = layout["sheets"]
+    layout["sheets"] += [{**first, "name": f"sheet-0{n}", "placements": []} for n in (2, 3)]
+    (job / "layout.json").write_text(json.dumps(layout))
+    for n in (2, 3):
+        (job / f"sheet-0{n}.nc").write_bytes((job / "sheet-01.nc").read_bytes())
+    done = run("cut", "job", "--port", "virtual", "--port", "/dev/no-such-port", "--json")
+    assert done.returncode == 3
+    answer = json.loads(done.stdout)
+    failed = [sheet for sheet in answer["sheets"] if not sheet["done"]]
+    assert [sheet["port"] for sheet in failed] == ["/dev/no-such-port"]
+    assert "/dev/no-such-port" in failed[0]["why"]
+    assert sum(sheet["port"] == "virtual" for sheet in answer["sheets"]) == 2
+
+
+def test_a_frame_is_traced(run, job):
+    done = run("machine", "frame", "job", "--port", "virtual", "--pointer", "2", "--json")
+    assert done.returncode == 0, done.stderr
+    assert len(json.loads(done.stdout)["bounds_mm"]) == 4
+    refused = run("machine", "frame", "job", "--port", "virtual", "--pointer", "9", "--quiet")
+    assert "could burn" in sentence(refused, 2)
