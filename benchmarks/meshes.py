@@ -298,7 +298,7 @@ def main() -> None:
         print(
             f"{name:14} {'yes' if a['fitted'] else 'no':6} {a.get('residual', np.nan):9.1e} "
             f"{100 * a.get('deviation', np.nan):8.2f}% {a.get('attempts', 0):5} "
-            f"{a['seconds']:6.1f}  {a.get('place') or a['why']}",
+            f"{a['seconds']:6.1f}  {a['why']}",
             flush=True,
         )
     fitted = sum(a["fitted"] for a in answers)
