@@ -1,0 +1,255 @@
+"""How long a large pattern takes on its way to sheets, and how near the result is to its bounds.
+
+    python benchmarks/layout.py [fan miura] [--facets 100000] [--vpype 2000] [--json FILE]
+
+Both patterns lie on beds of 600 x 400 mm with a margin of 5 mm: a curved fan with facets of about
+11 mm and a regular Miura-ori with facets of about 10 mm, in card with tabs of 7 mm.
+
+The bound of the patches is the area of the pattern over that of the usable bed, without tabs. The
+bound of the travel between dashes is half the sum of the ways from each end of a dash to the
+nearest place on another: no order of the dashes can do with less, and hardly any comes near.
+With vpype installed, its linesort is given the dashes of as many sheets as hold --vpype of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from miurafab.fabrication import sheets
+from miurafab.fabrication.drawing.dxf import sheet_dxf
+from miurafab.fabrication.drawing.svg import sheet_svg
+from miurafab.fabrication.ordering import travel_bound
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.geometry.quads import QuadGrid
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import OPERATIONS, load_machine, load_material
+
+BED_MM, MARGIN_MM = (600.0, 400.0), 5.0
+STAGES = {
+    "make_pieces": "patches and tabs",
+    "nest": "nesting",
+    "place_texts": "lettering",
+    "sheet_strokes": "perforation",
+    "order_strokes": "ordering",
+}
+LIMITS = {"patches and tabs": 20.0, "perforation": 5.0, "ordering": 5.0, "SVG": 10.0, "DXF": 10.0}
+
+
+def pattern_of(points: np.ndarray) -> CreasePattern:
+    """The pattern of a vertex grid (rows, columns, 2): column lines alternate as a whole, row lines
+    from segment to segment, as in a Miura-ori.
+    """
+    rows, columns = points.shape[:2]
+    grid = QuadGrid(columns, rows)
+    edges = grid.edges_vertices
+    row, column = np.divmod(edges.min(axis=1), columns)
+    along = np.abs(edges[:, 1] - edges[:, 0]) == 1
+    kinds = np.where((np.where(along, row + column, column) % 2) == 0, "M", "V")
+    border = np.where(
+        along, (row == 0) | (row == rows - 1), (column == 0) | (column == columns - 1)
+    )
+    kinds = np.where(border, "B", kinds)
+    index = np.arange(rows * columns).reshape(rows, columns)
+    corners = (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
+    return CreasePattern(
+        vertices_coords=points.reshape(-1, 2),
+        edges_vertices=edges,
+        edges_assignment=kinds,
+        edges_fold_angle=np.select([kinds == "M", kinds == "V"], [-2.0, 2.0], 0.0),
+        faces_vertices=np.stack(corners, axis=-1).reshape(-1, 4),
+        grid=(columns, rows),
+    )
+
+
+def fan(columns: int, rows: int) -> CreasePattern:
+    """Row lines are arcs about one centre, column lines zig-zag across them."""
+    cell, radius, skew = 11.0, 2000.0, 0.35
+    i, j = np.indices((rows + 1, columns + 1))
+    angle = np.pi / 2 + cell / (radius + 0.5 * rows * cell) * (columns / 2 - j - skew * (i % 2))
+    away = radius + i * cell
+    return pattern_of(np.stack([away * np.cos(angle), away * np.sin(angle)], axis=-1))
+
+
+def miura(columns: int, rows: int) -> CreasePattern:
+    """Parallelograms with sides of 10 mm and an acute angle of 67 degrees."""
+    side, acute = 10.0, math.radians(67)
+    i, j = np.indices((rows + 1, columns + 1))
+    x = j * side + (i % 2) * side * math.cos(acute)
+    return pattern_of(np.stack([x, i * side * math.sin(acute)], axis=-1))
+
+
+PATTERNS = {"fan": fan, "miura": miura}
+
+
+def measure(name: str, facets: int) -> tuple[dict[str, Any], tuple[Toolpath, ...]]:
+    """The times of all stages in seconds, and what came of them."""
+    columns = round(math.sqrt(1.6 * facets))
+    pattern = PATTERNS[name](columns, round(facets / columns))
+    machine = load_machine("fluidnc-laser-600")
+    bed = replace(machine.bed, width_mm=BED_MM[0], height_mm=BED_MM[1], margin_mm=MARGIN_MM)
+    seconds = dict.fromkeys(STAGES.values(), 0.0)
+    kept = {stage: getattr(sheets, stage) for stage in STAGES}
+    for stage, title in STAGES.items():
+        setattr(sheets, stage, _timed(kept[stage], title, seconds))
+    try:
+        started = time.perf_counter()
+        layout = sheets.lay_out(pattern, replace(machine, bed=bed), load_material("card-250"))
+        seconds["all of the layout"] = time.perf_counter() - started
+    finally:
+        for stage, function in kept.items():
+            setattr(sheets, stage, function)
+    for title, draw in (("SVG", sheet_svg), ("DXF", sheet_dxf)):
+        started = time.perf_counter()
+        size = sum(len(draw(path)) for path in layout.toolpaths)
+        seconds[title] = time.perf_counter() - started
+        print(f"  {title} {size / 1e6:.1f} MB", file=sys.stderr)
+    usable = (BED_MM[0] - 2 * MARGIN_MM) * (BED_MM[1] - 2 * MARGIN_MM)
+    corners = pattern.vertices_coords[pattern.faces_vertices]
+    x, y = corners[..., 0], corners[..., 1]
+    area = abs((x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum()) / 2
+    dashes = [_only(path, "perforate") for path in layout.toolpaths]
+    totals = layout.totals
+    return {
+        "pattern": name,
+        "facets": len(pattern.faces_vertices),
+        "seconds": seconds,
+        "patches": totals.patches,
+        "patch_bound": area / usable,
+        "sheets": totals.sheets,
+        "seam_m": totals.seam_mm / 1000,
+        "tabs": totals.tabs,
+        "untabbed": len(layout.untabbed),
+        "unlettered": layout.unlettered,
+        "density": totals.density,
+        "dashes": sum(len(each) for each in dashes),
+        "perforate_travel_m": sum(each.travel_mm for each in dashes) / 1000,
+        "perforate_bound_m": sum(travel_bound(each) for each in dashes) / 1000,
+        "megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }, layout.toolpaths
+
+
+def _timed(
+    function: Callable[..., Any], title: str, seconds: dict[str, float]
+) -> Callable[..., Any]:
+    def call(*arguments: Any, **named: Any) -> Any:
+        started = time.perf_counter()
+        try:
+            return function(*arguments, **named)
+        finally:
+            seconds[title] += time.perf_counter() - started
+
+    return call
+
+
+def _only(path: Toolpath, operation: str) -> Toolpath:
+    keep = path.operation == OPERATIONS.index(operation)
+    size = np.diff(path.offsets)
+    return replace(
+        path,
+        points=path.points[np.repeat(keep, size)],
+        offsets=np.concatenate([[0], np.cumsum(size[keep])]),
+        operation=path.operation[keep],
+        patch=path.patch[keep],
+        edge=path.edge[keep],
+    )
+
+
+def against_vpype(paths: tuple[Toolpath, ...], least: int) -> dict[str, Any] | None:
+    """The travel in mm of the dashes of some sheets, ours and after vpype's linesort; None where
+    vpype is not installed.
+    """
+    vpype = shutil.which("vpype")
+    if vpype is None:
+        return None
+    found = {"dashes": 0, "ours_mm": 0.0, "vpype_mm": 0.0, "vpype_seconds": 0.0, "bound_mm": 0.0}
+    for path in paths:
+        dashes = _only(path, "perforate")
+        with tempfile.TemporaryDirectory() as folder:
+            raw, done = Path(folder, "raw.svg"), Path(folder, "sorted.svg")
+            raw.write_text(sheet_svg(dashes), encoding="utf-8")
+            started = time.perf_counter()
+            command = [vpype, "read", str(raw), "linesort", "write", str(done)]
+            subprocess.run(command, check=True, capture_output=True)
+            found["vpype_seconds"] += time.perf_counter() - started
+            found["vpype_mm"] += _svg_travel(done, path.height_mm)
+        found["ours_mm"] += dashes.travel_mm
+        found["bound_mm"] += travel_bound(dashes)
+        found["dashes"] += len(dashes)
+        if found["dashes"] >= least:
+            break
+    return found
+
+
+def _svg_travel(file: Path, height: float) -> float:
+    """The travel of the strokes of an SVG in the order of the file, from the lower left corner."""
+    from svgelements import SVG, Shape
+
+    ends = []
+    for shape in SVG.parse(str(file), ppi=25.4).elements():
+        if isinstance(shape, Shape):
+            whole = list(abs(shape.segments()) if callable(shape.segments) else shape)
+            points = [(each.x, height - each.y) for s in whole for each in (s.start, s.end) if each]
+            if points:
+                ends.append((points[0], points[-1]))
+    places = np.array([[(0.0, 0.0), (0.0, 0.0)], *ends, [(0.0, 0.0), (0.0, 0.0)]])
+    return float(np.linalg.norm(places[1:, 0] - places[:-1, 1], axis=1).sum())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("patterns", nargs="*", default=sorted(PATTERNS), metavar="fan|miura")
+    parser.add_argument("--facets", type=int, default=100_000)
+    parser.add_argument("--vpype", type=int, default=2000, help="dashes given to vpype, about")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    rows = []
+    for name in options.patterns:
+        row, paths = measure(name, options.facets)
+        row["vpype"] = against_vpype(paths, options.vpype)
+        rows.append(row)
+        _show(row)
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
+
+
+def _show(row: dict[str, Any]) -> None:
+    print(f"{row['pattern']}, {row['facets']:,} facets, {row['megabytes']:.0f} MB at most")
+    for title, seconds in row["seconds"].items():
+        limit = f"   (limit {LIMITS[title]:.0f} s)" if title in LIMITS else ""
+        print(f"  {title:20s}{seconds:9.2f} s{limit}")
+    bound = row["patch_bound"]
+    print(
+        f"  {row['patches']} patches, {row['patches'] / math.ceil(bound):.3f} times the bound of "
+        f"{math.ceil(bound)}; {row['sheets']} sheets, {row['density']:.0%} of them used\n"
+        f"  {row['seam_m']:.1f} m of seams, {row['tabs']:,} tabs, {row['untabbed']} seam edges "
+        f"without, {row['unlettered']} texts without room\n"
+        f"  {row['dashes']:,} dashes, {row['perforate_travel_m']:.2f} m of travel between them, "
+        f"{row['perforate_travel_m'] / row['perforate_bound_m']:.4f} times the bound"
+    )
+    other = row["vpype"]
+    if other is None:
+        print("  vpype is not installed: no comparison")
+    else:
+        print(
+            f"  {other['dashes']:,} of the dashes: {other['ours_mm']:.0f} mm of travel, vpype "
+            f"linesort {other['vpype_mm']:.0f} mm in {other['vpype_seconds']:.1f} s, bound "
+            f"{other['bound_mm']:.0f} mm"
+        )
+
+
+if __name__ == "__main__":
+    main()
