@@ -1,0 +1,117 @@
+"""What may be asked of a layout, from a file or the command line."""
+
+from __future__ import annotations
+
+import pytest
+
+import miurafab
+from miurafab.errors import InputError, ProfileError
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.profiles import load_material, shipped_directory
+from miurafab.profiles.material import Crease, Perforation
+
+
+def test_nothing_asked_is_the_usual():
+    assert miurafab.layout_options({}) == LayoutOptions()
+
+
+def test_every_option_is_read():
+    options = miurafab.layout_options(
+        {
+            "gap": "3mm",
+            "max_patch": "10cm x 300",
+            "seam_rows": "7, 3",
+            "seam_columns": 4,
+            "tab_height": "5mm",
+            "tab_inset": "0.5mm",
+            "tab_side": "alternate",
+            "full_facet": True,
+            "two_sided": True,
+            "bridges": 3,
+            "bridge": "0.4mm",
+            "spread_heat": True,
+        }
+    )
+    assert options == LayoutOptions(
+        gap_mm=3.0,
+        max_patch_mm=(300.0, 100.0),
+        seam_rows=(3, 7),
+        seam_columns=(4,),
+        tab_height_mm=5.0,
+        tab_inset_mm=0.5,
+        tab_side="alternate",
+        full_facet=True,
+        two_sided=True,
+        bridges=3,
+        bridge_mm=0.4,
+        spread_heat=True,
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ({"gapp": "2mm"}, "'gapp' is not a known key; did you mean 'gap'"),
+        ({"max_patch": "300mm"}, "'max_patch' is '300mm'; write two lengths"),
+        ({"max_patch": "300mm x 0"}, "both sides must be longer than 0"),
+        ({"seam_rows": "0"}, "'seam_rows' is '0'; write line numbers from 1 up"),
+        ({"tab_side": "left"}, "it must be one of lower, upper, alternate"),
+        ({"bridges": 1}, "'bridges' is 1, on which a piece would swing"),
+    ],
+)
+def test_a_wrong_option_is_refused_by_name(given, complaint):
+    with pytest.raises(InputError, match=complaint):
+        miurafab.layout_options(given)
+
+
+def test_options_of_a_design_file_give_way_to_those_of_the_command_line(tmp_path):
+    file = tmp_path / "x.toml"
+    file.write_text('[layout]\nmachine = "m"\ngap = "4mm"\nbridges = 2\n')
+    options = miurafab.layout_options({"gap": "1mm"}, file)
+    assert options == LayoutOptions(gap_mm=1.0, bridges=2)
+
+
+def with_creases(tmp_path, text, perforation=""):
+    whole = (shipped_directory("materials") / "card-250.toml").read_text()
+    whole = whole.replace("[perforation]", f"[perforation]\n{perforation}")
+    file = tmp_path / "own.toml"
+    file.write_text(f"{whole}\n{text}")
+    return load_material(file)
+
+
+def test_a_material_says_how_each_kind_of_crease_is_made(tmp_path):
+    material = with_creases(
+        tmp_path,
+        '[creases]\nrelief_hole = "0.5mm"\n'
+        '[creases.valley]\nmode = "score"\n'
+        '[creases.tab]\ncut = "2mm"\nfit = "stretch_gap"\n',
+        'start_end = "cut"',
+    )
+    assert material.relief_hole_mm == 0.5
+    usual = Perforation(1.2, 0.8, 0.6, 0.5, start_end="cut")
+    assert material.perforation == usual
+    own = Perforation(2.0, 0.8, 0.6, 0.5, start_end="cut", fit="stretch_gap")
+    assert material.creases == {
+        "mountain": Crease(),
+        "valley": Crease("score"),
+        "tab": Crease("perforate", own),
+    }
+    assert material.perforation_of("tab") == own
+    assert material.perforation_of("mountain") == usual
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        (
+            '[creases.mountin]\nmode = "cut"',
+            "'mountin' is not a known key",
+        ),
+        ('[creases.valley]\nmode = "burn"', "it must be one of perforate, score, cut, none"),
+        ('[creases.valley]\nmode = "cut"\nend_bridge = 0', "would part the sheet"),
+        ('[creases]\nrelief_hole = "0.2mm"', "it must be 0 or at least 0.25 mm"),
+    ],
+)
+def test_a_wrong_crease_table_is_refused_by_name(tmp_path, text, complaint):
+    with pytest.raises(ProfileError, match=complaint):
+        with_creases(tmp_path, text)
