@@ -10,13 +10,16 @@ share with what lies on a sheet, for all positions at once, is a correlation of 
 product of Fourier transforms; positions where it is 0 are free. Parts come by size, on the first
 sheet with a free position, at the one that a rule prefers. Several orders and rules are tried, and
 the fewest sheets win. Nothing is random and no clock is read: the same input gives the same layout.
+
+Off-cuts are used before whole sheets. One is any part of the bed, with holes where it has defects;
+the cells that it lacks are taken from the beginning, so that half a gap is kept from them too.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -36,25 +39,29 @@ _TOLERANCE = 1e-6
 @dataclass(frozen=True)
 class Slot:
     """Where an outline goes: turned counter-clockwise by ``rotation_deg`` about its origin, then
-    moved by (``x_mm``, ``y_mm``) on the usable bed of ``sheet``, from 0.
+    moved by (``x_mm``, ``y_mm``) on the usable bed of ``sheet``, from 0. ``offcut`` is the number
+    of the off-cut that this sheet is, -1 for a whole one.
     """
 
     sheet: int
     x_mm: float
     y_mm: float
     rotation_deg: int
+    offcut: int = -1
 
 
 @dataclass(frozen=True)
 class Stock:
     """What the outlines go on: the usable size in mm, the gap kept between outlines, and the
-    rotations in degrees, multiples of 90, that the material allows.
+    rotations in degrees, multiples of 90, that the material allows. There are as many whole sheets
+    as it takes, and one of each of the ``offcuts``: what can be used of it, placed on the bed.
     """
 
     width: float
     height: float
     gap: float
     rotations: tuple[int, ...]
+    offcuts: tuple[shapely.Polygon, ...] = ()
 
 
 Engine = Callable[[Sequence[NDArray[np.float64]], Stock], list[Slot]]
@@ -65,7 +72,7 @@ def nest(
 ) -> list[Slot]:
     """A slot for each outline (n, 2), a closed curve in mm without its repeated first point.
 
-    Each outline must fit the stock at one of its rotations. Raises
+    Each outline must fit a whole sheet at one of its rotations. Raises
     :class:`~miurafab.errors.LayoutError` if one does not, or if the engine's layout is wrong.
     """
     for number, outline in enumerate(outlines):
@@ -117,6 +124,13 @@ def layout_faults(
             faults.append(f"patch {number} is turned by {slot.rotation_deg} degrees")
         if low_x < bed[0] or low_y < bed[1] or high_x > bed[2] or high_y > bed[3]:
             faults.append(f"patch {number} lies outside the usable bed")
+        if slot.offcut >= 0 and not stock.offcuts[slot.offcut].buffer(_TOLERANCE).covers(shape):
+            faults.append(f"patch {number} lies outside off-cut {slot.offcut + 1}")
+    pairs = {(slot.sheet, slot.offcut) for slot in slots}
+    sheets, offcuts = zip(*pairs, strict=True) if pairs else ((), ())
+    taken = [offcut for offcut in offcuts if offcut >= 0]
+    if len(set(sheets)) < len(pairs) or len(set(taken)) < len(taken):
+        faults.append("an off-cut is used for two sheets, or a sheet is two off-cuts")
     tree = shapely.STRtree(shapes)
     near = tree.query(shapes, predicate="dwithin", distance=stock.gap - _TOLERANCE)
     for one, other in near.T.tolist():
@@ -167,6 +181,17 @@ class _Raster:
         transform = np.conj(scipy.fft.rfft2(cells.astype(np.float32), self.cells))
         return _Mask(rotation, cells, transform, (-float(low[0]), -float(low[1])))
 
+    def lacking(self, offcut: shapely.Polygon) -> NDArray[np.bool_]:
+        """The cells that touch what ``offcut`` lacks of the usable bed."""
+        bed = shapely.box(0.0, 0.0, self.stock.width, self.stock.height)
+        reach = np.hypot(*self.cell) / 2
+        lost = shapely.buffer(bed.difference(offcut), reach * 1.003, quad_segs=16)
+        rings = [
+            shapely.get_coordinates(ring) for ring in shapely.get_rings(shapely.get_parts(lost))
+        ]
+        half = self.stock.gap / 2
+        return _scan([(ring + half) / self.cell for ring in rings], np.array(self.cells))
+
 
 def _scan(rings: list[NDArray[np.float64]], count: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which cells' centres lie inside ``rings`` given in units of cells, by even-odd crossings."""
@@ -188,11 +213,13 @@ def _scan(rings: list[NDArray[np.float64]], count: NDArray[np.int64]) -> NDArray
 class _Sheet:
     """The cells taken on one sheet, and how many are free."""
 
-    def __init__(self, raster: _Raster) -> None:
+    def __init__(self, raster: _Raster, lacking: NDArray[np.bool_] | None = None) -> None:
         self.raster = raster
         self.taken = np.zeros(raster.cells, dtype=np.float32)
+        if lacking is not None:
+            self.taken += lacking
         self.transform = scipy.fft.rfft2(self.taken)
-        self.free = self.taken.size
+        self.free = int(self.taken.size - np.count_nonzero(self.taken))
 
     def best(self, mask: _Mask, weights: tuple[float, float]) -> tuple[float, int, int] | None:
         """The free position of ``mask`` whose far corner is least by ``weights``, if any."""
@@ -224,12 +251,14 @@ def raster_engine(outlines: Sequence[NDArray[np.float64]], stock: Stock) -> list
     ]
     areas = np.array([shapely.Polygon(outline).area for outline in outlines])
     sides = np.array([np.ptp(outline, axis=0) for outline in outlines])
-    bound = math.ceil(areas.sum() / (stock.width * stock.height) - 1e-9)
+    lacking = [raster.lacking(offcut) for offcut in stock.offcuts]
+    rest = areas.sum() - sum(offcut.area for offcut in stock.offcuts)
+    bound = math.ceil(rest / (stock.width * stock.height) - 1e-9)
     orders = [np.argsort(-key, kind="stable") for key in (areas, sides.max(axis=1))]
     best: list[Slot] = []
     fewest = math.inf
     for weights, order in product([(0.01, 1.0), (1.0, 0.01), (1.0, 1.0)], orders):
-        slots, used = _first_fit(raster, masks, order.tolist(), weights)
+        slots, used = _first_fit(raster, masks, order.tolist(), weights, lacking)
         if used < fewest:
             best, fewest = slots, used
         if math.ceil(fewest) <= bound:
@@ -238,10 +267,14 @@ def raster_engine(outlines: Sequence[NDArray[np.float64]], stock: Stock) -> list
 
 
 def _first_fit(
-    raster: _Raster, masks: list[list[_Mask]], order: list[int], weights: tuple[float, float]
+    raster: _Raster,
+    masks: list[list[_Mask]],
+    order: list[int],
+    weights: tuple[float, float],
+    lacking: list[NDArray[np.bool_]],
 ) -> tuple[list[Slot], float]:
-    """The slots of one pass, and the sheets used: all but the last, and its share in use."""
-    sheets: list[_Sheet] = []
+    """The slots of one pass, and the whole sheets used: all but the last, and its share in use."""
+    sheets = [_Sheet(raster, cells) for cells in lacking]
     slots: dict[int, Slot] = {}
     for number in order:
         smallest = min(int(mask.cells.sum()) for mask in masks[number])
@@ -257,7 +290,11 @@ def _first_fit(
                 (_, i, j), mask = min(open_places, key=lambda entry: entry[0][0])
                 sheet.put(mask, i, j)
                 x, y = np.array([i, j]) * raster.cell + mask.shift
-                slots[number] = Slot(index, float(x), float(y), mask.rotation)
+                offcut = index if index < len(lacking) else -1
+                slots[number] = Slot(index, float(x), float(y), mask.rotation, offcut)
                 break
-    share = 1 - sheets[-1].free / sheets[-1].taken.size if sheets else 0.0
-    return [slots[number] for number in sorted(slots)], len(sheets) - 1 + share
+    whole = sheets[len(lacking) :]
+    share = 1 - whole[-1].free / whole[-1].taken.size if whole else 0.0
+    used = sorted({slot.sheet for slot in slots.values()})
+    placed = [replace(slots[n], sheet=used.index(slots[n].sheet)) for n in sorted(slots)]
+    return placed, len(whole) - 1 + share

@@ -105,6 +105,59 @@ def test_small_outlines_go_into_the_notch_of_a_large_one():
     assert max(slot.sheet for slot in slots) == 0
 
 
+def bars(count: int) -> list[np.ndarray]:
+    return [np.array([[0, 0], [28, 0], [28, 18], [0, 18]], dtype=float)] * count
+
+
+def assert_on_offcuts(outlines, slots, stock):
+    """Parts on off-cuts lie in them, and each off-cut is one sheet."""
+    for outline, slot in zip(outlines, slots, strict=True):
+        if slot.offcut >= 0:
+            region = stock.offcuts[slot.offcut].buffer(1e-6)
+            assert region.contains(shapely.Polygon(place(outline, slot)))
+    used = {(slot.sheet, slot.offcut) for slot in slots}
+    assert len({sheet for sheet, _ in used}) == len(used)
+
+
+def test_offcuts_go_first_and_their_defects_stay_free():
+    hole = shapely.box(40.0, 20.0, 50.0, 30.0)
+    corner = shapely.Polygon([(0, 0), (100, 0), (100, 40), (40, 40), (40, 80), (0, 80)])
+    offcuts = (shapely.box(0, 0, 90, 60).difference(hole), corner, shapely.box(0, 0, 10, 10))
+    outlines = bars(14)
+    stock = Stock(120.0, 100.0, 2.0, ANY, offcuts)
+    slots = nest(outlines, stock)
+    assert_sound(outlines, slots, stock)
+    assert_on_offcuts(outlines, slots, stock)
+    counts = [sum(slot.offcut == number for slot in slots) for number in (0, 1, 2, -1)]
+    assert counts[0] >= 4
+    assert counts[1] >= 4
+    assert counts[2] == 0
+    assert layout_faults(outlines, slots, stock) == []
+
+
+@settings(derandomize=True, max_examples=15, deadline=None)
+@given(
+    st.lists(st.integers(0, 1000), min_size=1, max_size=8),
+    st.lists(st.integers(0, 1000), min_size=1, max_size=3),
+)
+def test_any_offcuts_get_a_sound_layout(seeds, shapes):
+    outlines = [star(seed) for seed in seeds]
+    offcuts = tuple(shapely.Polygon(2.5 * star(seed) + 100.0).buffer(0) for seed in shapes)
+    stock = Stock(200.0, 160.0, 3.0, ANY, offcuts)
+    slots = nest(outlines, stock)
+    assert_sound(outlines, slots, stock)
+    assert_on_offcuts(outlines, slots, stock)
+
+
+def test_a_part_off_its_offcut_or_an_offcut_used_twice_is_a_fault():
+    outlines = bars(2)
+    stock = Stock(120.0, 100.0, 2.0, ANY, (shapely.box(0, 0, 40, 60),))
+    off = [Slot(0, 0.0, 0.0, 0, 0), Slot(0, 30.0, 30.0, 0, 0)]
+    assert layout_faults(outlines, off, stock) == ["patch 1 lies outside off-cut 1"]
+    twice = [Slot(0, 0.0, 0.0, 0, 0), Slot(1, 0.0, 0.0, 0, 0)]
+    assert "two sheets" in layout_faults(outlines, twice, stock)[0]
+
+
 def test_the_same_input_gives_the_same_layout():
     outlines = zigzag_pieces(12, 3)
     stock = Stock(400.0, 300.0, 2.0, ANY)
