@@ -234,3 +234,21 @@ def test_what_cannot_be_resumed_is_said() -> None:
         stream_job(job, MACHINE, "virtual", resumption=rest)
     with pytest.raises(InputError, match="check mode"):
         stream_job(job, MACHINE, "virtual", resumption=rest, check_mode=True)
+
+
+@pytest.mark.parametrize("style", ["absolute", "relative"])
+def test_m3_is_armed_in_the_dark(style: str) -> None:
+    """The beam comes on with the first stroke, not when its modes are brought back."""
+    text = dashes(style).text.replace("M4 S0", "M3 S0")
+    job = Job("m3.nc", text)
+    rest = resume(job, MACHINE, [record(job, line=300, taken=300)])
+    wire = FakeWire(new_device())
+    plan = plan_job(job, MACHINE, at=(0.0, 0.0), allow_m3=True, resumption=rest)
+    deliver(plan, wire, StopSignals())
+    first = wire.device.beam_log[0]
+    x, y, _ = strokes(parse_program(job)).stroke(rest.stroke)[0]
+    assert (first.x0, first.y0) == pytest.approx((x, y), abs=0.02)
+    standing = [segment for segment in wire.device.beam_log if segment.standing]
+    assert standing in ([], wire.device.beam_log[-1:])  # the job's own M5 waits for the last stroke
+    moved = {(round(s.y0), int((s.x0 - 4.98) // 3)) for s in wire.device.beam_log}
+    assert len(moved) == STROKES - rest.stroke
