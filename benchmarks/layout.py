@@ -9,7 +9,8 @@ The bound of the patches is the area of the pattern over that of the usable bed,
 bound of the travel between dashes is half the sum of the ways from each end of a dash to the
 nearest place on another: no order of the dashes can do with less, and hardly any comes near.
 Times are of the processor, so that other work on the machine does not count; vpype's are by the
-clock. With vpype installed, its linesort is given the dashes of as many sheets as hold --vpype of them.
+clock. With vpype installed, its linesort is given the dashes of as many sheets as hold --vpype of
+them.
 """
 
 from __future__ import annotations
@@ -198,14 +199,14 @@ def against_vpype(paths: tuple[Toolpath, ...], least: int) -> dict[str, Any] | N
 def _svg_travel(file: Path, height: float) -> float:
     """The travel of the strokes of an SVG in the order of the file, from the lower left corner."""
     from svgelements import SVG, Shape
+    from svgelements import Path as Way
 
     ends = []
     for shape in SVG.parse(str(file), ppi=25.4).elements():
         if isinstance(shape, Shape):
-            whole = list(abs(shape.segments()) if callable(shape.segments) else shape)
-            points = [(each.x, height - each.y) for s in whole for each in (s.start, s.end) if each]
-            if points:
-                ends.append((points[0], points[-1]))
+            way = abs(Way(shape))
+            first, last = way.first_point, way.current_point
+            ends.append(((first.x, height - first.y), (last.x, height - last.y)))
     places = np.array([[(0.0, 0.0), (0.0, 0.0)], *ends, [(0.0, 0.0), (0.0, 0.0)]])
     return float(np.linalg.norm(places[1:, 0] - places[:-1, 1], axis=1).sum())
 

@@ -32,6 +32,9 @@ def sheets(
         typer.Option(help="A design file whose [layout] holds options; those given here win."),
     ] = None,
     gap: Annotated[str | None, typer.Option(help="Kept between patches [default: 2mm].")] = None,
+    offcuts: Annotated[
+        str | None, typer.Option(help="Left-over sheets to use up first: 300x200,180x90.")
+    ] = None,
     max_patch: Annotated[
         str | None, typer.Option(help="The largest patch, as 300mmx200mm [default: the bed].")
     ] = None,
@@ -77,6 +80,7 @@ def sheets(
     console = Console(as_json, quiet)
     given = {
         "gap": gap,
+        "offcuts": offcuts,
         "max_patch": max_patch,
         "seam_rows": seam_rows,
         "seam_columns": seam_columns,

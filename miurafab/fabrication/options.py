@@ -19,9 +19,10 @@ TAB_SIDES = ("lower", "upper", "alternate")
 class LayoutOptions:
     """How a pattern is laid out.
 
-    ``gap_mm`` is kept between patches on a sheet. ``max_patch_mm`` (longer, shorter side) limits
-    patches more than the bed does. ``seam_rows`` and ``seam_columns`` are lines of the vertex grid
-    along which the pattern is cut in any case, from 1.
+    ``gap_mm`` is kept between patches on a sheet. ``offcuts_mm`` (longer, shorter side) are left
+    over from other jobs and used up before whole sheets. ``max_patch_mm`` (longer, shorter side)
+    limits patches more than the bed does. ``seam_rows`` and ``seam_columns`` are lines of the
+    vertex grid along which the pattern is cut in any case, from 1.
 
     ``tab_height_mm`` and ``tab_inset_mm`` stand in for the material's. ``tab_side`` says which
     patch of a seam bears its tabs: the one with the ``lower`` or the ``upper`` number, or both in
@@ -34,6 +35,7 @@ class LayoutOptions:
     """
 
     gap_mm: float = 2.0
+    offcuts_mm: tuple[tuple[float, float], ...] = ()
     max_patch_mm: tuple[float, float] | None = None
     seam_rows: tuple[int, ...] = ()
     seam_columns: tuple[int, ...] = ()
@@ -62,6 +64,7 @@ def read_options(table: Table) -> LayoutOptions:
         raise table.fault("bridges", "is 1, on which a piece would swing; use 0, or 2 and more")
     return LayoutOptions(
         gap_mm=table.length("gap", usual.gap_mm, low=0, high=100),
+        offcuts_mm=_sizes(table, "offcuts"),
         max_patch_mm=_size(table, "max_patch"),
         seam_rows=_lines(table, "seam_rows"),
         seam_columns=_lines(table, "seam_columns"),
@@ -79,7 +82,16 @@ def read_options(table: Table) -> LayoutOptions:
 def _size(table: Table, key: str) -> tuple[float, float] | None:
     if not table.has(key):
         return None
-    text = table.text(key)
+    return _sides(table, key, table.text(key))
+
+
+def _sizes(table: Table, key: str) -> tuple[tuple[float, float], ...]:
+    if not table.has(key):
+        return ()
+    return tuple(_sides(table, key, part) for part in table.text(key).split(","))
+
+
+def _sides(table: Table, key: str, text: str) -> tuple[float, float]:
     sides = text.lower().replace("×", "x").split("x")
     try:
         one, other = (parse_length(side.strip()) for side in sides)

@@ -75,7 +75,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A sheet as large as the machine's bed, and what lies on it.
+    """A sheet as large as the machine's bed, or an off-cut, and what lies on it.
 
     ``back`` is the name of what is made on its back before its front, or None. ``travel_mm`` is
     what is moved with the beam off, and ``travel_bound_mm`` what no order could do with less than.
@@ -167,9 +167,18 @@ def lay_out(
         _patch(pattern, number, piece, pieces, numbers, (width, height))
         for number, piece in enumerate(pieces.pieces)
     )
+    offcuts = [_on_bed(size, machine) for size in options.offcuts_mm]
     slots = nest(
         [patch.outline_mm for patch in patches],
-        Stock(width, height, options.gap_mm, (0, 90, 180, 270)),
+        Stock(
+            width,
+            height,
+            options.gap_mm,
+            (0, 90, 180, 270),
+            tuple(
+                shapely.box(0, 0, x - 2 * bed.margin_mm, y - 2 * bed.margin_mm) for x, y in offcuts
+            ),
+        ),
     )
     placements = [
         Placement(
@@ -180,7 +189,11 @@ def lay_out(
         )
         for patch, slot in zip(patches, slots, strict=True)
     ]
-    sheets = _sheets(placements, slots, bed.width_mm, bed.height_mm)
+    sheets = _sheets(placements, slots, [*offcuts, (bed.width_mm, bed.height_mm)])
+    usable = sum(
+        (each.width_mm - 2 * bed.margin_mm) * (each.height_mm - 2 * bed.margin_mm)
+        for each in sheets
+    )
     motion = _motion(patches, placements, slots)
     turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
     names = [patch.label for patch in patches]
@@ -206,7 +219,7 @@ def lay_out(
         material=material.name,
         patches=patches,
         sheets=sheets,
-        totals=_totals(pattern, pieces, patches, sheets, toolpaths + behind, width * height),
+        totals=_totals(pattern, pieces, patches, sheets, toolpaths + behind, usable),
         untabbed=tuple(pieces.untabbed.tolist()),
         unlettered=unlettered,
         remarks=_remarks(pieces, numbers, drawn.unrelieved, material),
@@ -301,16 +314,33 @@ def _patch(
 
 
 def _sheets(
-    placements: list[Placement], slots: list[Slot], width: float, height: float
+    placements: list[Placement], slots: list[Slot], sizes: list[tuple[float, float]]
 ) -> tuple[Sheet, ...]:
+    """The sheets; ``sizes`` are those of the off-cuts, and last that of a whole sheet."""
     count = max(slot.sheet for slot in slots) + 1
     on_sheet: list[list[Placement]] = [[] for _ in range(count)]
+    size = [sizes[-1]] * count
     for placement, slot in zip(placements, slots, strict=True):
         on_sheet[slot.sheet].append(placement)
+        size[slot.sheet] = sizes[slot.offcut]
     return tuple(
-        Sheet(f"sheet-{number:02d}", width, height, tuple(placed))
+        Sheet(f"sheet-{number:02d}", *size[number - 1], tuple(placed))
         for number, placed in enumerate(on_sheet, start=1)
     )
+
+
+def _on_bed(size: tuple[float, float], machine: MachineProfile) -> tuple[float, float]:
+    """The width and height of what the bed takes of an off-cut, laid along its longer side."""
+    bed = machine.bed
+    long, short = size
+    width, height = (long, short) if bed.width_mm >= bed.height_mm else (short, long)
+    width, height = min(width, bed.width_mm), min(height, bed.height_mm)
+    if min(width, height) <= 2 * bed.margin_mm:
+        raise LayoutError(
+            f"An off-cut of {long:g} mm x {short:g} mm leaves nothing within margins of "
+            f"{bed.margin_mm:g} mm; leave it out."
+        )
+    return width, height
 
 
 def _motion(patches: tuple[Patch, ...], placements: list[Placement], slots: list[Slot]) -> Motion:
@@ -346,7 +376,7 @@ def _totals(
         sheets=len(sheets),
         seam_mm=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()),
         tabs=len(pieces.tabs),
-        density=float(area / (len(sheets) * usable)),
+        density=float(area / usable),
         cut_mm=sum(toolpath.length_of("cut") for toolpath in toolpaths),
         perforated_mm=sum(toolpath.length_of("perforate") for toolpath in toolpaths),
         travel_mm=sum(toolpath.travel_mm for toolpath in toolpaths),

@@ -19,6 +19,7 @@ def test_every_option_is_read():
     options = miurafab.layout_options(
         {
             "gap": "3mm",
+            "offcuts": "200x300mm, 15cm x 100",
             "max_patch": "10cm x 300",
             "seam_rows": "7, 3",
             "seam_columns": 4,
@@ -34,6 +35,7 @@ def test_every_option_is_read():
     )
     assert options == LayoutOptions(
         gap_mm=3.0,
+        offcuts_mm=((300.0, 200.0), (150.0, 100.0)),
         max_patch_mm=(300.0, 100.0),
         seam_rows=(3, 7),
         seam_columns=(4,),
@@ -53,6 +55,7 @@ def test_every_option_is_read():
     [
         ({"gapp": "2mm"}, "'gapp' is not a known key; did you mean 'gap'"),
         ({"max_patch": "300mm"}, "'max_patch' is '300mm'; write two lengths"),
+        ({"offcuts": "300x200,"}, "'offcuts' is ''; write two lengths"),
         ({"max_patch": "300mm x 0"}, "both sides must be longer than 0"),
         ({"seam_rows": "0"}, "'seam_rows' is '0'; write line numbers from 1 up"),
         ({"tab_side": "left"}, "it must be one of lower, upper, alternate"),

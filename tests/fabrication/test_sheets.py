@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.layout import SCHEMA, read_layout, write_layout
+from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import lay_out
 from miurafab.profiles import OPERATIONS
 
@@ -297,3 +298,23 @@ def test_random_patterns_beds_and_materials_give_a_sound_layout_or_a_clear_refus
         low, high = toolpath.points.min(axis=0), toolpath.points.max(axis=0)
         assert (low >= size[2] - 1e-5).all()
         assert (high <= np.array(size[:2]) - size[2] + 1e-5).all()
+
+
+def test_offcuts_are_used_up_before_whole_sheets():
+    pattern = miura(24, 16, 14.0, 14.0)
+    small = (120.0, 90.0)
+    options = LayoutOptions(offcuts_mm=((240.0, 180.0), (12.0, 11.0)), max_patch_mm=small)
+    layout = lay_out(pattern, bed(260.0, 200.0), card(), options=options)
+    sizes = [(sheet.width_mm, sheet.height_mm) for sheet in layout.sheets]
+    assert sizes[0] == (240.0, 180.0)
+    assert set(sizes[1:]) <= {(260.0, 200.0)}
+    assert len(sizes) > 1
+    for sheet, toolpath in zip(layout.sheets, layout.toolpaths, strict=True):
+        assert (toolpath.width_mm, toolpath.height_mm) == (sheet.width_mm, sheet.height_mm)
+        assert (toolpath.points >= 5.0 - 0.2).all()
+        assert (toolpath.points <= np.array([sheet.width_mm, sheet.height_mm]) - 5.0 + 0.2).all()
+    assert 0 < layout.totals.density < 1
+    with pytest.raises(LayoutError, match="off-cut of 12 mm x 9 mm leaves nothing"):
+        lay_out(
+            pattern, bed(260.0, 200.0), card(), options=LayoutOptions(offcuts_mm=((12.0, 9.0),))
+        )
