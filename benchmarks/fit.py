@@ -1,6 +1,7 @@
 """Time the solver: growth with the number of facets, and side by side with general-purpose ones.
 
     python benchmarks/fit.py [--target hypar] [--largest 100000] [--rivals] [--csv FILE]
+                             [--plot FILE]
 
 First table: whole fits from seed to audited pattern, and the solving alone. Each size runs in a
 process of its own, so that its peak memory is its own; ``fit_cpu`` is the processor's time, which
@@ -226,6 +227,7 @@ def main() -> int:
     parser.add_argument("--largest", type=int, default=100_000)
     parser.add_argument("--rivals", action="store_true", help="also run the general solvers")
     parser.add_argument("--csv", type=Path, help="write the first table to this file")
+    parser.add_argument("--plot", type=Path, help="draw time against facets to this picture")
     options = parser.parse_args()
     print(f"{options.target}: whole fits")
     growth: list[dict[str, Any]] = []
@@ -241,6 +243,8 @@ def main() -> int:
             writer = csv.DictWriter(stream, growth[0].keys(), lineterminator="\n")
             writer.writeheader()
             writer.writerows(growth)
+    if options.plot is not None:
+        draw_growth(growth, options.plot, options.target)
     print("ring of a hyperboloid by one period")
     rings: list[dict[str, Any]] = []
     for facets in (7680, 100_000):
@@ -248,6 +252,25 @@ def main() -> int:
     if options.rivals:
         compare(options.target, options.largest)
     return 0
+
+
+def draw_growth(rows: list[dict[str, Any]], path: Path, target: str) -> None:
+    """Whole fit and solving alone against facets, beside a line of slope one."""
+    from matplotlib.figure import Figure
+
+    facets = np.array([row["facets"] for row in rows], dtype=np.float64)
+    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+    axes = figure.add_subplot()
+    for key, label in (("fit_seconds", "fit and audit"), ("solve_seconds", "solving alone")):
+        axes.loglog(facets, [row[key] for row in rows], "o-", label=label)
+    linear = rows[-1]["fit_seconds"] * facets / facets[-1]
+    axes.loglog(facets, linear, ":", color="gray", label="linear growth")
+    axes.set_xlabel("facets")
+    axes.set_ylabel("seconds")
+    axes.set_title(f"Fitting {target}")
+    axes.legend()
+    axes.grid(True, which="both", alpha=0.25)
+    figure.savefig(path, dpi=130)
 
 
 def compare(target: str, largest: int) -> None:
