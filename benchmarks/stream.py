@@ -6,8 +6,8 @@ The controller paces its wire at 115200 baud. *wire*: bytes of the job a second 
 nothing moves, as a fraction of the 11520 that the wire carries. *micro*: 1500 dashes of 0.3 mm with
 0.2 mm gaps at F6000, behind a relay that hands the controller's answers on every 1 or 16 ms, as USB
 bridges do; the time between the first and the last beam by the controller's own beam log, against
-the time estimate's for an ideal sender on that link. *memory*: what streaming a long job in check
-mode adds to the sender's memory, after the job was read and checked.
+that of an ideal sender in the controller's own clock on that link. *memory*: what streaming a long
+job in check mode adds to the sender's memory, after the job was read and checked.
 
 On a busy computer let the controller's time pass more slowly than real time (``--speed 0.25``): all
 figures are in its time, and the latency is stretched with it.
@@ -28,18 +28,18 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import serial
 
-from miurafab.gcode.job import Job, prepare_lines
-from miurafab.gcode.program import parse_program
+from miurafab.gcode.job import Job, prepare, prepare_lines
+from miurafab.grbl.settings import virtual_settings
+from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.sender import Progress, stream_job
 from miurafab.machine.virtual_server import PtyWire
-from miurafab.motion.estimate import estimate
-from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.profiles import load_machine
 
 MACHINE = "grbl-laser-400"
@@ -168,12 +168,28 @@ def micro(python: str, sender: str, latency: float, speed: float) -> tuple[float
 
 
 def ideal(latency: float) -> float:
-    """The same time of an ideal sender, by the time estimate."""
-    program = parse_program(micro_job())
-    parameters = MotionParameters.from_profile(load_machine(MACHINE))
-    times = estimate(program, parameters, Link(latency=latency))
-    burns = np.flatnonzero(program.beam_on)
-    return float(times.end[burns[-1]] - times.start[burns[0]])
+    """The same time of an ideal sender: the receive buffer always full, not one query.
+
+    It sits in the controller's own clock, and sees the answers every ``latency`` seconds.
+    """
+    machine = load_machine(MACHINE)
+    device = VirtualGrbl(virtual_settings(machine), baud=machine.controller.baud)
+    device.advance(1.0)
+    device.take_output()
+    lines, unanswered, room = deque(prepare(micro_job())), deque[int](), machine.controller.rx_bytes
+    look_at = device.now
+    while lines or unanswered:
+        while lines and len(lines[0].data) < room:
+            data = lines.popleft().data + b"\n"
+            device.receive(data)
+            unanswered.append(len(data))
+            room -= len(data)
+        look_at += latency
+        device.advance(look_at - device.now)
+        for _ in range(device.take_output().count(b"ok")):
+            room += unanswered.popleft()
+    device.advance(3.0)
+    return device.beam_log[-1].t1 - device.beam_log[0].t0
 
 
 def check_mode(lines: int, speed: float) -> tuple[float, float]:

@@ -1,13 +1,14 @@
 """Where a running job is, in strokes and in time left, by the figures of its dry run.
 
-What is acknowledged is planned, not made: the machine is behind by the moves of its planner. So
-the place is that of the last acknowledged line, less those moves; the time left is the dry run's
-from there on, at the feed that the override leaves.
+What is acknowledged is planned, not made: the machine is behind by up to the moves of its planner.
+Among those the reported position says which is being made, and how much of it is done. The time
+left is the dry run's from there on, at the feed that the override leaves.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from miurafab.gcode.program import strokes
 from miurafab.machine.sender import Progress
@@ -21,16 +22,39 @@ class Timeline:
         burnt = strokes(sheet.program)
         self.strokes = len(burnt)
         self._stroke_ends = burnt.last_move
-        self._lines = sheet.program.line
-        self._ends = sheet.end_seconds
-        self._seconds = sheet.seconds
+        self._program = sheet.program
+        self._ends = np.concatenate([[0.0], sheet.end_seconds])
         self._blocks = blocks
+        self._move = 0  # being made; never goes back
 
     def place(self, now: Progress) -> tuple[int, float]:
         """The strokes done, and the seconds left."""
-        move = int(np.searchsorted(self._lines, now.line, side="right"))
-        if now.state != "Idle":
-            move = max(0, move - self._blocks)
-        done = int(np.searchsorted(self._stroke_ends, move))
-        made = float(self._ends[move - 1]) if move else 0.0
-        return done, (self._seconds - made) * 100.0 / max(now.feed_override, 1)
+        planned = int(np.searchsorted(self._program.line, now.line, side="right"))
+        first, share = max(self._move, planned - self._blocks - 2), 0.0
+        if now.state == "Idle" and now.lines_acknowledged == now.lines_total:
+            first = len(self._program)
+        elif first < planned and now.position is not None:
+            moves = slice(first, planned)
+            gap, along = _nearest(
+                np.array(now.position[:2]),
+                self._program.start[moves, :2],
+                self._program.end[moves, :2],
+            )
+            nearest = int(np.argmin(gap))
+            first, share = first + nearest, float(along[nearest])
+        self._move = first
+        done = int(np.searchsorted(self._stroke_ends, first))
+        begun = self._ends[first]
+        ended = self._ends[min(first + 1, len(self._ends) - 1)]
+        left = self._ends[-1] - begun - share * (ended - begun)
+        return done, max(0.0, float(left)) * 100.0 / max(now.feed_override, 1)
+
+
+def _nearest(
+    at: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(n,) how far ``at`` is from each of n moves, and (n,) what share of it lies behind."""
+    way = end - start
+    square = np.maximum((way**2).sum(axis=1), 1e-12)
+    along = np.clip(((at - start) * way).sum(axis=1) / square, 0.0, 1.0)
+    return np.linalg.norm(at - start - along[:, None] * way, axis=1), along

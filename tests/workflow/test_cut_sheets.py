@@ -1,0 +1,107 @@
+"""Time left that holds, journals beside what was cut, and further sheets from where the head is."""
+
+import json
+
+import pytest
+from small_jobs import dashes, known_toolpath, write_nc
+
+import miurafab
+from miurafab.errors import InputError
+from miurafab.machine.journal import read_journal
+from miurafab.workflow.cut_sheets import CutOptions, findings, frame
+
+
+@pytest.fixture(scope="module")
+def pattern(tmp_path_factory):
+    """A small pattern on disk."""
+    path = tmp_path_factory.mktemp("pattern") / "s.fold"
+    wanted = miurafab.design("hypar", facets="6x5", size="70mm")
+    miurafab.save_pattern(miurafab.fit(wanted.request).pattern, path, "small")
+    return path
+
+
+@pytest.fixture
+def folder(pattern, tmp_path):
+    """A job directory with three sheets, all alike."""
+    path = tmp_path / "job"
+    miurafab.write_job(pattern, path, "grbl-laser-400", "card-250")
+    layout = json.loads((path / "layout.json").read_text())
+    (first,) = layout["sheets"]
+    for n in (2, 3):
+        layout["sheets"].append({**first, "name": f"sheet-0{n}", "placements": []})
+        (path / f"sheet-0{n}.nc").write_bytes((path / "sheet-01.nc").read_bytes())
+    (path / "layout.json").write_text(json.dumps(layout))
+    return path
+
+
+@pytest.mark.parametrize("toolpath", [known_toolpath(), dashes(1500)])
+def test_the_time_left_holds(tmp_path, toolpath):
+    prepared = miurafab.prepare(str(write_nc(tmp_path, toolpath)))
+    seen = []
+    (sheet,) = miurafab.cut(prepared, port="virtual", on_progress=seen.append)
+    total = sheet.result.seconds
+    for now in seen:
+        # A planner's worth of moves either way, and the rounding of the poll.
+        assert now.stream.seconds_elapsed + now.seconds_left == pytest.approx(
+            total, rel=0.03, abs=2.5
+        )
+    assert [now.stroke for now in seen] == sorted(now.stroke for now in seen)
+    assert seen[-1].stroke == seen[-1].strokes
+    assert seen[-1].seconds_left == pytest.approx(0, abs=0.1)
+
+
+def test_a_plain_file_has_its_journal_beside_it(tmp_path):
+    path = write_nc(tmp_path, known_toolpath())
+    miurafab.cut(miurafab.prepare(str(path)), port="virtual")
+    (run,) = read_journal(path.with_suffix(".journal"))
+    assert run.ended == "done"
+    assert path.with_suffix(".transcript").is_file()
+
+
+def test_check_mode_leaves_no_journal_to_resume(tmp_path):
+    path = write_nc(tmp_path, known_toolpath())
+    prepared = miurafab.prepare(str(path))
+    miurafab.cut(prepared, port="virtual", options=CutOptions(check_mode=True))
+    assert not path.with_suffix(".journal").exists()
+
+
+def test_a_further_sheet_is_told_where_the_head_was_left(folder):
+    for name in ("sheet-01", "sheet-02"):
+        file = folder / f"{name}.nc"
+        file.write_text(file.read_text() + "G0 X7 Y9\n", newline="\n")
+    prepared = miurafab.prepare(str(folder))
+    miurafab.cut(prepared, port="virtual", options=CutOptions(at=(3.0, 4.0)))
+    for name, where in (("sheet-01", "X3.000Y4.000"), ("sheet-02", "X7.000Y9.000")):
+        assert f"G92{where}" in (folder / f"{name}.transcript").read_text()
+
+
+def test_only_what_was_interrupted_or_never_begun_is_resumed(folder):
+    prepared = miurafab.prepare(str(folder))
+    miurafab.cut(prepared, port="virtual", sheets=[1, 2])
+    journal = folder / "sheet-02.journal"
+    journal.write_text(journal.read_text().partition('{"taken"')[0])
+    options = CutOptions(resume=True, at=(0.0, 0.0))
+    done = miurafab.cut(prepared, port="virtual", options=options)
+    assert [sheet.name for sheet in done] == ["sheet-02", "sheet-03"]
+    assert done[0].resumed
+    assert done[1].resumed is None
+    with pytest.raises(InputError, match="was interrupted"):
+        miurafab.cut(prepared, port="virtual", options=options)
+
+
+def test_what_the_material_does_not_take_is_found(folder):
+    file = folder / "sheet-01.nc"
+    file.write_text(file.read_text() + "M4 S950\nG1 X9 F600\nM5\n", newline="\n")
+    found = findings(miurafab.prepare(str(folder)))
+    assert [(sheet, finding.name) for sheet, finding in found] == [("sheet-01", "material")]
+    assert "S900" in str(found[0][1].error)
+
+
+def test_a_frame_burns_nothing(tmp_path):
+    path = write_nc(tmp_path, known_toolpath())
+    prepared = miurafab.prepare(str(path))
+    assert frame(prepared, 1, port="virtual").seconds > 5
+    (tmp_path / "dark.nc").write_text("G0 X5\n")
+    with pytest.raises(InputError, match="burns nothing"):
+        frame(miurafab.prepare(str(tmp_path / "dark.nc")), 1, port="virtual")
+    assert not list(tmp_path.glob("*frame*"))
