@@ -1,9 +1,9 @@
 """``layout.json``: a layout written down, and read back, so that others can rely on it.
 
 The schema is ``miurafab-layout/1``: machine, material, sheets with placements, patches with
-outlines and tabs in the patch frame, and totals. Lengths are mm, rotations degrees,
-counter-clockwise; lists of points are [[x, y], ...] and closed curves do not repeat their first
-point. Toolpaths are not in it: they are in the drawings and the G-code.
+outlines and tabs in the patch frame, totals, and what nested the patches. Lengths are mm,
+rotations degrees, counter-clockwise; lists of points are [[x, y], ...] and closed curves do not
+repeat their first point. Toolpaths are not in it: they are in the drawings and the G-code.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from miurafab.errors import LayoutError
 from miurafab.fabrication.sheets import Layout, Patch, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
+from miurafab.version import __version__
 
 SCHEMA = "miurafab-layout/1"
 
@@ -32,6 +33,7 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
         "sheets": [dataclasses.asdict(sheet) for sheet in layout.sheets],
         "patches": [_patch_table(patch) for patch in layout.patches],
         "totals": dataclasses.asdict(layout.totals),
+        "nesting": {"engine": "miurafab raster", "version": __version__},
         "untabbed": list(layout.untabbed),
         "unlettered": layout.unlettered,
         "remarks": list(layout.remarks),

@@ -40,9 +40,9 @@ from miurafab.workflow.dry_run import dry_run
 from miurafab.workflow.job_directory import (
     LAYOUT,
     JobDirectory,
-    _keep_own_profile,
-    _make_room,
-    _write,
+    keep_own_profile,
+    make_room,
+    write_text,
 )
 
 CHOICES = "calibration.json"
@@ -71,16 +71,16 @@ def calibrate(machine: str, material: str, directory: Path) -> Calibration:
     sheet = calibration_sheet(profile, stock)
     toolpath = sheet.toolpath
     job = post_sections(sheet.sections, profile, patch_labels=sheet.labels)
-    _make_room(directory)
+    make_room(directory)
     timed = dry_run(SHEET, job, profile, (sheet.width_mm, sheet.height_mm))
-    _write(directory / f"{SHEET}{profile.job_suffix}", job.text)
-    _write(directory / f"{SHEET}.svg", sheet_svg(toolpath))
+    write_text(directory / f"{SHEET}{profile.job_suffix}", job.text)
+    write_text(directory / f"{SHEET}.svg", sheet_svg(toolpath))
     guide = calibration_guide(sheet, profile, stock, directory.name or str(directory))
     (directory / GUIDE).write_bytes(guide)
     coupon = fold_text(sheet.coupon, "Fold coupon")
-    _write(directory / _COUPON, coupon)
-    _keep_own_profile("firmware_profiles", machine, directory)
-    _keep_own_profile("materials", material, directory)
+    write_text(directory / _COUPON, coupon)
+    keep_own_profile("firmware_profiles", machine, directory)
+    keep_own_profile("materials", material, directory)
     choices = {
         "schema": SCHEMA,
         "machine": profile.name,
@@ -89,7 +89,7 @@ def calibrate(machine: str, material: str, directory: Path) -> Calibration:
         "squares": [dataclasses.asdict(square) for square in sheet.squares],
         "kerf_gauge": {"strips": STRIPS},
     }
-    _write(directory / CHOICES, json.dumps(choices, indent=1) + "\n")
+    write_text(directory / CHOICES, json.dumps(choices, indent=1) + "\n")
     layout = Layout(
         machine=profile.name,
         material=stock.name,
@@ -109,7 +109,7 @@ def calibrate(machine: str, material: str, directory: Path) -> Calibration:
         toolpaths=(toolpath,),
     )
     digest = hashlib.sha256(coupon.encode("utf-8")).hexdigest()
-    _write(directory / LAYOUT, write_layout(layout, _COUPON, digest))
+    write_text(directory / LAYOUT, write_layout(layout, _COUPON, digest))
     return Calibration(JobDirectory(directory, layout, profile, (job,), (timed,)), sheet)
 
 
@@ -157,7 +157,7 @@ def add_material(
         if value is not None
     )
     head = f"# {choices['material']} calibrated on {choices['machine']}: {said}.\n"
-    _write(path, head + _toml(values))
+    write_text(path, head + _toml(values))
     try:
         material = load_material(path)
         _drawable(material)

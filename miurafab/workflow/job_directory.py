@@ -118,7 +118,7 @@ def write_job(
     pattern = read_fold(pattern_file)
     layout = lay_out(pattern, profile, stock, options=options)
     labels = {patch.id: patch.label for patch in layout.patches}
-    _make_room(directory)
+    make_room(directory)
     jobs, dry_runs = [], []
     for number, toolpath in enumerate(layout.passes):
         tell(0.4 + 0.5 * number / len(layout.passes), f"drawing {toolpath.sheet}")
@@ -126,8 +126,8 @@ def write_job(
         jobs.append(job)
         size = (toolpath.width_mm, toolpath.height_mm)
         dry_runs.append(dry_run(toolpath.sheet, job, profile, size))
-        _write(directory / f"{toolpath.sheet}{profile.job_suffix}", job.text)
-        _write(directory / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
+        write_text(directory / f"{toolpath.sheet}{profile.job_suffix}", job.text)
+        write_text(directory / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
         for name in formats:
             (directory / f"{toolpath.sheet}.{name}").write_bytes(FORMATS[name](toolpath))
     seconds = round(float(sum(sheet.seconds for sheet in dry_runs)), 1)
@@ -138,10 +138,10 @@ def write_job(
     copy = directory / pattern_file.name
     if copy.resolve() != pattern_file.resolve():
         shutil.copyfile(pattern_file, copy)
-    _keep_own_profile("firmware_profiles", machine, directory)
-    _keep_own_profile("materials", material, directory)
+    keep_own_profile("firmware_profiles", machine, directory)
+    keep_own_profile("materials", material, directory)
     digest = hashlib.sha256(copy.read_bytes()).hexdigest()
-    _write(directory / LAYOUT, write_layout(layout, copy.name, digest))
+    write_text(directory / LAYOUT, write_layout(layout, copy.name, digest))
     tell(1.0, "done")
     return JobDirectory(directory, layout, profile, tuple(jobs), tuple(dry_runs))
 
@@ -176,7 +176,8 @@ def read_job(directory: Path) -> JobDirectory:
     return JobDirectory(directory, layout, machine, tuple(jobs), tuple(dry_runs))
 
 
-def _keep_own_profile(kind: Kind, name: str, directory: Path) -> None:
+def keep_own_profile(kind: Kind, name: str, directory: Path) -> None:
+    """Copy a profile or material of the user's own into the job ``directory``."""
     path = find_file(kind, name)
     if path.resolve().parent != shipped_directory(kind).resolve():
         copy = directory / path.name
@@ -184,7 +185,7 @@ def _keep_own_profile(kind: Kind, name: str, directory: Path) -> None:
             shutil.copyfile(path, copy)
 
 
-def _make_room(directory: Path) -> None:
+def make_room(directory: Path) -> None:
     """Create the directory, or clear the sheets of the job that is in it."""
     if directory.exists() and not directory.is_dir():
         raise InputError(f"{directory} is a file; a job needs a directory.")
@@ -212,5 +213,6 @@ def _make_room(directory: Path) -> None:
             (directory / f"{Path(name).name}.{suffix}").unlink(missing_ok=True)
 
 
-def _write(path: Path, text: str) -> None:
+def write_text(path: Path, text: str) -> None:
+    """Write ``text`` with the same bytes on every system."""
     path.write_text(text, encoding="utf-8", newline="\n")
