@@ -155,6 +155,7 @@ def cut(
                 keys=keys,
                 before_sheet=before,
                 after_frame=after_frame,
+                on_resume=console.remark,
                 on_progress=show_progress,
             )
     _report(console, prepared, done, port[0])

@@ -83,13 +83,15 @@ def cut(
     keys: Keys | None = None,
     before_sheet: Callable[[int, int], None] | None = None,
     after_frame: Callable[[int], None] | None = None,
+    on_resume: Callable[[str], None] | None = None,
     on_progress: Callable[[SheetProgress], None] | None = None,
 ) -> tuple[CutSheet, ...]:
     """Stream the sheets of ``prepared`` (or those numbered in ``sheets``, from 1) to ``port``.
 
     Every sheet is checked before the first is started. ``before_sheet`` is called with the number
     of the sheet and how many there are, before each: the place to ask for fresh material;
-    ``after_frame`` with its number when its frame was traced. The journal and the transcript go
+    ``after_frame`` with its number when its frame was traced; ``on_resume``, before the port is
+    opened, with what will be burnt twice of a sheet that goes on. The journal and the transcript go
     beside the job. Raises what :func:`~miurafab.machine.sender.stream_job` raises.
     """
     plans = _plans(prepared, _chosen(prepared, sheets), options)
@@ -100,6 +102,8 @@ def cut(
         expected = prepared.dry_runs[number - 1]
         if before_sheet is not None:
             before_sheet(number, len(prepared.jobs))
+        if resumption is not None and on_resume is not None:
+            on_resume(resumption.sentence)
         if options.frame:
             frame(prepared, number, port=port, options=replace(options, at=at))
             if after_frame is not None:
