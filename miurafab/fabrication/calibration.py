@@ -222,25 +222,31 @@ def _dashes(material: Material) -> list[Perforation]:
     least = material.kerf_mm + MIN_STROKE_MM
     found: dict[tuple[float, float], Perforation] = {}
     for dash, gap in DASHES:
-        cut = max(_rounded(usual.cut_mm * dash), math.ceil(least * 20 - 1e-9) / 20)
-        left = max(_rounded(usual.gap_mm * gap), 0.05)
+        cut = max(_scaled(usual.cut_mm, dash), math.ceil(least * 20 - 1e-9) / 20)
+        left = max(_scaled(usual.gap_mm, gap), 0.05)
         rule = replace(usual, cut_mm=cut, gap_mm=left, min_end_mm=min(usual.min_end_mm, cut))
         found.setdefault((cut, left), rule)
     return list(found.values())
 
 
-def _rounded(length: float) -> float:
-    return round(round(length * 20) / 20, 2)
+def _scaled(length: float, factor: float) -> float:
+    """A length times ``factor`` in twentieths of a millimetre; the length itself as it stands."""
+    return length if factor == 1.0 else round(round(length * factor * 20) / 20, 2)
 
 
 def _settings(material: Material, name: str, fastest: float) -> list[Operation]:
     """The columns of one operation, by energy a mm, least first."""
     usual = material.operations[name]
     powers = dict.fromkeys(
-        round(min(usual.power * factor, material.max_power), 2) for factor in POWERS
+        min(usual.power if factor == 1.0 else round(usual.power * factor, 2), material.max_power)
+        for factor in POWERS
     )
     feeds = dict.fromkeys(
-        float(round(min(usual.feed_mm_min * factor, fastest), -1)) for factor in FEEDS
+        min(
+            usual.feed_mm_min if factor == 1.0 else float(f"{usual.feed_mm_min * factor:.3g}"),
+            fastest,
+        )
+        for factor in FEEDS
     )
     found = [replace(usual, power=power, feed_mm_min=feed) for power in powers for feed in feeds]
     return sorted(found, key=lambda each: (each.power / each.feed_mm_min, each.power))
@@ -278,7 +284,7 @@ def _arranged(
 
 
 def _percent(operation: Operation) -> str:
-    return f"{operation.power:.0%}"
+    return f"{100 * operation.power:g}%"
 
 
 def _feed(operation: Operation) -> str:

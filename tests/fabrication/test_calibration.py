@@ -14,6 +14,7 @@ from miurafab.fabrication.calibration import STRIPS, calibration_sheet, gauge_ma
 from miurafab.gcode.program import parse_program, strokes
 from miurafab.posting.sections import post_sections
 from miurafab.profiles import OPERATIONS, load_machine, load_material, shipped_names
+from miurafab.profiles.material import Operation
 
 LASERS = [
     name for name in shipped_names("firmware_profiles") if load_machine(name).tool.kind == "laser"
@@ -85,6 +86,17 @@ def test_the_dashes_of_a_flap_are_those_of_its_row_and_no_two_flaps_are_alike():
         settings.add((cell.perforation, cell.operation))
         assert cell.operation.power <= stock.max_power
     assert len(settings) == len(sheet.cells) >= 20
+
+
+def test_the_settings_of_the_material_itself_are_among_those_tried():
+    stock = card(cut=1.23, gap=0.77)
+    odd = {"perforate": Operation(0.123, 4.0, 2), "cut": Operation(0.987, 1234.5, 1)}
+    stock = dataclasses.replace(stock, operations={**stock.operations, **odd})
+    sheet = calibration_sheet(bed(400, 400), stock)
+    assert stock.operations["perforate"] in [cell.operation for cell in sheet.cells]
+    assert stock.operations["cut"] in [square.operation for square in sheet.squares]
+    assert stock.perforation in [cell.perforation for cell in sheet.cells]
+    assert all(cell.operation.feed_mm_min > 0 for cell in sheet.cells)
 
 
 @pytest.mark.parametrize("kerf", [0.0, 0.08, 0.15, 0.37])
