@@ -204,7 +204,12 @@ def frame(
 
 
 @app.command()
-def console(port: PortOption, baud: BaudOption = 115_200) -> None:
+def console(
+    port: PortOption,
+    baud: BaudOption = 115_200,
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
     """Talk to the controller line by line, until the end of the input (Ctrl-D).
 
     ?, ! and ~ alone on a line are sent at once, 'reset' resets. The controller is reset at the
@@ -212,7 +217,11 @@ def console(port: PortOption, baud: BaudOption = 115_200) -> None:
     """
     from miurafab.machine import actions
 
-    actions.talk(port, sys.stdin, lambda line: print(line, flush=True), baud=baud)
+    out = Console(as_json, quiet)
+    said: list[str] = []
+    actions.talk(port, sys.stdin, said.append if as_json else out.line, baud=baud)
+    if as_json:
+        out.answer({"said": said})
 
 
 def _stands(console: Console, report: StatusReport) -> None:

@@ -30,7 +30,9 @@ def test_every_action_has_help_and_json(run, action):
 @pytest.mark.parametrize("action", [a for a in ACTIONS if a != "list"])
 def test_every_action_tells_a_port_that_does_not_exist(run, tmp_path, action):
     (tmp_path / "saved").write_text("$0=10\n")
-    file = ["saved"] if action in ("backup", "restore") else []
+    (tmp_path / "job.nc").write_text("M4 S1\nG1 X5 F600\nM5\n")
+    files = {"backup": ["saved"], "restore": ["saved"], "frame": ["job.nc"]}
+    file = files.get(action, [])
     move = ["--x", "1mm"] if action == "jog" else []
     done = run("machine", action, *file, *move, "--port", "/dev/no-such-port")
     assert "The port /dev/no-such-port does not exist" in sentence(done, 3)
