@@ -177,7 +177,7 @@ def ideal(latency: float) -> float:
     device.advance(1.0)
     device.take_output()
     lines, unanswered, room = deque(prepare(micro_job())), deque[int](), machine.controller.rx_bytes
-    look_at = device.now
+    look_at, said = device.now, b""
     while lines or unanswered:
         while lines and len(lines[0].data) < room:
             data = lines.popleft().data + b"\n"
@@ -186,8 +186,10 @@ def ideal(latency: float) -> float:
             room -= len(data)
         look_at += latency
         device.advance(look_at - device.now)
-        for _ in range(device.take_output().count(b"ok")):
+        said += device.take_output()
+        for _ in range(said.count(b"ok\r\n")):
             room += unanswered.popleft()
+        said = said[said.rfind(b"\n") + 1 :]
     device.advance(3.0)
     return device.beam_log[-1].t1 - device.beam_log[0].t0
 
@@ -227,7 +229,7 @@ def main() -> None:
         senders += [("grbl-streamer", given.rivals, STREAMER), ("grbl-link", given.rivals, LINK)]
     for latency in (0.001, 0.016):
         best = ideal(latency)
-        print(f"micro, {1000 * latency:g} ms: an ideal sender {best:.2f} s")
+        print(f"micro, {1000 * latency:g} ms: an ideal sender {best:.2f} s", flush=True)
         for name, python, sender in senders:
             seconds, dashes = micro(python, sender, latency, given.speed)
             share = f"{seconds:7.2f} s  {seconds / best:.3f} of ideal"

@@ -203,8 +203,8 @@ def talk(
     """Send ``lines`` one at a time as they come, and ``tell`` what the controller answers.
 
     ``?``, ``!`` and ``~`` alone on a line are the realtime bytes, ``reset`` is a soft reset. A
-    refused line is told and does not end the conversation. At the end, and on every way out, the
-    controller is reset unless it stands idle with the beam off.
+    refused line is told and does not end the conversation. At the end dark moves are waited for;
+    then, and on every way out, the controller is reset unless it stands idle with the beam off.
     """
     with conversation(port, baud=baud, settings=settings, moves=True) as session:
         heard = bytearray()
@@ -231,6 +231,9 @@ def talk(
             except (ControllerError, GcodeError) as error:
                 tell(str(error))
         status = session.wait_status()
+        while status.state in ("Run", "Jog") and not status.beam_on:
+            session.pause(_POLL_S)
+            status = session.wait_status()
         if status.beam_on or status.state != "Idle":
             session.stop()
 
