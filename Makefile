@@ -3,13 +3,16 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint clean
+.PHONY: demo test test-large lint clean
 
 demo: .venv/installed
 	$(BIN)/miurafab cut patterns/hypar.toml --port virtual
 
 test: .venv/installed-dev
 	$(BIN)/python -m pytest -n 2
+
+test-large: .venv/installed-dev
+	$(BIN)/python -m pytest -n 2 -m large
 
 lint: .venv/installed-dev
 	$(BIN)/ruff check .
