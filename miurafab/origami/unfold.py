@@ -1,7 +1,7 @@
 """Unfolding: a developable tessellation laid flat without stretching, with its fold angles.
 
 The heading of each facet follows from its neighbour's by the corner angles at the side between
-them, up the first column and then along each row; the vertices follow by adding up sides. Both are
+them, up the middle column and then along each row; the vertices follow by adding up sides. Both are
 plain sums of lengths and angles of the folded form, so rounding adds up and is never amplified
 (placing each row from the positions of the one before does amplify it, by 1e8 on a spiral of 20
 rows). The flat pattern is isometric as far as the sheet is developable and planar; the audit
@@ -120,20 +120,21 @@ def _develop(points: Floats) -> Floats:
     right_corner = angle_between(-right[:-1], up[:, 1:])
     upper_corner = angle_between(right[1:], -up[:, :-1])
 
-    # the heading of each facet's lower side: up the first column, then along each row
-    rising = left_corner[:, 0] + upper_corner[:, 0] - np.pi
+    # the heading of each facet's lower side: up the middle column, then along each row both ways,
+    # so that rounding has half as far to add up
+    middle = (points.shape[1] - 1) // 2
+    rising = left_corner[:, middle] + upper_corner[:, middle] - np.pi
     first = np.concatenate([[0.0], np.cumsum(rising[:-1])])
     turning = np.pi - right_corner[:, :-1] - left_corner[:, 1:]
-    heading = first[:, None] + np.concatenate(
-        [np.zeros((len(first), 1)), np.cumsum(turning, axis=1)], axis=1
-    )
+    turned = np.concatenate([np.zeros((len(first), 1)), np.cumsum(turning, axis=1)], axis=1)
+    heading = first[:, None] + turned - turned[:, [middle]]
     last_row = heading[-1] + left_corner[-1] + upper_corner[-1] - np.pi
     along = np.linalg.norm(right, axis=2)[..., None] * _unit(np.vstack([heading, last_row]))
-    upward = heading[:, 0] + left_corner[:, 0]
-    across = np.linalg.norm(up[:, 0], axis=1)[:, None] * _unit(upward)
+    upward = heading[:, middle] + left_corner[:, middle]
+    across = np.linalg.norm(up[:, middle], axis=1)[:, None] * _unit(upward)
     start = np.concatenate([np.zeros((1, 2)), np.cumsum(across, axis=0)])
     steps = np.concatenate([np.zeros((len(start), 1, 2)), np.cumsum(along, axis=1)], axis=1)
-    flat: Floats = start[:, None, :] + steps
+    flat: Floats = start[:, None, :] + steps - steps[:, [middle]]
     return flat
 
 
