@@ -30,10 +30,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, sparse
 
-from miurafab.origami.attempts import STEP_CAP
 from miurafab.origami.constraints import OrigamiConstraints
 from miurafab.origami.fit import FitRequest, fit
 from miurafab.origami.fit_request import FitResult
+from miurafab.origami.last_resorts import STEP_CAP
 from miurafab.origami.seed import Corrugation, seed
 from miurafab.origami.solver import project
 from miurafab.origami.unknowns import Unknowns

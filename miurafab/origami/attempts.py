@@ -22,6 +22,7 @@ from miurafab.origami.constraints import flat_foldability
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cylinder import cylinder_on
 from miurafab.origami.fit_request import Attempt, FitRequest
+from miurafab.origami.last_resorts import COARSEST, STEP_CAP, bend, refine, shaken, solve
 from miurafab.origami.polish import Follow, followers, polish
 from miurafab.origami.seed import Corrugation, seed
 from miurafab.origami.solver import Projection, project
@@ -30,7 +31,7 @@ from miurafab.origami.unfold import unfold
 from miurafab.origami.unknowns import Unknowns, about_z
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution, revolution
 from miurafab.surfaces.mesh import MeshSurface
-from miurafab.surfaces.surface import Bent, Swapped, TargetSurface, tangents
+from miurafab.surfaces.surface import Swapped, TargetSurface
 
 Floats = NDArray[np.float64]
 
@@ -44,13 +45,8 @@ BENDS_ELSEWHERE = 2
 """How many of those stretches are tried on meshes, first as they lie, then laid elsewhere: enough
 to find a sheet where there is one, and an answer within a minute where there is none.
 """
-BEND_STEPS = 12
-STEP_CAP = 0.25
-"""The farthest that a coordinate moves in one step, in mean edge lengths."""
 FAR = 0.02
 """A mid-surface farther from the target than this part of the diagonal makes the search go on."""
-SHAKE = 0.03
-"""The standard deviation of a random attempt's coordinates, in mean edge lengths."""
 SCALINGS = 4
 """How often a sheet is polished again because its scale has changed."""
 BOUND_MARGIN = 2e-3
@@ -105,6 +101,7 @@ class Plan:
             "strip": "one period of the revolution",
             "seed": "seed",
             "bent": "bending step by step",
+            "refined": "from coarse to fine",
             "shaken": "seed shaken",
         }
         place = f", {self.place}" if self.place else ""
@@ -123,7 +120,7 @@ class Plan:
                 whole = unknowns.sheet(solution.x)
                 solution = replace(solution, x=whole.vertices.ravel())
                 unknowns = Unknowns(unknowns.columns, unknowns.rows, unknowns.length)
-            solution = _solve(unknowns, solution.x, flat_foldable=True)
+            solution = solve(unknowns, solution.x, flat_foldable=True)
             iterations += solution.iterations
         if not solution.converged:
             return Attempt(
@@ -162,16 +159,18 @@ class Plan:
             unknowns = Unknowns(columns, rows, float(sheet.edge_lengths.mean()))
             return unknowns, Projection(sheet.vertices.ravel(), 0.0, 0, True, "exact", nothing)
         if self.way == "bent":
-            return _bend(self.surface, columns, rows, self.corrugation, level)
+            return bend(self.surface, columns, rows, self.corrugation, level)
+        if self.way == "refined":
+            return refine(self.surface, columns, rows, self.corrugation, level)
         if self.way == "strip":
             assert isinstance(self.surface, Revolution)
             unknowns, start = _period(self.surface, columns, rows, self.corrugation, level)
         else:
             start, _ = seed(self.surface, columns, rows, self.corrugation, level)
             if self.way == "shaken":
-                start = _shaken(start, request.seed)
+                start = shaken(start, request.seed)
             unknowns = Unknowns(columns, rows, float(start.edge_lengths.mean()))
-        return unknowns, _solve(unknowns, start.vertices.ravel(), flat_foldable=False)
+        return unknowns, solve(unknowns, start.vertices.ravel(), flat_foldable=False)
 
     def _polished(
         self, request: FitRequest, unknowns: Unknowns, solution: Projection, plain: Candidate
@@ -258,7 +257,8 @@ def plans(request: FitRequest) -> Iterator[Plan]:
             yield Plan("strip", request.surface, "u", corrugation)
         if request.surface.closed:
             return  # any other way would open the seam
-    for way in ("seed", "bent", "shaken"):
+    fine = min(request.columns, request.rows) >= COARSEST
+    for way in ("seed", "bent", *(("refined",) if fine else ()), "shaken"):
         for corrugation in corrugations:
             for surface, name in oriented:
                 yield Plan(way, surface, name, corrugation)
@@ -307,11 +307,6 @@ def _turning(surface: TargetSurface) -> float:
     return float(np.arccos(np.clip(cosine, -1, 1)).sum(axis=1).mean())
 
 
-def _solve(unknowns: Unknowns, x: Floats, flat_foldable: bool) -> Projection:
-    constraints = unknowns.constraints(flat_foldable)
-    return project(constraints, x, unknowns.places, cap=STEP_CAP * unknowns.length)
-
-
 def _period(
     surface: Revolution, columns: int, rows: int, corrugation: Corrugation, level: float
 ) -> tuple[Unknowns, Tessellation]:
@@ -320,42 +315,6 @@ def _period(
     start, _ = seed(revolution(surface.profile, beta), columns, 2, corrugation, level)
     unknowns = Unknowns(columns, rows, float(start.edge_lengths.mean()), 2 * beta)
     return unknowns, Tessellation(start.points @ about_z((beta - surface.angle) / 2).T)
-
-
-def _bend(
-    surface: TargetSurface, columns: int, rows: int, corrugation: Corrugation, level: float
-) -> tuple[Unknowns, Projection]:
-    """From the flat sheet to the full target in equal steps; each starts from the last solution,
-    carried along in the target's own frame (tangents and normal at each vertex).
-    """
-    uv = surface.domain.lattice(columns, rows)
-    bends = np.linspace(0.0, 1.0, BEND_STEPS + 1)
-    start, _ = seed(Bent(surface, 0.0), columns, rows, corrugation, level)
-    unknowns = Unknowns(columns, rows, float(start.edge_lengths.mean()))
-    solution = _solve(unknowns, start.vertices.ravel(), flat_foldable=False)
-    iterations = solution.iterations
-    for before, after in itertools.pairwise(bends):
-        offset = solution.x.reshape(rows, columns, 3) - Bent(surface, before).point(uv)
-        local = np.linalg.solve(_frame(Bent(surface, before), uv), offset[..., None])
-        there = Bent(surface, after)
-        carried = Tessellation(there.point(uv) + (_frame(there, uv) @ local)[..., 0])
-        unknowns = replace(unknowns, length=float(carried.edge_lengths.mean()))
-        solution = _solve(unknowns, carried.vertices.ravel(), flat_foldable=False)
-        iterations += solution.iterations
-        if not solution.converged:
-            break
-    return unknowns, replace(solution, iterations=iterations)
-
-
-def _frame(surface: TargetSurface, uv: Floats) -> Floats:
-    along, across = tangents(surface, uv)
-    return np.stack([along, across, surface.normal(uv)], axis=-1)
-
-
-def _shaken(start: Tessellation, seed_number: int) -> Tessellation:
-    random = np.random.default_rng(seed_number)
-    amount = SHAKE * float(start.edge_lengths.mean())
-    return Tessellation(start.points + random.normal(scale=amount, size=start.points.shape))
 
 
 def _worst_kawasaki(sheet: Tessellation) -> float:

@@ -7,7 +7,8 @@ meets everything asked is the answer. The order:
 2. straight from the seed, with several stretches along and across the rows, each in both directions
    of the rows, the one along which the normal turns less first;
 3. the same bent step by step from flat to the full target, carrying the solution along;
-4. the seeds shaken a little at random, by the request's ``seed``.
+4. the same from a coarse sheet to twice as fine ones;
+5. the seeds shaken a little at random, by the request's ``seed``.
 
 On a mesh the sheet may then lie elsewhere: the scan smoothed more, the grid turned, and as the last
 resort a smaller part of the rectangle, each with the seeds and some of the bends. The advice says
@@ -29,7 +30,7 @@ from miurafab.origami.attempts import Candidate, plans
 from miurafab.origami.fit_request import Attempt, FitRequest, FitResult
 from miurafab.origami.search import coarsest
 
-LAST_RESORTS = ("bent", "shaken")
+LAST_RESORTS = ("bent", "refined", "shaken")
 """The ways to a sheet where the seed alone finds none."""
 
 __all__ = ["Attempt", "FitRequest", "FitResult", "fit"]

@@ -111,7 +111,8 @@ class FitRequest:
 
 @dataclass(frozen=True)
 class Attempt:
-    """One attempt: the way (``direct``, ``strip``, ``seed``, ``bent``, ``shaken``), the row
+    """One attempt: the way (``direct``, ``strip``, ``seed``, ``bent``, ``refined``,
+    ``shaken``), the row
     direction, the corrugation, the residual it ended with, why it was not enough (empty if it
     was), and on a mesh where else the sheet was laid.
     """
