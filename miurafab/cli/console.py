@@ -103,7 +103,7 @@ class Console:
             rich.progress.TextColumn("{task.fields[note]}", style="dim"),
         )
         with rich.progress.Progress(
-            *columns, console=self._err, disable=self.silent, transient=not self._err.is_terminal
+            *columns, console=self._err, disable=self.silent or not self._err.is_terminal
         ) as bar:
             task = bar.add_task(label, total=1.0, note="")
 

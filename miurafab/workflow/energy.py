@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import io
 import math
 from pathlib import Path
@@ -14,8 +13,8 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy import EnergyCurve, Progress, energy_curve
 from miurafab.origami.energy_model import Paper, sheet_model
 from miurafab.profiles import Material, load_material
+from miurafab.workflow import plotting
 
-PLOTS = (".png", ".svg")
 # Colours that colour-blind eyes keep apart (Okabe and Ito, "Color Universal Design", 2008).
 CURVE, BARRIER, STABLE = "#0072b2", "#d55e00", "#009e73"
 
@@ -53,16 +52,7 @@ def energy(
 
 def check_writable(path: Path) -> None:
     """Refuse, before any work is done, a file that :func:`write_energy` could not write."""
-    suffix = path.suffix.lower()
-    if suffix not in (*PLOTS, ".csv"):
-        raise InputError(f"{path}: the energy is written as .png, .svg or .csv, by the ending.")
-    if suffix in PLOTS and importlib.util.find_spec("matplotlib") is None:
-        raise InputError(
-            f"{path}: plots need matplotlib; install it with pip install 'miurafab[plot]', or "
-            "write a .csv."
-        )
-    if not path.absolute().parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist.")
+    plotting.check_writable(path, "the energy")
 
 
 def write_energy(curve: EnergyCurve, path: str | Path, title: str = "") -> None:
@@ -70,12 +60,12 @@ def write_energy(curve: EnergyCurve, path: str | Path, title: str = "") -> None:
 
     Raises :class:`~miurafab.errors.InputError` for another ending, or where matplotlib is missing.
     """
-    path = Path(path)
-    check_writable(path)
-    if path.suffix.lower() == ".csv":
-        path.write_text(energy_table(curve), encoding="utf-8", newline="\n")
-    else:
-        path.write_bytes(energy_plot(curve, path.suffix.lower().removeprefix("."), title))
+    plotting.write_result(
+        Path(path),
+        "the energy",
+        lambda: energy_table(curve),
+        lambda kind: energy_plot(curve, kind, title),
+    )
 
 
 def energy_table(curve: EnergyCurve) -> str:

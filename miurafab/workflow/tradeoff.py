@@ -22,10 +22,10 @@ import numpy as np
 from miurafab.errors import InputError
 from miurafab.origami.fit import fit
 from miurafab.origami.tradeoff import WEIGHTS, Sample, Tradeoff, cost, optimal_side, summarise
+from miurafab.workflow import plotting
 from miurafab.workflow.design import design
 
 SIDES = (8, 12, 16, 24, 32, 48)
-PLOTS = (".png", ".svg")
 Job = tuple[str, dict[str, str | None]]
 Progress = Callable[[float, str], None]
 # Colours that colour-blind eyes keep apart (Okabe and Ito, "Color Universal Design", 2008).
@@ -137,16 +137,7 @@ def _on_cluster(jobs: list[Job], address: str) -> Iterator[Sample]:
 
 def check_writable(path: Path) -> None:
     """Refuse, before any work is done, a file that :func:`write_tradeoff` could not write."""
-    suffix = path.suffix.lower()
-    if suffix not in (*PLOTS, ".csv"):
-        raise InputError(f"{path}: the trade-off is written as .png, .svg or .csv, by the ending.")
-    if suffix in PLOTS and importlib.util.find_spec("matplotlib") is None:
-        raise InputError(
-            f"{path}: plots need matplotlib; install it with pip install 'miurafab[plot]', or "
-            "write a .csv."
-        )
-    if not path.absolute().parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist.")
+    plotting.check_writable(path, "the trade-off")
 
 
 def write_tradeoff(found: Tradeoff, path: str | Path, title: str = "") -> None:
@@ -154,13 +145,12 @@ def write_tradeoff(found: Tradeoff, path: str | Path, title: str = "") -> None:
 
     Raises :class:`~miurafab.errors.InputError` for another ending, or where matplotlib is missing.
     """
-    path = Path(path)
-    check_writable(path)
-    if path.suffix.lower() == ".csv":
-        path.write_text(tradeoff_table(found), encoding="utf-8", newline="\n")
-    else:
-        kind = path.suffix.lower().removeprefix(".")
-        path.write_bytes(tradeoff_plot(found, kind, title))
+    plotting.write_result(
+        Path(path),
+        "the trade-off",
+        lambda: tradeoff_table(found),
+        lambda kind: tradeoff_plot(found, kind, title),
+    )
 
 
 def tradeoff_table(found: Tradeoff) -> str:

@@ -16,7 +16,7 @@ from miurafab.gcode.program import Program, parse_program, strokes
 
 
 def read(text: str, **options: object) -> Program:
-    return parse_program(Job("job.nc", text), **options)  # type: ignore[arg-type]
+    return parse_program(Job("job.nc", text), **options)
 
 
 def ends(text: str) -> list[list[float]]:

@@ -74,11 +74,11 @@ def test_chunks_make_no_difference(
         whole.receive(data)
         whole.advance(ticks * TICK)
         while data:
-            size = random.randint(1, len(data))  # type: ignore[attr-defined]
+            size = random.randint(1, len(data))
             cut.receive(data[:size])
             data = data[size:]
         while ticks:
-            step = random.randint(1, ticks)  # type: ignore[attr-defined]
+            step = random.randint(1, ticks)
             cut.advance(step * TICK)
             ticks -= step
         assert cut.take_output() == whole.take_output()

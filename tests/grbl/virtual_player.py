@@ -23,7 +23,7 @@ Step = str | bytes | float | Callable[[VirtualGrbl], object]
 
 def ready(settings: dict[int, float] | None = None, **options: object) -> VirtualGrbl:
     """A controller that has said its banner."""
-    device = VirtualGrbl(settings, baud=115_200, **options)  # type: ignore[arg-type]
+    device = VirtualGrbl(settings, baud=115_200, **options)
     device.advance(0.1)
     assert device.take_output().decode().startswith(BANNER)
     return device

@@ -193,7 +193,7 @@ def test_the_modes_are_those_of_the_whole(tmp_path: Path) -> None:
 
 def record(job: Job, **changes: object) -> JournalRun:
     made = JournalRun(job.name, job_digest(job), MACHINE.name, "virtual", len(job.lines))
-    return replace(made, ended="failed", **changes)  # type: ignore[arg-type]
+    return replace(made, ended="failed", **changes)
 
 
 def test_seventeen_moves_back_or_as_many_as_the_controller_plans() -> None:

@@ -56,7 +56,7 @@ def send(
 ) -> StreamResult:
     plan = plan_job(job, machine, force=force, check_mode=check_mode)
     try:
-        return deliver(plan, wire, StopSignals(), **options)  # type: ignore[arg-type]
+        return deliver(plan, wire, StopSignals(), **options)
     finally:
         assert wire.closed
 

@@ -27,7 +27,7 @@ def machine(**changes: object) -> MotionParameters:
         "s_max": 1000.0,
         "s_min": 0.0,
     }
-    return MotionParameters(**(values | changes))  # type: ignore[arg-type]
+    return MotionParameters(**(values | changes))
 
 
 def test_a_right_angle_is_cornered_at_the_speed_of_its_circle() -> None:

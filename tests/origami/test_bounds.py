@@ -18,7 +18,7 @@ EVERY = {"min_edge": 2.0, "angles": (0.5, 2.5), "aspect": 2.0, "kawasaki": 0.1}
 @pytest.mark.parametrize("only", [*EVERY, None])
 def test_the_gradient_is_that_of_central_differences(only: str | None) -> None:
     limits = EVERY if only is None else {only: EVERY[only]}
-    bounds = Bounds(SHEET.grid, 10.0, **limits)  # type: ignore[arg-type]
+    bounds = Bounds(SHEET.grid, 10.0, **limits)
     x = SHEET.vertices.ravel() + np.random.default_rng(1).normal(scale=0.5, size=48)
     h = 1e-5
     columns = [(bounds(x + h * e)[0] - bounds(x - h * e)[0]) / (2 * h) for e in np.eye(len(x))]
@@ -39,7 +39,7 @@ def test_slack_is_the_distance_to_the_limit() -> None:
 
 
 def test_each_kind_is_counted_by_itself() -> None:
-    bounds = Bounds(SHEET.grid, 10.0, **EVERY)  # type: ignore[arg-type]
+    bounds = Bounds(SHEET.grid, 10.0, **EVERY)
     g, _ = bounds(SHEET.vertices.ravel())
     counts = bounds.count(np.ones(len(g), dtype=bool))
     assert counts == {"edge": 24, "angle": 72, "aspect": 108, "kawasaki": 8}

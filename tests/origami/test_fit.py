@@ -174,7 +174,7 @@ class TestRings:
     def test_a_ring_closes_and_every_period_is_the_same(self) -> None:
         surface, _ = make_surface("vase", {"angle": "360deg"})
         result = fit(FitRequest(surface, 14, 24, size_mm=200.0))
-        check = audit(result.pattern, surface)  # type: ignore[arg-type]
+        check = audit(result.pattern, surface)
         assert check.findings == ()
         assert result.pattern is not None
         assert result.pattern.folded_coords is not None

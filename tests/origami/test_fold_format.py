@@ -62,7 +62,7 @@ def test_the_frames_of_a_motion_follow_the_folded_form() -> None:
     assert written["file_classes"] == ["singleModel", "animation"]
     frames = written["file_frames"]
     assert len(frames) == 7
-    assert frames[0]["vertices_coords"] == pattern.folded_coords.tolist()  # type: ignore[union-attr]
+    assert frames[0]["vertices_coords"] == pattern.folded_coords.tolist()
     for frame, points, angles in zip(frames[1:], motion.frames, motion.fold_angles, strict=True):
         assert frame["frame_parent"] == 0
         assert frame["frame_inherit"] is True

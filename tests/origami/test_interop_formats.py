@@ -106,7 +106,7 @@ def test_the_shortest_line_of_an_svg_has_ten_units_and_the_sheet_its_size() -> N
     lines = re.findall(r'x1="([^"]+)" y1="([^"]+)" x2="([^"]+)" y2="([^"]+)"', text)
     ends = np.array(lines, dtype=float).reshape(-1, 2, 2)
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min() >= 10 - 1e-9
-    width, height = re.search(r'width="([\d.]+)mm" height="([\d.]+)mm"', text).groups()  # type: ignore[union-attr]
+    width, height = re.search(r'width="([\d.]+)mm" height="([\d.]+)mm"', text).groups()
     assert [float(width), float(height)] == pytest.approx(
         np.ptp(regular().vertices_coords, axis=0).tolist()
     )

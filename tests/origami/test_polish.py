@@ -61,7 +61,7 @@ def test_bounds_hold_while_it_comes_closer() -> None:
 def test_one_period_has_the_conditions_of_the_whole_ring() -> None:
     surface = make_surface("pill", {"angle": "360deg"})[0]
     beta = surface.domain.height / 20
-    profile = surface.profile  # type: ignore[attr-defined]
+    profile = surface.profile
     first, _ = seed(revolution(profile, beta), 9, 2, Corrugation(0.8, 1.2))
     unknowns = Unknowns(9, 21, float(first.edge_lengths.mean()), 2 * beta)
     x = first.vertices.ravel()

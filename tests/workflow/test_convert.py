@@ -62,7 +62,7 @@ def test_two_obj_files_make_the_pattern_again(saved: Path) -> None:
     again = read_fold(saved.with_name("again.fold"))
     assert audit(again).valid
     first = read_fold(saved)
-    assert np.array_equal(again.folded_coords, first.folded_coords)  # type: ignore[arg-type]
+    assert np.array_equal(again.folded_coords, first.folded_coords)
     assert np.sort(again.edges_fold_angle) == pytest.approx(np.sort(first.edges_fold_angle))
 
 
@@ -95,7 +95,7 @@ def test_what_does_not_go_is_refused(
 ) -> None:
     folder = saved.parent
     with pytest.raises((InputError, PatternError), match=words):
-        convert(folder / source, folder / target, **options)  # type: ignore[arg-type]
+        convert(folder / source, folder / target, **options)
     assert not (folder / target).exists()
 
 
