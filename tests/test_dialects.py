@@ -13,7 +13,8 @@ from miurafab.fabrication.knife import axis_way, tip_way
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.program import strokes
-from miurafab.machine.sender import plan_job, stream_job
+from miurafab.machine.planning import plan_job
+from miurafab.machine.sender import stream_job
 from miurafab.posting import post
 from miurafab.profiles import (
     OPERATIONS,

@@ -24,8 +24,6 @@ KEYS = {
     "p": b"\x99",
 }
 """What each key sends (GRBL 1.1 ``config.h``): feed +10 %, -10 %, as written; power likewise."""
-LEGEND = "space holds, r resumes, q aborts, + - 0 change the feed, ] [ p the power"
-"""The keys, for people."""
 
 
 class Keys(Protocol):

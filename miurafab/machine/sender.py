@@ -23,29 +23,23 @@ from typing import NoReturn
 
 from miurafab.errors import (
     ControllerError,
-    GcodeError,
-    InputError,
     JobStopped,
     MachineError,
     MiurafabError,
 )
 from miurafab.gcode.job import Job, prepare_lines
-from miurafab.gcode.program import Program, parse_program
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Error, Event, Ok, Options, StatusReport
 from miurafab.grbl.settings import Settings, virtual_settings
 from miurafab.grbl.streamer import LineRefused, Refusal, Streamer
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import ABORT, KEYS, Keys, NoKeys
+from miurafab.machine.planning import Plan, plan_job
 from miurafab.machine.preflight import (
-    Finding,
-    check_lines,
-    check_program,
     check_settings,
     check_status,
     check_travel,
     raise_findings,
-    require_known,
 )
 from miurafab.machine.resume import Resumption
 from miurafab.machine.session import ANSWER_S, Session
@@ -56,11 +50,6 @@ from miurafab.profiles import MachineProfile
 
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # and when only the last moves are awaited
-_GRBL = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc")
-_ELSEWHERE = {
-    "marlin": "a program that waits for Marlin's ok after every line, or from its SD card",
-    "hpgl": "the cutter's own program, or to its port with flow control on",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,26 +81,6 @@ class StreamResult:
     lines: int
     seconds: float
     errors: tuple[Refusal, ...]
-    remarks: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A job that passed the checks which need no controller.
-
-    ``program`` is None where it could not be read and that was forced or is left to check mode;
-    ``remarks`` say what was forced.
-    """
-
-    job: Job
-    machine: MachineProfile
-    lines: int
-    program: Program | None
-    force: frozenset[str]
-    check_mode: bool
-    home: bool
-    at: tuple[float, float] | None
-    resumption: Resumption | None
     remarks: tuple[str, ...]
 
 
@@ -179,69 +148,6 @@ def stream_job(
             )
         except KeyboardInterrupt:
             raise JobStopped(f"{job.name} was stopped by {signals.reason}.") from None
-
-
-def plan_job(
-    job: Job,
-    machine: MachineProfile,
-    *,
-    force: frozenset[str] = frozenset(),
-    allow_m3: bool = False,
-    check_mode: bool = False,
-    home: bool = False,
-    at: tuple[float, float] | None = None,
-    resumption: Resumption | None = None,
-    most_power: float = 1.0,
-) -> Plan:
-    """Check ``job`` by itself; raises :class:`~miurafab.errors.InputError` for what is wrong."""
-    if resumption is not None:
-        if check_mode:
-            raise InputError("A job is resumed or read in check mode, not both.")
-        if not home and at is None:
-            raise InputError(
-                f"To go on with {job.name} the machine must know where it is: home it first "
-                "(--home), or put the head at a known place and state it (--at 0,0 is the origin "
-                "of the job)."
-            )
-        job = resumption.job
-    require_known(force)
-    if machine.dialect not in _GRBL:
-        raise InputError(
-            f"{machine.name} speaks {machine.dialect}, which cannot be streamed from here; send "
-            f"the file with {_ELSEWHERE[machine.dialect]}, or choose a machine that speaks "
-            f"{', '.join(_GRBL)}."
-        )
-    count, program, findings = examine_job(
-        job, machine, allow_m3=allow_m3, check_mode=check_mode, most_power=most_power
-    )
-    remarks = raise_findings(findings, force)
-    return Plan(job, machine, count, program, force, check_mode, home, at, resumption, remarks)
-
-
-def examine_job(
-    job: Job,
-    machine: MachineProfile,
-    *,
-    allow_m3: bool = False,
-    check_mode: bool = False,
-    most_power: float = 1.0,
-) -> tuple[int, Program | None, list[Finding]]:
-    """The number of lines of ``job``, what it does, and all that speaks against starting it.
-
-    Raises :class:`~miurafab.errors.GcodeError` for a line that cannot be sent at all.
-    """
-    lines = prepare_lines(job.name, job.iter_lines(), machine.controller.line_chars)
-    count, findings = check_lines(job.name, lines, machine, allow_m3=allow_m3 or check_mode)
-    program: Program | None = None
-    try:
-        program = parse_program(job)
-    except GcodeError as error:
-        # In check mode the controller itself is asked what it thinks of every line.
-        if not check_mode:
-            findings.append(Finding("program", error))
-    else:
-        findings.extend(check_program(program, machine, most_power=most_power))
-    return count, program, findings
 
 
 def deliver(

@@ -15,10 +15,11 @@ from miurafab.gcode.job import Job
 from miurafab.machine.framing import frame_job
 from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import Keys
+from miurafab.machine.planning import examine_job, plan_job
 from miurafab.machine.preflight import Finding
 from miurafab.machine.resume import Resumption, resume
 from miurafab.machine.sender import Progress as StreamProgress
-from miurafab.machine.sender import StreamResult, examine_job, plan_job, stream_job
+from miurafab.machine.sender import StreamResult, stream_job
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.dry_run import SheetPreview

@@ -20,7 +20,8 @@ from miurafab.errors import JobStopped, MiurafabError
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl, standing_seconds
-from miurafab.machine.sender import deliver, plan_job
+from miurafab.machine.planning import plan_job
+from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
 

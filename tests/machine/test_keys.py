@@ -17,7 +17,8 @@ from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.actions import talk
 from miurafab.machine.framing import frame_job
 from miurafab.machine.keys import NoKeys, terminal_keys
-from miurafab.machine.sender import StreamResult, deliver, plan_job
+from miurafab.machine.planning import plan_job
+from miurafab.machine.sender import StreamResult, deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
 

@@ -15,8 +15,9 @@ from miurafab.gcode.program import parse_program, strokes
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.journal import JournalRun, job_digest, read_journal
+from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import Resumption, resume
-from miurafab.machine.sender import deliver, plan_job, stream_job
+from miurafab.machine.sender import deliver, stream_job
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
 

@@ -23,7 +23,8 @@ from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.streamer import LineRefused
 from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.journal import read_journal
-from miurafab.machine.sender import Progress, StreamResult, deliver, plan_job, stream_job
+from miurafab.machine.planning import plan_job
+from miurafab.machine.sender import Progress, StreamResult, deliver, stream_job
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile, load_machine
 
