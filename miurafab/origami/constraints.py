@@ -29,30 +29,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def planarity(points: Floats, faces: Ints, length: float) -> Floats:
-    """(F,) facet determinants over ``length`` cubed; ``points`` (V, 3), ``faces`` (F, 4)."""
-    a, b, c = _from_first_corner(points, faces)
-    residual: Floats = np.einsum("fk,fk->f", a, np.cross(b, c)) / length**3
-    return residual
-
-
-def developability(points: Floats, grid: QuadGrid) -> Floats:
-    """(I,) angle surplus at each interior vertex, radians."""
-    angles = sector_angles(points, grid.interior_vertices, grid.interior_neighbours)
-    surplus: Floats = angles.sum(axis=1) - 2 * np.pi
-    return surplus
-
-
 def flat_foldability(points: Floats, grid: QuadGrid) -> Floats:
     """(I,) Kawasaki residual a0 + a2 - pi at each interior vertex, radians."""
     angles = sector_angles(points, grid.interior_vertices, grid.interior_neighbours)
     residual: Floats = angles[:, 0] + angles[:, 2] - np.pi
     return residual
-
-
-def _from_first_corner(points: Floats, faces: Ints) -> tuple[Floats, Floats, Floats]:
-    p = points[faces]
-    return p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +90,8 @@ class OrigamiConstraints:
         return np.concatenate(values), matrix
 
     def _planarity(self, points: Floats) -> tuple[Floats, Floats]:
-        a, b, c = _from_first_corner(points, self.grid.faces_vertices)
+        p = points[self.grid.faces_vertices]
+        a, b, c = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]
         bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
         residual: Floats = np.einsum("fk,fk->f", a, bc) / self.length**3
         gradient: Floats = np.stack([-(bc + ca + ab), bc, ca, ab], axis=1) / self.length**3

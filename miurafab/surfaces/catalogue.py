@@ -16,8 +16,6 @@ from miurafab.surfaces import analytic, curves
 from miurafab.surfaces.surface import TargetSurface
 from miurafab.units import parse_angle
 
-FULL_TURN = 2 * math.pi
-
 
 @dataclass(frozen=True)
 class Parameter:
