@@ -9,6 +9,7 @@ it. Distances are measured to the triangles themselves, not to the spline.
 from __future__ import annotations
 
 import hashlib
+import io
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -200,8 +201,9 @@ def load_mesh(
     except OSError as fault:
         raise TargetError(f"{path} cannot be read: {fault.strerror}.") from None
     try:
-        with path.open("rb") as stream:
-            mesh = trimesh.load_mesh(stream, file_type=path.suffix[1:].lower(), process=False)
+        mesh = trimesh.load_mesh(
+            io.BytesIO(content), file_type=path.suffix[1:].lower(), process=False
+        )
     except Exception as fault:  # noqa: BLE001 - trimesh's readers raise whatever their parser does
         reason = " ".join(str(fault).split()) or type(fault).__name__
         raise TargetError(f"{path} cannot be read as a mesh: {reason.rstrip('.')}.") from None
