@@ -1,9 +1,9 @@
 """Mesh targets: a scanned or modelled surface as a smooth map from a rectangle.
 
-The mesh must be one disk. Small holes are filled, it is laid flat, a rectangle in the layout is the
-parameter domain, and a smooth spline through the vertices over that rectangle gives points and
-normals. Where the mesh is rough (a scan), it is laid flat a second time as the spline has smoothed
-it. Distances are measured to the triangles themselves, not to the spline.
+The mesh, mended to one disk (:mod:`~miurafab.surfaces.mesh_repair`), is laid flat, a rectangle in
+the layout is the parameter domain, and a smooth spline through the vertices over that rectangle
+gives points and normals. Where the mesh is rough (a scan), it is laid flat a second time as the
+spline has smoothed it. Distances are measured to the triangles themselves, not to the spline.
 """
 
 from __future__ import annotations
@@ -18,12 +18,22 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from scipy.interpolate import NdBSpline
 
 from miurafab.errors import TargetError
 from miurafab.geometry.distances import closest_on_mesh
-from miurafab.surfaces.parameterise import border_loops, flatten
+from miurafab.surfaces.mesh_repair import (
+    Ints,
+    clean,
+    doubled_areas,
+    edges_of,
+    even_triangles,
+    fill_holes,
+    oriented_sheet,
+    side_lengths,
+    size_remarks,
+)
+from miurafab.surfaces.parameterise import flatten
 from miurafab.surfaces.placement import (
     Placement,
     Region,
@@ -36,10 +46,6 @@ from miurafab.surfaces.smoothing import Smoothed, smooth
 from miurafab.surfaces.surface import Domain, Floats, tangents, unit
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb")
-Ints = NDArray[np.int64]
-
-SMALL_HOLE = 0.15
-"""Holes are filled up to this part of the length of the border."""
 
 ROUGH = 0.03
 """A mesh is rough where the smooth spline leaves it by this part of its median edge."""
@@ -84,7 +90,7 @@ class Layout:
         )
         places, points = _within(frame[: self.known], self.vertices[: self.known], wide)
         smoothed = smooth(places, points, wide, _spans(wide, edge, _SPANS), stiffness)
-        triangles = _even_triangles(self.vertices, self.faces[: self.real])
+        triangles = even_triangles(self.vertices, self.faces[: self.real])
         return MeshSurface(smoothed.spline, domain, triangles, placement, stiffness, self)
 
     def _not_covered(self, frame: Floats) -> str:
@@ -258,22 +264,22 @@ def _placed_before(place: dict[str, Any], name: str) -> tuple[Placement, float]:
 
 def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[Layout, tuple[str, ...]]:
     """The mesh laid flat, and remarks on it. Raises ``TargetError`` if it is not one disk."""
-    vertices, faces = _clean(vertices, faces, name)
-    remarks = _size_remarks(vertices, name)
-    faces = _check_sheet(vertices, faces, name)
+    vertices, faces = clean(vertices, faces, name)
+    remarks = size_remarks(vertices, name)
+    faces = oriented_sheet(vertices, faces, name)
     known, real = len(vertices), len(faces)
-    vertices, faces, filled = _fill_holes(vertices, faces, name)
+    vertices, faces, filled = fill_holes(vertices, faces, name)
     if filled:
         remarks += (f"{name}: {filled} small hole{'s were' if filled > 1 else ' was'} filled.",)
-    if len(vertices) - len(_edges(faces)[0]) + len(faces) != 1:
+    if len(vertices) - len(edges_of(faces)[0]) + len(faces) != 1:
         raise TargetError(f"{name} has a handle; it cannot be laid flat. Cut it open.")
     flat = flatten(vertices, faces)
     smoothed = _smoothed(vertices[:known], flat[:known], faces)
-    edge = float(np.median(_side_lengths(vertices, faces[:real])))
+    edge = float(np.median(side_lengths(vertices, faces[:real])))
     rough = smoothed.roughness > ROUGH * edge
     if rough:
         even = np.asarray(smoothed.spline(flat), dtype=np.float64)
-        if _doubled_areas(even, faces).min() > 1e-6 * np.median(_doubled_areas(even, faces)):
+        if doubled_areas(even, faces).min() > 1e-6 * np.median(doubled_areas(even, faces)):
             flat = flatten(even, faces)
     return Layout(vertices, faces, real, known, flat, rough, name), remarks
 
@@ -297,162 +303,5 @@ def _within(places: Floats, points: Floats, domain: Domain) -> tuple[Floats, Flo
     return places[inside], points[inside]
 
 
-def _side_lengths(points: Floats, faces: Ints) -> Floats:
-    corners = points[faces]
-    lengths: Floats = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    return lengths
-
-
 def _median_edge(points: Floats, faces: Ints) -> float:
-    return float(np.median(_side_lengths(points, faces)))
-
-
-def _doubled_areas(points: Floats, faces: Ints) -> Floats:
-    p = points[faces]
-    areas: Floats = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    return areas
-
-
-def _clean(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
-    """Merge equal vertices, drop degenerate triangles and unused vertices."""
-    if not len(faces):
-        raise TargetError(f"{name} holds no triangles.")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise TargetError(f"{name}: a triangle refers to a vertex that does not exist.")
-    if not np.isfinite(vertices[faces]).all():
-        used = np.unique(faces)
-        bad = int(used[~np.isfinite(vertices[used]).all(axis=1)][0])
-        raise TargetError(
-            f"{name}: vertex {bad} has a coordinate that is not a finite number (NaN or infinite); "
-            "repair the mesh and try again."
-        )
-    size = float(np.ptp(vertices[faces].reshape(-1, 3), axis=0).max())
-    if size == 0:
-        raise TargetError(f"{name}: all triangles lie in one point.")
-    if not size < 1e100:
-        raise TargetError(f"{name}: its coordinates are too large to be lengths ({size:.0e} mm).")
-    vertices = np.where(np.isfinite(vertices), vertices, 0.0)
-    low = vertices[faces].reshape(-1, 3).min(axis=0)
-    keys = np.round(np.clip((vertices - low) / (1e-9 * size), -1e12, 1e12)).astype(np.int64)
-    _, first, merged = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    vertices, faces = vertices[first], merged.reshape(-1)[faces]
-    distinct = (np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)
-    faces = faces[distinct & (_doubled_areas(vertices, faces) > 1e-14 * size**2)]
-    if not len(faces):
-        raise TargetError(f"{name}: all triangles are degenerate (have no area).")
-    used, faces = np.unique(faces, return_inverse=True)
-    return vertices[used], faces.reshape(-1, 3)
-
-
-def _size_remarks(vertices: Floats, name: str) -> tuple[str, ...]:
-    size = float(np.ptp(vertices, axis=0).max())
-    if 1.0 <= size <= 10_000.0:
-        return ()
-    return (
-        f"{name} is {size:.3g} mm large, as mesh files are read in millimetres; if it is in "
-        "another unit, give the size that is meant with --size.",
-    )
-
-
-def _edges(faces: Ints) -> tuple[Ints, Ints]:
-    """(E, 2) the edges of a triangle mesh, and (E,) the number of triangles at each."""
-    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    edges, uses = np.unique(sides, axis=0, return_counts=True)
-    return edges, uses
-
-
-def _check_sheet(vertices: Floats, faces: Ints, name: str) -> Ints:
-    """The triangles oriented alike; refuses what is not one sheet with a border, by its fault."""
-    edges, uses = _edges(faces)
-    if (uses > 2).any():
-        raise TargetError(
-            f"{name} is not a surface: {int((uses > 2).sum())} edges have more than two triangles; "
-            "remove the inner walls or duplicate triangles."
-        )
-    pieces = trimesh.graph.connected_components(edges, nodes=np.arange(len(vertices)))
-    if len(pieces) > 1:
-        sizes = sorted((len(piece) for piece in pieces), reverse=True)
-        raise TargetError(
-            f"{name} holds {len(pieces)} separate pieces (the largest of {sizes[0]} and "
-            f"{sizes[1]} vertices); keep one and try again."
-        )
-    border = edges[uses == 1]
-    if not len(border):
-        raise TargetError(f"{name} is closed; cut it open so that it is a sheet with one border.")
-    touching = np.flatnonzero(np.bincount(border.ravel()) > 2)
-    if len(touching):
-        x, y, z = vertices[touching[0]]
-        raise TargetError(
-            f"{name}: its border touches itself at ({x:.4g}, {y:.4g}, {z:.4g}); widen it there or "
-            "cut it apart."
-        )
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    if not mesh.is_winding_consistent:
-        trimesh.repair.fix_winding(mesh)
-        if not mesh.is_winding_consistent:
-            raise TargetError(
-                f"{name} has one side only, like a Moebius strip; cut it open across."
-            )
-    fan = np.asarray(mesh.faces, dtype=np.int64)
-    pinched = _pinched(fan, len(vertices))
-    if pinched is not None:
-        x, y, z = vertices[pinched]
-        raise TargetError(
-            f"{name} is pinched: parts that share no edge meet at ({x:.4g}, {y:.4g}, {z:.4g}); "
-            "separate them there."
-        )
-    return fan
-
-
-def _pinched(faces: Ints, count: int) -> int | None:
-    """A vertex about which the triangles do not form one fan, if there is any."""
-    corners = faces.ravel()
-    # corners of neighbouring triangles at one vertex are joined across their common side
-    following, previous = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, 1, axis=1).ravel()
-    out, back = corners * count + following, corners * count + previous
-    order = np.argsort(back)
-    place = np.searchsorted(back, out, sorter=order).clip(max=len(back) - 1)
-    match = order[place]
-    joined = np.flatnonzero(back[match] == out)
-    fans = trimesh.graph.connected_component_labels(
-        np.stack([joined, match[joined]], axis=1), node_count=len(corners)
-    )
-    pairs = np.unique(np.stack([corners, fans], axis=1), axis=0)
-    several = np.flatnonzero(np.bincount(pairs[:, 0], minlength=count) > 1)
-    return int(several[0]) if len(several) else None
-
-
-def _fill_holes(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints, int]:
-    """Each small hole closed by a fan about its middle, and their number."""
-    loops = border_loops(faces)
-    lengths = [
-        float(np.linalg.norm(vertices[np.roll(loop, -1)] - vertices[loop], axis=1).sum())
-        for loop in loops
-    ]
-    order = sorted(range(len(loops)), key=lambda n: -lengths[n])
-    for n in order[1:]:
-        if lengths[n] > SMALL_HOLE * lengths[order[0]]:
-            raise TargetError(
-                f"{name} has a hole {lengths[n] / math.pi:.3g} mm across, too large to be filled "
-                f"here (it has {len(loops) - 1} in all); fill it in your mesh program, or cut the "
-                "mesh to a part without."
-            )
-        loop = loops[n]
-        middle = np.full(len(loop), len(vertices))
-        vertices = np.concatenate([vertices, vertices[loop].mean(axis=0, keepdims=True)])
-        # a border runs with its triangles, so what fills it runs against
-        faces = np.concatenate([faces, np.stack([np.roll(loop, -1), loop, middle], axis=1)])
-    return vertices, faces, len(loops) - 1
-
-
-def _even_triangles(vertices: Floats, faces: Ints) -> Floats:
-    """(T, 3, 3) the same surface with no triangle much larger than most."""
-    corners = vertices[faces]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    extent = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    limit = max(3 * float(np.median(longest)), extent / 80)
-    if longest.max() <= limit:
-        return corners
-    points, split = trimesh.remesh.subdivide_to_size(vertices, faces, limit, max_iter=24)
-    fine: Floats = np.asarray(points, dtype=np.float64)[np.asarray(split)]
-    return fine
+    return float(np.median(side_lengths(points, faces)))
