@@ -9,12 +9,11 @@ select"). Anything else is refused by name, since what it draws would be left ou
 from __future__ import annotations
 
 import re
-from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import GcodeError
+from miurafab.gcode.columns import Columns
 from miurafab.gcode.job import Job
 from miurafab.gcode.moves import BEAM_M3, FEED, RAPID, Context, Program
 from miurafab.profiles import OPERATIONS
@@ -45,12 +44,14 @@ class _Reader:
         self.feed = _SPEED * _MM_MIN_PER_CM_S
         self.contexts: dict[Context, int] = {Context(): 0}
         self.context = 0
-        self.moves: list[tuple[float, ...]] = []
-        self.sent: list[tuple[int, int]] = []
+        self.moves = Columns("f8", "f8", "i1", "f8", "f8", "i4", "i4")
+        self.sent = Columns("i4", "i4")
 
     def read(self, job: Job) -> Program:
         for number, line in enumerate(job.iter_lines(), 1):
             place = 0
+            if line.strip():
+                self.sent.add(number, len(line) + 1)
             while place < len(line):
                 match = _INSTRUCTION.match(line, place)
                 if match is None:
@@ -58,7 +59,6 @@ class _Reader:
                         f"{self.name}, line {number}: {line[place : place + 12]!r} is not HPGL; "
                         "preview and cut HPGL files with an HPGL machine, G-code with another."
                     )
-                self.sent.append((number, match.end() - place))
                 self._do(number, match[1].upper(), [*map(float, _NUMBER.findall(match[2]))])
                 place = match.end()
         return self._program()
@@ -100,41 +100,35 @@ class _Reader:
                 motion, feed, power = (
                     (FEED, self.feed, self.force) if self.down else (RAPID, 0.0, 0.0)
                 )
-                self.moves.append((*self.at, *target, motion, feed, power, number, self.context))
+                self.moves.add(*target, motion, feed, power, number, self.context)
             self.at = target
 
     def _program(self) -> Program:
-        moves = np.array(self.moves, dtype=np.float64).reshape(-1, 9)
-        flat = np.zeros((len(moves), 1))
+        moves, sent = self.moves, self.sent
+        places = np.zeros((len(moves) + 1, 3))
+        for axis in range(2):
+            places[1:, axis] = moves.take(axis)
+        power = moves.take(4)
+        number = sent.take(0)
         none = np.zeros(0)
-        lines = _lines(self.sent)
         return Program(
             name=self.name,
-            start=np.hstack([moves[:, 0:2], flat]),
-            end=np.hstack([moves[:, 2:4], flat]),
-            motion=moves[:, 4].astype(np.int8),
-            feed_mm_min=moves[:, 5].copy(),
-            power=moves[:, 6].copy(),
-            spindle=np.where(moves[:, 6] > 0, BEAM_M3, 0).astype(np.int8),
-            line=moves[:, 7].astype(np.int64),
-            context=moves[:, 8].astype(np.int64),
+            start=places[:-1],
+            end=places[1:],
+            motion=moves.take(2),
+            feed_mm_min=moves.take(3),
+            power=power,
+            spindle=np.where(power > 0, BEAM_M3, 0).astype(np.int8),
+            line=moves.take(5),
+            context=moves.take(6),
             contexts=tuple(self.contexts),
             event_move=none.astype(np.int64),
             event_kind=none.astype(np.int8),
-            event_seconds=none.copy(),
-            event_power=none.copy(),
-            event_line=none.astype(np.int64),
-            line_number=lines[:, 0].copy(),
-            line_bytes=lines[:, 1].copy(),
-            line_words=np.zeros(len(lines), dtype=np.int64),
-            line_points=np.zeros(len(lines), dtype=np.int64),
+            event_seconds=none,
+            event_power=none,
+            event_line=none.astype(np.int32),
+            line_number=number,
+            line_bytes=sent.take(1),
+            line_words=np.zeros(len(number), dtype=np.int32),
+            line_points=np.zeros(len(number), dtype=np.int32),
         )
-
-
-def _lines(sent: list[tuple[int, int]]) -> NDArray[np.int64]:
-    """(L, 2) int64: the file's lines that hold instructions, and the bytes of these."""
-    pairs = np.array(sent, dtype=np.int64).reshape(-1, 2)
-    number, first = np.unique(pairs[:, 0], return_index=True)
-    bounds = [*first.tolist(), len(pairs)]
-    size = [int(pairs[a:b, 1].sum()) + 1 for a, b in pairwise(bounds)]
-    return np.stack([number, np.array(size, dtype=np.int64)], axis=1)

@@ -40,15 +40,16 @@ class Program:
     Per move, in order: ``start`` and ``end`` (n, 3) float64 mm; ``motion`` (n,) int8, RAPID or
     FEED; ``feed_mm_min`` (n,) float64, 0 for rapids; ``power`` (n,) float64, the S that the beam
     gets, 0 with the spindle off and for rapids in laser mode; ``spindle`` (n,) int8, BEAM_OFF,
-    BEAM_M3 or BEAM_M4; ``line`` (n,) int64, 1-based in the file; ``context`` (n,) int64 into
-    ``contexts``. Arcs are chords; a move that goes nowhere is left out.
+    BEAM_M3 or BEAM_M4; ``line`` (n,) int32, 1-based in the file; ``context`` (n,) int32 into
+    ``contexts``. Arcs are chords; a move that goes nowhere is left out, and each move starts where
+    the one before it ends, so that both share one array.
 
     Per event: ``event_move`` (e,) int64, the number of moves made before it; ``event_kind`` (e,)
     int8; ``event_seconds`` (e,) float64; ``event_power`` (e,) float64, the S that burns from it
-    on while nothing moves, NaN for as before; ``event_line`` (e,) int64.
+    on while nothing moves, NaN for as before; ``event_line`` (e,) int32.
 
     Per line sent: ``line_number``, ``line_bytes`` with the newline, ``line_words`` and
-    ``line_points`` (decimal points), all (L,) int64.
+    ``line_points`` (decimal points), all (L,) int32. In all 50 bytes a move and 16 a line.
     """
 
     name: str
@@ -58,18 +59,18 @@ class Program:
     feed_mm_min: NDArray[np.float64]
     power: NDArray[np.float64]
     spindle: NDArray[np.int8]
-    line: NDArray[np.int64]
-    context: NDArray[np.int64]
+    line: NDArray[np.int32]
+    context: NDArray[np.int32]
     contexts: tuple[Context, ...]
     event_move: NDArray[np.int64]
     event_kind: NDArray[np.int8]
     event_seconds: NDArray[np.float64]
     event_power: NDArray[np.float64]
-    event_line: NDArray[np.int64]
-    line_number: NDArray[np.int64]
-    line_bytes: NDArray[np.int64]
-    line_words: NDArray[np.int64]
-    line_points: NDArray[np.int64]
+    event_line: NDArray[np.int32]
+    line_number: NDArray[np.int32]
+    line_bytes: NDArray[np.int32]
+    line_words: NDArray[np.int32]
+    line_points: NDArray[np.int32]
 
     def __len__(self) -> int:
         return len(self.motion)
@@ -91,14 +92,14 @@ class Strokes:
 
     ``points`` (N, 3) float64 mm; ``offsets`` (S + 1,) int64, stroke s being
     ``points[offsets[s]:offsets[s + 1]]``; ``first_move`` and ``last_move`` (S,) int64, its moves
-    in the program, both included; ``context`` (S,) int64 into ``contexts``.
+    in the program, both included; ``context`` (S,) int32 into ``contexts``.
     """
 
     points: NDArray[np.float64]
     offsets: NDArray[np.int64]
     first_move: NDArray[np.int64]
     last_move: NDArray[np.int64]
-    context: NDArray[np.int64]
+    context: NDArray[np.int32]
     contexts: tuple[Context, ...]
 
     def __len__(self) -> int:
@@ -122,8 +123,8 @@ def strokes(program: Program) -> Strokes:
     if not len(burns):
         nothing = np.zeros(0, dtype=np.int64)
         return Strokes(
-            np.zeros((0, 3)), np.zeros(1, dtype=np.int64), nothing, nothing, nothing,
-            program.contexts,
+            np.zeros((0, 3)), np.zeros(1, dtype=np.int64), nothing, nothing,
+            program.context[:0], program.contexts,
         )  # fmt: skip
     joined = (np.diff(burns) == 1) & (np.diff(program.context[burns]) == 0)
     first = burns[np.concatenate([[True], ~joined])]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from miurafab.errors import GcodeError
+from miurafab.gcode.columns import Columns
 from miurafab.gcode.execution import (
     Dwell,
     Line,
@@ -38,12 +40,14 @@ from miurafab.gcode.moves import (
     strokes,
 )
 from miurafab.gcode.parser import ModalState, parse_block
+from miurafab.gcode.regular import LEAST_RUN, Lines, read_lines, run_of
 
 __all__ = ["Context", "Program", "Strokes", "parse_program", "strokes"]
 
 _COMMENT = re.compile(r"\s*\(\s*(sheet|patch|operation)\s+([^()]*?)\s*\)\s*")
 _INLINE = re.compile(r"(M0*[345])I0*(?![\d.])")
 _NO_LETTERS = str.maketrans("", "", "0123456789.+-")
+_CHUNK = 1 << 18  # characters read at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,21 +81,80 @@ class _Reader:
         self.at: Sequence[float] = (0.0, 0.0, 0.0)
         self.contexts: dict[Context, int] = {Context(): 0}
         self.context = Context()
-        self.moves: list[tuple[float, ...]] = []
-        self.events: list[tuple[float, ...]] = []
-        self.sent: list[tuple[int, ...]] = []
+        # x, y, z, motion, feed, power, spindle, line, context
+        self.moves = Columns("f8", "f8", "f8", "i1", "f8", "f8", "i1", "i4", "i4")
+        # move, kind, seconds, power, line
+        self.events = Columns("i8", "i1", "f8", "f8", "i4")
+        # number, bytes, words, points
+        self.sent = Columns("i4", "i4", "i4", "i4")
 
     def read(self, job: Job) -> Program:
-        for number, line in enumerate(job.iter_lines(), 1):
-            code = bare_code(job.name, number, line)
+        number = 1
+        for text in _chunks(job.text):
+            lines = read_lines(text)
+            first, count = 0, len(lines.regular)
+            for begin, stop in _runs(lines):
+                self._words(job.name, number, text, lines, first, begin)
+                first = begin
+                while stop - first >= LEAST_RUN and not self._run(lines, first, stop, number):
+                    self._words(job.name, number, text, lines, first, first + LEAST_RUN)
+                    first += LEAST_RUN
+                if stop - first >= LEAST_RUN:
+                    first = stop
+            self._words(job.name, number, text, lines, first, count)
+            number += count
+        return self._program(job.name)
+
+    def _words(
+        self, name: str, number: int, text: str, lines: Lines, first: int, stop: int
+    ) -> None:
+        """Lines ``first`` to before ``stop`` of a chunk that begins with line ``number``."""
+        bounds = lines.bounds[first : stop + 1].tolist()
+        for index, (begin, end) in enumerate(pairwise(bounds), number + first):
+            line = text[begin : end - 1]
+            code = bare_code(name, index, line)
             if code:
                 code = code.upper()
                 words = len(code.translate(_NO_LETTERS))
-                self.sent.append((number, len(code) + 1, words, code.count(".")))
-                self._line(job.name, number, code.replace("/", ""))
+                self.sent.add(index, len(code) + 1, words, code.count("."))
+                self._line(name, index, code.replace("/", ""))
             elif "(" in line:
                 self._comment(line)
-        return self._program(job.name)
+
+    def _run(self, lines: Lines, first: int, stop: int, number: int) -> bool:
+        """A run of regular lines at once; False if the state gives them another meaning."""
+        run = run_of(lines, first, stop, self.state)
+        if run is None:
+            return False
+        spindle, laser = self.state.spindle, self.rules.laser
+        numbers = np.arange(number + first, number + stop)
+        self.sent.extend(
+            numbers, lines.size[first:stop] + 1, lines.words[first:stop], lines.points[first:stop]
+        )
+        before = np.concatenate([[self.at], run.target[:-1]])
+        goes = (run.target != before).any(axis=1)
+        power = np.where(run.rapid, 0.0, run.speed) if laser else run.speed
+        made = len(self.moves) + np.cumsum(goes) - goes
+        # Laser mode takes a new power with the motion, but where there is none to M3; else each
+        # new power waits for the motion to end.
+        stops = ~goes & (spindle == BEAM_M3) if laser else run.changes & (spindle != BEAM_OFF)
+        if stops.any():
+            nothing = np.zeros(int(stops.sum()))
+            self.events.extend(made[stops], nothing, nothing, power[stops], numbers[stops])
+        if goes.any():
+            context = self.contexts.setdefault(self.context, len(self.contexts))
+            count = int(goes.sum())
+            self.moves.extend(
+                *run.target[goes].T,
+                np.where(run.rapid, RAPID, FEED)[goes],
+                np.where(run.rapid, 0.0, run.feed)[goes],
+                power[goes] if spindle else np.zeros(count),
+                np.full(count, spindle),
+                numbers[goes],
+                np.full(count, context),
+            )
+        self.at = tuple(run.target[-1].tolist())
+        return True
 
     def _comment(self, line: str) -> None:
         match = _COMMENT.fullmatch(line)
@@ -149,46 +212,64 @@ class _Reader:
         elif line.inverse_time:
             feed *= sum((b - a) ** 2 for a, b in zip(start, target, strict=True)) ** 0.5
         context = self.contexts.setdefault(self.context, len(self.contexts))
-        self.moves.append(
-            (
-                *start,
-                *target,
-                RAPID if line.rapid else FEED,
-                feed,
-                line.speed if line.spindle else 0.0,
-                line.spindle,
-                number,
-                context,
-            )
+        self.moves.add(
+            *target,
+            RAPID if line.rapid else FEED,
+            feed,
+            line.speed if line.spindle else 0.0,
+            line.spindle,
+            number,
+            context,
         )
 
     def _event(
         self, kind: int, number: int, *, seconds: float = 0.0, power: float = np.nan
     ) -> None:
-        self.events.append((len(self.moves), kind, seconds, power, number))
+        self.events.add(len(self.moves), kind, seconds, power, number)
 
     def _program(self, name: str) -> Program:
-        moves = np.array(self.moves, dtype=np.float64).reshape(-1, 12)
-        events = np.array(self.events, dtype=np.float64).reshape(-1, 5)
-        sent = np.array(self.sent, dtype=np.int64).reshape(-1, 4)
+        moves, events, sent = self.moves, self.events, self.sent
+        places = np.zeros((len(moves) + 1, 3))
+        for axis in range(3):
+            places[1:, axis] = moves.take(axis)
         return Program(
             name=name,
-            start=moves[:, 0:3].copy(),
-            end=moves[:, 3:6].copy(),
-            motion=moves[:, 6].astype(np.int8),
-            feed_mm_min=moves[:, 7].copy(),
-            power=moves[:, 8].copy(),
-            spindle=moves[:, 9].astype(np.int8),
-            line=moves[:, 10].astype(np.int64),
-            context=moves[:, 11].astype(np.int64),
+            start=places[:-1],
+            end=places[1:],
+            motion=moves.take(3),
+            feed_mm_min=moves.take(4),
+            power=moves.take(5),
+            spindle=moves.take(6),
+            line=moves.take(7),
+            context=moves.take(8),
             contexts=tuple(self.contexts),
-            event_move=events[:, 0].astype(np.int64),
-            event_kind=events[:, 1].astype(np.int8),
-            event_seconds=events[:, 2].copy(),
-            event_power=events[:, 3].copy(),
-            event_line=events[:, 4].astype(np.int64),
-            line_number=sent[:, 0].copy(),
-            line_bytes=sent[:, 1].copy(),
-            line_words=sent[:, 2].copy(),
-            line_points=sent[:, 3].copy(),
+            event_move=events.take(0),
+            event_kind=events.take(1),
+            event_seconds=events.take(2),
+            event_power=events.take(3),
+            event_line=events.take(4),
+            line_number=sent.take(0),
+            line_bytes=sent.take(1),
+            line_words=sent.take(2),
+            line_points=sent.take(3),
         )
+
+
+def _chunks(text: str) -> Iterator[str]:
+    """``text`` in pieces of whole lines, each line ended by one LF."""
+    begin = 0
+    while begin < len(text):
+        end = text.find("\n", begin + _CHUNK) + 1 or len(text)
+        piece = text[begin:end]
+        if "\r" in piece:
+            piece = piece.replace("\r\n", "\n").replace("\r", "\n")
+        yield piece if piece.endswith("\n") else piece + "\n"
+        begin = end
+
+
+def _runs(lines: Lines) -> list[tuple[int, int]]:
+    """Where runs of regular lines worth an array begin and stop."""
+    edges = np.flatnonzero(np.diff(lines.regular, prepend=False, append=False))
+    begins, stops = edges[::2], edges[1::2]
+    long = stops - begins >= LEAST_RUN
+    return list(zip(begins[long].tolist(), stops[long].tolist(), strict=True))
