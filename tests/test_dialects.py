@@ -13,6 +13,7 @@ from miurafab.fabrication.knife import axis_way, tip_way
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.program import strokes
+from miurafab.gcode.reading import read_program
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import stream_job
 from miurafab.posting import post
@@ -24,7 +25,7 @@ from miurafab.profiles import (
     shipped_names,
 )
 from miurafab.workflow.design import save_pattern
-from miurafab.workflow.dry_run import dry_run, read_program
+from miurafab.workflow.dry_run import dry_run
 from miurafab.workflow.job_directory import read_job, write_job
 from miurafab.workflow.preview import preview
 

@@ -37,6 +37,13 @@ class Job:
         lines = _LINE_ENDS.split(self.text)
         return tuple(lines[:-1] if lines[-1] == "" else lines)
 
+    @property
+    def line_count(self) -> int:
+        """How many lines the file has."""
+        text = self.text
+        ends = text.count("\n") + text.count("\r") - text.count("\r\n")
+        return ends + bool(text and not text.endswith(("\n", "\r")))
+
     def iter_lines(self) -> Iterator[str]:
         """The same lines one at a time, so that a long file is not held twice."""
         return (match[1] for match in _LINES.finditer(self.text) if match[0])

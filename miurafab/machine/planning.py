@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 from miurafab.errors import GcodeError, InputError
 from miurafab.gcode.job import Job, prepare_lines
-from miurafab.gcode.program import Program, parse_program
+from miurafab.gcode.program import Program
+from miurafab.gcode.reading import read_program
 from miurafab.machine.preflight import (
     Finding,
     check_lines,
@@ -58,8 +59,14 @@ def plan_job(
     at: tuple[float, float] | None = None,
     resumption: Resumption | None = None,
     most_power: float = 1.0,
+    program: Program | None = None,
 ) -> Plan:
-    """Check ``job`` by itself; raises :class:`~miurafab.errors.InputError` for what is wrong."""
+    """Check ``job`` by itself; raises :class:`~miurafab.errors.InputError` for what is wrong.
+
+    ``program`` is ``job`` as :func:`~miurafab.gcode.reading.read_program` read it for ``machine``,
+    if somebody has done so; it is read here otherwise. The other options are those of
+    :func:`~miurafab.machine.sender.stream_job`.
+    """
     if resumption is not None:
         if check_mode:
             raise InputError("A job is resumed or read in check mode, not both.")
@@ -69,7 +76,7 @@ def plan_job(
                 "(--home), or put the head at a known place and state it (--at 0,0 is the origin "
                 "of the job)."
             )
-        job = resumption.job
+        job, program = resumption.job, None
     require_known(force)
     if machine.dialect not in _GRBL:
         raise InputError(
@@ -78,7 +85,12 @@ def plan_job(
             f"{', '.join(_GRBL)}."
         )
     count, program, findings = examine_job(
-        job, machine, allow_m3=allow_m3, check_mode=check_mode, most_power=most_power
+        job,
+        machine,
+        allow_m3=allow_m3,
+        check_mode=check_mode,
+        most_power=most_power,
+        program=program,
     )
     remarks = raise_findings(findings, force)
     return Plan(job, machine, count, program, force, check_mode, home, at, resumption, remarks)
@@ -91,16 +103,18 @@ def examine_job(
     allow_m3: bool = False,
     check_mode: bool = False,
     most_power: float = 1.0,
+    program: Program | None = None,
 ) -> tuple[int, Program | None, list[Finding]]:
     """The number of lines of ``job``, what it does, and all that speaks against starting it.
+
+    ``program`` as for :func:`plan_job`.
 
     Raises :class:`~miurafab.errors.GcodeError` for a line that cannot be sent at all.
     """
     lines = prepare_lines(job.name, job.iter_lines(), machine.controller.line_chars)
     count, findings = check_lines(job.name, lines, machine, allow_m3=allow_m3 or check_mode)
-    program: Program | None = None
     try:
-        program = parse_program(job)
+        program = read_program(job, machine) if program is None else program
     except GcodeError as error:
         # In check mode the controller itself is asked what it thinks of every line.
         if not check_mode:

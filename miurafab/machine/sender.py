@@ -131,10 +131,35 @@ def stream_job(
         resumption=resumption,
         most_power=most_power,
     )
+    return stream_plan(
+        plan,
+        port,
+        journal_path=journal_path,
+        transcript_path=transcript_path,
+        on_progress=on_progress,
+        keys=keys,
+        virtual_speed=virtual_speed,
+    )
+
+
+def stream_plan(
+    plan: Plan,
+    port: str,
+    *,
+    journal_path: Path | None = None,
+    transcript_path: Path | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+    keys: Keys | None = None,
+    virtual_speed: float | None = None,
+) -> StreamResult:
+    """Send a planned job; see :func:`stream_job`."""
     with StopSignals() as signals:
         try:
             transport = open_port(
-                port, machine.controller.baud, virtual_settings(machine), virtual_speed
+                port,
+                plan.machine.controller.baud,
+                virtual_settings(plan.machine),
+                virtual_speed,
             )
             signals.at_once = transport.blocks
             return deliver(
@@ -147,7 +172,7 @@ def stream_job(
                 keys=keys,
             )
         except KeyboardInterrupt:
-            raise JobStopped(f"{job.name} was stopped by {signals.reason}.") from None
+            raise JobStopped(f"{plan.job.name} was stopped by {signals.reason}.") from None
 
 
 def deliver(

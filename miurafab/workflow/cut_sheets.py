@@ -15,11 +15,11 @@ from miurafab.gcode.job import Job
 from miurafab.machine.framing import frame_job
 from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import Keys
-from miurafab.machine.planning import examine_job, plan_job
+from miurafab.machine.planning import Plan, examine_job, plan_job
 from miurafab.machine.preflight import Finding
-from miurafab.machine.resume import Resumption, resume
+from miurafab.machine.resume import resume
 from miurafab.machine.sender import Progress as StreamProgress
-from miurafab.machine.sender import StreamResult, stream_job
+from miurafab.machine.sender import StreamResult, stream_job, stream_plan
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.dry_run import SheetPreview
@@ -98,8 +98,8 @@ def cut(
     plans = _plans(prepared, _chosen(prepared, sheets), options)
     done = []
     at = options.at
-    for number, resumption in plans:
-        job = prepared.jobs[number - 1]
+    for number, plan in plans:
+        job, resumption = prepared.jobs[number - 1], plan.resumption
         expected = prepared.dry_runs[number - 1]
         if before_sheet is not None:
             before_sheet(number, len(prepared.jobs))
@@ -109,20 +109,12 @@ def cut(
             frame(prepared, number, port=port, options=replace(options, at=at))
             if after_frame is not None:
                 after_frame(number)
-        result = stream_job(
-            job,
-            prepared.machine,
+        result = stream_plan(
+            replace(plan, at=at),
             port,
             journal_path=journal_path(prepared, job),
             transcript_path=_beside(prepared, job, ".transcript"),
             on_progress=_placed(on_progress, number, expected, prepared.machine),
-            force=options.force,
-            allow_m3=options.allow_m3,
-            check_mode=options.check_mode,
-            home=options.home,
-            at=at,
-            resumption=resumption,
-            most_power=prepared.most_power,
             keys=keys,
             virtual_speed=options.virtual_speed,
         )
@@ -153,11 +145,9 @@ def _chosen(prepared: Prepared, sheets: Sequence[int] | None) -> list[int]:
     return chosen
 
 
-def _plans(
-    prepared: Prepared, chosen: list[int], options: CutOptions
-) -> list[tuple[int, Resumption | None]]:
-    """The sheets to send, each checked by itself, with where those interrupted go on."""
-    plans: list[tuple[int, Resumption | None]] = []
+def _plans(prepared: Prepared, chosen: list[int], options: CutOptions) -> list[tuple[int, Plan]]:
+    """The sheets to send, each checked by itself, those interrupted from where they go on."""
+    plans: list[tuple[int, Plan]] = []
     for number in chosen:
         job = prepared.jobs[number - 1]
         resumption = None
@@ -168,7 +158,7 @@ def _plans(
                 continue
             if runs:
                 resumption = resume(job, prepared.machine, runs)
-        plan_job(
+        plan = plan_job(
             job,
             prepared.machine,
             force=options.force,
@@ -178,9 +168,10 @@ def _plans(
             at=options.at,
             resumption=resumption,
             most_power=prepared.most_power,
+            program=prepared.dry_runs[number - 1].program,
         )
-        plans.append((number, resumption))
-    if options.resume and not any(resumption for _, resumption in plans):
+        plans.append((number, plan))
+    if options.resume and not any(plan.resumption for _, plan in plans):
         raise InputError(
             f"No sheet of {prepared.name} was interrupted, by the journals beside it; leave "
             "--resume out to cut."
@@ -221,7 +212,11 @@ def findings(prepared: Prepared, *, allow_m3: bool = False) -> list[tuple[str, F
         (expected.name, finding)
         for job, expected in zip(prepared.jobs, prepared.dry_runs, strict=True)
         for finding in examine_job(
-            job, prepared.machine, allow_m3=allow_m3, most_power=prepared.most_power
+            job,
+            prepared.machine,
+            allow_m3=allow_m3,
+            most_power=prepared.most_power,
+            program=expected.program,
         )[2]
     ]
 

@@ -6,7 +6,7 @@ foreign file are worth as much as those of our own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
-from miurafab.gcode.hpgl import parse_hpgl
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import Program, parse_program, strokes
+from miurafab.gcode.program import Program, strokes
+from miurafab.gcode.reading import read_program
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.profiles import OPERATIONS, MachineProfile
-from miurafab.workflow.hazards import has_laser_mode, hazards
+from miurafab.workflow.hazards import hazards
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def dry_run(
     stroke_layer = layer[burnt.first_move]
     return SheetPreview(
         name=name,
-        lines=len(job.lines),
+        lines=job.line_count,
         seconds=times.seconds,
         beam_on_seconds=times.beam_on_seconds,
         cut_mm=float(lengths[burning].sum()),
@@ -120,20 +120,6 @@ def dry_run(
         paper_mm=paper_mm,
         view_mm=_box(np.vstack([program.start[:1, :2], program.end[:, :2], (0, 0), bed, paper_mm])),
     )
-
-
-def read_program(job: Job, machine: MachineProfile) -> Program:
-    """``job`` as ``machine`` would run it, in the dialect that it speaks.
-
-    What a pen or knife does while it is up has no power, whatever S holds it up. Raises
-    :class:`~miurafab.errors.GcodeError`, naming the line, for what the machine would refuse.
-    """
-    if machine.dialect == "hpgl":
-        return parse_hpgl(job)
-    program = parse_program(job, laser=has_laser_mode(machine), inline=machine.dialect == "marlin")
-    if machine.tool.kind == "laser":
-        return program
-    return replace(program, power=np.where(program.power == machine.tool.s_up, 0.0, program.power))
 
 
 def read_gcode(path: Path) -> Job:

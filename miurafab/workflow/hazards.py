@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.program import Program
+from miurafab.gcode.reading import has_laser_mode
 from miurafab.profiles import MachineProfile
 
 _HALF_MICRON = 5e-4
@@ -23,6 +24,7 @@ _BEAM_WORD = re.compile(
     r"M0*(?P<spindle>[345])(?:\.0*)?(?![\d.])|(?P<end>M0*(?:2|30))(?:\.0*)?(?![\d.])"
     r"|S(?P<power>\d+\.?\d*|\.\d+)|(?P<dwell>G0*4)(?:\.0*)?(?![\d.])"
 )
+_ARMS_OR_WAITS = re.compile(r"M|G[0 \t]*4")
 
 
 def hazards(job: Job, program: Program, machine: MachineProfile) -> tuple[str, ...]:
@@ -39,15 +41,6 @@ def hazards(job: Job, program: Program, machine: MachineProfile) -> tuple[str, .
     if not program.beam_on.any():
         found.append("The job burns nothing.")
     return tuple(found)
-
-
-def has_laser_mode(machine: MachineProfile) -> bool:
-    """Whether the controller darkens the beam in ``G0`` (GRBL 1.1 and later with ``$32=1``)."""
-    return (
-        machine.tool.kind == "laser"
-        and machine.dialect != "grbl-0.9"
-        and machine.settings.get(32, 1) == 1
-    )
 
 
 def _off_the_bed(program: Program, machine: MachineProfile) -> list[str]:
@@ -122,11 +115,15 @@ def _beam(job: Job) -> list[str]:
     armed, power = "5", 0.0
     constant = dwells = 0
     first_constant = first_dwell = 0
+    power_line = ""  # the last that only set a power, looked at where it matters
     for number, line in enumerate(job.iter_lines(), 1):
         code = line.upper()
-        if "M" not in code and "S" not in code and "G4" not in code and "G04" not in code:
+        if _ARMS_OR_WAITS.search(code) is None:
+            if "S" in code:
+                power_line = code
             continue
-        code = bare_code(job.name, number, code)
+        code = bare_code(job.name, number, power_line) + bare_code(job.name, number, code)
+        power_line = ""
         waits = False
         for word in _BEAM_WORD.finditer(code):
             if word["spindle"]:

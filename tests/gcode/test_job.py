@@ -45,6 +45,7 @@ def test_what_is_sent_is_what_the_firmware_would_keep(text: str) -> None:
 def test_lines_one_at_a_time_are_the_lines(text: str) -> None:
     job = Job("j", text)
     assert tuple(job.iter_lines()) == job.lines
+    assert job.line_count == len(job.lines)
     assert "\n".join(job.lines).rstrip("\n") == (
         text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n")
     )

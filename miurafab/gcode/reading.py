@@ -1,0 +1,43 @@
+"""A job read back as one machine would run it, in the dialect that the machine speaks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from miurafab.gcode.hpgl import parse_hpgl
+from miurafab.gcode.job import Job
+from miurafab.gcode.program import Program, parse_program
+from miurafab.profiles import MachineProfile
+
+_ARC_TOLERANCE = 12
+_STOCK_ARC_TOLERANCE = 0.002  # mm (``defaults.h``)
+
+
+def read_program(job: Job, machine: MachineProfile) -> Program:
+    """``job`` as ``machine`` would run it.
+
+    What a pen or knife does while it is up has no power, whatever S holds it up. Raises
+    :class:`~miurafab.errors.GcodeError`, naming the line, for what the machine would refuse.
+    """
+    if machine.dialect == "hpgl":
+        return parse_hpgl(job)
+    program = parse_program(
+        job,
+        laser=has_laser_mode(machine),
+        arc_tolerance_mm=machine.settings.get(_ARC_TOLERANCE, _STOCK_ARC_TOLERANCE),
+        inline=machine.dialect == "marlin",
+    )
+    if machine.tool.kind == "laser":
+        return program
+    return replace(program, power=np.where(program.power == machine.tool.s_up, 0.0, program.power))
+
+
+def has_laser_mode(machine: MachineProfile) -> bool:
+    """Whether the controller darkens the beam in ``G0`` (GRBL 1.1 and later with ``$32=1``)."""
+    return (
+        machine.tool.kind == "laser"
+        and machine.dialect != "grbl-0.9"
+        and machine.settings.get(32, 1) == 1
+    )
