@@ -10,9 +10,11 @@ the processor, the wire, and each stop.
 from __future__ import annotations
 
 import math
+from array import array
 from collections import deque
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,7 @@ from miurafab.motion.stepper import Processor, Stepper
 
 _OK_BYTES = 4
 _FOREVER = 1 << 62
+_BLOCK = 4096  # lines at a time that stand as Python's objects
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +105,8 @@ class _Run:
         self.wire = _Wire(link)
         self.now = 0
         self.cycling = False
-        self.began = [-1] * len(program)
-        self.ended = [-1] * len(program)
+        self.began = array("q", [-1]) * len(program)
+        self.ended = array("q", [-1]) * len(program)
         self.moving = -1
         self.follows = False
         self.burning = False
@@ -113,46 +116,20 @@ class _Run:
         self.last_end = 0
 
     def lines(self) -> None:
-        program = self.program
-        moves = list(
-            zip(
-                program.end.tolist(),
-                (program.feed_mm_min / 60.0).tolist(),
-                (program.motion == RAPID).tolist(),
-                program.spindle.tolist(),
-                program.power.tolist(),
-                range(len(program)),
-                strict=True,
-            )
-        )
-        events = list(
-            zip(
-                program.event_kind.tolist(),
-                program.event_seconds.tolist(),
-                program.event_power.tolist(),
-                strict=True,
-            )
-        )
-        steps = _in_line_order(program)
-        for size, words, points, todo in zip(
-            program.line_bytes.tolist(),
-            program.line_words.tolist(),
-            program.line_points.tolist(),
-            steps,
-            strict=True,
-        ):
-            self._receive(size)
-            self._work(cpu.LINE_FIXED + cpu.words_cost(words, size - 1, points) + cpu.REALTIME)
-            chord = cpu.ARC_CHORD if len(todo) > 1 else 0
+        for line in _lines(self.program):
+            self._receive(line.size)
+            reading = cpu.words_cost(line.words, line.size - 1, line.points)
+            self._work(cpu.LINE_FIXED + reading + cpu.REALTIME)
+            chord = cpu.ARC_CHORD if len(line.actions) > 1 else 0
             self._work(cpu.ARC_SETUP if chord else 0)
-            for index in todo:
-                if index >= 0:
-                    self._work(chord)
-                    self._line(*moves[index])
+            for action in line.actions:
+                if len(action) == 3:
+                    self._event(*action)
                 else:
-                    self._event(*events[~index])
+                    self._work(chord)
+                    self._line(*action)
             self._work(_OK_BYTES * cpu.ANSWER_BYTE)
-            self.wire.answer(self.now, size)
+            self.wire.answer(self.now, line.size)
         self._synchronize()
 
     def _receive(self, size: int) -> None:
@@ -290,14 +267,70 @@ def _burns(word: float | None) -> int:
     return 1 if word else 0
 
 
-def _in_line_order(program: Program) -> list[list[int]]:
-    """What each line sent does, in order: move indices, and events as their bitwise complement."""
-    move_key = np.stack([program.line, np.arange(len(program)), np.ones(len(program))])
-    count = len(program.event_line)
-    event_key = np.stack([program.event_line, program.event_move, np.zeros(count)])
-    lines, places, kinds = np.concatenate([event_key, move_key], axis=1).astype(np.int64)
-    values = np.concatenate([~np.arange(count), np.arange(len(program))])
-    order = np.lexsort((kinds, places, lines))
-    bounds = [*np.searchsorted(lines[order], program.line_number).tolist(), len(order)]
-    done = values[order].tolist()
-    return [done[a:b] for a, b in pairwise(bounds)]
+_Move = tuple[list[float], float, bool, int, float, int]
+_Event = tuple[int, float, float]
+
+
+class _Sent(NamedTuple):
+    """A line sent: its bytes, words and points, and what it does, in order."""
+
+    size: int
+    words: int
+    points: int
+    actions: Sequence[_Move | _Event]
+
+
+def _lines(program: Program) -> Iterator[_Sent]:
+    """The lines of ``program`` one after another, a block at a time taken out of its arrays."""
+    for first in range(0, len(program.line_number), _BLOCK):
+        block = slice(first, first + _BLOCK)
+        numbers = program.line_number[block]
+        span = numbers[0], numbers[-1] + 1
+        begin, stop = np.searchsorted(program.line, span).tolist()
+        moves = _moves(program, begin, stop)
+        move_bounds = [*np.searchsorted(program.line[begin:stop], numbers).tolist(), len(moves)]
+        events_begin, events_stop = np.searchsorted(program.event_line, span).tolist()
+        events = _events(program, events_begin, events_stop)
+        event_lines = program.event_line[events_begin:events_stop]
+        event_bounds = [*np.searchsorted(event_lines, numbers).tolist(), len(events)]
+        places = (program.event_move[events_begin:events_stop] - begin).tolist()
+        for index, (size, words, points) in enumerate(
+            zip(
+                program.line_bytes[block].tolist(),
+                program.line_words[block].tolist(),
+                program.line_points[block].tolist(),
+                strict=True,
+            )
+        ):
+            here, end = move_bounds[index], move_bounds[index + 1]
+            actions: list[_Move | _Event] = []
+            for event in range(event_bounds[index], event_bounds[index + 1]):
+                actions += moves[here : places[event]]
+                actions.append(events[event])
+                here = max(here, places[event])
+            yield _Sent(size, words, points, [*actions, *moves[here:end]])
+
+
+def _moves(program: Program, begin: int, stop: int) -> list[_Move]:
+    return list(
+        zip(
+            program.end[begin:stop].tolist(),
+            (program.feed_mm_min[begin:stop] / 60.0).tolist(),
+            (program.motion[begin:stop] == RAPID).tolist(),
+            program.spindle[begin:stop].tolist(),
+            program.power[begin:stop].tolist(),
+            range(begin, stop),
+            strict=True,
+        )
+    )
+
+
+def _events(program: Program, begin: int, stop: int) -> list[_Event]:
+    return list(
+        zip(
+            program.event_kind[begin:stop].tolist(),
+            program.event_seconds[begin:stop].tolist(),
+            program.event_power[begin:stop].tolist(),
+            strict=True,
+        )
+    )

@@ -126,6 +126,12 @@ class Processor:
     def run(self, now: int, cycles: float) -> int:
         """Do work of ``cycles`` from ``now``, stepping on beside it: when it is done."""
         stepper = self.stepper
+        share = stepper.share
+        if share:  # mostly nothing changes meanwhile
+            done_at = now + math.ceil(cycles / share)
+            change = stepper.next_change()
+            if change is None or done_at < change:
+                return done_at
         self.start(now, cycles)
         while True:
             done, change = self.finish(), stepper.next_change()
