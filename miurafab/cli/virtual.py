@@ -10,6 +10,7 @@ import typer
 
 from miurafab.cli.console import Console, JsonOption, QuietOption, json_text
 from miurafab.errors import InputError
+from miurafab.grbl.virtual_faults import KINDS, parse_faults
 
 
 def virtual(
@@ -33,12 +34,21 @@ def virtual(
             "--keep-running", help="Do not reset when a sender opens the port, as most boards do."
         ),
     ] = False,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Let something go wrong: KIND[=VALUE]@WHEN, WHEN being a byte of the sender's or "
+            "a time since its first; may be repeated. KIND is one of " + ", ".join(KINDS) + "."
+        ),
+    ] = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
     """Run a virtual GRBL controller for any sender, until Ctrl-C.
 
-    The first line printed is what a sender opens: a path, or a socket:// address.
+    The first line printed is what a sender opens: a path, or a socket:// address. Faults such as
+    --fault drop@1200 (a byte is lost), --fault reset@3s or --fault disconnect=2s@1200 show what
+    a sender does when things go wrong; docs/machines.md lists them.
     """
     from miurafab.machine.virtual_server import serve_virtual
 
@@ -58,6 +68,7 @@ def virtual(
         speed=speed,
         beam_log=beam_log,
         reset_on_open=not keep_running,
+        faults=parse_faults(fault or ()),
         announce=announce,
     )
     console.remark(

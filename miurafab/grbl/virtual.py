@@ -7,16 +7,19 @@ when the planner has room, a status report shows what the machine does at that m
 writes lose bytes, and a job takes the time that it takes.
 
 Whatever is done to it, however it is cut into calls, the same bytes at the same times give the
-same output.
+same output. ``faults`` (:mod:`miurafab.grbl.virtual_faults`) befall it and its cable on their own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 
 from miurafab.errors import ProfileError
 from miurafab.grbl.settings import parse_dump
 from miurafab.grbl.virtual_beam import BeamSegment, standing_seconds
+from miurafab.grbl.virtual_cable import Cable
+from miurafab.grbl.virtual_faults import Fault
 from miurafab.grbl.virtual_protocol import firmware
 from miurafab.grbl.virtual_settings import Settings
 from miurafab.grbl.virtual_state import Machine, Until, Wait
@@ -32,7 +35,7 @@ class VirtualGrbl:
     ``settings`` maps a ``$`` number to its value, over the firmware's stock defaults (None: just
     those); an unknown number raises :class:`~miurafab.errors.ProfileError`. ``baud`` paces the
     wire both ways, ten bit times a byte; None: bytes take no time. ``homing_switches`` False:
-    ``$H`` finds none. At power-up the banner is in the output.
+    ``$H`` finds none. ``faults`` strike once each. At power-up the banner is in the output.
     """
 
     def __init__(
@@ -41,6 +44,7 @@ class VirtualGrbl:
         *,
         baud: int | None = None,
         homing_switches: bool = True,
+        faults: Iterable[Fault] = (),
     ) -> None:
         stored = Settings()
         unknown = sorted(set(settings or {}) - set(stored.values))
@@ -50,6 +54,9 @@ class VirtualGrbl:
         self._machine = Machine(stored, baud, homing_switches)
         self._seconds = 0.0
         self._frozen = False
+        self._thaws_at: int | None = None
+        faults = tuple(faults)
+        self._cable = Cable(faults, self._suffer) if faults else None
         self._power_on()
 
     def _power_on(self) -> None:
@@ -94,6 +101,7 @@ class VirtualGrbl:
             uart.next_arrival(),
             uart.next_departure(machine.now),
             self._due(),
+            self._next_fault(),
         )
         event = min((event for event in events if event is not None), default=None)
         return None if event is None else max(event / cpu.CLOCK - self._seconds, 0.0)
@@ -102,12 +110,26 @@ class VirtualGrbl:
 
     def receive(self, data: bytes) -> None:
         """Bytes that reach the UART (with ``baud``: start down the wire) now."""
-        self._machine.uart.receive(self._machine.now, data)
-        self._run(self._machine.now)
+        now, cable = self._machine.now, self._cable
+        if cable is None:
+            self._machine.uart.receive(now, data)
+        else:
+            self._pump()
+            cable.send(now, data)
+        self._run(now)
 
     def take_output(self) -> bytes:
-        """The bytes that have come out of the UART since the last call."""
-        return self._machine.uart.take(self._machine.now)
+        """The bytes that have come out of the UART (and of the cable) since the last call."""
+        now, cable = self._machine.now, self._cable
+        if cable is None:
+            return self._machine.uart.take(now)
+        self._pump()
+        return cable.outward.take(now)
+
+    @property
+    def connected(self) -> bool:
+        """Whether the cable is in; a fault may take it out."""
+        return self._cable is None or self._cable.connected
 
     @property
     def lost_bytes(self) -> int:
@@ -161,12 +183,16 @@ class VirtualGrbl:
     def power_cycle(self) -> None:
         """Switch off and on: only the EEPROM survives; output not yet taken is lost."""
         self._frozen = False
+        self._thaws_at = None
         self._machine.uart.power_cycle(self._machine.now)
         self._power_on()
 
-    def freeze(self) -> None:
+    def freeze(self, seconds: float = math.inf) -> None:
         """The main program hangs: nothing is answered, prepared motion runs out."""
         self._frozen = True
+        self._thaws_at = None
+        if seconds < math.inf:
+            self._thaws_at = self._machine.now + round(seconds * cpu.CLOCK)
 
     def press_limit(self, axis: str, pressed: bool = True) -> None:
         """Press or release a limit switch, ``"X"``, ``"Y"`` or ``"Z"``."""
@@ -183,6 +209,41 @@ class VirtualGrbl:
         self._machine.change_probe_pin(touching)
         self._run(self._machine.now)
 
+    def _suffer(self, fault: Fault, now: int) -> None:
+        """A fault of the controller itself, not of its cable."""
+        machine = self._machine
+        if fault.kind == "reset":
+            machine.change_control_pin("reset", True)
+            machine.change_control_pin("reset", False)
+        elif fault.kind == "power":
+            self.power_cycle()
+        elif fault.kind == "alarm":
+            machine.reset()
+            machine.alarm = int(fault.value)
+        else:
+            machine.uart.deaf = fault.kind == "stall"
+            self.freeze(fault.value)
+
+    def _thaw(self) -> None:
+        """The hang is over: the main program goes on where it was."""
+        now = self._machine.now
+        self._frozen = False
+        self._thaws_at = None
+        self._machine.uart.hear(now)
+        if isinstance(self._wait, Until):
+            self._wait = Until(max(self._wait.time, now))
+        else:
+            self._processor.note(now)
+        if self._wait is None:
+            self._resume()
+
+    def _next_fault(self) -> int | None:
+        """When the next fault strikes or ends, or the cable lets something go."""
+        due = None if self._cable is None else self._cable.next_due(self._machine.now)
+        if due is None or (self._thaws_at is not None and self._thaws_at < due):
+            due = self._thaws_at
+        return due
+
     # The run of events
 
     def _due(self) -> int | None:
@@ -197,6 +258,36 @@ class VirtualGrbl:
 
         With ``stop_at_line`` it ends where a line of output is out.
         """
+        cable, machine = self._cable, self._machine
+        while True:
+            if cable is not None:
+                self._pump()
+                line = cable.outward.next_line()
+                if stop_at_line and line is not None:
+                    target = min(target, max(line, machine.now))
+            due = self._next_fault()
+            stop = target if due is None else min(target, max(due, machine.now))
+            reached = self._run_events(stop, stop_at_line)
+            if due is not None and due <= reached:
+                self._befall(reached)
+            elif reached == target or cable is None:
+                return reached
+
+    def _befall(self, now: int) -> None:
+        """What is due strikes, or ends."""
+        if self._thaws_at is not None and self._thaws_at <= now:
+            self._thaw()
+        if self._cable is not None:
+            self._pump()
+            self._machine.uart.receive(now, self._cable.happen(now))
+
+    def _pump(self) -> None:
+        """What is out of the UART goes into the cable."""
+        if self._cable is not None:
+            self._cable.reply(self._machine.uart.take_dated(self._machine.now))
+
+    def _run_events(self, target: int, stop_at_line: bool) -> int:
+        """:meth:`_run` while nothing befalls the controller from outside."""
         machine, processor = self._machine, self._processor
         stepper, uart = machine.stepper, machine.uart
         if self._wait is None and machine.pending():

@@ -113,7 +113,11 @@ class Uart:
 
     def take(self, now: int) -> bytes:
         """The bytes that are out by ``now``."""
-        out = bytearray()
+        return bytes(byte for _, byte in self.take_dated(now))
+
+    def take_dated(self, now: int) -> list[tuple[int, int]]:
+        """The same, each with the time when it was out."""
+        out = []
         while self._going and self._going[0][0] <= now:
-            out.append(self._going.popleft()[1])
-        return bytes(out)
+            out.append(self._going.popleft())
+        return out

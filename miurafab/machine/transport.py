@@ -147,19 +147,26 @@ class VirtualTransport:
 
     def write(self, data: bytes) -> None:
         """Hand ``data`` to the controller."""
+        self._require_cable()
         self.device.receive(data)
 
     def write_now(self, data: bytes) -> None:
         """Hand ``data`` to the controller."""
+        self._require_cable()
         self.device.receive(data)
 
     def read(self, timeout: float) -> bytes:
         """Let the controller's time pass until it has spoken a line, or for ``timeout`` seconds."""
+        self._require_cable()
         if timeout > 0:
             self.device.advance_to_line(max(timeout, _INSTANT))
         output = self.device.take_output()
         self._keep_pace()
         return output
+
+    def _require_cable(self) -> None:
+        if not self.device.connected:
+            raise PortError(f"The port {self.name} went away; is the cable in and the power on?")
 
     def _keep_pace(self) -> None:
         if self._speed is not None:

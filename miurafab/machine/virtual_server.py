@@ -20,7 +20,7 @@ import os
 import select
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TextIO
@@ -28,6 +28,7 @@ from typing import Protocol, TextIO
 from miurafab.errors import InputError, PortError
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.grbl.virtual_faults import Fault
 from miurafab.machine.actions import read_dump
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import BAUD
@@ -50,6 +51,12 @@ class Wire(Protocol):
     def write(self, data: bytes) -> None:
         """Send to whoever listens; what nobody takes is lost, as on a serial line."""
 
+    def unplug(self) -> None:
+        """Take the cable out: whoever has it open finds it gone."""
+
+    def plug(self) -> None:
+        """Put the cable in again; ``address`` may be another then, as with USB."""
+
     def close(self) -> None:
         """Release the address."""
 
@@ -63,8 +70,13 @@ class PtyWire:
                 "This system has no pseudo-terminals; serve over TCP and open it as "
                 "'socket://localhost:PORT'."
             )
+        self.plug()
+
+    def plug(self) -> None:
+        """See :class:`Wire`."""
         import tty
 
+        self._plugged = True
         self._master, sender_side = os.openpty()
         tty.setraw(sender_side)
         self.address = os.ttyname(sender_side)
@@ -77,6 +89,9 @@ class PtyWire:
 
     def wait(self, timeout: float) -> tuple[bytes, bool]:
         """See :class:`Wire`."""
+        if not self._plugged:
+            time.sleep(timeout)
+            return b"", False
         flags = dict(self._poll.poll(timeout * 1000)).get(self._master, 0)
         was_open, self._open = self._open, not flags & select.POLLHUP
         data = b""
@@ -93,9 +108,15 @@ class PtyWire:
             with contextlib.suppress(OSError):
                 os.write(self._master, data)
 
+    def unplug(self) -> None:
+        """See :class:`Wire`."""
+        if self._plugged:
+            os.close(self._master)
+        self._plugged = self._open = False
+
     def close(self) -> None:
         """See :class:`Wire`."""
-        os.close(self._master)
+        self.unplug()
 
 
 class TcpWire:
@@ -110,6 +131,7 @@ class TcpWire:
         except OSError as fault:
             raise PortError(f"Cannot listen at {where}: {fault.strerror}.") from None
         self._listener.setblocking(False)
+        self._plugged = True
         self._sender: socket.socket | None = None
         self.address = f"socket://{host}:{self._listener.getsockname()[1]}"
 
@@ -126,7 +148,7 @@ class TcpWire:
                 self._sender = None
         if self._listener in ready:
             newcomer, _ = self._listener.accept()
-            if self._sender is not None:
+            if self._sender is not None or not self._plugged:
                 newcomer.close()
             else:
                 newcomer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -140,10 +162,20 @@ class TcpWire:
             with contextlib.suppress(OSError):
                 self._sender.send(data)
 
-    def close(self) -> None:
+    def unplug(self) -> None:
         """See :class:`Wire`."""
+        self._plugged = False
         if self._sender is not None:
             self._sender.close()
+        self._sender = None
+
+    def plug(self) -> None:
+        """See :class:`Wire`."""
+        self._plugged = True
+
+    def close(self) -> None:
+        """See :class:`Wire`."""
+        self.unplug()
         self._listener.close()
 
 
@@ -176,19 +208,21 @@ def serve_virtual(
     speed: float = 1.0,
     beam_log: Path | None = None,
     reset_on_open: bool = True,
+    faults: Iterable[Fault] = (),
     announce: Callable[[str], None] = print,
 ) -> Served:
     """Serve a virtual controller until Ctrl-C, SIGTERM or SIGHUP.
 
-    Over TCP at ``tcp`` (``HOST:PORT``), else over a pseudo-terminal; ``announce`` is called once
-    with the address to open. ``settings``: see :func:`load_virtual_settings`. ``speed`` is
-    virtual seconds a real second. With ``reset_on_open`` the controller is switched off and on
-    when a sender opens the port. Raises :class:`~miurafab.errors.InputError` for an option at
-    fault, :class:`~miurafab.errors.PortError` for an address that is taken.
+    Over TCP at ``tcp`` (``HOST:PORT``), else over a pseudo-terminal; ``announce`` is called with
+    the address to open, and again if it is another after the cable was out. ``settings``: see
+    :func:`load_virtual_settings`. ``speed`` is virtual seconds a real second. With
+    ``reset_on_open`` the controller is switched off and on when a sender opens the port.
+    ``faults`` strike once each, in all. Raises :class:`~miurafab.errors.InputError` for an option
+    at fault, :class:`~miurafab.errors.PortError` for an address that is taken.
     """
     if not 0 < speed < math.inf:
         raise InputError(f"A speed of {speed:g} does not run; give a positive number.")
-    device = VirtualGrbl(load_virtual_settings(settings), baud=BAUD)
+    device = VirtualGrbl(load_virtual_settings(settings), baud=BAUD, faults=faults)
     with contextlib.ExitStack() as at_end:
         log = _BeamLog(device, beam_log)
         at_end.callback(log.close)
@@ -198,7 +232,7 @@ def serve_virtual(
         signals.at_once = False
         announce(wire.address)
         with contextlib.suppress(KeyboardInterrupt):
-            _serve(device, wire, speed, log, signals.check, reset_on_open=reset_on_open)
+            _serve(device, wire, speed, log, signals.check, announce, reset_on_open=reset_on_open)
     return Served(device.now, log.seconds, device.lost_bytes)
 
 
@@ -208,11 +242,13 @@ def _serve(
     speed: float,
     log: _BeamLog,
     check: Callable[[], None],
+    announce: Callable[[str], None],
     *,
     reset_on_open: bool,
 ) -> None:
     start = time.monotonic()
     boot_at = math.inf
+    plugged = True
     while True:
         check()
         upcoming = device.next_event_in()
@@ -229,7 +265,20 @@ def _serve(
         output = device.take_output()
         if output and boot_at == math.inf:
             wire.write(output)
+        if device.connected != plugged:
+            plugged = device.connected
+            _replug(wire, plugged, announce)
         log.update()
+
+
+def _replug(wire: Wire, plugged: bool, announce: Callable[[str], None]) -> None:
+    if not plugged:
+        wire.unplug()
+        return
+    before = wire.address
+    wire.plug()
+    if wire.address != before:
+        announce(wire.address)
 
 
 class _BeamLog:

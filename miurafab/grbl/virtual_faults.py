@@ -1,0 +1,138 @@
+"""What goes wrong at a practice machine, and when: faults as values, and how they are written.
+
+A fault is ``KIND@WHEN`` or ``KIND=VALUE@WHEN``::
+
+    drop@1200            the 1200th byte that the sender sends is lost
+    corrupt=3@2.5s       3 bytes arrive changed, from 2.5 s after the sender's first byte
+    disconnect=2s@1200   the cable comes out, and is in again 2 s later
+
+WHEN is a number (the sender is about to send that byte, counted from 1) or a time with its unit,
+``s`` or ``ms``, on the controller's clock since the sender's first byte. VALUE is a count of bytes
+or ``all``, a time, or the number of an alarm, as :data:`KINDS` says. Each fault strikes once, and
+the same faults give the same bytes: noise is drawn from a fixed seed.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from miurafab.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of fault: the ``unit`` of its value ("bytes", "s", "code" or "": none), the value
+    it has unless given (None: it must be given), and ``does``, what happens.
+    """
+
+    unit: str
+    stock: float | None
+    does: str
+
+
+_FOR_GOOD = math.inf
+KINDS = MappingProxyType(
+    {
+        "drop": Kind("bytes", 1, "bytes from the sender are lost"),
+        "drop-reply": Kind("bytes", 1, "bytes to the sender are lost"),
+        "corrupt": Kind("bytes", 1, "bytes from the sender arrive with one bit changed"),
+        "corrupt-reply": Kind("bytes", 1, "bytes to the sender arrive with one bit changed"),
+        "noise": Kind("bytes", 8, "random bytes reach the controller"),
+        "noise-reply": Kind("bytes", 8, "random bytes reach the sender"),
+        "delay": Kind("s", None, "what the sender sends is held up for that long"),
+        "delay-reply": Kind("s", None, "what the controller says is held up for that long"),
+        "slow": Kind("s", None, "a slow host: from now on every byte takes that longer, both ways"),
+        "disconnect": Kind("s", _FOR_GOOD, "the cable comes out, for that long or for good"),
+        "reset": Kind("", None, "the controller's reset button is pressed"),
+        "power": Kind("", None, "the controller loses power for a moment"),
+        "alarm": Kind("code", 1, "the controller stops with that ALARM; 1 is a hard limit"),
+        "stall": Kind("s", 0.1, "the controller is deaf for that long, as while it writes EEPROM"),
+        "hang": Kind("s", _FOR_GOOD, "the controller's program hangs, for that long or for good"),
+    }
+)
+"""Every kind of fault."""
+
+_FORM = re.compile(r"(?P<kind>[a-z-]+)(?:=(?P<value>[^@=]+))?@(?P<when>[^@=]+)")
+_TIME = re.compile(r"(\d+(?:\.\d+)?|\.\d+)(ms|s)")
+_COUNT = re.compile(r"[1-9]\d*")
+_ALARMS = range(1, 10)
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """``kind`` strikes at the ``at_byte``-th byte of the sender, or ``at_s`` after its first.
+
+    ``value`` is in the unit of the kind: bytes, seconds or an alarm's number; ``math.inf`` means
+    all bytes, or for good; 0 where the kind has none.
+    """
+
+    kind: str
+    value: float
+    at_byte: int | None = None
+    at_s: float | None = None
+
+
+def parse_fault(text: str) -> Fault:
+    """The fault that ``text`` writes; see the module for the form.
+
+    Raises :class:`~miurafab.errors.InputError` naming what of it cannot be read.
+    """
+    match = _FORM.fullmatch(text.strip())
+    if match is None:
+        raise InputError(
+            f"The fault '{text}' is not KIND@WHEN or KIND=VALUE@WHEN, such as 'drop@1200' (a byte) "
+            "or 'disconnect=2s@3s' (times)."
+        )
+    kind = KINDS.get(match["kind"])
+    if kind is None:
+        raise InputError(
+            f"The fault '{text}' is of no known kind; the kinds are {', '.join(KINDS)}."
+        )
+    value = _value(text, match["kind"], kind, match["value"])
+    when = match["when"]
+    if _COUNT.fullmatch(when):
+        return Fault(match["kind"], value, at_byte=int(when))
+    seconds = _seconds(when)
+    if seconds is None:
+        raise InputError(
+            f"The fault '{text}' strikes at '{when}', which is neither the number of a byte (1200) "
+            "nor a time (3s, 250ms)."
+        )
+    return Fault(match["kind"], value, at_s=seconds)
+
+
+def parse_faults(texts: Iterable[str]) -> tuple[Fault, ...]:
+    """The faults that ``texts`` write, in their order; see :func:`parse_fault`."""
+    return tuple(parse_fault(text) for text in texts)
+
+
+def _value(text: str, name: str, kind: Kind, written: str | None) -> float:
+    if written is None:
+        if kind.unit and kind.stock is None:
+            raise InputError(f"The fault '{text}' needs a time, such as '{name}=50ms@3s'.")
+        return kind.stock or 0.0
+    if kind.unit == "bytes":
+        if written == "all" and not name.startswith("noise"):
+            return math.inf
+        if _COUNT.fullmatch(written):
+            return float(written)
+        raise InputError(f"The fault '{text}' has '{written}' for a number of bytes.")
+    if kind.unit == "code":
+        if _COUNT.fullmatch(written) and int(written) in _ALARMS:
+            return float(written)
+        raise InputError(f"The fault '{text}' has '{written}' for the number of an alarm, 1 to 9.")
+    if kind.unit == "s":
+        seconds = _seconds(written)
+        if seconds is not None and seconds > 0:
+            return seconds
+        raise InputError(f"The fault '{text}' has '{written}' for a time such as 2s or 50ms.")
+    raise InputError(f"The fault '{text}' has a value, and '{name}' takes none.")
+
+
+def _seconds(text: str) -> float | None:
+    match = _TIME.fullmatch(text)
+    return None if match is None else float(match[1]) * (1e-3 if match[2] == "ms" else 1.0)
