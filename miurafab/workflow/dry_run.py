@@ -49,7 +49,7 @@ class SheetPreview:
 
     ``lines`` of the file; ``seconds`` in all and with the beam on; ``cut_mm`` burnt and
     ``travel_mm`` dark; ``bounds_mm`` (x0, y0, x1, y1) of what is burnt, None if nothing is.
-    Per move of ``program``: ``layer`` (n,) int64, into :data:`LAYERS`, and ``end_seconds`` (n,)
+    Per move of ``program``: ``layer`` (n,) int8, into :data:`LAYERS`, and ``end_seconds`` (n,)
     float64, when it ends. ``layer_mm`` and ``layer_strokes``: length and number, by layer.
     ``paper_mm`` is the sheet, or the bed where no sheet is known; ``view_mm`` (x0, y0, x1, y1) the
     smallest box that holds the bed, the sheet and every move.
@@ -64,7 +64,7 @@ class SheetPreview:
     bounds_mm: tuple[float, float, float, float] | None
     warnings: tuple[str, ...]
     program: Program
-    layer: NDArray[np.int64]
+    layer: NDArray[np.int8]
     end_seconds: NDArray[np.float64]
     layer_mm: tuple[float, ...]
     layer_strokes: tuple[int, ...]
@@ -98,7 +98,7 @@ def dry_run(
     link = Link(baud=controller.baud, rx_bytes=controller.rx_bytes)
     times = estimate(program, MotionParameters.from_profile(machine), link)
     burning = program.beam_on
-    layer = np.where(burning, _layers(program), _TRAVEL)
+    layer = np.where(burning, _layers(program), np.int8(_TRAVEL))
     lengths = program.lengths
     burnt = strokes(program)
     bed = (machine.bed.width_mm, machine.bed.height_mm)
@@ -130,11 +130,11 @@ def read_gcode(path: Path) -> Job:
         raise InputError(f"{path} cannot be read: {fault.strerror}.") from None
 
 
-def _layers(program: Program) -> NDArray[np.int64]:
+def _layers(program: Program) -> NDArray[np.int8]:
     """(n,) the layer of each move by the operation that its comments name."""
     place = {layer.name: at for at, layer in enumerate(LAYERS) if layer.name in OPERATIONS}
     of_context = [place.get(context.operation, _OTHER) for context in program.contexts]
-    return np.array(of_context, dtype=np.int64)[program.context]
+    return np.array(of_context, dtype=np.int8)[program.context]
 
 
 def _box(points: NDArray[np.float64]) -> tuple[float, float, float, float]:

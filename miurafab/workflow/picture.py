@@ -31,6 +31,8 @@ _DASH = (5.0, 4.0)
 """Pixels drawn and left out along a travel; a travel shorter than a dash would fill the gaps of a
 perforation and is left out."""
 
+_LINES_AT_ONCE = 16_384
+
 _Points = NDArray[np.float64]
 
 
@@ -92,9 +94,9 @@ def _strokes(sheet: SheetPreview, machine: MachineProfile, plot: _Plot) -> Image
         bed.width_mm - 2 * margin,
         bed.height_mm - 2 * margin,
     )
-    loop = plot.pixels(corners + margin)
+    loop = corners + margin
     image.paste(_MARGIN, mask=_ink(loop, np.roll(loop, -1, axis=0), plot, 1, _DASH))
-    start, end = plot.pixels(sheet.program.start), plot.pixels(sheet.program.end)
+    start, end = sheet.program.start, sheet.program.end
     for index, layer in enumerate(LAYERS):
         moves = sheet.layer == index
         if moves.any():
@@ -109,7 +111,25 @@ def _strokes(sheet: SheetPreview, machine: MachineProfile, plot: _Plot) -> Image
 def _ink(
     start: _Points, end: _Points, plot: _Plot, radius: int, dash: tuple[float, float] | None
 ) -> Image.Image:
-    """How much of each pixel the lines cover, 0 to 255. ``radius`` is in mask pixels."""
+    """How much of each pixel the lines (in mm) cover, 0 to 255; ``radius`` is in mask pixels."""
+    high, wide = plot.height * _FINE + 2 * radius, plot.width * _FINE + 2 * radius
+    mask = np.zeros((high, wide), dtype=bool)
+    for first in range(0, len(start), _LINES_AT_ONCE):
+        block = slice(first, first + _LINES_AT_ONCE)
+        points = _along(plot.pixels(start[block]), plot.pixels(end[block]), radius, dash)
+        column, row = np.floor(points * _FINE).astype(np.int64).T + radius
+        inside = (column >= 0) & (column < wide) & (row >= 0) & (row < high)
+        mask[row[inside], column[inside]] = True
+    thick = np.zeros((plot.height * _FINE, plot.width * _FINE), dtype=bool)
+    for down in range(2 * radius + 1):
+        for right in range(2 * radius + 1):
+            if (down - radius) ** 2 + (right - radius) ** 2 <= radius**2 + 1:
+                thick |= mask[down : down + thick.shape[0], right : right + thick.shape[1]]
+    return Image.fromarray(thick.astype(np.uint8) * 255).reduce(_FINE)
+
+
+def _along(start: _Points, end: _Points, radius: int, dash: tuple[float, float] | None) -> _Points:
+    """Points along lines in pixels, a third of a pixel apart, those in the gaps left out."""
     length = np.linalg.norm(end - start, axis=1)
     if dash is not None:
         long = length >= dash[0]
@@ -124,18 +144,8 @@ def _ink(
     if dash is not None:
         drawn = np.mod(part * length[line], sum(dash)) < dash[0]
         line, part = line[drawn], part[drawn]
-    points = start[line] + (end - start)[line] * part[:, None]
-    column, row = np.floor(points * _FINE).astype(np.int64).T + radius
-    high, wide = plot.height * _FINE + 2 * radius, plot.width * _FINE + 2 * radius
-    inside = (column >= 0) & (column < wide) & (row >= 0) & (row < high)
-    mask = np.zeros((high, wide), dtype=bool)
-    mask[row[inside], column[inside]] = True
-    thick = np.zeros((plot.height * _FINE, plot.width * _FINE), dtype=bool)
-    for down in range(2 * radius + 1):
-        for right in range(2 * radius + 1):
-            if (down - radius) ** 2 + (right - radius) ** 2 <= radius**2 + 1:
-                thick |= mask[down : down + thick.shape[0], right : right + thick.shape[1]]
-    return Image.fromarray(thick.astype(np.uint8) * 255).reduce(_FINE)
+    points: _Points = start[line] + (end - start)[line] * part[:, None]
+    return points
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:

@@ -1,8 +1,8 @@
 """A picture of each sheet as an SVG: one path a kind of move, sharp at any size.
 
 It is for looking at, and not for cutting: the drawings for laser software are the sheets' own.
-The whole path is one ``%`` over a format that is as long as the path, so that no line of Python
-runs for each dash.
+Thousands of moves are one ``%`` over a format that is as long as their path, so that no line of
+Python runs for each dash.
 """
 
 from __future__ import annotations
@@ -10,9 +10,12 @@ from __future__ import annotations
 import html
 
 import numpy as np
+from numpy.typing import NDArray
 
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_text
+
+_MOVES_AT_ONCE = 16_384
 
 
 def svg_text(sheet: SheetPreview, machine: MachineProfile) -> str:
@@ -71,17 +74,25 @@ def _path(sheet: SheetPreview, index: int, unit: float) -> str:
     if not len(moves):
         return ""
     layer = LAYERS[index]
-    start, end = sheet.program.start[moves, :2], sheet.program.end[moves, :2]
     begins = np.concatenate([[True], np.diff(moves) != 1])
-    formats = np.where(begins, "M%.7g %.7gL%.7g %.7g", "L%.7g %.7g")
-    numbers = np.concatenate([start.round(3), end.round(3)], axis=1)
-    wanted = np.repeat(np.stack([begins, np.ones_like(begins)], axis=1), 2, axis=1)
-    data = "".join(formats.tolist()) % tuple(numbers[wanted].tolist())
+    data = "".join(
+        _data(sheet, moves[first : first + _MOVES_AT_ONCE], begins[first : first + _MOVES_AT_ONCE])
+        for first in range(0, len(moves), _MOVES_AT_ONCE)
+    )
     thin = 0.09 if layer.name == "travel" else 0.18
     return (
         f'<path id="{layer.name}" fill="none" stroke="{layer.colour}" '
         f'stroke-width="{_n(thin * unit)}"{_dashes(layer.name, unit)} d="{data}"/>'
     )
+
+
+def _data(sheet: SheetPreview, moves: NDArray[np.int64], begins: NDArray[np.bool_]) -> str:
+    """Path data of ``moves``; those that ``begins`` marks start by going to their place."""
+    start, end = sheet.program.start[moves, :2], sheet.program.end[moves, :2]
+    formats = np.where(begins, "M%.7g %.7gL%.7g %.7g", "L%.7g %.7g")
+    numbers = np.concatenate([start.round(3), end.round(3)], axis=1)
+    wanted = np.repeat(np.stack([begins, np.ones_like(begins)], axis=1), 2, axis=1)
+    return "".join(formats.tolist()) % tuple(numbers[wanted].tolist())
 
 
 def _dashes(layer: str, unit: float) -> str:
