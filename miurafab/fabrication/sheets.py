@@ -11,6 +11,7 @@ origin, and from there to its sheet. A point p of the pattern lies on the sheet 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from miurafab.errors import LayoutError
 from miurafab.fabrication.boxes import best_turn
 from miurafab.fabrication.labels import place_texts
-from miurafab.fabrication.nesting import Slot, Stock, nest, turned
+from miurafab.fabrication.nesting import Problem, SheetKind, Slot, Stock, nest, turned
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.ordering import order_strokes, travel_bound
 from miurafab.fabrication.pieces import Piece, Pieces, make_pieces
@@ -168,18 +169,20 @@ def lay_out(
         for number, piece in enumerate(pieces.pieces)
     )
     offcuts = [_on_bed(size, machine) for size in options.offcuts_mm]
-    slots = nest(
-        [patch.outline_mm for patch in patches],
-        Stock(
-            width,
-            height,
-            options.gap_mm,
-            (0, 90, 180, 270),
-            tuple(
-                shapely.box(0, 0, x - 2 * bed.margin_mm, y - 2 * bed.margin_mm) for x, y in offcuts
-            ),
-        ),
+    quarters = (0, 90, 180, 270)
+    kinds = [
+        *(SheetKind(x - 2 * bed.margin_mm, y - 2 * bed.margin_mm, quarters, 1) for x, y in offcuts),
+        SheetKind(width, height, quarters),
+    ]
+    nesting = nest(
+        Problem(
+            tuple(patch.outline_mm for patch in patches),
+            tuple(patch.label for patch in patches),
+            Stock(tuple(kinds), options.gap_mm),
+            30.0,
+        )
     )
+    slots = nesting.slots
     placements = [
         Placement(
             patch=patch.id,
@@ -314,7 +317,7 @@ def _patch(
 
 
 def _sheets(
-    placements: list[Placement], slots: list[Slot], sizes: list[tuple[float, float]]
+    placements: list[Placement], slots: Sequence[Slot], sizes: list[tuple[float, float]]
 ) -> tuple[Sheet, ...]:
     """The sheets; ``sizes`` are those of the off-cuts, and last that of a whole sheet."""
     count = max(slot.sheet for slot in slots) + 1
@@ -322,7 +325,7 @@ def _sheets(
     size = [sizes[-1]] * count
     for placement, slot in zip(placements, slots, strict=True):
         on_sheet[slot.sheet].append(placement)
-        size[slot.sheet] = sizes[slot.offcut]
+        size[slot.sheet] = sizes[slot.kind]
     return tuple(
         Sheet(f"sheet-{number:02d}", *size[number - 1], tuple(placed))
         for number, placed in enumerate(on_sheet, start=1)
@@ -343,7 +346,9 @@ def _on_bed(size: tuple[float, float], machine: MachineProfile) -> tuple[float, 
     return width, height
 
 
-def _motion(patches: tuple[Patch, ...], placements: list[Placement], slots: list[Slot]) -> Motion:
+def _motion(
+    patches: tuple[Patch, ...], placements: list[Placement], slots: Sequence[Slot]
+) -> Motion:
     """The way of each patch from the pattern to its sheet, in one step."""
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     moved = np.array(
