@@ -50,6 +50,10 @@ def sheets(
     tab_inset: Annotated[
         str | None, typer.Option(help="Inset of the tabs [default: the material's].")
     ] = None,
+    tab_angle: Annotated[
+        str | None,
+        typer.Option(help="Largest inner angle at a tab's base [default: the material's, 75deg]."),
+    ] = None,
     tab_side: Annotated[
         str | None,
         typer.Option(help="The patch that bears the tabs: lower, upper, alternate [lower]."),
@@ -86,6 +90,7 @@ def sheets(
         "seam_columns": seam_columns,
         "tab_height": tab_height,
         "tab_inset": tab_inset,
+        "tab_angle": tab_angle,
         "tab_side": tab_side,
         "full_facet": full_facet,
         "two_sided": two_sided,

@@ -2,7 +2,9 @@
 
 The first patch is the one with the longest seams. Each next one is the patch that shares the
 longest seam with what is assembled, so that the assembly grows round and holes are closed before
-they are ringed in, while fingers still reach the inner side.
+they are ringed in, while fingers still reach the inner side. A seam between two borders of the
+pattern, which makes a ring or a tube of the sheet, is closed when everything else is glued: until
+then it is reached from both sides.
 """
 
 from __future__ import annotations
@@ -18,16 +20,18 @@ from miurafab.origami.crease_pattern import CreasePattern
 @dataclass(frozen=True)
 class GlueStep:
     """``patch`` is glued onto ``onto`` (patch ids, sorted) by the tabs of these numbers; the first
-    step of each connected piece has neither.
+    step of each connected piece has neither. A step that ``closes`` glues what is assembled to
+    itself, ``patch`` being the one that bears the tabs.
     """
 
     patch: int
     onto: tuple[int, ...]
     tabs: tuple[int, ...]
+    closes: bool = False
 
 
 def assembly_order(layout: Layout, pattern: CreasePattern) -> tuple[GlueStep, ...]:
-    """One step for each patch, in the order of assembly."""
+    """One step for each patch, in the order of assembly, then those that close it."""
     count = len(layout.patches)
     owner = np.full(len(pattern.faces_vertices), -1)
     for patch in layout.patches:
@@ -42,8 +46,12 @@ def assembly_order(layout: Layout, pattern: CreasePattern) -> tuple[GlueStep, ..
     np.fill_diagonal(seam, 0.0)
 
     tabs: dict[tuple[int, int], list[int]] = {}
+    closing: dict[tuple[int, int], list[int]] = {}
     for patch in layout.patches:
         for tab in patch.tabs:
+            if tab.edge != tab.mate_edge:
+                closing.setdefault((patch.id, tab.mate_patch), []).append(tab.number)
+                continue
             low, high = sorted((patch.id, tab.mate_patch))
             tabs.setdefault((low, high), []).append(tab.number)
     left = set(range(count))
@@ -57,4 +65,8 @@ def assembly_order(layout: Layout, pattern: CreasePattern) -> tuple[GlueStep, ..
         steps.append(GlueStep(best, onto, tuple(numbers)))
         done.append(best)
         left.remove(best)
+    steps += [
+        GlueStep(patch, (mate,), tuple(sorted(numbers)), closes=True)
+        for (patch, mate), numbers in sorted(closing.items())
+    ]
     return tuple(steps)

@@ -9,8 +9,9 @@ v being u turned by a right angle. So the largest s is the least of the quotient
 would be too small to read is left out. For a polygon that is not convex the same rule is stricter
 than needed.
 
-The number of a tab stands on the tab, and once more on the facet it is glued to, at the place that
-the tab will cover; a patch name stands where no tab will.
+The number of a tab stands on the tab, followed by M or V where its fold is a mountain or a valley,
+and once more on the facet it is glued to, at the place that the tab will cover; a patch name stands
+where no tab will. A letter for which there is no room is left out before its number is.
 """
 
 from __future__ import annotations
@@ -35,6 +36,10 @@ NUMBER_MM = (1.2, 3.0)
 """Least and greatest height of a tab number in mm (judged)."""
 
 
+MARKED = ("M", "V")
+"""The assignments of folds that are engraved behind the number of a tab."""
+
+
 @dataclass(frozen=True, eq=False)
 class Text:
     """A text on a patch, its ``strokes`` (n, 2) in mm in the pattern's plane."""
@@ -42,6 +47,17 @@ class Text:
     patch: int
     text: str
     strokes: tuple[NDArray[np.float64], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Lettering:
+    """The ``texts`` of all patches, how many were ``left_out`` for want of room, and on how many
+    tabs the number stands ``unmarked``, without the letter of its fold.
+    """
+
+    texts: list[Text]
+    left_out: int
+    unmarked: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +90,14 @@ def place_texts(
     tabs: TabRegions,
     numbers: NDArray[np.int64],
     turns: NDArray[np.float64],
-) -> tuple[list[Text], int]:
-    """The texts of all patches, and how many found no place.
+) -> Lettering:
+    """The texts of all patches.
 
     ``face_patch`` (F,) the patch of each facet, ``names`` of the P patches, ``numbers`` (N,) those
     of the ``tabs``, ``turns`` (P,) the angle by which each patch is turned later: texts are
     engraved so that they can be read then.
     """
-    texts, left_out = _tab_numbers(face_patch, tabs, numbers, turns)
+    texts, left_out, unmarked = _tab_numbers(face_patch, tabs, numbers, turns)
     spots = _facet_spots(pattern, tabs, turns[face_patch])
     width = np.array([text_width(name) for name in names])
     height = np.minimum(spots.height(width[face_patch]), NAME_MM[1])
@@ -94,7 +110,7 @@ def place_texts(
             continue
         centre, along = spots.centre[face], spots.along[face]
         texts.append(_written(patch, name, centre, along, float(height[face])))
-    return texts, left_out
+    return Lettering(texts, left_out, unmarked)
 
 
 def _tab_numbers(
@@ -102,25 +118,35 @@ def _tab_numbers(
     tabs: TabRegions,
     numbers: NDArray[np.int64],
     turns: NDArray[np.float64],
-) -> tuple[list[Text], int]:
-    """Each tab's number on the tab and on the facet under it, and how many have no room."""
+) -> tuple[list[Text], int, int]:
+    """Each tab's number on the tab and on the facet under it, how many of these have no room, and
+    how many tabs have none for the letter.
+    """
     texts: list[Text] = []
-    left_out = 0
+    left_out = unmarked = 0
     if not len(tabs):
-        return texts, left_out
-    base = tabs.points[:, 1] - tabs.points[:, 0]
+        return texts, left_out, unmarked
     words = [str(number) for number in numbers.tolist()]
-    width = np.array([text_width(word) for word in words])
-    for faces in (tabs.own_face, tabs.mate_face):
-        patch = face_patch[faces]
-        spots = _spots(tabs.points, tabs.present, _upright(base, turns[patch]))
-        height = np.minimum(spots.height(width), NUMBER_MM[1])
+    folds = tabs.seams.fold.tolist()
+    marked = [w + f if f in MARKED else w for w, f in zip(words, folds, strict=True)]
+    for faces, points, wanted in (
+        (tabs.own_face, tabs.points, marked),
+        (tabs.mate_face, tabs.glued, words),
+    ):
+        patch, base = face_patch[faces], points[:, 1] - points[:, 0]
+        spots = _spots(points, tabs.present, _upright(base, turns[patch]))
+        shown, height = list(wanted), spots.height(np.array([text_width(word) for word in wanted]))
+        bare = spots.height(np.array([text_width(word) for word in words]))
+        for tab in np.flatnonzero((height < NUMBER_MM[0]) & (bare >= NUMBER_MM[0])).tolist():
+            shown[tab], height[tab] = words[tab], bare[tab]
+            unmarked += 1
+        height = np.minimum(height, NUMBER_MM[1])
         room = height >= NUMBER_MM[0]
         left_out += int((~room).sum())
         for tab in np.flatnonzero(room).tolist():
             centre, along = spots.centre[tab], spots.along[tab]
-            texts.append(_written(int(patch[tab]), words[tab], centre, along, float(height[tab])))
-    return texts, left_out
+            texts.append(_written(int(patch[tab]), shown[tab], centre, along, float(height[tab])))
+    return texts, left_out, unmarked
 
 
 def _facet_spots(pattern: CreasePattern, tabs: TabRegions, turns: NDArray[np.float64]) -> _Spots:
@@ -138,11 +164,11 @@ def _facet_spots(pattern: CreasePattern, tabs: TabRegions, turns: NDArray[np.flo
         # One tab of each facet at a time.
         faces, first = np.unique(tabs.mate_face[left], return_index=True)
         tab = left[first]
-        base = tabs.points[tab, 1] - tabs.points[tab, 0]
+        base = tabs.glued[tab, 1] - tabs.glued[tab, 0]
         base /= np.linalg.norm(base, axis=1)[:, None]
         normal, limit = np.zeros((len(corners), 2)), np.full(len(corners), NO_LIMIT)
         normal[faces] = np.column_stack([-base[:, 1], base[:, 0]])
-        depth = np.einsum("nki,ni->nk", tabs.points[tab], normal[faces])
+        depth = np.einsum("nki,ni->nk", tabs.glued[tab], normal[faces])
         limit[faces] = np.where(tabs.present[tab], depth, -np.inf).max(axis=1)
         points, count = clip_convex(points, count, normal, limit)
         left = np.delete(left, first)

@@ -83,6 +83,7 @@ def _patch_table(patch: Patch) -> dict[str, Any]:
             {
                 "number": tab.number,
                 "edge": tab.edge,
+                "mate_edge": tab.mate_edge,
                 "mate_patch": tab.mate_patch,
                 "fold": tab.fold,
                 "polygon_mm": tab.polygon_mm.tolist(),
@@ -106,6 +107,7 @@ def _patch(table: dict[str, Any]) -> Patch:
             Tab(
                 number=int(tab["number"]),
                 edge=int(tab["edge"]),
+                mate_edge=int(tab.get("mate_edge", tab["edge"])),
                 mate_patch=int(tab["mate_patch"]),
                 polygon_mm=_points(tab["polygon_mm"]),
                 fold=str(tab.get("fold", "flat")),

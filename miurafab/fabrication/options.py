@@ -6,6 +6,7 @@ way they come through :func:`read_options`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from miurafab.errors import InputError
@@ -24,7 +25,8 @@ class LayoutOptions:
     limits patches more than the bed does. ``seam_rows`` and ``seam_columns`` are lines of the
     vertex grid along which the pattern is cut in any case, from 1.
 
-    ``tab_height_mm`` and ``tab_inset_mm`` stand in for the material's. ``tab_side`` says which
+    ``tab_height_mm``, ``tab_inset_mm`` and ``tab_angle`` (rad, the largest inner angle at the base)
+    stand in for the material's. ``tab_side`` says which
     patch of a seam bears its tabs: the one with the ``lower`` or the ``upper`` number, or both in
     turn, edge by edge (``alternate``). With ``full_facet`` a tab is the whole facet that it is
     glued to, less the inset.
@@ -41,6 +43,7 @@ class LayoutOptions:
     seam_columns: tuple[int, ...] = ()
     tab_height_mm: float | None = None
     tab_inset_mm: float | None = None
+    tab_angle: float | None = None
     tab_side: str = "lower"
     full_facet: bool = False
     two_sided: bool = False
@@ -70,6 +73,9 @@ def read_options(table: Table) -> LayoutOptions:
         seam_columns=_lines(table, "seam_columns"),
         tab_height_mm=length_or_none("tab_height", 0.5),
         tab_inset_mm=length_or_none("tab_inset", 0.0),
+        tab_angle=table.angle("tab_angle", 0.0, low=0.1, high=math.pi)
+        if table.has("tab_angle")
+        else None,
         tab_side=table.choice("tab_side", TAB_SIDES, usual.tab_side),
         full_facet=table.flag("full_facet", usual.full_facet),
         two_sided=table.flag("two_sided", usual.two_sided),

@@ -20,7 +20,8 @@ from miurafab.fabrication.bands import GridShape, Rectangle, split_grid
 from miurafab.fabrication.boxes import best_turn, box_of, fan, fits, support
 from miurafab.fabrication.growing import grow_patches, is_disk
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.tabs import TabRegions, tab_regions
+from miurafab.fabrication.seams import inner_seams
+from miurafab.fabrication.tabs import TabRegions, choose_tabs, ring_tabs, tab_regions
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -57,11 +58,13 @@ def split(
     cells = _cells(pattern)
     blocks = _blocks(cells, options)
     faces = len(pattern.faces_vertices)
-    if len(blocks) == 1 and _fits_whole(pattern, width, height):
+    if len(blocks) == 1 and _fits_whole(pattern, width, height, material, options):
         return np.zeros(faces, dtype=np.int64)
     directions = fan(_TURNS)
     corners = pattern.faces_vertices
     body = support(pattern.vertices_coords[corners], corners >= 0, directions)
+    ring = ring_tabs(pattern, material, options)
+    body = _with_tabs(body, ring, support(ring.points, ring.present, directions))
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
     turned = options.tab_side == "upper"
     if turned and cells is not None:
@@ -77,7 +80,8 @@ def split(
     else:
         place = _places(cells)[pattern.edges_faces[inner]]
         edges, sides = inner, (place[:, 0] < place[:, 1]).astype(np.int64)
-    tabs = tab_regions(pattern, edges, sides, material, full_facet=options.full_facet)
+    seams = inner_seams(pattern, edges, sides)
+    tabs = tab_regions(pattern, seams, material, full_facet=options.full_facet)
     tab_values = support(tabs.points, tabs.present, directions)
     reach = _with_tabs(body, tabs, tab_values)
     _check_alone(pattern, ~fits(reach, width, height), tabs, width, height)
@@ -217,10 +221,18 @@ def check_facets(pattern: CreasePattern) -> None:
             )
 
 
-def _fits_whole(pattern: CreasePattern, width: float, height: float) -> bool:
+def _fits_whole(
+    pattern: CreasePattern,
+    width: float,
+    height: float,
+    material: Material,
+    options: LayoutOptions,
+) -> bool:
     faces = np.arange(len(pattern.faces_vertices))
     used = np.unique(pattern.faces_vertices[pattern.faces_vertices >= 0])
-    if best_turn(pattern.vertices_coords[used], width, height) is None:
+    tabs, _, _ = choose_tabs(pattern, np.zeros_like(faces), material, options)
+    points = np.concatenate([pattern.vertices_coords[used], tabs.points[tabs.present]])
+    if best_turn(points, width, height) is None:
         return False
     return is_disk(pattern, faces) and not len(_overlapping(pattern, np.zeros_like(faces)))
 

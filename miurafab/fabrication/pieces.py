@@ -2,8 +2,9 @@
 
 The outline of a piece is the boundary of its patch with each of its own tabs let in on its seam
 edge. Tabs lie in facets of other patches, so this is a simple closed curve, unless the flat pattern
-overlaps itself; tabs that would collide then are left out by name, as are tabs put on the other
-side of a seam if the piece outgrows the bed by them.
+overlaps itself or a tab stands on the border of the pattern, where nothing keeps it clear of the
+rest; tabs that would collide then are left out by name, as are tabs put on the other side of a
+seam, or made higher, if the piece outgrows the bed by them.
 """
 
 from __future__ import annotations
@@ -69,10 +70,10 @@ def make_pieces(
         width, height = min(width, along), min(height, across)
     room = 2 * allowance(material.kerf_mm)
     face_patch = split(pattern, width - room, height - room, material, options)
-    tabs, swapped, untabbed = choose_tabs(pattern, face_patch, material, options)
+    tabs, unusual, untabbed = choose_tabs(pattern, face_patch, material, options)
     around = boundaries(pattern, face_patch)
     size = (width - room, height - room)
-    kept = _without_misfits(pattern, face_patch, around, tabs, swapped, size)
+    kept = _without_misfits(pattern, face_patch, around, tabs, unusual, size)
     untabbed = np.sort(np.concatenate([untabbed, tabs.edge[~kept]]))
     tabs = tabs.take(kept)
 
@@ -117,15 +118,15 @@ def _without_misfits(
     face_patch: NDArray[np.int64],
     around: list[Boundary],
     tabs: TabRegions,
-    swapped: NDArray[np.bool_],
+    unusual: NDArray[np.bool_],
     size: tuple[float, float],
 ) -> NDArray[np.bool_]:
     """(N,) which tabs may stay."""
     kept = np.ones(len(tabs), dtype=bool)
     outlines, standing = _outlines(pattern, face_patch, around, tabs)
     for outline, own in zip(outlines, standing, strict=True):
-        if swapped[own].any() and best_turn(outline, *size) is None:
-            kept[own[swapped[own]]] = False
+        if unusual[own].any() and best_turn(outline, *size) is None:
+            kept[own[unusual[own]]] = False
     outlines, standing = _outlines(pattern, face_patch, around, tabs.take(kept))
     names = np.flatnonzero(kept)
     valid = shapely.is_valid(np.array([shapely.Polygon(outline) for outline in outlines]))

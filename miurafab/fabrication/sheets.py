@@ -25,6 +25,7 @@ from miurafab.fabrication.nesting import Problem, SheetKind, Slot, Stock, nest, 
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.ordering import order_strokes, travel_bound
 from miurafab.fabrication.pieces import Piece, Pieces, make_pieces
+from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.strokes import Blank, Motion, sheet_strokes
 from miurafab.fabrication.tabs import FOLDS, Tab
 from miurafab.fabrication.toolpath import Toolpath
@@ -200,11 +201,11 @@ def lay_out(
     motion = _motion(patches, placements, slots)
     turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
     names = [patch.label for patch in patches]
-    texts, unlettered = place_texts(pattern, pieces.face_patch, names, pieces.tabs, numbers, turns)
+    lettering = place_texts(pattern, pieces.face_patch, names, pieces.tabs, numbers, turns)
     drawn = sheet_strokes(
         pattern,
         pieces,
-        texts,
+        lettering.texts,
         motion,
         material,
         [Blank(each.name, each.width_mm, each.height_mm, bed.margin_mm) for each in sheets],
@@ -224,8 +225,8 @@ def lay_out(
         sheets=sheets,
         totals=_totals(pattern, pieces, patches, sheets, toolpaths + behind, usable),
         untabbed=tuple(pieces.untabbed.tolist()),
-        unlettered=unlettered,
-        remarks=_remarks(pieces, numbers, drawn.unrelieved, material),
+        unlettered=lettering.left_out,
+        remarks=_remarks(pieces, numbers, lettering.unmarked, drawn.unrelieved, material),
         toolpaths=toolpaths,
         backs=behind,
     )
@@ -247,11 +248,17 @@ def _with_own_tabs(material: Material, options: LayoutOptions) -> Material:
         rule = replace(rule, height_mm=options.tab_height_mm)
     if options.tab_inset_mm is not None:
         rule = replace(rule, inset_mm=options.tab_inset_mm)
+    if options.tab_angle is not None:
+        rule = replace(rule, max_angle=options.tab_angle)
     return replace(material, tabs=rule)
 
 
 def _remarks(
-    pieces: Pieces, numbers: NDArray[np.int64], unrelieved: int, material: Material
+    pieces: Pieces,
+    numbers: NDArray[np.int64],
+    unmarked: int,
+    unrelieved: int,
+    material: Material,
 ) -> tuple[str, ...]:
     found = []
     weak = numbers[pieces.tabs.areas < material.tabs.min_area_mm2]
@@ -262,6 +269,8 @@ def _remarks(
             f"{len(weak)} of {len(numbers)} tabs have less than {material.tabs.min_area_mm2:g} mm2 "
             f"of glue: number {shown}{more}."
         )
+    if unmarked:
+        found.append(f"{unmarked} tabs have no room for the letter of their fold.")
     if unrelieved:
         found.append(f"At {unrelieved} vertices a crease is too short for a relief hole.")
     return tuple(found)
@@ -307,9 +316,10 @@ def _patch(
             Tab(
                 number=int(numbers[tab]),
                 edge=int(tabs.edge[tab]),
+                mate_edge=int(tabs.seams.edges[tab, 1]),
                 mate_patch=int(pieces.face_patch[tabs.mate_face[tab]]),
                 polygon_mm=framed(tabs.polygon(tab)),
-                fold=FOLDS.get(str(pattern.edges_assignment[tabs.edge[tab]]), "flat"),
+                fold=FOLDS.get(str(tabs.seams.fold[tab]), "flat"),
             )
             for tab in piece.tabs.tolist()
         ),
@@ -371,10 +381,8 @@ def _totals(
     toolpaths: tuple[Toolpath, ...],
     usable: float,
 ) -> Totals:
-    faces = pattern.edges_faces
-    seam = (faces >= 0).all(axis=1)
-    seam &= pieces.face_patch[faces[:, 0]] != pieces.face_patch[faces[:, 1]]
-    ends = pattern.vertices_coords[pattern.edges_vertices[seam]]
+    seams = all_seams(pattern, pieces.face_patch).edges[:, 0]
+    ends = pattern.vertices_coords[pattern.edges_vertices[seams]]
     area = sum(shapely.Polygon(patch.outline_mm).area for patch in patches)
     return Totals(
         patches=len(patches),

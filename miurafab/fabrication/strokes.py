@@ -258,7 +258,7 @@ def _creases(
     back = holed[pattern.edges_vertices[edges]] * (diameter / 2)
     ends = ends + np.stack([way * back[:, :1], -way * back[:, 1:]], axis=1)
 
-    tabs = pieces.tabs.take(np.isin(pattern.edges_assignment[pieces.tabs.edge], FOLDED))
+    tabs = pieces.tabs.take(np.isin(pieces.tabs.seams.fold, FOLDED))
     base = tabs.points[:, :2]
     along = np.diff(pattern.vertices_coords[pattern.edges_vertices[tabs.edge]], axis=1)[:, 0]
     backwards = np.einsum("ni,ni->n", base[:, 1] - base[:, 0], along) < 0

@@ -1,7 +1,8 @@
 """Glue tabs: each is a piece of the facet that it will be glued to.
 
 The paper is continuous across a seam, so the tab on seam edge e of patch A, glued to facet g of
-patch B, is drawn where g itself lies in the flat pattern. It is the set of points x of g with
+patch B, is drawn where g itself lies in the flat pattern; where the seam joins two borders of the
+sheet, where g lies once it is carried there. It is the set of points x of g with
 
     0 <= d_e(x) <= height,    d_k(x) >= inset  for every other side k of g,
     d_k(x) - d_e(x) >= inset |n_k - n_e|  for every other side k of g that bears a tab too,
@@ -27,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.seams import Seams, all_seams, ring_seams
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -35,6 +37,9 @@ MIN_SIDE_MM = 1.0
 
 MIN_AREA_MM2 = 2.0
 """A tab with less glue area does not hold (judged)."""
+
+RAISED = 2.0
+"""How many times its usual height a tab may have that would have too little glue (judged)."""
 
 FOLDS = {"M": "mountain", "V": "valley", "U": "unassigned"}
 """Which way the fold of a tab goes, by the assignment of its edge; flat for all others."""
@@ -46,13 +51,15 @@ NO_LIMIT = -1e12
 @dataclass(frozen=True, eq=False)
 class Tab:
     """A tab of one patch. ``number`` is engraved on both sides of the seam; ``edge`` is the pattern
-    edge of the seam, ``mate_patch`` the id of the patch it is glued to, and ``polygon_mm`` (n, 2)
-    its outline in the patch frame, counter-clockwise, the first side being the base. ``fold`` is
-    one of :data:`FOLDS`, or flat.
+    edge that it stands on and ``mate_edge`` the one that it joins it to, the same one except where
+    two borders of the pattern are joined; ``mate_patch`` is the id of the patch it is glued to, and
+    ``polygon_mm`` (n, 2) its outline in the patch frame, counter-clockwise, the first side being
+    the base. ``fold`` is one of :data:`FOLDS`, or flat.
     """
 
     number: int
     edge: int
+    mate_edge: int
     mate_patch: int
     polygon_mm: NDArray[np.float64]
     fold: str = "flat"
@@ -60,19 +67,34 @@ class Tab:
 
 @dataclass(frozen=True, eq=False)
 class TabRegions:
-    """N tabs in the pattern's plane: on ``edge`` (N,) of facet ``own_face`` (N,), glued to
-    ``mate_face`` (N,). ``points`` (N, m, 2) in mm, counter-clockwise, the first side being the
-    base; of each only the first ``count`` (N,) corners are real, none if there is no region.
+    """N tabs in the pattern's plane, on ``seams`` (N). ``points`` (N, m, 2) in mm,
+    counter-clockwise, the first side being the base; of each only the first ``count`` (N,) corners
+    are real, none if there is no region. ``glued`` (N, m, 2) is where they lie inside the facet
+    that they are glued to.
     """
 
-    edge: NDArray[np.int64]
-    own_face: NDArray[np.int64]
-    mate_face: NDArray[np.int64]
+    seams: Seams
     points: NDArray[np.float64]
+    glued: NDArray[np.float64]
     count: NDArray[np.int64]
 
     def __len__(self) -> int:
-        return len(self.edge)
+        return len(self.count)
+
+    @property
+    def edge(self) -> NDArray[np.int64]:
+        """(N,) the pattern edge that each stands on."""
+        return self.seams.edges[:, 0]
+
+    @property
+    def own_face(self) -> NDArray[np.int64]:
+        """(N,) the facet that bears it."""
+        return self.seams.faces[:, 0]
+
+    @property
+    def mate_face(self) -> NDArray[np.int64]:
+        """(N,) the facet that it is glued to."""
+        return self.seams.faces[:, 1]
 
     def polygon(self, index: int | np.integer) -> NDArray[np.float64]:
         """(n, 2) corners of one tab."""
@@ -80,13 +102,8 @@ class TabRegions:
 
     def take(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> TabRegions:
         """The tabs that ``which`` picks."""
-        return TabRegions(
-            self.edge[which],
-            self.own_face[which],
-            self.mate_face[which],
-            self.points[which],
-            self.count[which],
-        )
+        points, glued = self.points[which], self.glued[which]
+        return TabRegions(self.seams.take(which), points, glued, self.count[which])
 
     @property
     def present(self) -> NDArray[np.bool_]:
@@ -112,6 +129,11 @@ class TabRegions:
         found: NDArray[np.bool_] = large & (self.count >= 3)
         return found
 
+    @property
+    def glue(self) -> NDArray[np.float64]:
+        """(N,) glue areas in mm², 0 where a tab is not usable."""
+        return np.where(self.usable, self.areas, 0.0)
+
 
 def inset_of(material: Material) -> float:
     """The inset in mm that tabs of ``material`` keep: at least so much that the cuts on both
@@ -122,26 +144,20 @@ def inset_of(material: Material) -> float:
 
 def tab_regions(
     pattern: CreasePattern,
-    edges: NDArray[np.int64],
-    sides: NDArray[np.int64],
+    seams: Seams,
     material: Material,
     bearing: NDArray[np.bool_] | None = None,
     *,
     full_facet: bool = False,
+    raised: NDArray[np.bool_] | None = None,
 ) -> TabRegions:
-    """The tabs on ``edges`` (N,), each glued to the facet ``edges_faces[edge, side]``.
+    """The tabs on N ``seams``, twice as high as the material's where ``raised`` (N,) says so.
 
     ``bearing`` (F, k) tells which sides of each facet have a tab glued inside them, and so share
     the facet; without it every tab is computed as if alone, which only makes it larger.
     """
-    mate = pattern.edges_faces[edges, sides]
-    ends = pattern.vertices_coords[pattern.edges_vertices[edges]]
-    a = ends[np.arange(len(edges)), sides]
-    b = ends[np.arange(len(edges)), 1 - sides]
-    along = b - a
-    length = np.linalg.norm(along, axis=1)
-    along /= np.where(length > 0, length, 1.0)[:, None]
-    frame = np.stack([along, np.column_stack([-along[:, 1], along[:, 0]])], axis=1)
+    mate, count = seams.faces[:, 1], len(seams)
+    a, _, frame = _frames(pattern, seams.edges[:, 1], mate)
 
     corners = pattern.faces_vertices[mate]
     real = corners >= 0
@@ -157,10 +173,13 @@ def tab_regions(
     offset = np.einsum("nki,nki->nk", normal, local)
 
     inset = inset_of(material)
-    other = real & (pattern.faces_edges[mate] != edges[:, None])
+    other = real & (pattern.faces_edges[mate] != seams.edges[:, 1:])
     reach = np.abs(local).max(axis=(1, 2), initial=0.0) + 1.0
-    height = reach if full_facet else np.full(len(edges), material.tabs.height_mm)
-    zero = np.zeros(len(edges))
+    asked = np.full(count, material.tabs.height_mm)
+    if raised is not None:
+        asked[raised] *= RAISED
+    height = reach if full_facet else asked
+    zero = np.zeros(count)
     points = np.stack(
         [
             np.column_stack([-reach, zero]),
@@ -170,22 +189,41 @@ def tab_regions(
         ],
         axis=1,
     )
-    count = np.full(len(edges), 4)
+    sides = np.full(count, 4)
     for k in range(corners.shape[1]):
         limit = np.where(other[:, k], offset[:, k] + inset, NO_LIMIT)
-        points, count = clip_convex(points, count, normal[:, k], limit)
+        points, sides = clip_convex(points, sides, normal[:, k], limit)
         if bearing is None:
             continue
         towards = normal[:, k] - np.array([0.0, 1.0])
         shared = other[:, k] & bearing[mate, k]
         limit = offset[:, k] + inset * np.linalg.norm(towards, axis=1)
-        points, count = clip_convex(points, count, towards, np.where(shared, limit, NO_LIMIT))
-    points, count = _base_first(points, count)
-    if material.tabs.max_angle < math.pi:
-        points, count = _not_steeper(points, count, material.tabs.max_angle)
-    placed = a[:, None] + np.einsum("nij,nki->nkj", frame, points)
-    own = pattern.edges_faces[edges, 1 - sides]
-    return TabRegions(edges, own, mate, placed, count)
+        points, sides = clip_convex(points, sides, towards, np.where(shared, limit, NO_LIMIT))
+    points, sides = _base_first(points, sides)
+    if material.tabs.max_angle < math.pi and not full_facet:
+        points, sides = _not_steeper(points, sides, material.tabs.max_angle)
+    glued = placed = a[:, None] + np.einsum("nij,nki->nkj", frame, points)
+    if (seams.edges[:, 0] != seams.edges[:, 1]).any():
+        # The facet that bears the tab has its side running the other way.
+        _, a, frame = _frames(pattern, seams.edges[:, 0], seams.faces[:, 0])
+        placed = a[:, None] - np.einsum("nij,nki->nkj", frame, points)
+    return TabRegions(seams, placed, glued, sides)
+
+
+def _frames(
+    pattern: CreasePattern, edges: NDArray[np.int64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Of each of ``edges`` (N,), with its facet in ``faces`` (N,) on the left: the first end and
+    the last (N, 2), and the unit vectors along it and into the facet, (N, 2, 2).
+    """
+    row = np.arange(len(edges))
+    backwards = (pattern.edges_faces[edges, 0] != faces).astype(np.int64)
+    ends = pattern.vertices_coords[pattern.edges_vertices[edges]]
+    start, end = ends[row, backwards], ends[row, 1 - backwards]
+    along = end - start
+    length = np.linalg.norm(along, axis=1)
+    along /= np.where(length > 0, length, 1.0)[:, None]
+    return start, end, np.stack([along, np.column_stack([-along[:, 1], along[:, 0]])], axis=1)
 
 
 def choose_tabs(
@@ -194,31 +232,44 @@ def choose_tabs(
     material: Material,
     options: LayoutOptions | None = None,
 ) -> tuple[TabRegions, NDArray[np.bool_], NDArray[np.int64]]:
-    """One tab for each seam edge of the split ``face_patch`` (F,), the patch id of each facet.
+    """One tab for each seam of the split ``face_patch`` (F,), the patch id of each facet.
 
-    The patch that ``options`` name bears the tab; where its tab would be too small, the other one.
-    Returns the tabs, (N,) which of them stand on the other patch, and (M,) the seam edges where
-    neither patch can bear one. Cuts in the pattern (assignment C) get none.
+    The patch that ``options`` name bears the tab. Where it would have less glue than the material
+    asks for, the tab goes to the other patch if it is larger there, and if that is not enough it
+    is drawn up to :data:`RAISED` times as high. Where a sheet is glued to itself the lower pattern
+    edge counts as the lower patch. Returns the tabs, (N,) which of them are not as usual, and (M,)
+    the seam edges where neither patch can bear one. Cuts in the pattern (assignment C) get none.
     """
     options = options or LayoutOptions()
-    faces = pattern.edges_faces
-    inner = (faces >= 0).all(axis=1)
-    patch = np.where(faces >= 0, face_patch[faces], -1)
-    seam = inner & (patch[:, 0] != patch[:, 1])
-    edges = np.flatnonzero(seam & (pattern.edges_assignment != "C"))
-    lower = patch[edges, 0] < patch[edges, 1]
-    usual = np.where(_by_lower(patch[edges], options.tab_side) == lower, 1, 0)
+    seams = all_seams(pattern, face_patch)
+    patch = face_patch[seams.faces]
+    lower = patch[:, 0] < patch[:, 1]
+    lower |= (patch[:, 0] == patch[:, 1]) & (seams.edges[:, 0] < seams.edges[:, 1])
+    seams = seams.swapped(_by_lower(patch, options.tab_side) != lower)
 
-    def made(sides: NDArray[np.int64]) -> TabRegions:
-        bearing = _bearing(pattern, edges, sides)
-        return tab_regions(pattern, edges, sides, material, bearing, full_facet=options.full_facet)
+    def made(seams: Seams, raised: NDArray[np.bool_] | None = None) -> TabRegions:
+        bearing = _bearing(pattern, seams)
+        full = options.full_facet
+        return tab_regions(pattern, seams, material, bearing, full_facet=full, raised=raised)
 
-    tabs = made(usual)
-    swapped = ~tabs.usable
-    if swapped.any():
-        tabs = made(np.where(swapped, 1 - usual, usual))
-    kept = tabs.usable
-    return tabs.take(kept), swapped[kept], edges[~kept]
+    tabs = made(seams)
+    weak = tabs.glue < material.tabs.min_area_mm2
+    unusual = weak
+    if weak.any():
+        swapped = weak & (made(seams.swapped(weak)).glue > tabs.glue)
+        tabs = made(seams.swapped(swapped))
+        weak = tabs.glue < material.tabs.min_area_mm2
+        tabs = made(tabs.seams, weak)
+        unusual = swapped | weak
+    kept = tabs.glue > 0
+    return tabs.take(kept), unusual[kept], seams.edges[~kept, 0]
+
+
+def ring_tabs(pattern: CreasePattern, material: Material, options: LayoutOptions) -> TabRegions:
+    """All tabs that may stand on the border of the pattern, on either side of each seam."""
+    seams = ring_seams(pattern)
+    seams = seams.joined(seams.swapped(np.ones(len(seams), dtype=bool)))
+    return tab_regions(pattern, seams, material, full_facet=options.full_facet)
 
 
 def _by_lower(patch: NDArray[np.int64], side: str) -> NDArray[np.bool_]:
@@ -253,16 +304,12 @@ def _not_steeper(
     return points, count
 
 
-def _bearing(
-    pattern: CreasePattern, edges: NDArray[np.int64], sides: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def _bearing(pattern: CreasePattern, seams: Seams) -> NDArray[np.bool_]:
     """(F, k) which facet sides have a tab glued inside them."""
-    mate_of_edge = np.full(len(pattern.edges_vertices), -2)
-    mate_of_edge[edges] = pattern.edges_faces[edges, sides]
-    facet = np.arange(len(pattern.faces_vertices))[:, None]
-    found: NDArray[np.bool_] = (pattern.faces_edges >= 0) & (
-        mate_of_edge[pattern.faces_edges] == facet
-    )
+    found = np.zeros(pattern.faces_edges.shape, dtype=bool)
+    mate = seams.faces[:, 1]
+    side = (pattern.faces_edges[mate] == seams.edges[:, 1:]).argmax(axis=1)
+    found[mate, side] = True
     return found
 
 
@@ -293,7 +340,7 @@ def clip_convex(
     kept = np.stack([real & inside, crossed], axis=2).reshape(rows, 2 * slots)
     order = np.argsort(~kept, axis=1, kind="stable")
     total = kept.sum(axis=1)
-    width = max(int(total.max(initial=0)), 2)
+    width = max(int(total.max(initial=0)), 3)
     order = order[:, :width]
     return np.take_along_axis(handed, order[..., None], axis=1), total
 

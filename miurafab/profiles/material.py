@@ -75,7 +75,7 @@ class TabRule:
 
     height_mm: float
     inset_mm: float
-    max_angle: float = math.pi
+    max_angle: float = math.radians(75)
     min_area_mm2: float = 10.0
 
 
@@ -196,7 +196,7 @@ def _tabs(table: Table) -> TabRule:
     rule = TabRule(
         height_mm=table.length("height", low=0.5, high=100),
         inset_mm=table.length("inset", 0.3, low=0, high=10),
-        max_angle=table.angle("max_angle", math.pi, low=0.1, high=math.pi),
+        max_angle=table.angle("max_angle", math.radians(75), low=0.1, high=math.pi),
         min_area_mm2=table.number("min_area", 10.0, low=0, high=1e6),
     )
     table.finish()

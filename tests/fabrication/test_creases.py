@@ -12,6 +12,7 @@ import shapely
 from flat_patterns import bed, card, miura, zigzag
 
 from miurafab.errors import LayoutError
+from miurafab.fabrication.boxes import best_turn
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.strokes import PIN_MM, bridged, pin_centres
@@ -243,8 +244,7 @@ def sound(pattern, layout, limit):
     facets = flat_patterns.facet_polygons(pattern)
     home = {face: patch.id for patch in layout.patches for face in patch.faces.tolist()}
     for patch in layout.patches:
-        size = np.sort(np.ptp(patch.outline_mm, axis=0))
-        assert (size <= np.sort(limit) + 1e-6).all()
+        assert best_turn(patch.outline_mm, *(side + 1e-5 for side in limit)) is not None
         for tab in patch.tabs:
             c, s = np.cos(np.radians(patch.rotation_deg)), np.sin(np.radians(patch.rotation_deg))
             points = tab.polygon_mm @ np.array([[c, -s], [s, c]]) + patch.origin_mm

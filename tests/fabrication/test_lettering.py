@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import flat_patterns
 import numpy as np
 import pytest
@@ -58,7 +60,8 @@ def test_no_text_touches_a_crease_a_cut_or_another_text(pattern):
     names = [f"P{k}" for k in range(len(pieces.pieces))]
     numbers = np.arange(len(pieces.tabs)) + 1
     turns = np.linspace(-1.5, 1.5, len(names))
-    texts, left_out = place_texts(pattern, pieces.face_patch, names, pieces.tabs, numbers, turns)
+    lettering = place_texts(pattern, pieces.face_patch, names, pieces.tabs, numbers, turns)
+    texts, left_out = lettering.texts, lettering.left_out
     assert len(texts) + left_out == len(names) + 2 * len(numbers)
     assert len(texts) > 0.8 * (len(names) + 2 * len(numbers))
     creases = shapely.STRtree(shapely.linestrings(pattern.vertices_coords[pattern.edges_vertices]))
@@ -82,9 +85,14 @@ def test_no_text_touches_a_crease_a_cut_or_another_text(pattern):
             np.testing.assert_allclose(across, [-along[1], along[0]], atol=1e-9)
             tilted = turns[patch] - np.radians(10.0)
             assert along @ np.array([np.cos(tilted), -np.sin(tilted)]) > -1e-6
-    numbered = [text.text for text in texts if text.text.isdigit()]
-    # Each number stands on the tab and on the facet under it.
-    assert all(numbered.count(number) in (1, 2) for number in numbered)
+    folds = dict(zip(numbers.tolist(), pieces.tabs.seams.fold.tolist(), strict=True))
+    marked = {f"{number}{fold}" for number, fold in folds.items()}
+    found = Counter(text.text for text in texts if text.text not in names)
+    # Each number stands on its tab with the letter of its fold, and bare on the facet under it.
+    assert set(found) <= marked | set(map(str, numbers))
+    bare = sum(found[str(number)] == 2 for number in numbers)
+    assert bare == lettering.unmarked < 0.1 * len(numbers)
+    assert all(times == 1 for text, times in found.items() if text in marked)
 
 
 def test_a_number_stands_on_both_sides_of_its_seam():
@@ -101,9 +109,9 @@ def test_a_patch_whose_facets_are_all_glued_upon_is_named_beside_its_tabs():
     face_patch = np.repeat([0, 0, 1], 9)
     tabs, _, _ = choose_tabs(pattern, face_patch, card())
     numbers, turns = np.arange(len(tabs)) + 1, np.zeros(2)
-    texts, left_out = place_texts(pattern, face_patch, ["P1", "P2"], tabs, numbers, turns)
-    assert left_out == 0
-    (name,) = [text for text in texts if text.text == "P2"]
+    lettering = place_texts(pattern, face_patch, ["P1", "P2"], tabs, numbers, turns)
+    assert lettering.left_out == 0
+    (name,) = [text for text in lettering.texts if text.text == "P2"]
     shape = shapely.MultiLineString([stroke.tolist() for stroke in name.strokes])
     for tab in range(len(tabs)):
         assert shape.distance(shapely.Polygon(tabs.polygon(tab))) >= CLEARANCE_MM - 1e-6

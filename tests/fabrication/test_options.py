@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 import miurafab
@@ -25,6 +27,7 @@ def test_every_option_is_read():
             "seam_columns": 4,
             "tab_height": "5mm",
             "tab_inset": "0.5mm",
+            "tab_angle": "60deg",
             "tab_side": "alternate",
             "full_facet": True,
             "two_sided": True,
@@ -41,6 +44,7 @@ def test_every_option_is_read():
         seam_columns=(4,),
         tab_height_mm=5.0,
         tab_inset_mm=0.5,
+        tab_angle=math.radians(60),
         tab_side="alternate",
         full_facet=True,
         two_sided=True,

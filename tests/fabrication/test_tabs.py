@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import flat_patterns
 import numpy as np
@@ -26,6 +27,10 @@ CASES = {
     "no inset": (miura(30, 26), card(inset=0.0)),
     "single facets": (miura(4, 4, a=60.0, b=60.0), card(tab=30.0)),
 }
+
+
+def with_angle(material, angle):
+    return dataclasses.replace(material, tabs=dataclasses.replace(material.tabs, max_angle=angle))
 
 
 def common_area(one, other) -> float:
@@ -105,12 +110,30 @@ def test_a_piece_is_its_patch_and_its_tabs(name):
 
 def test_the_tab_of_a_rectangle_is_the_strip_less_its_insets():
     pattern = miura(2, 1, a=30.0, b=20.0, sector=np.pi / 2)
-    tabs, swapped, untabbed = choose_tabs(pattern, np.array([0, 1]), card(tab=7.0, inset=0.3))
-    assert not swapped.any()
+    upright = with_angle(card(tab=7.0, inset=0.3), math.pi)
+    tabs, unusual, untabbed = choose_tabs(pattern, np.array([0, 1]), upright)
+    assert not unusual.any()
     assert not len(untabbed)
     expected = shapely.box(30.0, 0.3, 37.0, 19.7)
     assert shapely.Polygon(tabs.polygon(0)).normalize().equals_exact(expected.normalize(), 1e-9)
     assert tabs.areas[0] == pytest.approx(7.0 * 19.4)
+
+
+@pytest.mark.parametrize("degrees", [45.0, 75.0])
+def test_no_inner_angle_at_a_base_is_larger_than_asked(degrees):
+    """Half the pieces of the mild pattern lean outwards by themselves."""
+    pattern, material = CASES["mild"]
+    assert material.tabs.max_angle == pytest.approx(math.radians(75.0)), "the usual"
+    pieces = make_pieces(pattern, 190.0, 140.0, with_angle(material, math.radians(degrees)))
+    tabs = pieces.tabs
+    largest = 0.0
+    for k in range(len(tabs)):
+        ring = tabs.polygon(k)
+        for corner, (one, other) in ((0, (1, -1)), (1, (2, 0))):
+            a, b = ring[one] - ring[corner], ring[other] - ring[corner]
+            angle = math.degrees(math.atan2(abs(a[0] * b[1] - a[1] * b[0]), a @ b))
+            largest = max(largest, angle)
+    assert largest == pytest.approx(degrees, abs=1e-5)
 
 
 def test_a_facet_with_two_seam_edges_is_split_on_its_bisector():
@@ -147,6 +170,19 @@ def test_a_tab_too_small_on_one_side_goes_to_the_other():
     tabs, _, untabbed = choose_tabs(narrow, np.array([0, 1, 2]), card())
     assert len(tabs) + len(untabbed) == 2
     assert len(untabbed) == 2
+
+
+def test_a_tab_with_too_little_glue_is_made_higher():
+    pattern = miura(4, 3, 10.0, 10.0, sector=np.pi / 2)
+    face_patch = np.repeat([0, 1, 2], 4)
+    for height in (0.8, 1.0, 1.2, 7.0):
+        tabs, unusual, _ = choose_tabs(pattern, face_patch, card(tab=height))
+        ends = pattern.vertices_coords[pattern.edges_vertices[tabs.edge], 1]
+        reach = np.abs(tabs.points[..., 1] - ends[:, :1]).max(axis=1, where=tabs.present, initial=0)
+        weak = height < 1.1
+        assert unusual.all() == unusual.any() == weak
+        np.testing.assert_allclose(reach, 2 * height if weak else height)
+        assert (tabs.areas >= 10.0).all()
 
 
 def test_a_facet_that_is_not_convex_gets_a_tab_inside_it_or_none():

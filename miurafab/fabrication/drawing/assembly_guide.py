@@ -301,7 +301,9 @@ def _glue_pages(
             canvas.setFillColor(_INK)
             canvas.setFont("Helvetica", 9.5)
             place = f"{start + row + 1}.  {labels[step.patch]}"
-            if step.onto:
+            if step.closes:
+                place += f" to {labels[step.onto[0]]}, closing the ring: {_tab_text(step.tabs)}"
+            elif step.onto:
                 onto = ", ".join(labels[p] for p in step.onto)
                 place += f" onto {onto}: {_tab_text(step.tabs)}"
             else:

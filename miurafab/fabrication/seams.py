@@ -1,0 +1,131 @@
+"""Seams: the pairs of facet sides that are glued together.
+
+Most lie within the sheet: an edge between two facets of different patches, one side of which bears
+a tab. Where the folded form closes upon itself (a ring, a tube), two edges of the sheet's border
+come to lie on each other, and are glued as well. Such edges are found by the folded form alone:
+
+- their ends coincide there, one edge running against the other as seen from its own facet;
+- they are equally long in the flat pattern;
+- no third edge lies there, and the facets do not lie on each other, as they do where a sheet is
+  folded together and nothing is glued.
+
+The crease of such a seam folds by the angle between its two facets, a valley if they close on the
+printed side, which is the one that the flat pattern is seen from.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.spatial
+from numpy.typing import NDArray
+
+from miurafab.geometry.angles import facet_normals, fold_angles
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.unfold import FLAT_ANGLE
+
+COINCIDENT = 1e-6
+"""Distance, over the diagonal of the folded form's box, within which two points are one."""
+
+TOGETHER = math.radians(0.5)
+"""Two facets that close to less than this lie on each other and are not glued."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seams:
+    """S seams. ``edges`` (S, 2) int64 are the pattern edges that come together, the same one twice
+    within the sheet, and ``faces`` (S, 2) the facets on them: column 0 bears the tab, which is
+    glued inside column 1. ``fold`` (S,) is the assignment of the crease.
+    """
+
+    edges: NDArray[np.int64]
+    faces: NDArray[np.int64]
+    fold: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        return len(self.edges)
+
+    def swapped(self, which: NDArray[np.bool_]) -> Seams:
+        """The seams with the tab on the other side where ``which`` (S,) says so."""
+        turn = which[:, None]
+        return Seams(
+            np.where(turn, self.edges[:, ::-1], self.edges),
+            np.where(turn, self.faces[:, ::-1], self.faces),
+            self.fold,
+        )
+
+    def take(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> Seams:
+        """The seams that ``which`` picks."""
+        return Seams(self.edges[which], self.faces[which], self.fold[which])
+
+    def joined(self, others: Seams) -> Seams:
+        """These seams and then ``others``."""
+        return Seams(
+            np.concatenate([self.edges, others.edges]),
+            np.concatenate([self.faces, others.faces]),
+            np.concatenate([self.fold, others.fold]),
+        )
+
+
+def inner_seams(
+    pattern: CreasePattern, edges: NDArray[np.int64], sides: NDArray[np.int64]
+) -> Seams:
+    """The seams on ``edges`` (S,) between two facets each, ``edges_faces[edge, side]`` being the
+    one that is glued upon.
+    """
+    mate = pattern.edges_faces[edges, sides]
+    own = pattern.edges_faces[edges, 1 - sides]
+    return Seams(
+        np.column_stack([edges, edges]),
+        np.column_stack([own, mate]),
+        pattern.edges_assignment[edges],
+    )
+
+
+def all_seams(pattern: CreasePattern, face_patch: NDArray[np.int64]) -> Seams:
+    """The seams of the split ``face_patch`` (F,): between patches, then between borders."""
+    faces = pattern.edges_faces
+    patch = np.where(faces >= 0, face_patch[faces], -1)
+    seam = (faces >= 0).all(axis=1) & (patch[:, 0] != patch[:, 1])
+    edges = np.flatnonzero(seam & (pattern.edges_assignment != "C"))
+    return inner_seams(pattern, edges, np.ones_like(edges)).joined(ring_seams(pattern))
+
+
+def ring_seams(pattern: CreasePattern) -> Seams:
+    """The pairs of border edges that the folded form brings together, the lower one first, in its
+    order; none where the folded form is not known.
+    """
+    none = np.empty((0, 2), dtype=np.int64)
+    border = np.flatnonzero((pattern.edges_faces >= 0).sum(axis=1) == 1)
+    if pattern.folded_coords is None or len(border) < 2:
+        return Seams(none, none, pattern.edges_assignment[:0])
+    # Each border edge runs with its facet on the left.
+    turned = pattern.edges_faces[border, 0] < 0
+    ends = pattern.edges_vertices[border]
+    ends = np.where(turned[:, None], ends[:, ::-1], ends)
+    folded = pattern.folded_coords[ends]
+    near = COINCIDENT * float(np.linalg.norm(np.ptp(pattern.folded_coords, axis=0)))
+    middles = scipy.spatial.KDTree(folded.mean(axis=1))
+    pairs = middles.query_pairs(near, output_type="ndarray").astype(np.int64).reshape(-1, 2)
+    pairs = np.sort(pairs, axis=1)
+    one, other = folded[pairs[:, 0]], folded[pairs[:, 1]][:, ::-1]
+    met = (np.linalg.norm(one - other, axis=2) <= near).all(axis=1)
+    length = np.linalg.norm(np.diff(pattern.vertices_coords[ends], axis=1)[:, 0], axis=1)
+    met &= np.abs(length[pairs[:, 0]] - length[pairs[:, 1]]) <= near
+    alone = np.bincount(pairs.ravel(), minlength=len(border)) == 1
+    pairs = pairs[met & alone[pairs].all(axis=1)]
+    pairs = pairs[np.argsort(pairs[:, 0])]
+    faces = pattern.edges_faces[border].max(axis=1)[pairs]
+    normal = _normals(pattern.folded_coords, pattern.faces_vertices[faces.ravel()])
+    left, right = normal.reshape(-1, 2, 3).swapaxes(0, 1)
+    angle = fold_angles(pattern.folded_coords, ends[pairs[:, 0]], left, right)
+    fold = np.select([angle > FLAT_ANGLE, angle < -FLAT_ANGLE], ["V", "M"], "F")
+    glued = np.abs(angle) < math.pi - TOGETHER
+    return Seams(border[pairs], faces, fold).take(glued)
+
+
+def _normals(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    corners = np.where(faces >= 0, faces, faces[:, :1])
+    return facet_normals(points, corners[:, [0, 1, 2, min(3, corners.shape[1] - 1)]])
