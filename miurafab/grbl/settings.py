@@ -15,6 +15,7 @@ from miurafab.errors import ProfileError
 from miurafab.grbl.codes import setting_codes
 from miurafab.grbl.events import Setting
 from miurafab.grbl.replies import parse_reply
+from miurafab.motion.parameters import COMMON_STEPS
 from miurafab.profiles import MachineProfile
 
 _LASER_MODE_IS_32 = ("grbl-1.1", "grblhal")
@@ -36,11 +37,11 @@ def profile_settings(machine: MachineProfile) -> dict[int, float]:
 def virtual_settings(machine: MachineProfile) -> dict[int, float]:
     """The settings that make a virtual controller this machine.
 
-    What :func:`profile_settings` expects, and the bed and the motion where the profile does not
-    give them as settings.
+    What :func:`profile_settings` expects, and the bed, the motion and the motor steps that the
+    time estimate assumes where the profile does not give them as settings.
     """
     bed, motion = machine.bed, machine.motion
-    pairs = {
+    pairs = dict.fromkeys((100, 101, 102), COMMON_STEPS) | {
         11: motion.junction_deviation_mm,
         110: motion.max_rate_mm_min[0],
         111: motion.max_rate_mm_min[1],

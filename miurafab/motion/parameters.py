@@ -12,8 +12,9 @@ _NEEDED = (1, 11, 12, 30, 31, 32, 100, 101, 102, 110, 111, 112, 120, 121, 122)
 Triple = tuple[float, float, float]
 _EIGHT_BIT = ("grbl-1.1", "grbl-0.9")
 """Dialects that run on an ATmega328P."""
-_COMMON_STEPS = 80.0
-"""steps/mm of a belt with 2 mm pitch, 20 teeth and 1/16 steps, the usual laser frame."""
+COMMON_STEPS = 80.0
+"""What a profile that gives no ``$100`` is taken to have: steps/mm of a belt with 2 mm pitch, 20 teeth and 1/16 steps, the
+usual laser frame."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class MotionParameters:
         rate_x, rate_y = motion.max_rate_mm_min
         acceleration_x, acceleration_y = motion.acceleration_mm_s2
         settings = {1: 25.0, 12: 0.002, 11: motion.junction_deviation_mm}
-        settings |= dict.fromkeys((100, 101, 102), _COMMON_STEPS)
+        settings |= dict.fromkeys((100, 101, 102), COMMON_STEPS)
         settings |= {110: rate_x, 111: rate_y, 112: rate_x}
         settings |= {120: acceleration_x, 121: acceleration_y, 122: acceleration_x}
         settings |= {30: profile.tool.s_max, 31: profile.tool.s_min}
