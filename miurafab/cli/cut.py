@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -74,14 +73,6 @@ def cut(
         bool | None,
         typer.Option(help="Wait for Enter before each further sheet [default: in a terminal]."),
     ] = None,
-    watched: Annotated[
-        bool,
-        typer.Option(
-            "--watched",
-            help="Stop with the beam off when standard input closes or is silent for 5 s: for a "
-            "program that starts this one and writes a byte a second.",
-        ),
-    ] = False,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -91,7 +82,6 @@ def cut(
     space holds, r resumes, q aborts, + - 0 change the feed and ] [ p the power.
     """
     from miurafab.machine.keys import terminal_keys
-    from miurafab.machine.watchdog import watched_by_parent
     from miurafab.workflow.cut_sheets import CutOptions
 
     console = Console(as_json, quiet)
@@ -123,8 +113,7 @@ def cut(
         _share(console, prepared, port, sheet, options)
         return
     waits = pause if pause is not None else port[0] != "virtual" and sys.stdin.isatty()
-    guard = watched_by_parent() if watched else nullcontext()
-    with guard, console.progress("cutting") as bar:
+    with console.progress("cutting") as bar:
 
         def show_progress(now: SheetProgress) -> None:
             share = now.stream.lines_acknowledged / max(now.stream.lines_total, 1)

@@ -8,15 +8,16 @@ for after the last acknowledgement says Idle.
 Every other way out - a refused line, an alarm, a reset, silence, a full disk, Ctrl-C, SIGTERM, an
 exception in somebody's progress callback - resets the controller before anything else happens,
 asks it whether the beam is off, and puts the answer into the sentence that the user reads. The
-one exception is a refused line: the controller still obeys then, and a feed hold before the
-reset lets the machine keep its position. An ``M5`` is never relied on: it would wait in the
+one exception is an abort at the keyboard of a job that goes dark at rest (M4): a feed hold before
+the reset lets the machine keep its position. An ``M5`` is never relied on: it would wait in the
 controller's queue behind up to seconds of burning.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
@@ -28,6 +29,7 @@ from miurafab.errors import (
     MiurafabError,
 )
 from miurafab.gcode.job import Job, prepare_lines
+from miurafab.gcode.moves import BEAM_M3
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Error, Event, Ok, Options, StatusReport
 from miurafab.grbl.settings import Settings, virtual_settings
@@ -50,6 +52,7 @@ from miurafab.profiles import MachineProfile
 
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # and when only the last moves are awaited
+_KEY_S = 0.01  # between two looks at the keyboard, if there is one
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,9 +154,10 @@ def stream_plan(
     on_progress: Callable[[Progress], None] | None = None,
     keys: Keys | None = None,
     virtual_speed: float | None = None,
+    signals: StopSignals | None = None,
 ) -> StreamResult:
-    """Send a planned job; see :func:`stream_job`."""
-    with StopSignals() as signals:
+    """Send a planned job; see :func:`stream_job`. ``signals`` are those already caught, if any."""
+    with StopSignals() if signals is None else nullcontext(signals) as signals:
         try:
             transport = open_port(
                 port,
@@ -240,6 +244,7 @@ class _Delivery:
         keys: Keys,
     ) -> None:
         self._keys = keys
+        self._patience = math.inf if isinstance(keys, NoKeys) else _KEY_S
         self._orders: list[bytes] = []
         self._plan = plan
         self._session = session
@@ -326,7 +331,7 @@ class _Delivery:
             elif session.now() >= poll_at:
                 session.ask_status()
                 poll_at = session.now() + (_END_POLL_S if streamer.finished else _POLL_S)
-            events = session.receive(poll_at - session.now())
+            events = session.receive(min(poll_at - session.now(), self._patience))
             for event in events:
                 streamer.take(event)
                 if isinstance(event, Ok | Error):
@@ -397,8 +402,11 @@ class _Delivery:
         """Stop the machine if it is at risk, and raise ``error`` with what became of it."""
         sentence = str(error)
         if self._at_risk:
-            gently = isinstance(error, LineRefused | JobAborted)
-            off = self._session.hold_and_stop() if gently else self._session.stop()
+            gently = isinstance(error, JobAborted) and not self._burns_at_rest
+            refused = isinstance(error, LineRefused)
+            off = (
+                self._session.hold_and_stop() if gently else self._session.stop(hold_first=refused)
+            )
             self._at_risk = False
             count = self._streamer.acknowledged
             outcome = (
@@ -418,6 +426,13 @@ class _Delivery:
             self._journal.ended(how, sentence)
         kind = JobStopped if isinstance(error, JobAborted) else type(error)
         raise kind(sentence) from None
+
+    @property
+    def _burns_at_rest(self) -> bool:
+        """Whether a feed hold leaves the beam on for a moment: M3, or nobody knows what it is."""
+        program = self._plan.program
+        laser = self._plan.machine.tool.kind == "laser"
+        return laser and (program is None or bool((program.spindle == BEAM_M3).any()))
 
     def make_safe(self) -> None:
         """Stop the machine if nothing else has: the last line of defence, on every way out."""

@@ -252,15 +252,16 @@ class Session:
                     return event
         return None
 
-    def stop(self) -> bool:
+    def stop(self, *, hold_first: bool = False) -> bool:
         """Reset the controller now; whether it then reported that the beam is off.
 
-        The reset is the first thing on the wire. Never raises for the machine's sake: a wire
-        that is gone is an answer too (False).
+        The reset is the first thing on the wire, with ``hold_first`` right behind a feed hold,
+        which a controller obeys that overhears the reset. Never raises for the machine's sake: a
+        wire that is gone is an answer too (False).
         """
         try:
             for _ in range(_RESETS):
-                self._reset_now()
+                self._reset_now(hold_first)
                 if self._wait_banner(_RESET_S) is not None:
                     break
             else:
@@ -288,13 +289,15 @@ class Session:
             return False
         return self.stop()
 
-    def _reset_now(self) -> None:
+    def _reset_now(self, hold_first: bool) -> None:
         if self.connection.state is State.CLOSED:
             raise PortError(f"The port {self.name} is closed.")
-        self._transport.write_now(self.connection.send_realtime(SOFT_RESET))
+        data = self.connection.send_realtime(FEED_HOLD) if hold_first else b""
+        data += self.connection.send_realtime(SOFT_RESET)
+        self._transport.write_now(data)
         self._asked_at = None
         if self._transcript is not None:
-            self._transcript.sent(self.now(), SOFT_RESET)
+            self._transcript.sent(self.now(), data)
 
     def close(self) -> None:
         """Release the port."""

@@ -25,26 +25,28 @@ class StopSignals:
     """``with StopSignals() as signals``; in another thread than the main one it does nothing.
 
     With ``at_once`` false the handler raises nothing, and only :meth:`check` does: for a wire
-    whose reads must not be torn (the controller in memory).
+    whose reads must not be torn (the controller in memory). ``caught`` is the name of the first
+    signal, None until one has come; ``cause`` says in words why it was sent, if somebody knows.
     """
 
     def __init__(self) -> None:
         self.at_once = True
-        self._caught: str | None = None
+        self.cause: str | None = None
+        self.caught: str | None = None
         self._held = False
         self._old: dict[int, Any] = {}
 
     @property
     def reason(self) -> str:
         """What stopped the job, in words."""
-        return _WORDS.get(self._caught or "SIGINT", "a signal")
+        return self.cause or _WORDS.get(self.caught or "SIGINT", "a signal")
 
     def check(self) -> None:
         """Raise ``KeyboardInterrupt`` for a signal that has come, until :meth:`hold`.
 
         So one whose exception Python dropped (it came during a finaliser) is not lost.
         """
-        if self._caught is not None and not self._held:
+        if self.caught is not None and not self._held:
             raise KeyboardInterrupt
 
     def hold(self) -> None:
@@ -73,7 +75,7 @@ class StopSignals:
             signal.signal(number, handler)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        if self._caught is None:
-            self._caught = signal.Signals(number).name
+        if self.caught is None:
+            self.caught = signal.Signals(number).name
             if self.at_once:
                 self.check()

@@ -34,7 +34,7 @@ if sys.platform != "win32":
 
     _FAULTS += (termios.error,)
 
-_SLICE = 0.01  # s; pyserial on Windows cannot be interrupted by Ctrl-C within one read
+_SLICE = 0.005  # s; how late a key is seen, and pyserial on Windows cannot be interrupted within
 _WRITE_TIMEOUT = 1.0  # s; far beyond the 90 ms that a full 1024-byte buffer takes at 115200 baud
 _INSTANT = 1e-6  # s; the least that a virtual clock moves, far above its rounding
 
@@ -161,6 +161,7 @@ class VirtualTransport:
         if timeout > 0:
             self.device.advance_to_line(max(timeout, _INSTANT))
         output = self.device.take_output()
+        self.device.beam_log.clear()  # nobody can ask for it here
         self._keep_pace()
         return output
 

@@ -1,58 +1,97 @@
-"""A job in a process of its own, which ends it safely when the program that started it is gone.
+"""The process that sends a job watches the one that started it, and ends the job when that is gone.
 
-The starting program holds the other end of this process's standard input and writes a byte there
-every second, whatever byte. When the pipe closes (that program has died, however it died) or is
-silent for :data:`SILENCE_S` (it hangs), this process is stopped as by SIGTERM: the reset goes onto
-the wire, the beam is off, the journal has its last word. The user interface can die without harm.
+The starting program holds the other end of this process's standard input. It writes bytes there:
+a :data:`BEAT` every second, whatever the user presses, or the number of a stop. When the pipe
+closes (that program has died, however it died) or is silent for :data:`SILENCE_S` (it hangs), this
+process is stopped as by SIGTERM: the reset goes onto the wire, the beam is off, the journal has
+its last word. The user interface can die without harm.
 """
 
 from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from types import TracebackType
 
+from miurafab.machine.signals import StopSignals
+
+BEAT = b"\0"
 BEAT_S = 1.0
-"""How often the starting program writes."""
+"""How often the starting program writes at the least."""
 SILENCE_S = 5.0
 """How long it may be silent."""
+STOPS = {"SIGINT": b"\1", "SIGTERM": b"\2", "SIGHUP": b"\3", "SIGBREAK": b"\4"}
+"""The bytes that stop this process as the signal of that name does."""
+
+_SIGNALS = {code[0]: name for name, code in STOPS.items()}
 
 
-@contextmanager
-def watched_by_parent(silence: float = SILENCE_S) -> Iterator[None]:
-    """Until the block ends, stop this process as SIGTERM does when its parent falls silent."""
-    watch = _Watch(sys.stdin.fileno(), silence)
-    watch.start()
-    try:
-        yield
-    finally:
-        watch.over.set()
+class ParentWatch:
+    """``with ParentWatch(...)``: until the end of the block the starting program is heeded.
 
+    ``descriptor`` is the pipe's end to read; ``signals`` are told why, when it is gone. It is also
+    the job's keyboard (:class:`~miurafab.machine.keys.Keys`): printable bytes are keys.
+    """
 
-class _Watch:
-    """Two threads: one reads, since no system's pipes can all be waited for, one keeps the time."""
-
-    def __init__(self, descriptor: int, silence: float) -> None:
-        self.over = threading.Event()
+    def __init__(self, descriptor: int, signals: StopSignals, silence: float = SILENCE_S) -> None:
         self._descriptor = descriptor
+        self._signals = signals
         self._silence = silence
         self._heard = time.monotonic()
+        self._over = threading.Event()
+        self._keys: list[str] = []
 
-    def start(self) -> None:
+    def pressed(self) -> str:
+        """The keys pressed since the last call; never waits."""
+        keys = "".join(self._keys)
+        del self._keys[: len(keys)]
+        return keys
+
+    def __enter__(self) -> ParentWatch:
+        # Two threads: one reads, since no system's pipes can all be waited for, one keeps the time.
         for work in (self._read, self._guard):
             threading.Thread(target=work, name="miurafab watchdog", daemon=True).start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._over.set()
 
     def _read(self) -> None:
-        while os.read(self._descriptor, 256):
+        while data := os.read(self._descriptor, 256):
             self._heard = time.monotonic()
-        self._heard = -self._silence
+            for byte in data.replace(BEAT, b""):
+                name = _SIGNALS.get(byte)
+                if name is None:
+                    self._keys.append(chr(byte))
+                else:
+                    self._stop(name)
+        self._lost("the end of the program that started it")
 
     def _guard(self) -> None:
-        while not self.over.wait(self._silence / 20):
+        while not self._over.wait(self._silence / 20):
             if time.monotonic() - self._heard > self._silence:
-                signal.raise_signal(signal.SIGTERM)
+                self._lost("the silence of the program that started it")
                 return
+
+    def _lost(self, why: str) -> None:
+        if not self._over.is_set():
+            self._signals.cause = why
+            self._stop("SIGTERM")
+
+    def _stop(self, name: str) -> None:
+        if self._over.is_set():
+            return
+        number = getattr(signal, name, signal.SIGTERM)
+        main = threading.main_thread().ident
+        if hasattr(signal, "pthread_kill") and main is not None:
+            # To the main thread itself, so that whatever it waits for ends at once.
+            signal.pthread_kill(main, number)
+        else:
+            signal.raise_signal(number)

@@ -8,18 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from miurafab.errors import InputError
 from miurafab.gcode.job import Job
 from miurafab.machine.framing import frame_job
+from miurafab.machine.job_process import stream_apart
 from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import Keys
 from miurafab.machine.planning import Plan, examine_job, plan_job
 from miurafab.machine.preflight import Finding
 from miurafab.machine.resume import resume
 from miurafab.machine.sender import Progress as StreamProgress
-from miurafab.machine.sender import StreamResult, stream_job, stream_plan
+from miurafab.machine.sender import StreamResult, stream_plan
+from miurafab.machine.transport import VIRTUAL
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.dry_run import SheetPreview
@@ -93,46 +96,71 @@ def cut(
     of the sheet and how many there are, before each: the place to ask for fresh material;
     ``after_frame`` with its number when its frame was traced; ``on_resume``, before the port is
     opened, with what will be burnt twice of a sheet that goes on. The journal and the transcript go
-    beside the job. Raises what :func:`~miurafab.machine.sender.stream_job` raises.
+    beside the job. A sheet for a real port is sent by a process of its own
+    (:func:`~miurafab.machine.job_process.stream_apart`). Raises what
+    :func:`~miurafab.machine.sender.stream_job` raises.
     """
-    plans = _plans(prepared, _chosen(prepared, sheets), options)
     done = []
     at = options.at
-    for number, plan in plans:
-        job, resumption = prepared.jobs[number - 1], plan.resumption
-        expected = prepared.dry_runs[number - 1]
+    for number, plan in plan_sheets(prepared, sheets, options):
         if before_sheet is not None:
             before_sheet(number, len(prepared.jobs))
-        if resumption is not None and on_resume is not None:
-            on_resume(resumption.sentence)
+        if plan.resumption is not None and on_resume is not None:
+            on_resume(plan.resumption.sentence)
         if options.frame:
             frame(prepared, number, port=port, options=replace(options, at=at))
             if after_frame is not None:
                 after_frame(number)
-        result = stream_plan(
-            replace(plan, at=at),
-            port,
-            journal_path=journal_path(prepared, job),
-            transcript_path=_beside(prepared, job, ".transcript"),
-            on_progress=_placed(on_progress, number, expected, prepared.machine),
-            keys=keys,
-            virtual_speed=options.virtual_speed,
-        )
-        if at is not None and len(expected.program):
-            x, y, _ = expected.program.end[-1].tolist()
-            at = (x, y)  # where this sheet left the head; the port forgets it when it is closed
-        done.append(
-            CutSheet(
-                expected.name,
-                result.lines,
-                expected.cut_mm,
-                expected.travel_mm,
-                expected.seconds,
-                result,
-                None if resumption is None else resumption.sentence,
-            )
-        )
+        send = partial(_stream(port), keys=keys, virtual_speed=options.virtual_speed)
+        plan = replace(plan, at=at)
+        done.append(cut_sheet(prepared, number, plan, port, send, on_progress=on_progress))
+        at = head_after(prepared, number, at)
     return tuple(done)
+
+
+def cut_sheet(
+    prepared: Prepared,
+    number: int,
+    plan: Plan,
+    port: str,
+    send: Callable[..., StreamResult],
+    *,
+    on_progress: Callable[[SheetProgress], None] | None = None,
+) -> CutSheet:
+    """``send`` the ``plan`` of sheet ``number``, with its journal and transcript beside the job."""
+    job, expected = prepared.jobs[number - 1], prepared.dry_runs[number - 1]
+    result = send(
+        plan,
+        port,
+        journal_path=journal_path(prepared, job),
+        transcript_path=_beside(prepared, job, ".transcript"),
+        on_progress=_placed(on_progress, number, expected, prepared.machine),
+    )
+    return CutSheet(
+        expected.name,
+        result.lines,
+        expected.cut_mm,
+        expected.travel_mm,
+        expected.seconds,
+        result,
+        None if plan.resumption is None else plan.resumption.sentence,
+    )
+
+
+def head_after(
+    prepared: Prepared, number: int, at: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """Where sheet ``number`` leaves a head that was ``at``; the port forgets it when closed."""
+    program = prepared.dry_runs[number - 1].program
+    if at is None or not len(program):
+        return at
+    x, y, _ = program.end[-1].tolist()
+    return x, y
+
+
+def _stream(port: str) -> Callable[..., StreamResult]:
+    """What sends to ``port``: the controller in memory needs no process that guards it."""
+    return stream_plan if port == VIRTUAL else stream_apart
 
 
 def _chosen(prepared: Prepared, sheets: Sequence[int] | None) -> list[int]:
@@ -145,10 +173,16 @@ def _chosen(prepared: Prepared, sheets: Sequence[int] | None) -> list[int]:
     return chosen
 
 
-def _plans(prepared: Prepared, chosen: list[int], options: CutOptions) -> list[tuple[int, Plan]]:
-    """The sheets to send, each checked by itself, those interrupted from where they go on."""
+def plan_sheets(
+    prepared: Prepared, sheets: Sequence[int] | None, options: CutOptions
+) -> list[tuple[int, Plan]]:
+    """The sheets to send, each checked by itself, those interrupted from where they go on.
+
+    Of the ``sheets`` (None: all) those that a resumed job has done already are left out. Raises
+    :class:`~miurafab.errors.InputError` for what is wrong with any.
+    """
     plans: list[tuple[int, Plan]] = []
-    for number in chosen:
+    for number in _chosen(prepared, sheets):
         job = prepared.jobs[number - 1]
         resumption = None
         if options.resume:
@@ -195,15 +229,8 @@ def frame(
     box = frame_job(
         name, bounds, prepared.machine, pointer=options.pointer, back_to=options.at or (0.0, 0.0)
     )
-    return stream_job(
-        box,
-        prepared.machine,
-        port,
-        force=options.force,
-        home=options.home,
-        at=options.at,
-        virtual_speed=options.virtual_speed,
-    )
+    plan = plan_job(box, prepared.machine, force=options.force, home=options.home, at=options.at)
+    return _stream(port)(plan, port, virtual_speed=options.virtual_speed)
 
 
 def findings(prepared: Prepared, *, allow_m3: bool = False) -> list[tuple[str, Finding]]:

@@ -1,25 +1,33 @@
 """Several machines share the sheets of one job: each takes the next sheet when it has none.
 
-Every sheet is cut by a process of its own (``miurafab cut --watched``), so that nothing that
-happens at one machine can disturb another. A machine that fails is given no more sheets; the sheet
-it was at is left as it is, to be looked at and resumed there, and the others cut what is left.
+Every sheet is cut by a process of its own (:mod:`miurafab.machine.job_process`), so that nothing
+that happens at one machine can disturb another. A machine that fails is given no more sheets; the
+sheet it was at is left as it is, to be looked at and resumed there; the others cut what is left.
 """
 
 from __future__ import annotations
 
-import contextlib
-import json
-import subprocess
-import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
-from miurafab.errors import InputError, JobStopped
-from miurafab.machine.watchdog import BEAT_S
+from miurafab.errors import InputError, JobStopped, MiurafabError
+from miurafab.machine.job_process import stream_apart
+from miurafab.machine.journal import read_journal
+from miurafab.machine.planning import Plan
+from miurafab.machine.signals import StopSignals
 from miurafab.workflow.cut import Prepared
-from miurafab.workflow.cut_sheets import CutOptions
+from miurafab.workflow.cut_sheets import (
+    CutOptions,
+    cut_sheet,
+    head_after,
+    journal_path,
+    plan_sheets,
+)
+
+_LOOK_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -43,41 +51,40 @@ def share_sheets(
     """Cut the sheets of a job directory on the machines at ``ports``; in order of the sheets.
 
     ``on_progress`` is called with the fraction done and a note when a sheet is done or failed. A
-    machine that fails is part of the answer. Raises :class:`~miurafab.errors.InputError` for what
-    cannot be shared, :class:`~miurafab.errors.JobStopped` after Ctrl-C, with every machine reset.
+    machine that fails is part of the answer. With ``options.resume`` an interrupted sheet goes on
+    at the machine that had it, before that takes another. Raises
+    :class:`~miurafab.errors.InputError` for what cannot be shared,
+    :class:`~miurafab.errors.JobStopped` after Ctrl-C, with every machine reset.
     """
     if prepared.directory is None:
         raise InputError(
             f"{prepared.name} is no job directory, so machines cannot share it; make one with "
             "'miurafab sheets'."
         )
-    if options.resume or options.frame:
-        raise InputError("Resume and frame on one machine at a time: give one --port.")
+    if options.frame:
+        raise InputError(
+            "A frame is looked at before its sheet is cut, so trace it at one machine at a time: "
+            "give one --port, or use 'miurafab machine frame'."
+        )
     twice = {port for port in ports if ports.count(port) > 1 and port != "virtual"}
     if twice:
         raise InputError(f"The port {min(twice)} is named twice.")
-    chosen = list(sheets) if sheets else list(range(1, len(prepared.jobs) + 1))
-    for number in chosen:
-        if not 1 <= number <= len(prepared.jobs):
-            raise InputError(f"{prepared.name} has no sheet {number}; it has {len(prepared.jobs)}.")
-    work = _Work(prepared, options, chosen, on_progress)
-    threads = [threading.Thread(target=work.at_machine, args=(port,)) for port in ports]
-    for thread in threads:
-        thread.start()
-    try:
+    plans = dict(plan_sheets(prepared, sheets, options))
+    with StopSignals() as signals:
+        signals.at_once = False
+        work = _Work(prepared, options, plans, ports, signals, on_progress)
+        threads = [threading.Thread(target=work.at_machine, args=(port,)) for port in ports]
+        for thread in threads:
+            thread.start()
         for thread in threads:
             while thread.is_alive():
-                thread.join(BEAT_S / 10)
-    except KeyboardInterrupt:
-        work.stop.set()
-        for thread in threads:
-            thread.join()
-        raise JobStopped(f"{prepared.name} was stopped by Ctrl-C on every machine.") from None
-    names = {number: prepared.dry_runs[number - 1].name for number in chosen}
+                thread.join(_LOOK_S)
+        if signals.caught is not None:
+            raise JobStopped(f"{prepared.name} was stopped by {signals.reason} on every machine.")
     return tuple(
         work.outcome.get(number)
-        or Shared(names[number], "", False, "no machine was left to cut it")
-        for number in chosen
+        or Shared(prepared.dry_runs[number - 1].name, "", False, "no machine was left to cut it")
+        for number in plans
     )
 
 
@@ -86,86 +93,56 @@ class _Work:
         self,
         prepared: Prepared,
         options: CutOptions,
-        chosen: list[int],
+        plans: dict[int, Plan],
+        ports: Sequence[str],
+        signals: StopSignals,
         on_progress: Callable[[float, str], None],
     ) -> None:
-        self.stop = threading.Event()
         self.outcome: dict[int, Shared] = {}
         self._prepared = prepared
         self._options = options
-        self._left = deque(chosen)
-        self._count = len(chosen)
+        self._plans = plans
+        self._signals = signals
         self._on_progress = on_progress
+        self._own = {port: _begun_at(prepared, plans, port) for port in ports}
+        begun = {number for numbers in self._own.values() for number in numbers}
+        self._left = deque(n for n in plans if n not in begun)
+        for number in self._left:
+            if plans[number].resumption is not None:
+                raise InputError(
+                    f"{prepared.dry_runs[number - 1].name} was interrupted at a machine that is "
+                    "not named now; name its --port too, or resume it with that port alone."
+                )
 
     def at_machine(self, port: str) -> None:
         """Cut sheets at ``port`` until none is left, or the machine has failed."""
         at = self._options.at
-        while not self.stop.is_set():
+        send = partial(
+            stream_apart, signals=self._signals, virtual_speed=self._options.virtual_speed
+        )
+        while self._signals.caught is None:
             try:
-                number = self._left.popleft()
+                number = (self._own[port] or self._left).popleft()
             except IndexError:
                 return
-            sheet = self._prepared.dry_runs[number - 1]
-            why = self._cut(port, number, at)
-            self.outcome[number] = Shared(sheet.name, port, not why, why)
-            note = f"{sheet.name} at {port} {'failed' if why else 'is done'}"
-            self._on_progress(len(self.outcome) / self._count, note)
+            name, why = self._prepared.dry_runs[number - 1].name, ""
+            try:
+                cut_sheet(self._prepared, number, replace(self._plans[number], at=at), port, send)
+            except MiurafabError as error:
+                why = str(error)
+            self.outcome[number] = Shared(name, port, not why, why)
+            note = f"{name} at {port} {'failed' if why else 'is done'}"
+            self._on_progress(len(self.outcome) / len(self._plans), note)
             if why:
                 return
-            if at is not None and len(sheet.program):
-                at = (float(sheet.program.end[-1, 0]), float(sheet.program.end[-1, 1]))
+            at = head_after(self._prepared, number, at)
 
-    def _cut(self, port: str, number: int, at: tuple[float, float] | None) -> str:
-        """Cut one sheet in a process of its own; why that failed, or nothing."""
-        process = subprocess.Popen(
-            self._command(port, number, at),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
-        assert process.stdin is not None
-        assert process.stdout is not None
-        while True:
-            try:
-                process.wait(BEAT_S / 4)
-                break
-            except subprocess.TimeoutExpired:
-                with contextlib.suppress(OSError, ValueError):
-                    if self.stop.is_set():
-                        process.stdin.close()
-                    else:
-                        process.stdin.write(b".")
-                        process.stdin.flush()
-        said = process.stdout.read()
-        process.stdout.close()
-        with contextlib.suppress(OSError):
-            process.stdin.close()
-        if process.returncode == 0:
-            return ""
-        try:
-            return str(json.loads(said)["error"])
-        except (ValueError, KeyError, TypeError):
-            return f"its process ended with code {process.returncode}"
 
-    def _command(self, port: str, number: int, at: tuple[float, float] | None) -> list[str]:
-        options = self._options
-        assert self._prepared.directory is not None
-        command = [sys.executable, "-m", "miurafab", "cut", str(self._prepared.directory.path)]
-        command += ["--port", port, "--sheet", str(number), "--watched", "--json", "--no-pause"]
-        command += ["--machine", self._machine()]
-        for name in sorted(options.force):
-            command += ["--force", name]
-        if at is not None:
-            command += ["--at", f"{at[0]}mm,{at[1]}mm"]
-        flags = {
-            "--allow-m3": options.allow_m3,
-            "--check-mode": options.check_mode,
-            "--home": options.home,
-        }
-        return command + [flag for flag, wanted in flags.items() if wanted]
-
-    def _machine(self) -> str:
-        """The profile by its name, or by its file in the job directory."""
-        assert self._prepared.directory is not None
-        own = self._prepared.directory.path / f"{self._prepared.machine.name}.toml"
-        return str(own) if own.is_file() else self._prepared.machine.name
+def _begun_at(prepared: Prepared, plans: dict[int, Plan], port: str) -> deque[int]:
+    """The interrupted sheets that ``port`` had."""
+    begun: deque[int] = deque()
+    for number, plan in plans.items():
+        path = journal_path(prepared, prepared.jobs[number - 1])
+        if plan.resumption is not None and path is not None and read_journal(path)[-1].port == port:
+            begun.append(number)
+    return begun

@@ -1,7 +1,6 @@
 """The sender as a process of its own, over a real pseudo-terminal, ended in every way.
 
-The only tests of this room that take real seconds. The wire is recorded between the pty and the
-virtual controller, byte by byte, with the time.
+Here the process that holds the port is ended; test_job_process has the two that watch each other.
 """
 
 from __future__ import annotations
@@ -15,77 +14,17 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import serial
 import serial.rfc2217
+from benches import ALONE, Bench
 
-from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.actions import machine_info
 from miurafab.machine.virtual_server import PtyWire
-from miurafab.profiles import load_machine
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
-
-SENDER = """
-import sys
-from miurafab.errors import MiurafabError
-from miurafab.gcode.job import Job
-from miurafab.machine.sender import stream_job
-from miurafab.profiles import load_machine
-try:
-    job = Job("long.nc", sys.argv[2])
-    stream_job(job, load_machine("grbl-laser-400"), sys.argv[1])
-except MiurafabError as error:
-    print(error)
-    sys.exit(error.exit_code)
-"""
-LONG = "M4 S0\n" + "".join(f"G0 X5 Y{n % 300}\nG1 X15 S500 F2000\n" for n in range(400)) + "M5\n"
-
-
-class Bench:
-    """A virtual controller on a pty in real time, and a record of what came down to it."""
-
-    def __init__(self) -> None:
-        self.device = VirtualGrbl(virtual_settings(load_machine("grbl-laser-400")), baud=115_200)
-        self.wire = PtyWire()
-        self.came: list[tuple[float, float, bytes]] = []  # real time, virtual time, bytes
-        self._start = time.monotonic()
-
-    @property
-    def bytes_came(self) -> bytes:
-        return b"".join(data for _, _, data in self.came)
-
-    def run(self, until: Callable[[], bool], limit: float = 20.0) -> None:
-        end = time.monotonic() + limit
-        while not until():
-            assert time.monotonic() < end, "the bench waited too long"
-            data, opened = self.wire.wait(0.002)
-            self.device.advance(max(0.0, time.monotonic() - self._start - self.device.now))
-            if opened:
-                self.device.power_cycle()
-            if data:
-                self.came.append((time.monotonic(), self.device.now, data))
-                self.device.receive(data)
-            self.wire.write(self.device.take_output())
-
-    def sender(self) -> subprocess.Popen[str]:
-        """A sender in mid-job, with the beam on."""
-        process = subprocess.Popen(
-            [sys.executable, "-c", SENDER, self.wire.address, LONG],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        try:
-            self.run(lambda: self.bytes_came.count(b"\n") > 30 and self.device.beam_on)
-        except BaseException:
-            process.kill()
-            process.wait()
-            raise
-        return process
 
 
 @pytest.fixture
@@ -193,7 +132,7 @@ def test_the_virtual_controller_serves_sender_after_sender(how: str, tmp_path: P
             assert machine_info(address).state == "Idle"
         job = "M4 S0\nG0 X5\nG1 X15 S500 F3000\nM5\n"
         done = subprocess.run(
-            [sys.executable, "-c", SENDER, address, job], capture_output=True, text=True
+            [sys.executable, "-c", ALONE, address, job], capture_output=True, text=True
         )
         assert (done.returncode, done.stdout) == (0, "")
         server.send_signal(signal.SIGINT)

@@ -1,0 +1,251 @@
+"""A job in a process of its own, so that nothing that happens to the user interface can hurt it.
+
+:func:`stream_apart` does what :func:`~miurafab.machine.sender.stream_plan` does, in another
+process, and two processes watch each other:
+
+* the one that sends knows nothing of terminals, progress bars and people. When the starting
+  program dies or hangs it stops the machine (:mod:`~miurafab.machine.watchdog`);
+* the starting program shows and asks. When the sending process dies (``kill -9``, out of memory)
+  it opens the port itself and resets the controller.
+
+Ctrl-C in a terminal reaches both at once; a signal to the starting program alone is passed on.
+What goes between them: the plan, pickled, then single bytes one way; pickled progress and the
+outcome the other way.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import pickle
+import queue
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from miurafab.errors import JobStopped, MachineError, MiurafabError
+from miurafab.grbl.connection import Connection
+from miurafab.machine.keys import Keys, NoKeys
+from miurafab.machine.planning import Plan
+from miurafab.machine.sender import Progress, StreamResult, stream_plan
+from miurafab.machine.session import Session
+from miurafab.machine.signals import StopSignals
+from miurafab.machine.transport import open_port
+from miurafab.machine.watchdog import BEAT, BEAT_S, STOPS, ParentWatch
+
+_LOOK_S = 0.005  # between two looks at keys and signals
+_STOP_S = 15.0  # for the process to stop the machine, ask it, and end; stopping takes 6 s at most
+
+
+@dataclass(frozen=True, slots=True)
+class _Order:
+    """What the sending process is told at its start."""
+
+    plan: Plan
+    port: str
+    journal_path: Path | None
+    transcript_path: Path | None
+    virtual_speed: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Begun:
+    """Said by the sending process when it is about to open the port."""
+
+
+class _Nothing:
+    """No message yet."""
+
+
+_Message = _Begun | Progress | StreamResult | MiurafabError | None
+
+
+def stream_apart(
+    plan: Plan,
+    port: str,
+    *,
+    journal_path: Path | None = None,
+    transcript_path: Path | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+    keys: Keys | None = None,
+    virtual_speed: float | None = None,
+    signals: StopSignals | None = None,
+) -> StreamResult:
+    """Send a planned job from a process of its own.
+
+    The options are those of :func:`~miurafab.machine.sender.stream_job`; ``signals`` are those of
+    a main thread that waits for this one, without it this thread's own. Raises what
+    ``stream_job`` raises, and :class:`~miurafab.errors.MachineError` if the process dies, after
+    the controller was reset.
+    """
+    order = _Order(plan, port, journal_path, transcript_path, virtual_speed)
+    with contextlib.ExitStack() as at_end:
+        if signals is None:
+            signals = at_end.enter_context(StopSignals())
+            signals.at_once = False
+        sender = _Sender(order)
+        at_end.callback(sender.end)
+        outcome = sender.attend(signals, keys or NoKeys(), on_progress)
+    if isinstance(outcome, StreamResult):
+        return outcome
+    if isinstance(outcome, MiurafabError):
+        raise outcome
+    if signals.caught is not None and not sender.begun:
+        raise JobStopped(
+            f"{plan.job.name} was stopped by {signals.reason} before a line of it was sent."
+        )
+    raise MachineError(
+        f"The process that sent {plan.job.name} {sender.death}; {_make_safe(order, sender.begun)}."
+    )
+
+
+class _Sender:
+    """The other process, as the starting program sees it."""
+
+    def __init__(self, order: _Order) -> None:
+        self.begun = False
+        self.death = ""
+        self._messages: queue.SimpleQueue[_Message] = queue.SimpleQueue()
+        self._complaints = b""
+        code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import main; main()"
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", code],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        assert self._process.stderr is not None
+        self._down = self._process.stdin
+        self._pipes = (self._process.stdout, self._process.stderr)
+        with contextlib.suppress(OSError):  # one that has died says so below
+            pickle.dump(order, self._down, protocol=5)
+            self._down.flush()
+        self._readers = [
+            threading.Thread(target=work, args=(pipe,), name="miurafab sender", daemon=True)
+            for work, pipe in zip((self._read, self._note), self._pipes, strict=True)
+        ]
+        for reader in self._readers:
+            reader.start()
+
+    def _read(self, pipe: IO[bytes]) -> None:
+        with contextlib.suppress(EOFError, pickle.UnpicklingError):
+            while True:
+                self._messages.put(pickle.load(pipe))
+        self._messages.put(None)
+
+    def _note(self, pipe: IO[bytes]) -> None:
+        self._complaints = pipe.read()
+
+    def attend(
+        self,
+        signals: StopSignals,
+        keys: Keys,
+        on_progress: Callable[[Progress], None] | None,
+    ) -> StreamResult | MiurafabError | None:
+        """Pass on keys and signals, show progress, until the outcome; None if the process died."""
+        # Nothing is written before it has read its order to the end.
+        beat_at, give_up_at = math.inf, None
+        while True:
+            message = self._next()
+            if isinstance(message, _Begun):
+                self.begun, beat_at = True, 0.0
+            elif isinstance(message, Progress):
+                if on_progress is not None:
+                    on_progress(message)
+            elif not isinstance(message, _Nothing):
+                self._process.wait()
+                return message
+            now = time.monotonic()
+            if signals.caught is not None and give_up_at is None and self.begun:
+                give_up_at = now + _STOP_S
+                self._tell(STOPS[signals.caught])
+            elif give_up_at is not None and now > give_up_at:
+                self._process.kill()
+            pressed = keys.pressed().encode("ascii", "ignore").translate(None, bytes(range(32)))
+            if now >= beat_at or (pressed and self.begun):
+                self._tell(BEAT + pressed)
+                beat_at = now + BEAT_S
+
+    def _next(self) -> _Message | _Nothing:
+        try:
+            return self._messages.get(timeout=_LOOK_S)
+        except queue.Empty:
+            return _Nothing()
+
+    def _tell(self, data: bytes) -> None:
+        with contextlib.suppress(OSError):
+            self._down.write(data)
+            self._down.flush()
+
+    def end(self) -> None:
+        """On every way out: the pipe is closed, which stops the machine if nothing else has."""
+        with contextlib.suppress(OSError):
+            self._down.close()
+        try:
+            self._process.wait(_STOP_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        for reader, pipe in zip(self._readers, self._pipes, strict=True):
+            reader.join()
+            pipe.close()
+        code = self._process.returncode
+        self.death = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
+        last = self._complaints.decode("utf-8", "replace").strip().rpartition("\n")[2]
+        if last:
+            self.death += f" ({last.rstrip('.')})"
+
+
+def _make_safe(order: _Order, begun: bool) -> str:
+    """Reset the controller that a dead process left; what became of that, in words."""
+    if not begun:
+        return "it had not opened the port"
+    unsure = "so switch the laser off at the machine"
+    try:
+        transport = open_port(order.port, order.plan.machine.controller.baud)
+    except MachineError as error:
+        return f"the controller could not be reset ({str(error).rstrip('.')}), {unsure}"
+    with contextlib.closing(transport):
+        session = Session(transport, Connection())
+        if session.stop():
+            return "the controller was reset and reports the beam off"
+    return f"the controller was reset but did not confirm that the beam is off, {unsure}"
+
+
+def main() -> None:
+    """The sending process: take the order, send the job, tell the outcome."""
+    up = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever prints must not get between the messages
+    order: _Order = pickle.load(sys.stdin.buffer)
+
+    def tell(message: object) -> None:
+        with contextlib.suppress(OSError):  # nobody listens any more
+            pickle.dump(message, up, protocol=5)
+            up.flush()
+
+    with StopSignals() as signals, ParentWatch(sys.stdin.fileno(), signals) as parent:
+        signals.at_once = False
+        tell(_Begun())
+        try:
+            outcome: StreamResult | MiurafabError = stream_plan(
+                order.plan,
+                order.port,
+                journal_path=order.journal_path,
+                transcript_path=order.transcript_path,
+                on_progress=tell,
+                keys=parent,
+                virtual_speed=order.virtual_speed,
+                signals=signals,
+            )
+        except MiurafabError as error:
+            outcome = error
+        signals.at_once = False
+        tell(outcome)

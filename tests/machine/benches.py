@@ -1,0 +1,133 @@
+"""A practice machine on a real pseudo-terminal, and the commands that are tried on it.
+
+The wire is recorded between the pty and the virtual controller, byte by byte, with the time. Only
+tests that use this take real seconds.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from miurafab.grbl.settings import virtual_settings
+from miurafab.grbl.virtual import VirtualGrbl, standing_seconds
+from miurafab.grbl.virtual_faults import parse_faults
+from miurafab.machine.virtual_server import PtyWire
+from miurafab.profiles import load_machine
+
+MACHINE = "grbl-laser-400"
+LONG = "M4 S0\n" + "".join(f"G0 X5 Y{n % 300}\nG1 X15 S500 F2000\n" for n in range(400)) + "M5\n"
+
+SENDER = """
+import sys
+from pathlib import Path
+from miurafab.errors import MiurafabError
+from miurafab.gcode.job import Job
+from miurafab.machine.{module} import {function}
+from miurafab.machine.planning import plan_job
+from miurafab.profiles import load_machine
+try:
+    plan = plan_job(Job("long.nc", sys.argv[2]), load_machine("grbl-laser-400"))
+    journal = Path(sys.argv[3]) if sys.argv[3:] else None
+    {function}(plan, sys.argv[1], journal_path=journal)
+except MiurafabError as error:
+    print(error)
+    sys.exit(error.exit_code)
+"""
+ALONE = SENDER.format(module="sender", function="stream_plan")
+APART = SENDER.format(module="job_process", function="stream_apart")
+
+
+class Bench:
+    """A virtual controller on a pty in real time, and a record of what came down to it."""
+
+    def __init__(self, *faults: str) -> None:
+        self.device = VirtualGrbl(
+            virtual_settings(load_machine(MACHINE)), baud=115_200, faults=parse_faults(faults)
+        )
+        self.wire = PtyWire()
+        self.came: list[tuple[float, float, bytes]] = []  # real time, virtual time, bytes
+        self._plugged = True
+        self._start = time.monotonic()
+
+    @property
+    def bytes_came(self) -> bytes:
+        return b"".join(data for _, _, data in self.came)
+
+    @property
+    def commands(self) -> bytes:
+        """All that came, without the status queries."""
+        return self.bytes_came.replace(b"?", b"")
+
+    def run(self, until: Callable[[], bool], limit: float = 20.0) -> None:
+        end = time.monotonic() + limit
+        while not until():
+            assert time.monotonic() < end, "the bench waited too long"
+            data, opened = self.wire.wait(0.002)
+            self.device.advance(max(0.0, time.monotonic() - self._start - self.device.now))
+            if opened:
+                self.device.power_cycle()
+            if data:
+                self.came.append((time.monotonic(), self.device.now, data))
+                self.device.receive(data)
+            self.wire.write(self.device.take_output())
+            if self._plugged and not self.device.connected:
+                self.wire.unplug()
+            self._plugged = self.device.connected
+
+    def start(self, code: str, *arguments: str) -> subprocess.Popen[str]:
+        """Python ``code`` with the port as its first argument, without waiting for it."""
+        command = [sys.executable, "-c", code, self.wire.address, *arguments]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+    def sender(self, code: str = ALONE, *arguments: str) -> subprocess.Popen[str]:
+        """A sender in mid-job, with the beam on."""
+        return self.until_burning(self.start(code, LONG, *arguments))
+
+    def cut(self, job: Path, *options: str, **more: object) -> subprocess.Popen[str]:
+        """``miurafab cut`` of ``job``, without waiting for it."""
+        command = [sys.executable, "-m", "miurafab", "cut", str(job), "--machine", MACHINE]
+        return subprocess.Popen(
+            [*command, "--port", self.wire.address, *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            **more,
+        )
+
+    def until_burning(self, process: subprocess.Popen[str]) -> subprocess.Popen[str]:
+        """Wait until ``process`` is in mid-job, with the beam on."""
+        try:
+            self.run(lambda: self.bytes_came.count(b"\n") > 30 and self.device.beam_on, 40)
+        except BaseException:
+            process.kill()
+            process.wait()
+            raise
+        return process
+
+    def finish(self, process: subprocess.Popen[str], limit: float = 30.0) -> str:
+        """Let ``process`` come to its end; what it said."""
+        with process:
+            self.run(lambda: process.poll() is not None, limit)
+            return process.stdout.read()
+
+    def assert_dark(self) -> None:
+        """The beam is off, stays off when all that is held has run, and never stood still."""
+        self.device.advance(60.0)
+        assert not self.device.beam_on
+        assert standing_seconds(self.device.beam_log) == 0.0
+
+    def assert_dark_from(self, virtual: float) -> None:
+        """As :meth:`assert_dark`, and nothing burnt after ``virtual`` on the controller's clock."""
+        self.assert_dark()
+        assert all(segment.t1 <= virtual + 0.01 for segment in self.device.beam_log)
+
+
+def children(process: subprocess.Popen[str]) -> list[int]:
+    """The processes that ``process`` has started (Linux)."""
+    task = Path(f"/proc/{process.pid}/task")
+    pids = [pid for each in task.iterdir() for pid in (each / "children").read_text().split()]
+    return [int(pid) for pid in pids]
