@@ -1,99 +1,51 @@
-"""A job on its way to a controller that speaks GRBL, and every way out of it.
+"""One job on its way to one machine, whatever the machine speaks: the end that every way has.
 
-The job is done when every line was acknowledged *and* a status report that was asked for after the
-last acknowledgement says Idle. What else may happen ends it in :meth:`GrblDelivery.end`: the
-controller is reset before anything else, and asked whether the beam is off. The one exception is an
-abort at the keyboard of a job that goes dark at rest (M4): a feed hold before the reset lets the
-machine keep its position. An ``M5`` is never relied on: it would wait in the controller's queue
-behind up to seconds of burning.
+Each dialect says how the machine is made safe (:meth:`Delivery.stop`). This says when: first of all
+on every way out but success, once, and with what became of it in the sentence that the user reads
+and in the journal.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from typing import NoReturn
 
-from miurafab.errors import ControllerError, JobStopped, MachineError, MiurafabError
-from miurafab.gcode.job import prepare_lines
-from miurafab.gcode.moves import BEAM_M3
-from miurafab.grbl.events import Error, Event, Ok, Options, StatusReport
-from miurafab.grbl.settings import Settings
-from miurafab.grbl.streamer import LineRefused, Streamer
+from miurafab.errors import JobStopped, MachineError, MiurafabError
 from miurafab.machine.journal import Journal
-from miurafab.machine.keys import ABORT, KEYS, Keys, NoKeys
 from miurafab.machine.planning import Plan
-from miurafab.machine.preflight import (
-    check_settings,
-    check_status,
-    check_travel,
-    raise_findings,
-)
-from miurafab.machine.progress import JobAborted, Progress, StreamResult
-from miurafab.machine.session import ANSWER_S, Session
+from miurafab.machine.progress import JobAborted, StreamResult
 from miurafab.machine.transcript import Transcript
 
-_POLL_S = 0.2  # between status queries while lines flow
-_END_POLL_S = 0.1  # and when only the last moves are awaited
-_KEY_S = 0.01  # between two looks at the keyboard, if there is one
 
+class Delivery(ABC):
+    """``plan`` on its way; ``at_risk`` while the machine may move or burn by what was sent."""
 
-class GrblDelivery:
-    """One job on its way over one session."""
+    def __init__(self, plan: Plan, transcript: Transcript | None, journal: Journal | None) -> None:
+        self.at_risk = False
+        self.plan = plan
+        self.journal = journal
+        self.records = [record for record in (transcript, journal) if record is not None]
 
-    def __init__(
-        self,
-        plan: Plan,
-        session: Session,
-        transcript: Transcript | None,
-        journal: Journal | None,
-        on_progress: Callable[[Progress], None] | None,
-        keys: Keys,
-    ) -> None:
-        self._keys = keys
-        self._patience = math.inf if isinstance(keys, NoKeys) else _KEY_S
-        self._orders: list[bytes] = []
-        self._plan = plan
-        self._session = session
-        self._records = [record for record in (transcript, journal) if record is not None]
-        self._journal = journal
-        self._on_progress = on_progress
-        self._at_risk = False  # whether the machine may move or burn by what we sent
-        self._begin = 0.0
-        self._streamer = Streamer(
-            session.connection,
-            plan.job.name,
-            prepare_lines(plan.job.name, plan.job.iter_lines(), plan.machine.controller.line_chars),
-            send_response=plan.machine.controller.streaming == "send-response",
-            collect_refusals=plan.check_mode,
-        )
-
-    # The way through
-
+    @abstractmethod
     def run(self) -> StreamResult:
-        remarks = self._plan.remarks + self._meet()
-        session, streamer = self._session, self._streamer
-        self._at_risk = True
-        if self._plan.check_mode:
-            session.command("$C")
-        self._begin = session.now()
-        self._stream()
-        seconds = session.now() - self._begin
-        if self._plan.check_mode:
-            session.stop()
-        elif self._plan.machine.tool.kind == "laser" and session.wait_status().beam_on:
-            session.stop()
-            remarks += ("The job ended with the laser armed, so the controller was reset.",)
-        self._at_risk = False
-        if self._journal is not None:
-            self._journal.ended("done", f"{streamer.acknowledged} lines acknowledged, then idle")
-        remarks += self._close_records()
-        return StreamResult(streamer.acknowledged, seconds, tuple(streamer.refusals), remarks)
+        """The whole way through; raises what ends it."""
 
-    def _close_records(self) -> tuple[str, ...]:
+    @property
+    @abstractmethod
+    def acknowledged(self) -> int:
+        """How many lines the machine has taken."""
+
+    @abstractmethod
+    def stop(self, error: MiurafabError | None) -> str:
+        """Make the machine safe, before anything else; what became of that, as a clause.
+
+        Never raises for the machine's sake.
+        """
+
+    def close_records(self) -> tuple[str, ...]:
         """Finish the files; a fault now does not undo the job, so it is a remark."""
         remarks = []
-        for record in self._records:
+        for record in self.records:
             record.close()
             try:
                 record.check()
@@ -101,148 +53,26 @@ class GrblDelivery:
                 remarks.append(str(error))
         return tuple(remarks)
 
-    def _meet(self) -> tuple[str, ...]:
-        """Greet the controller and make all checks that need it; the sentences forced."""
-        plan, session = self._plan, self._session
-        session.greet()
-        if plan.home:
-            self._at_risk = True
-            session.home()
-            self._at_risk = False
-        if plan.at is not None:
-            session.command("G92X{:.3f}Y{:.3f}".format(*plan.at))
-        remarks = raise_findings(check_status(session.wait_status()), plan.force)
-        options = (event for event in session.command("$I") if isinstance(event, Options))
-        for option in options:
-            if self._journal is not None and option.planner_blocks is not None:
-                self._journal.plans_ahead(option.planner_blocks)
-        settings = Settings.from_events(session.command("$$"))
-        findings = list(check_settings(plan.machine, settings))
-        if plan.program is not None:
-            findings.extend(check_travel(plan.program, settings, session.work_offset))
-        return remarks + raise_findings(findings, plan.force)
-
-    def _stream(self) -> None:
-        session, streamer = self._session, self._streamer
-        poll_at = answered = session.now()
-        asked_last = False  # whether a status was asked for after the last acknowledgement
-        while True:
-            if not session.connection.in_flight:
-                answered = session.now()
-            data = streamer.pull()
-            if data:
-                session.write(data)
-            if streamer.finished and not asked_last and not session.awaits_status:
-                asked_last = session.ask_status()
-                poll_at = session.now() + _END_POLL_S
-            elif session.now() >= poll_at:
-                session.ask_status()
-                poll_at = session.now() + (_END_POLL_S if streamer.finished else _POLL_S)
-            events = session.receive(min(poll_at - session.now(), self._patience))
-            for event in events:
-                streamer.take(event)
-                if isinstance(event, Ok | Error):
-                    answered = session.now()
-                elif isinstance(event, StatusReport):
-                    self._report(event)
-                    if asked_last and event.state in ("Idle", "Check"):
-                        return
-                    if event.state in ("Hold", "Door"):
-                        answered = session.now()
-                    self._watch_for_loss(event, answered)
-            self._after(events)
-            self._obey()
-
-    def _obey(self) -> None:
-        """Do what was asked for at the keyboard."""
-        self._orders += [KEYS[key] for key in self._keys.pressed() if key in KEYS]
-        if ABORT in self._orders:
-            raise JobAborted(f"{self._plan.job.name} was stopped at the keyboard.")
-        if not self._session.connection.writing_eeprom:
-            for order in self._orders:
-                self._session.write(self._session.connection.send_realtime(order))
-            self._orders.clear()
-
-    def _after(self, events: list[Event]) -> None:
-        session, streamer = self._session, self._streamer
-        if not events and session.now() - session.heard > ANSWER_S:
-            raise ControllerError(
-                f"The controller has said nothing for {ANSWER_S:g} s, not even to status queries, "
-                f"{streamer.where}."
-            )
-        if self._journal is not None and streamer.last is not None and events:
-            seconds = session.now() - self._begin
-            self._journal.taken(streamer.acknowledged, streamer.last.number, seconds)
-        for record in self._records:
-            record.check()
-
-    def _watch_for_loss(self, report: StatusReport, answered: float) -> None:
-        """A controller that idles while it owes an answer never got the line whole."""
-        owed = self._session.connection.in_flight
-        patience = ANSWER_S + self._streamer.dwell_in_flight
-        if owed and report.state == "Idle" and self._session.now() - answered > patience:
-            raise ControllerError(
-                f"The controller is idle but has not answered line {owed[0].number} of "
-                f"{self._plan.job.name} for {patience:g} s: bytes were lost on the way, so look at "
-                "the cable and the baud rate."
-            )
-
-    def _report(self, status: StatusReport) -> None:
-        if self._on_progress is not None:
-            session, streamer = self._session, self._streamer
-            self._on_progress(
-                Progress(
-                    streamer.acknowledged,
-                    self._plan.lines,
-                    session.now() - self._begin,
-                    status.state,
-                    session.position,
-                    session.connection.in_flight_bytes,
-                    streamer.last.number if streamer.last else 0,
-                    session.feed_override,
-                )
-            )
-
-    # The other ways out
-
     def end(self, error: MiurafabError) -> NoReturn:
         """Stop the machine if it is at risk, and raise ``error`` with what became of it."""
         sentence = str(error)
-        if self._at_risk:
-            gently = isinstance(error, JobAborted) and not self._burns_at_rest
-            refused = isinstance(error, LineRefused)
-            off = (
-                self._session.hold_and_stop() if gently else self._session.stop(hold_first=refused)
-            )
-            self._at_risk = False
-            count = self._streamer.acknowledged
-            outcome = (
-                "the controller was reset and reports the beam off"
-                if off
-                else "the controller did not confirm that the beam is off, so switch the laser off "
-                "at the machine"
-            )
+        if self.at_risk:
+            outcome = self.stop(error)
+            self.at_risk = False
             sentence = (
-                f"{sentence.rstrip('.')}; {count} of {self._plan.lines} lines were acknowledged, "
-                f"and {outcome}."
+                f"{sentence.rstrip('.')}; {self.acknowledged} of {self.plan.lines} lines were "
+                f"acknowledged, and {outcome}."
             )
         elif isinstance(error, JobStopped):
             sentence = f"{sentence.rstrip('.')} before a line of it was sent."
-        if self._journal is not None:
+        if self.journal is not None:
             how = "stopped" if isinstance(error, JobStopped) else "failed"
-            self._journal.ended(how, sentence)
+            self.journal.ended(how, sentence)
         kind = JobStopped if isinstance(error, JobAborted) else type(error)
         raise kind(sentence) from None
 
-    @property
-    def _burns_at_rest(self) -> bool:
-        """Whether a feed hold leaves the beam on for a moment: M3, or nobody knows what it is."""
-        program = self._plan.program
-        laser = self._plan.machine.tool.kind == "laser"
-        return laser and (program is None or bool((program.spindle == BEAM_M3).any()))
-
     def make_safe(self) -> None:
         """Stop the machine if nothing else has: the last line of defence, on every way out."""
-        if self._at_risk:
-            self._at_risk = False
-            self._session.stop()
+        if self.at_risk:
+            self.at_risk = False
+            self.stop(None)

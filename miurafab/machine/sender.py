@@ -19,7 +19,7 @@ from miurafab.errors import JobStopped, MiurafabError
 from miurafab.gcode.job import Job
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.settings import virtual_settings
-from miurafab.machine.delivery import GrblDelivery
+from miurafab.machine.grbl_delivery import GrblDelivery
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import Keys, NoKeys
 from miurafab.machine.planning import Plan, plan_job

@@ -1,0 +1,220 @@
+"""A job on its way to a controller that speaks GRBL, and every way out of it.
+
+The job is done when every line was acknowledged *and* a status report that was asked for after the
+last acknowledgement says Idle. On every other way out (:meth:`GrblDelivery.stop`) the controller is
+reset before anything else, and asked whether the beam is off. The one exception is an
+abort at the keyboard of a job that goes dark at rest (M4): a feed hold before the reset lets the
+machine keep its position. An ``M5`` is never relied on: it would wait in the controller's queue
+behind up to seconds of burning.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from miurafab.errors import ControllerError, MiurafabError
+from miurafab.gcode.job import prepare_lines
+from miurafab.gcode.moves import BEAM_M3
+from miurafab.grbl.events import Error, Event, Ok, Options, StatusReport
+from miurafab.grbl.settings import Settings
+from miurafab.grbl.streamer import LineRefused, Streamer
+from miurafab.machine.delivery import Delivery
+from miurafab.machine.journal import Journal
+from miurafab.machine.keys import ABORT, KEYS, Keys, NoKeys
+from miurafab.machine.planning import Plan
+from miurafab.machine.preflight import (
+    check_settings,
+    check_status,
+    check_travel,
+    raise_findings,
+)
+from miurafab.machine.progress import JobAborted, Progress, StreamResult
+from miurafab.machine.session import ANSWER_S, Session
+from miurafab.machine.transcript import Transcript
+
+WAS_RESET = "the controller was reset and reports the beam off"
+NOT_CONFIRMED = (
+    "the controller did not confirm that the beam is off, so switch the laser off at the machine"
+)
+"""What became of the machine, as a clause."""
+
+_POLL_S = 0.2  # between status queries while lines flow
+_END_POLL_S = 0.1  # and when only the last moves are awaited
+_KEY_S = 0.01  # between two looks at the keyboard, if there is one
+
+
+class GrblDelivery(Delivery):
+    """One job on its way over one session."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        session: Session,
+        transcript: Transcript | None,
+        journal: Journal | None,
+        on_progress: Callable[[Progress], None] | None,
+        keys: Keys,
+    ) -> None:
+        super().__init__(plan, transcript, journal)
+        self._keys = keys
+        self._patience = math.inf if isinstance(keys, NoKeys) else _KEY_S
+        self._orders: list[bytes] = []
+        self._session = session
+        self._on_progress = on_progress
+        self._begin = 0.0
+        self._streamer = Streamer(
+            session.connection,
+            plan.job.name,
+            prepare_lines(plan.job.name, plan.job.iter_lines(), plan.machine.controller.line_chars),
+            send_response=plan.machine.controller.streaming == "send-response",
+            collect_refusals=plan.check_mode,
+        )
+
+    # The way through
+
+    def run(self) -> StreamResult:
+        """See :class:`Delivery`."""
+        remarks = self.plan.remarks + self._meet()
+        session, streamer = self._session, self._streamer
+        self.at_risk = True
+        if self.plan.check_mode:
+            session.command("$C")
+        self._begin = session.now()
+        self._stream()
+        seconds = session.now() - self._begin
+        if self.plan.check_mode:
+            session.stop()
+        elif self.plan.machine.tool.kind == "laser" and session.wait_status().beam_on:
+            session.stop()
+            remarks += ("The job ended with the laser armed, so the controller was reset.",)
+        self.at_risk = False
+        if self.journal is not None:
+            self.journal.ended("done", f"{streamer.acknowledged} lines acknowledged, then idle")
+        remarks += self.close_records()
+        return StreamResult(streamer.acknowledged, seconds, tuple(streamer.refusals), remarks)
+
+    def _meet(self) -> tuple[str, ...]:
+        """Greet the controller and make all checks that need it; the sentences forced."""
+        plan, session = self.plan, self._session
+        session.greet()
+        if plan.home:
+            self.at_risk = True
+            session.home()
+            self.at_risk = False
+        if plan.at is not None:
+            session.command("G92X{:.3f}Y{:.3f}".format(*plan.at))
+        remarks = raise_findings(check_status(session.wait_status()), plan.force)
+        options = (event for event in session.command("$I") if isinstance(event, Options))
+        for option in options:
+            if self.journal is not None and option.planner_blocks is not None:
+                self.journal.plans_ahead(option.planner_blocks)
+        settings = Settings.from_events(session.command("$$"))
+        findings = list(check_settings(plan.machine, settings))
+        if plan.program is not None:
+            findings.extend(check_travel(plan.program, settings, session.work_offset))
+        return remarks + raise_findings(findings, plan.force)
+
+    def _stream(self) -> None:
+        session, streamer = self._session, self._streamer
+        poll_at = answered = session.now()
+        asked_last = False  # whether a status was asked for after the last acknowledgement
+        while True:
+            if not session.connection.in_flight:
+                answered = session.now()
+            data = streamer.pull()
+            if data:
+                session.write(data)
+            if streamer.finished and not asked_last and not session.awaits_status:
+                asked_last = session.ask_status()
+                poll_at = session.now() + _END_POLL_S
+            elif session.now() >= poll_at:
+                session.ask_status()
+                poll_at = session.now() + (_END_POLL_S if streamer.finished else _POLL_S)
+            events = session.receive(min(poll_at - session.now(), self._patience))
+            for event in events:
+                streamer.take(event)
+                if isinstance(event, Ok | Error):
+                    answered = session.now()
+                elif isinstance(event, StatusReport):
+                    self._report(event)
+                    if asked_last and event.state in ("Idle", "Check"):
+                        return
+                    if event.state in ("Hold", "Door"):
+                        answered = session.now()
+                    self._watch_for_loss(event, answered)
+            self._after(events)
+            self._obey()
+
+    def _obey(self) -> None:
+        """Do what was asked for at the keyboard."""
+        self._orders += [KEYS[key] for key in self._keys.pressed() if key in KEYS]
+        if ABORT in self._orders:
+            raise JobAborted(f"{self.plan.job.name} was stopped at the keyboard.")
+        if not self._session.connection.writing_eeprom:
+            for order in self._orders:
+                self._session.write(self._session.connection.send_realtime(order))
+            self._orders.clear()
+
+    def _after(self, events: list[Event]) -> None:
+        session, streamer = self._session, self._streamer
+        if not events and session.now() - session.heard > ANSWER_S:
+            raise ControllerError(
+                f"The controller has said nothing for {ANSWER_S:g} s, not even to status queries, "
+                f"{streamer.where}."
+            )
+        if self.journal is not None and streamer.last is not None and events:
+            seconds = session.now() - self._begin
+            self.journal.taken(streamer.acknowledged, streamer.last.number, seconds)
+        for record in self.records:
+            record.check()
+
+    def _watch_for_loss(self, report: StatusReport, answered: float) -> None:
+        """A controller that idles while it owes an answer never got the line whole."""
+        owed = self._session.connection.in_flight
+        patience = ANSWER_S + self._streamer.dwell_in_flight
+        if owed and report.state == "Idle" and self._session.now() - answered > patience:
+            raise ControllerError(
+                f"The controller is idle but has not answered line {owed[0].number} of "
+                f"{self.plan.job.name} for {patience:g} s: bytes were lost on the way, so look at "
+                "the cable and the baud rate."
+            )
+
+    def _report(self, status: StatusReport) -> None:
+        if self._on_progress is not None:
+            session, streamer = self._session, self._streamer
+            self._on_progress(
+                Progress(
+                    streamer.acknowledged,
+                    self.plan.lines,
+                    session.now() - self._begin,
+                    status.state,
+                    session.position,
+                    session.connection.in_flight_bytes,
+                    streamer.last.number if streamer.last else 0,
+                    session.feed_override,
+                )
+            )
+
+    # The other ways out
+
+    @property
+    def acknowledged(self) -> int:
+        """See :class:`Delivery`."""
+        return self._streamer.acknowledged
+
+    def stop(self, error: MiurafabError | None) -> str:
+        """See :class:`Delivery`."""
+        session = self._session
+        if isinstance(error, JobAborted) and not self._burns_at_rest:
+            off = session.hold_and_stop()
+        else:
+            off = session.stop(hold_first=isinstance(error, LineRefused))
+        return WAS_RESET if off else NOT_CONFIRMED
+
+    @property
+    def _burns_at_rest(self) -> bool:
+        """Whether a feed hold leaves the beam on for a moment: M3, or nobody knows what it is."""
+        program = self.plan.program
+        laser = self.plan.machine.tool.kind == "laser"
+        return laser and (program is None or bool((program.spindle == BEAM_M3).any()))
