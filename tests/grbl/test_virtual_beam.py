@@ -5,7 +5,9 @@ from __future__ import annotations
 import pytest
 from virtual_player import LASER, RECORDED, play, ready
 
+from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import BeamSegment, VirtualGrbl, standing_seconds
+from miurafab.profiles import load_machine
 
 
 def burnt(device: VirtualGrbl) -> list[BeamSegment]:
@@ -100,3 +102,28 @@ def test_the_log_stays_true_when_positions_are_counted_anew() -> None:
     device.power_cycle()
     assert all(s.x0 == s.x1 or 0 < (s.t1 - s.t0) < 0.1 for s in device.beam_log)
     assert {round(abs(s.x1 - s.x0) / (s.t1 - s.t0)) <= 51 for s in device.beam_log} == {True}
+
+
+@pytest.mark.parametrize("idle_delay", [25, 255, 0])
+def test_what_a_hold_leaves_burning_in_place(idle_delay: int) -> None:
+    """The firmware's rule: at rest it waits for $1 before it puts out power that follows the speed
+    (``st_go_idle`` and what calls it, ``stepper.c``). The last bit of braking has no power, but a
+    bit shorter than one motor step is left out, and then that of the bit before it stands.
+    """
+    machine = virtual_settings(load_machine("grbl-laser-400"))
+    program = b"M4S0F2000\nG1X3.3Y7.7S900\nX9.1Y3.3\nX2Y1\n"
+    left = []
+    for index in range(40):
+        device = VirtualGrbl(machine | {1: idle_delay}, baud=115_200)
+        device.receive(program)
+        device.advance(0.1 + 0.0171 * index)
+        device.receive(b"!")
+        device.advance(1.0)
+        assert not device.beam_on
+        left += [segment for segment in device.beam_log if segment.standing]
+    if idle_delay in (0, 255):
+        assert left == []
+    else:
+        assert 10 < len(left) < 30
+        assert {round(segment.t1 - segment.t0, 6) for segment in left} == {0.025}
+        assert max(segment.power for segment in left) < 0.12

@@ -1,27 +1,34 @@
 """Any fault at any moment over any wire: the job is done whole, or ended with the beam dark.
 
-One property over everything that can befall a job, with the moment and the wire drawn by
+One property over everything that can befall a job, with the kind, the moment and the wire drawn by
 Hypothesis. What must hold, whatever happens:
 
-* no byte is lost at the controller (its receive buffer is never overrun);
+* no byte is lost at the controller by an overrun of its receive buffer, unless it was deaf;
 * the job either is done, every stroke burnt once, or raises one sentence of our own;
 * when all is over the beam is off, and it never stood still while it burnt;
-* where the host could still reach the controller, nothing but a reset is its last command.
+* where the host could still reach the controller, nothing but a reset is its last command;
+* the sender never holds more bytes unanswered than the controller has room for, and every line
+  that it takes for acknowledged was answered once, in order, as its journal tells.
 """
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
+
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from wires import FakeWire
 
 from miurafab.errors import JobStopped, MiurafabError
-from miurafab.gcode.job import Job
+from miurafab.gcode.job import Job, prepare
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl, standing_seconds
+from miurafab.grbl.virtual_faults import KINDS, parse_faults
+from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
-from miurafab.machine.sender import deliver
+from miurafab.machine.sender import Progress, deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
 
@@ -33,110 +40,144 @@ JOB = Job(
     + "".join(f"G0 X5 Y{n}\nG1 X15 S500 F3000\n" for n in range(STROKES))
     + "M5\nG0 X0 Y0\n",
 )
+LINES = prepare(JOB)
 SECONDS = 8.0  # a little longer than the job takes
+NO_SHRINKING = (Phase.explicit, Phase.generate)  # it would take minutes, and the faults are short
+PATIENCE = 60.0  # of the controller's time: then somebody presses Ctrl-C
 
-
-def interrupt(wire: FakeWire) -> None:
-    raise KeyboardInterrupt
-
-
-def reset_button(wire: FakeWire) -> None:
-    wire.device.press_button("reset")
-    wire.device.press_button("reset", False)
-
-
-def limit_switch(wire: FakeWire) -> None:
-    wire.device.press_limit("X")
-
-
-def power_failure(wire: FakeWire) -> None:
-    wire.device.power_cycle()
-
-
-def hang(wire: FakeWire) -> None:
-    wire.device.freeze()
-
-
-def deafness(wire: FakeWire) -> None:
-    wire.deaf_at = wire.device.now
-
-
-def cable_out(wire: FakeWire) -> None:
-    wire.cut_at = wire.device.now
-
-
-def lost_answer(wire: FakeWire) -> None:
-    wire.swallow_ok = True
-
-
-def noise(wire: FakeWire) -> None:
-    wire.injections.append((wire.device.now, b"\xfe\x81ok?\r\n"))
-
-
-def false_answers(wire: FakeWire) -> None:
-    wire.injections.append((wire.device.now, b"ok\r\n" * 40))
-
-
-def nothing(wire: FakeWire) -> None:
-    pass
-
-
-HARMLESS = {nothing}
-UNREACHABLE = {cable_out, hang}
+HARMLESS = {"delay=300ms", "delay-reply=300ms", "slow=5ms", "hang=300ms"}
+"""Faults that a job gets over: it is late, and whole."""
+SPOILS_LINES = {"drop=3", "corrupt=2", "noise=5"}
+"""Faults after which the controller may get other lines than were sent, none the wiser."""
+UNREACHABLE = {"disconnect", "disconnect=500ms", "hang"}
 FAULTS = (
-    interrupt,
-    reset_button,
-    limit_switch,
-    power_failure,
-    hang,
-    deafness,
-    cable_out,
-    lost_answer,
-    noise,
-    false_answers,
-    nothing,
+    "drop=3",
+    "drop=all",
+    "corrupt=2",
+    "noise=5",
+    "delay=300ms",
+    "delay=8s",
+    "drop-reply=6",
+    "drop-reply=all",
+    "corrupt-reply=2",
+    "noise-reply=3",
+    "delay-reply=300ms",
+    "delay-reply=8s",
+    "slow=5ms",
+    "disconnect",
+    "disconnect=500ms",
+    "reset",
+    "power",
+    "alarm",
+    "alarm=3",
+    "stall",
+    "hang=300ms",
+    "hang",
 )
 
 
-@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
+def test_no_kind_of_fault_is_left_out() -> None:
+    assert {fault.partition("=")[0] for fault in FAULTS} == set(KINDS)
+
+
+class Run:
+    """The job over a wire with faults, and what was seen of it."""
+
+    def __init__(self, faults: list[str], latency: float, seed: int, stop_at: float) -> None:
+        device = VirtualGrbl(virtual_settings(MACHINE), baud=115_200, faults=parse_faults(faults))
+        self.error: MiurafabError | None = None
+        self.seen: list[Progress] = []
+
+        def before_call(call: int) -> None:
+            if device.now >= stop_at:
+                signals.caught = "SIGINT"
+
+        signals = StopSignals()
+        self.wire = FakeWire(device, latency=latency, seed=seed, before_call=before_call)
+        with tempfile.TemporaryDirectory() as folder:
+            journal = Path(folder) / "journal"
+            try:
+                deliver(
+                    plan_job(JOB, MACHINE),
+                    self.wire,
+                    signals,
+                    journal_path=journal,
+                    on_progress=self.seen.append,
+                )
+            except MiurafabError as raised:
+                self.error = raised
+            self.journal = read_journal(journal)[-1]
+        self.wire.settle()
+
+    @property
+    def begun(self) -> bool:
+        return b"G21\n" in self.wire.bytes_written
+
+    @property
+    def burnt(self) -> float:
+        return sum(abs(s.x1 - s.x0) for s in self.wire.device.beam_log)
+
+    def check(self, faults: list[str]) -> None:
+        kinds = {fault.partition("@")[0] for fault in faults}
+        device = self.wire.device
+        sent = self.wire.bytes_written
+        if not kinds & (SPOILS_LINES | {"stall", "corrupt-reply=2", "noise-reply=3"}):
+            # Who is deaf loses bytes, and who hears an ok that was never said cannot count.
+            assert device.lost_bytes == 0
+        if self.error is None:
+            assert self.journal.ended == "done"
+            assert sent.replace(b"?", b"").count(b"\x18") == 0
+            if not kinds & SPOILS_LINES:
+                assert self.burnt == pytest.approx(10 * STROKES, abs=0.5)
+        else:
+            assert str(self.error).endswith(".")
+            assert "\n" not in str(self.error)
+            assert self.error.exit_code == 3
+            assert not kinds <= HARMLESS or isinstance(self.error, JobStopped)
+            assert self.journal.ended == (
+                "stopped" if isinstance(self.error, JobStopped) else "failed"
+            )
+            if self.begun and not kinds & UNREACHABLE:
+                assert self.wire.commands.endswith(b"\x18")
+        # Lines went out once each, in order; those taken are the first of them.
+        lines = b"".join(line.data + b"\n" for line in LINES)
+        assert lines.startswith(
+            sent.replace(b"?", b"").replace(b"!", b"").replace(b"\x18", b"").partition(b"$$\n")[2]
+        )
+        assert all(0 <= now.in_flight <= 128 for now in self.seen)
+        assert [p.lines_acknowledged for p in self.seen] == sorted(
+            p.lines_acknowledged for p in self.seen
+        )
+        if self.journal.taken:
+            assert self.journal.line == LINES[self.journal.taken - 1].number
+        assert not device.beam_on
+        # A firmware that hangs or is deaf in mid-move still waits its step idle delay ($1).
+        hung = any(fault.startswith(("hang", "stall")) for fault in faults)
+        assert standing_seconds(device.beam_log) <= (0.026 * len(faults) if hung else 0.0)
+
+
+dates = st.one_of(
+    st.integers(1, 1500).map(str), st.floats(0.05, SECONDS).map(lambda at: f"{at:.4f}s")
+)
+latencies = st.sampled_from([0.0, 0.002, 0.016])
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@given(when=dates, latency=latencies, seed=st.integers(0, 1000))
+@settings(max_examples=6, phases=NO_SHRINKING)
+def test_done_whole_or_ended_dark(fault: str, when: str, latency: float, seed: int) -> None:
+    faults = [f"{fault}@{when}"]
+    Run(faults, latency, seed, PATIENCE).check(faults)
+
+
 @given(
-    when=st.floats(0.05, SECONDS),
-    latency=st.sampled_from([0.0, 0.002, 0.016]),
+    faults=st.lists(st.builds("{}@{}".format, st.sampled_from(FAULTS), dates), max_size=3),
+    latency=latencies,
     seed=st.integers(0, 1000),
+    stop=st.floats(0.5, 2 * SECONDS),
 )
-@settings(max_examples=12)
-def test_done_whole_or_ended_dark(fault, when: float, latency: float, seed: int) -> None:
-    device = VirtualGrbl(virtual_settings(MACHINE) | {21: 1}, baud=115_200)
-    struck: list[float] = []
-
-    def strike(call: int) -> None:
-        if device.now >= when and not struck:
-            struck.append(device.now)
-            fault(wire)
-
-    wire = FakeWire(device, latency=latency, seed=seed, before_call=strike)
-    error: MiurafabError | None = None
-    try:
-        result = deliver(plan_job(JOB, MACHINE), wire, StopSignals())
-    except MiurafabError as raised:
-        error = raised
-    # Who hears an ok that was never said cannot count.
-    assert device.lost_bytes == 0 or fault is false_answers
-    wire.settle()
-    burnt = sum(abs(segment.x1 - segment.x0) for segment in device.beam_log)
-    if error is None:
-        assert result.lines == 5 + 2 * STROKES
-        assert burnt == pytest.approx(10 * STROKES, abs=0.5)
-    else:
-        assert struck
-        assert fault not in HARMLESS
-        assert str(error).endswith(".")
-        assert burnt <= 10 * STROKES + 0.5
-        if fault is interrupt:
-            assert isinstance(error, JobStopped)
-        if fault not in UNREACHABLE and b"G21\n" in wire.bytes_written:
-            assert wire.commands.endswith(b"\x18")
-            assert device.beam_log == [] or device.beam_log[-1].t1 <= wire.written[-1][0] + 0.05
-    assert not device.beam_on
-    # A firmware that hangs in mid-move still waits its step idle delay ($1) with the beam on.
-    assert standing_seconds(device.beam_log) <= (0.026 if fault is hang else 0.0)
+@settings(max_examples=40, phases=NO_SHRINKING)
+def test_several_faults_and_an_interrupt(
+    faults: list[str], latency: float, seed: int, stop: float
+) -> None:
+    Run(faults, latency, seed, stop).check(faults)

@@ -14,6 +14,7 @@ from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program, strokes
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.journal import JournalRun, job_digest, read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import Resumption, resume
@@ -23,7 +24,7 @@ from miurafab.profiles import load_machine
 
 MACHINE = load_machine("grbl-laser-400")
 STROKES = 200
-KINDS = ("cable", "reset", "interrupt", "power")
+KINDS = ("disconnect", "reset", "interrupt", "power", "alarm", "hang")
 
 
 def dashes(style: str) -> Job:
@@ -42,8 +43,9 @@ def dashes(style: str) -> Job:
     return Job(f"{style}.nc", "\n".join([*lines, "M5", "G90", "G0 X0 Y0", ""]))
 
 
-def new_device() -> VirtualGrbl:
-    return VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud)
+def new_device(*faults: str) -> VirtualGrbl:
+    settings = virtual_settings(MACHINE)
+    return VirtualGrbl(settings, baud=MACHINE.controller.baud, faults=parse_faults(faults))
 
 
 def run(
@@ -54,24 +56,18 @@ def run(
     deliver(plan, wire, StopSignals(), journal_path=journal)
 
 
-def fault(wire: FakeWire, kind: str, at: float) -> None:
-    """Let the run over ``wire`` end so at ``at`` s of the controller's time."""
-    if kind == "cable":
-        wire.cut_at = at
-        return
+def struck(kind: str, at: float) -> FakeWire:
+    """A wire to a controller on which a run ends so at ``at`` s of the controller's time."""
+    if kind != "interrupt":
+        return FakeWire(new_device(f"{kind}@{at:.6f}s"))
 
     def before_call(call: int) -> None:
-        if wire.device.now < at:
-            return
-        wire.before_call = lambda call: None
-        if kind == "interrupt":
+        if wire.device.now >= at:
+            wire.before_call = lambda call: None
             raise KeyboardInterrupt
-        if kind == "reset":
-            wire.device.receive(b"\x18")
-        else:
-            wire.device.power_cycle()
 
-    wire.before_call = before_call
+    wire = FakeWire(new_device(), before_call=before_call)
+    return wire
 
 
 def burnt(job: Job, devices: list[VirtualGrbl]) -> Counter[int]:
@@ -110,9 +106,8 @@ def interrupted_and_resumed(
     rests: list[Resumption] = []
     rest = None
     for kind, at in kinds:
-        wire = FakeWire(new_device())
+        wire = struck(kind, at)
         devices.append(wire.device)
-        fault(wire, kind, at)
         with pytest.raises((MachineError, JobStopped)):
             run(job, wire, journal, rest)
         wire.settle(5.0)
@@ -154,7 +149,7 @@ def test_a_fault_after_a_stroke(style: str, first: int, tmp_path: Path) -> None:
     job = dashes(style)
     ends = stroke_ends(job)
     assert len(ends) == STROKES
-    check(job, [(KINDS[first % 4], ends[first] + 0.001)], tmp_path)
+    check(job, [(KINDS[first % 6], ends[first] + 0.001)], tmp_path)
 
 
 @pytest.mark.large
@@ -162,14 +157,19 @@ def test_a_fault_after_a_stroke(style: str, first: int, tmp_path: Path) -> None:
 def test_a_fault_after_every_stroke(style: str, tmp_path: Path) -> None:
     job = dashes(style)
     for index, end in enumerate(stroke_ends(job)):
-        for kind in KINDS if index % 10 == 0 else (KINDS[index % 4],):
+        for kind in KINDS if index % 10 == 0 else (KINDS[index % 6],):
             check(job, [(kind, end + 0.001)], tmp_path)
 
 
 def test_a_resumed_job_is_interrupted_again(tmp_path: Path) -> None:
     job = dashes("absolute")
     ends = stroke_ends(job)
-    kinds = [("cable", ends[60]), ("power", ends[3]), ("interrupt", ends[40]), ("reset", ends[0])]
+    kinds = [
+        ("disconnect", ends[60]),
+        ("power", ends[3]),
+        ("interrupt", ends[40]),
+        ("reset", ends[0]),
+    ]
     check(job, kinds, tmp_path)
 
 

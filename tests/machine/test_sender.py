@@ -22,6 +22,7 @@ from miurafab.gcode.job import Job, prepare
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.streamer import LineRefused
 from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import Progress, StreamResult, deliver, stream_job
@@ -40,10 +41,10 @@ def zigzag(strokes: int, feed: int = 3000) -> Job:
     return Job("zigzag.nc", text + "M5\nG0 X0 Y0\n")
 
 
-def new_device(**changes: float) -> VirtualGrbl:
+def new_device(*faults: str, **changes: float) -> VirtualGrbl:
     """A controller set up as MACHINE; ``s32=0`` changes ``$32``."""
     values = virtual_settings(MACHINE) | {int(name[1:]): value for name, value in changes.items()}
-    return VirtualGrbl(values, baud=MACHINE.controller.baud)
+    return VirtualGrbl(values, baud=MACHINE.controller.baud, faults=parse_faults(faults))
 
 
 def send(
@@ -266,8 +267,7 @@ def test_a_refused_line_is_dark_at_once_and_is_named() -> None:
 
 
 def test_an_alarm_ends_the_job_and_is_never_unlocked() -> None:
-    wire = FakeWire(new_device())
-    wire.injections = [(1.0, b"ALARM:1\r\n[MSG:Reset to continue]\r\n")]
+    wire = FakeWire(new_device("alarm@1s"))
     with pytest.raises(ControllerError, match=r"ALARM:1, a limit switch was hit.*beam off"):
         send(STOPPED, wire)
     assert_dark_after_reset(wire)
@@ -276,25 +276,16 @@ def test_an_alarm_ends_the_job_and_is_never_unlocked() -> None:
 
 @pytest.mark.parametrize("at", [0.5, 1.5, 2.5])
 def test_a_reset_that_nobody_asked_for_ends_the_job(at: float) -> None:
-    wire = FakeWire(new_device())
-
-    def reset(call: int) -> None:
-        if wire.device.now >= at and not done:
-            done.append(wire.device.now)
-            wire.device.receive(b"\x18")
-
-    done: list[float] = []
-    wire.before_call = reset
+    wire = FakeWire(new_device(f"reset@{at}s"))
     with pytest.raises(ControllerError, match=r"restarted by itself|ALARM:3"):
         send(STOPPED, wire)
     wire.settle()
     assert wire.commands.endswith(b"\x18")
-    assert all(segment.t1 <= done[0] + 0.01 for segment in wire.device.beam_log)
+    assert all(segment.t1 <= at + 0.02 for segment in wire.device.beam_log)
 
 
 def test_a_vanished_port_is_told_and_an_m4_job_goes_dark_by_itself() -> None:
-    wire = FakeWire(new_device())
-    wire.cut_at = 1.0
+    wire = FakeWire(new_device("disconnect@1s"))
     with pytest.raises(PortError, match=r"went away.*switch the laser off at the machine"):
         send(STOPPED, wire)
     wire.settle()
@@ -303,37 +294,29 @@ def test_a_vanished_port_is_told_and_an_m4_job_goes_dark_by_itself() -> None:
 
 
 def test_a_controller_that_says_nothing_any_more_is_reset() -> None:
-    wire = FakeWire(new_device())
-    wire.deaf_at = 1.0
+    wire = FakeWire(new_device("drop-reply=all@1s"))
     with pytest.raises(ControllerError, match=r"said nothing for 3 s.*did not confirm"):
         send(zigzag(200), wire)
     assert_dark_after_reset(wire)
 
 
 def test_a_lost_answer_is_noticed_when_the_controller_idles() -> None:
-    wire = FakeWire(new_device())
-
-    def swallow(call: int) -> None:
-        if wire.device.now > 1.0 and not done:
-            wire.swallow_ok = True
-            done.append(call)
-
-    done: list[int] = []
-    wire.before_call = swallow
+    """Of 80 bytes that are lost a status report is the smaller part."""
+    wire = FakeWire(new_device("drop-reply=80@1s"))
     with pytest.raises(ControllerError, match=r"idle but has not answered line \d+ of zigzag"):
         send(STOPPED, wire)
     assert_dark_after_reset(wire)
 
 
-def test_noise_among_the_replies_does_no_harm() -> None:
+def test_talk_among_the_replies_does_no_harm() -> None:
     wire = FakeWire(new_device())
-    wire.injections = [(0.5, b"\xff\x00\xf0garbage\r\n"), (1.0, b"[MSG:hello]\r\n")]
+    wire.lies = [(0.5, b"\xff\x00\xf0garbage\r\n"), (1.0, b"[MSG:hello]\r\n")]
     assert send(STOPPED, wire).lines == 65
 
 
 def test_an_answer_to_nothing_ends_the_job() -> None:
     wire = FakeWire(new_device())
-    wire.injections = [(0.8, b"ok\r\n" * 30)]
+    wire.lies = [(0.8, b"ok\r\n" * 30)]
     with pytest.raises(ControllerError, match="answered a line that was never sent"):
         send(STOPPED, wire)
     assert_dark_after_reset(wire)
@@ -341,9 +324,11 @@ def test_an_answer_to_nothing_ends_the_job() -> None:
 
 @pytest.mark.parametrize("said", [b"", b"hello\r\nlogin: "])
 def test_what_does_not_speak_grbl_is_told(said: bytes) -> None:
-    wire = FakeWire(new_device())
-    wire.deaf_at = 0.0
-    wire.injections = []
+    device = new_device("drop-reply=all@0s")
+    device.advance(0.1)
+    device.take_output()
+    wire = FakeWire(device)
+    wire.lies = [(0.0, said)]
     with pytest.raises(PortError, match="Nothing that speaks GRBL answers at the fake wire"):
         send(STOPPED, wire)
     assert b"G21" not in wire.bytes_written
@@ -411,8 +396,7 @@ def test_a_line_that_may_not_be_sent_is_refused_before_the_port_is_opened() -> N
 def test_the_journal_says_what_was_taken(tmp_path: Path) -> None:
     path = tmp_path / "deep" / "job.journal"
     send(STOPPED, FakeWire(new_device()), journal_path=path)
-    wire = FakeWire(new_device())
-    wire.cut_at = 1.5
+    wire = FakeWire(new_device("disconnect@1500ms"))
     with pytest.raises(PortError):
         send(STOPPED, wire, journal_path=path)
     done, failed = read_journal(path)

@@ -1,6 +1,7 @@
-"""A fake wire between the sender and the virtual controller: it chops, delays and fails on order.
+"""A fake wire between the sender and the virtual controller: it chops and delays.
 
-Time is the controller's: no test sleeps. What the host wrote is kept with the time, and so can
+What fails on order is the virtual controller's (:mod:`miurafab.grbl.virtual_faults`). Time is the
+controller's: no test sleeps. What the host wrote is kept with the time, and so can
 be held against what the controller's beam log says.
 """
 
@@ -40,11 +41,7 @@ class FakeWire:
         self.calls = 0
         self.before_call = before_call
         self.closed = False
-        self.cut_at = float("inf")  # the cable comes out
-        self.deaf_at = float("inf")  # the controller's words are lost from here on
-        self.swallow_ok = False  # the next ok is lost
-        self._held = b""
-        self.injections: list[tuple[float, bytes]] = []  # noise towards the host
+        self.lies: list[tuple[float, bytes]] = []  # what somebody else says to the host, and when
         self._latency = latency
         self._random = random.Random(seed)
         self._to_device: deque[tuple[float, bytes]] = deque()
@@ -110,7 +107,7 @@ class FakeWire:
 
     def _call(self) -> None:
         self.calls += 1
-        if self.device.now >= self.cut_at:
+        if not self.device.connected:
             raise PortError("The port of the fake wire went away.")
         self.before_call(self.calls)
 
@@ -128,15 +125,6 @@ class FakeWire:
 
     def _collect(self) -> None:
         output = self.device.take_output()
-        while self.injections and self.device.now >= self.injections[0][0]:
-            output += self.injections.pop(0)[1]
-        if self.swallow_ok:
-            output = self._held + output
-            self._held = b""
-            if b"ok\r\n" in output:
-                output = output.replace(b"ok\r\n", b"", 1)
-                self.swallow_ok = False
-            else:
-                self._held, output = output, b""
-        if self.device.now < self.deaf_at:
-            self._post(self._to_host, output)
+        while self.lies and self.device.now >= self.lies[0][0]:
+            output += self.lies.pop(0)[1]
+        self._post(self._to_host, output)
