@@ -10,7 +10,9 @@ perforate, cut. Within one:
   and the outlines, each time to the nearest one left; a closed stroke is begun at its nearest
   point.
 
-With heat to be spread, the outline that is made next is the one farthest from the two before it.
+With heat to be spread, the outline that is made next is the one farthest from the two before it,
+and so is the patch whose creases are made next. Within a patch every other trail of the route is
+left out on the way through, and made on the way back: trails side by side are far apart in time.
 
 The strokes are the same before and after, but for their direction and where a closed one begins.
 """
@@ -20,12 +22,11 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-import scipy.spatial
 from numpy.typing import NDArray
 
-from miurafab.fabrication.routing import find_route
+from miurafab.fabrication.routing import Route, find_route
 from miurafab.fabrication.toolpath import Toolpath
-from miurafab.profiles import OPERATIONS
+from miurafab.profiles import OPERATIONS, MachineProfile, Material
 
 HOLE = 0
 """The rank of closed strokes so small that their middle says where they are."""
@@ -49,34 +50,44 @@ OUTLINE = 3
 """The rank of the outlines of patches, last of all."""
 
 
+def corner_of(machine: MachineProfile, material: Material) -> float:
+    """The travel in mm for which there is time while the tool turns from one dash to another.
+
+    It slows down into the leg between them and out of it, each time by up to v / a of lost time.
+    """
+    feed = material.operations["perforate"].feed_mm_min
+    speed = min(feed, *machine.motion.max_rate_mm_min) / 60
+    return 2 * speed**2 / min(machine.motion.acceleration_mm_s2)
+
+
 def order_strokes(
-    strokes: Strokes, edges_vertices: NDArray[np.int64], *, spread_heat: bool = False
+    strokes: Strokes,
+    edges_vertices: NDArray[np.int64],
+    *,
+    spread_heat: bool = False,
+    corner_mm: float = 1.0,
 ) -> Toolpath:
     """The toolpath of ``strokes`` in order. ``edges_vertices`` (E, 2) of the pattern tells which
-    creases meet; a crease's strokes run from its first vertex to its second.
+    creases meet; a crease's strokes run from its first vertex to its second. ``corner_mm`` is the
+    travel in whose time a corner is turned, when creases follow each other.
     """
     raw = strokes.toolpath
-    order = _Order(
-        np.empty(0, dtype=np.int64), np.empty(0, dtype=bool), np.empty(0, dtype=np.int64)
-    )
+    parts: list[_Order] = []
     here = np.zeros(2)
     for operation, name in enumerate(OPERATIONS):
         for rank in np.unique(strokes.rank[raw.operation == operation]).tolist():
             chosen = np.flatnonzero((raw.operation == operation) & (strokes.rank == rank))
             if name in ("score", "perforate"):
-                part = _creases(raw, chosen, strokes.group[chosen], edges_vertices, here)
+                made = _spread_creases if spread_heat else _creases
+                part = made(raw, chosen, strokes.group[chosen], edges_vertices, here, corner_mm)
             elif name == "cut" and rank == HOLE:
                 part = _holes(raw, chosen, here)
             else:
                 spread = spread_heat and name == "cut" and rank == OUTLINE
                 part = _nearest(raw, chosen, strokes.group[chosen], here, spread)
-            order = _Order(
-                np.concatenate([order.stroke, part.stroke]),
-                np.concatenate([order.backwards, part.backwards]),
-                np.concatenate([order.begin, part.begin]),
-            )
+            parts.append(part)
             here = _arranged(raw, part).points[-1]
-    return _arranged(raw, order)
+    return _arranged(raw, _joined(parts)) if parts else raw
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -88,6 +99,14 @@ class _Order:
     stroke: NDArray[np.int64]
     backwards: NDArray[np.bool_]
     begin: NDArray[np.int64]
+
+
+def _joined(parts: list[_Order]) -> _Order:
+    return _Order(
+        np.concatenate([part.stroke for part in parts]),
+        np.concatenate([part.backwards for part in parts]),
+        np.concatenate([part.begin for part in parts]),
+    )
 
 
 def _arranged(raw: Toolpath, order: _Order) -> Toolpath:
@@ -130,7 +149,90 @@ def _creases(
     group: NDArray[np.int64],
     edges_vertices: NDArray[np.int64],
     here: NDArray[np.float64],
+    corner: float,
 ) -> _Order:
+    runs = _runs(raw, chosen, group, edges_vertices)
+    route = runs.route(here, corner)
+    return runs.made(chosen, route.order, route.backwards)
+
+
+def _spread_creases(
+    raw: Toolpath,
+    chosen: NDArray[np.int64],
+    group: NDArray[np.int64],
+    edges_vertices: NDArray[np.int64],
+    here: NDArray[np.float64],
+    corner: float,
+) -> _Order:
+    """Patch after patch, and of each every other trail on the way through, the rest on the way
+    back, each from its nearer end.
+    """
+    patches = np.unique(raw.patch[chosen])
+    middles = np.array([raw.starts[chosen[raw.patch[chosen] == p]].mean(axis=0) for p in patches])
+    begin = int(np.argmin(((middles - here) ** 2).sum(axis=1)))
+    parts = []
+    for k in _far_apart(middles, begin):
+        own = raw.patch[chosen] == patches[k]
+        runs = _runs(raw, chosen[own], group[own], edges_vertices)
+        route = runs.route(here, corner)
+        way = runs.node[route.order]
+        way = np.where(route.backwards[:, None], way[:, ::-1], way)
+        trails = np.split(np.arange(len(way)), np.flatnonzero(way[:-1, 1] != way[1:, 0]) + 1)
+        order, backwards = [], []
+        for trail in trails[::2] + trails[1::2][::-1]:
+            first, last = runs.positions[way[trail[0], 0]], runs.positions[way[trail[-1], 1]]
+            turned = np.hypot(*(last - here)) < np.hypot(*(first - here))
+            order.append(route.order[trail[::-1] if turned else trail])
+            backwards.append(route.backwards[trail[::-1] if turned else trail] != turned)
+            here = first if turned else last
+        parts.append(runs.made(chosen[own], np.concatenate(order), np.concatenate(backwards)))
+    return _joined(parts)
+
+
+def _far_apart(middles: NDArray[np.float64], begin: int) -> list[int]:
+    """All of ``middles`` (n, 2) from ``begin`` on, each time the farthest from the last two."""
+    left = np.ones(len(middles), dtype=bool)
+    taken = [begin]
+    left[begin] = False
+    while left.any():
+        apart = np.linalg.norm(middles[:, None] - middles[taken[-2:]], axis=2).min(axis=1)
+        taken.append(int(np.argmax(np.where(left, np.round(apart, 6), -1.0))))
+        left[taken[-1]] = False
+    return taken
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Runs:
+    """C creases, each a run of strokes: where it ``begin``s among those chosen and their ``count``,
+    its ``node``s (C, 2), its drawn ``ends`` (C, 2, 2), and the ``positions`` of all nodes.
+    """
+
+    begin: NDArray[np.int64]
+    count: NDArray[np.int64]
+    node: NDArray[np.int64]
+    ends: NDArray[np.float64]
+    positions: NDArray[np.float64]
+
+    def route(self, here: NDArray[np.float64], corner: float) -> Route:
+        """The route over the creases from ``here``."""
+        a, b = self.node.T
+        return find_route(a, b, self.positions, here, self.ends, corner)
+
+    def made(
+        self, chosen: NDArray[np.int64], order: NDArray[np.int64], backwards: NDArray[np.bool_]
+    ) -> _Order:
+        """The strokes of the creases in ``order``."""
+        member = _unrolled(self.begin[order], self.count[order], backwards)
+        back = np.repeat(backwards, self.count[order])
+        return _Order(chosen[member], back, np.zeros(len(member), dtype=np.int64))
+
+
+def _runs(
+    raw: Toolpath,
+    chosen: NDArray[np.int64],
+    group: NDArray[np.int64],
+    edges_vertices: NDArray[np.int64],
+) -> _Runs:
     begin, count = _groups(group)
     ends = np.stack([raw.starts[chosen[begin]], raw.ends[chosen[begin + count - 1]]], axis=1)
     # The same pattern vertex is another node on another patch.
@@ -140,11 +242,7 @@ def _creases(
     node = node.reshape(-1, 2)
     total = np.zeros((len(nodes), 2))
     np.add.at(total, node.ravel(), ends.reshape(-1, 2))
-    positions = total / np.bincount(node.ravel())[:, None]
-    route = find_route(node[:, 0], node[:, 1], positions, here)
-    member = _unrolled(begin[route.order], count[route.order], route.backwards)
-    back = np.repeat(route.backwards, count[route.order])
-    return _Order(chosen[member], back, np.zeros(len(member), dtype=np.int64))
+    return _Runs(begin, count, node, ends, total / np.bincount(node.ravel())[:, None])
 
 
 def _holes(raw: Toolpath, chosen: NDArray[np.int64], here: NDArray[np.float64]) -> _Order:
@@ -193,14 +291,12 @@ def _nearest(
     points, leaves, owner = np.array(entries), np.array(exits), np.array(item)
     left = np.ones(len(points), dtype=bool)
     taken: list[int] = []
-    middles = _middles(raw, chosen, begin, count)
-    for _ in range(len(begin)):
-        open_now = left
-        if spread and taken:
-            waiting = np.unique(owner[left])
-            last = middles[owner[taken[-2:]]]
-            apart = np.linalg.norm(middles[waiting][:, None] - last, axis=2).min(axis=1)
-            open_now = owner == waiting[int(np.argmax(np.round(apart, 6)))]
+    turns = [-1] * len(begin)
+    if spread:
+        nearest = int(owner[np.argmin(np.hypot(*(points - here).T))])
+        turns = _far_apart(_middles(raw, chosen, begin, count), nearest)
+    for turn in turns:
+        open_now = left if turn < 0 else owner == turn
         way = np.where(open_now, np.hypot(*(points - here).T), np.inf)
         at = int(np.argmin(way))
         taken.append(at)
@@ -224,28 +320,3 @@ def _middles(
         points = np.concatenate([raw.stroke(int(k)) for k in chosen[at : at + strokes]])
         found.append((points.min(axis=0) + points.max(axis=0)) / 2)
     return np.array(found)
-
-
-def travel_bound(toolpath: Toolpath) -> float:
-    """A length in mm below which no order of these strokes, by any route, can bring the travel.
-
-    Every leg has two ends, and an end of an open stroke, or the origin, is at least as far from
-    the other end of its leg as from the nearest place where another stroke may be entered or left.
-    Of closed strokes it is only said that they may be entered anywhere.
-    """
-    if not len(toolpath):
-        return 0.0
-    owner = np.repeat(np.arange(len(toolpath)), np.diff(toolpath.offsets))
-    place = np.zeros(len(owner), dtype=bool)
-    place[toolpath.offsets[:-1]] = True
-    place[toolpath.offsets[1:] - 1] = True
-    closed = (toolpath.starts == toolpath.ends).all(axis=1)[owner]
-    ends = np.flatnonzero(place & ~closed)
-    places = np.concatenate([ends, np.flatnonzero(closed)])
-    points = np.concatenate([toolpath.points[places], np.zeros((1, 2))])
-    owners = np.append(owner[places], -1)
-    # Of three places at most two are the stroke's own.
-    asking = np.append(np.arange(len(ends)), len(points) - 1)
-    way, near = scipy.spatial.KDTree(points).query(points[asking], k=min(3, len(points)))
-    way = np.where(owners[near] == owners[asking, None], np.inf, way).min(axis=1)
-    return float(way[:-1].sum() + 2 * way[-1]) / 2

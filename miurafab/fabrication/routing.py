@@ -12,7 +12,8 @@ travel legs are added:
    odd cycles is assigned again; and pairs of legs are exchanged as long as that shortens them.
 2. Components that are still apart are joined by exchanging two legs ab, cd for ac, bd, the
    exchange that costs least first.
-3. The tour is found by walking and splicing (Hierholzer 1873), straight on where there is a choice.
+3. The tour passes each node by the cheapest of its pairings
+   (:mod:`~miurafab.fabrication.trails`).
 
 The rural postman problem is NP-hard for several components; for one component steps 1 and 3 give
 the optimum whenever the matching is optimal.
@@ -27,6 +28,8 @@ import scipy.optimize
 import scipy.sparse
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
+
+from miurafab.fabrication.trails import closed_tour
 
 _ASSIGNED = 1200
 """Odd nodes that are assigned at once; more are halved along the longer side first."""
@@ -51,10 +54,14 @@ def find_route(
     b: NDArray[np.int64],
     positions: NDArray[np.float64],
     start: NDArray[np.float64],
+    ends: NDArray[np.float64] | None = None,
+    corner: float = 1.0,
 ) -> Route:
     """The route over M creases between the nodes ``a`` and ``b`` (M,), none of which is a loop.
 
     ``positions`` (N, 2) in mm are those of the nodes; the route begins near ``start`` (2,).
+    ``ends`` (M, 2, 2) are the ends of the creases as they are drawn, the nodes if not given, and a
+    corner is taken to cost as much as ``corner`` mm of travel.
     """
     if not len(a):
         return Route(np.empty(0, dtype=np.int64), np.empty(0, dtype=bool), 0.0, 0.0)
@@ -65,7 +72,10 @@ def find_route(
     odd = np.flatnonzero(np.bincount(np.concatenate([tails, heads])) % 2)
     legs, bound = match(odd, placed)
     legs = _joined(tails, heads, legs, placed)
-    tour = _tour(np.append(tails, legs[:, 0]), np.append(heads, legs[:, 1]), placed)
+    drawn = placed[np.stack([np.append(tails, legs[:, 0]), np.append(heads, legs[:, 1])], axis=1)]
+    if ends is not None:
+        drawn[:count] = ends
+    tour = closed_tour(np.append(tails, legs[:, 0]), np.append(heads, legs[:, 1]), drawn, corner)
     extra = int(np.flatnonzero(tour[:, 0] == count)[0])
     if tour[extra, 1] == 0:
         tour = np.column_stack([tour[::-1, 0], 1 - tour[::-1, 1]])
@@ -234,41 +244,3 @@ def _with_bare(
     w, k = divmod(int(np.argmin(extra)), len(legs))
     node, (c, d) = int(members[w]), legs[k].tolist()
     return np.concatenate([np.delete(legs, k, axis=0), [[c, node], [node, d]]])
-
-
-def _tour(
-    a: NDArray[np.int64], b: NDArray[np.int64], positions: NDArray[np.float64]
-) -> NDArray[np.int64]:
-    """(M, 2) edge and direction (1 for b to a) of a closed tour over a connected even graph."""
-    ends = np.concatenate([a, b])
-    order = np.argsort(ends, kind="stable")
-    first = np.searchsorted(ends[order], np.arange(len(positions) + 1)).tolist()
-    step = positions[b] - positions[a]
-    size = np.linalg.norm(step, axis=1)
-    step = np.nan_to_num(step / np.where(size > 0, size, 1.0)[:, None])
-    way = np.concatenate([step, -step]).tolist()
-    count = len(a)
-    leaving = order.tolist()
-    open_at = [leaving[first[v] : first[v + 1]] for v in range(len(positions))]
-    heads = np.concatenate([b, a]).tolist()
-    done = [False] * count
-    here = int(a[0])
-    path: list[tuple[int, int]] = [(here, -1)]
-    circuit: list[int] = []
-    while path:
-        here, arrived = path[-1]
-        choice = open_at[here] = [half for half in open_at[here] if not done[half % count]]
-        if not choice:
-            path.pop()
-            if arrived >= 0:
-                circuit.append(arrived)
-            continue
-        if arrived >= 0 and len(choice) > 1:
-            dx, dy = way[arrived]
-            half = max(choice, key=lambda h: dx * way[h][0] + dy * way[h][1])
-        else:
-            half = choice[0]
-        done[half % count] = True
-        path.append((heads[half], half))
-    halves = np.array(circuit[::-1], dtype=np.int64)
-    return np.column_stack([halves % count, halves // count])

@@ -23,12 +23,13 @@ from miurafab.fabrication.boxes import best_turn
 from miurafab.fabrication.labels import place_texts
 from miurafab.fabrication.nesting import Problem, SheetKind, Slot, Stock, nest, turned
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.ordering import order_strokes, travel_bound
+from miurafab.fabrication.ordering import Strokes, corner_of, order_strokes
 from miurafab.fabrication.pieces import Piece, Pieces, make_pieces
 from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.strokes import Blank, Motion, sheet_strokes
 from miurafab.fabrication.tabs import FOLDS, Tab
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.fabrication.travel import travel_bound
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, Material
 
@@ -211,11 +212,14 @@ def lay_out(
         [Blank(each.name, each.width_mm, each.height_mm, bed.margin_mm) for each in sheets],
         options,
     )
-    ways = pattern.edges_vertices
-    toolpaths = tuple(
-        order_strokes(each, ways, spread_heat=options.spread_heat) for each in drawn.fronts
-    )
-    backs = [None if each is None else order_strokes(each, ways) for each in drawn.backs]
+    ways, corner = pattern.edges_vertices, corner_of(machine, material)
+    spread = options.spread_heat
+
+    def ordered(strokes: Strokes) -> Toolpath:
+        return order_strokes(strokes, ways, spread_heat=spread, corner_mm=corner)
+
+    toolpaths = tuple(ordered(each) for each in drawn.fronts)
+    backs = [None if each is None else ordered(each) for each in drawn.backs]
     sheets = tuple(_with_passes(*made) for made in zip(sheets, toolpaths, backs, strict=True))
     behind = tuple(back for back in backs if back is not None)
     return Layout(

@@ -1,0 +1,177 @@
+"""One closed tour over a connected even graph, with the cheapest passes through its nodes.
+
+A closed tour pairs the ends of edges that meet at each node: it arrives by one and leaves by the
+other. A pass has a price: the way from the drawn end of one stroke to that of the other, and what
+the corner costs in time, written as travel. A turn by the angle phi is priced at
+
+    corner * sin(phi / 2),
+
+``corner`` being v^2 / a: at the acceleration a the tool loses v / a of time where it stops and
+starts again, in which it would have gone that far.
+
+1. At each node the cheapest pairing is taken; of the three there are at a node of degree 4 all are
+   tried, at nodes of higher degree the cheapest pair goes first.
+2. The pairs now form closed trails. As long as there is more than one, two that meet at a node are
+   joined by exchanging the partners of two pairs there, the exchange that costs least first
+   (Kruskal's rule). For nodes of degree 4 every exchange of that kind joins them.
+
+Half-edge h of M edges leaves its node along edge h % M: the tail for h < M, the head otherwise.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+
+def closed_tour(
+    tails: NDArray[np.int64],
+    heads: NDArray[np.int64],
+    ends: NDArray[np.float64],
+    corner: float,
+) -> NDArray[np.int64]:
+    """(M, 2) the edges in turn and the direction of each (1 for head to tail).
+
+    ``tails`` and ``heads`` (M,) are the nodes of each edge and ``ends`` (M, 2, 2) where it is drawn
+    from and to, in mm, NaN for an end that is anywhere; ``corner`` is in mm. Every node has an even
+    number of edges, and they are all connected.
+    """
+    count = len(tails)
+    at = np.concatenate([tails, heads])
+    places = np.concatenate([ends[:, 0], ends[:, 1]])
+    step = ends[:, 1] - ends[:, 0]
+    size = np.linalg.norm(step, axis=1)
+    step = np.nan_to_num(step / np.where(size > 0, size, 1.0)[:, None])
+    prices = _Prices(places, np.concatenate([step, -step]), corner)
+    partner = _cheapest(at, prices)
+    while True:
+        trail = _trails(partner, count)
+        if trail.max() == 0:
+            break
+        _join(partner, trail, at, prices)
+    follow = partner.tolist()
+    half, found = 0, []
+    for _ in range(count):
+        found.append(half)
+        half = follow[(half + count) % (2 * count)]
+    tour = np.array(found, dtype=np.int64)
+    return np.column_stack([tour % count, tour // count])
+
+
+class _Prices:
+    """What the passes between half-edges cost, in mm."""
+
+    def __init__(
+        self, places: NDArray[np.float64], ways: NDArray[np.float64], corner: float
+    ) -> None:
+        self.places, self.ways, self.corner = places, ways, corner
+
+    def of(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.float64]:
+        """The price of each pass from i to j, the same both ways."""
+        apart = np.nan_to_num(np.linalg.norm(self.places[i] - self.places[j], axis=-1))
+        one, other = self.ways[i], self.ways[j]
+        both = (one != 0).any(axis=-1) & (other != 0).any(axis=-1)
+        turn = np.sqrt(np.clip((1 + np.einsum("...k,...k->...", one, other)) / 2, 0, 1))
+        price: NDArray[np.float64] = apart + self.corner * np.where(both, turn, 0.0)
+        return price
+
+
+_PAIRINGS = np.array([[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]])
+"""The ways to pair four things: the first with the second, the third with the fourth."""
+
+
+def _cheapest(at: NDArray[np.int64], prices: _Prices) -> NDArray[np.int64]:
+    """(2 M,) the partner of each half-edge at its node."""
+    partner = np.full(len(at), -1)
+    order = np.argsort(at, kind="stable")
+    begin = np.flatnonzero(np.diff(at[order], prepend=-1))
+    degree = np.diff(np.append(begin, len(at)))
+    two = order[begin[degree == 2][:, None] + np.arange(2)]
+    partner[two] = two[:, ::-1]
+    four = order[begin[degree == 4][:, None] + np.arange(4)]
+    if len(four):
+        options = four[:, _PAIRINGS]
+        cost = prices.of(options[..., 0::2], options[..., 1::2]).sum(axis=2)
+        # Prices equal up to rounding: the first pairing, so that rounding decides nothing.
+        best = np.argmin(np.round(cost, 9), axis=1)
+        chosen = options[np.arange(len(four)), best]
+        partner[chosen] = chosen[:, [1, 0, 3, 2]]
+    for first, size in zip(begin[degree > 4].tolist(), degree[degree > 4].tolist(), strict=True):
+        here = order[first : first + size]
+        i, j = np.triu_indices(size, 1)
+        for k in np.argsort(np.round(prices.of(here[i], here[j]), 9), kind="stable").tolist():
+            one, other = here[i[k]], here[j[k]]
+            if partner[one] < 0 and partner[other] < 0:
+                partner[one], partner[other] = other, one
+    return partner
+
+
+def _trails(partner: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """(2 M,) the closed trail that each half-edge is part of."""
+    half = np.arange(2 * count)
+    rows = np.concatenate([half, half])
+    columns = np.concatenate([(half + count) % (2 * count), partner])
+    graph = scipy.sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(2 * count,) * 2)
+    label: NDArray[np.int64] = connected_components(graph, directed=False)[1].astype(np.int64)
+    return label
+
+
+def _join(
+    partner: NDArray[np.int64],
+    trail: NDArray[np.int64],
+    at: NDArray[np.int64],
+    prices: _Prices,
+) -> None:
+    """Exchange partners, the cheapest exchange first, where that joins two trails."""
+    one, other = _meeting(partner, trail, at)
+    partner_one, partner_other = partner[one], partner[other]
+    now = prices.of(one, partner_one) + prices.of(other, partner_other)
+    ways = np.stack(
+        [
+            prices.of(one, other) + prices.of(partner_one, partner_other),
+            prices.of(one, partner_other) + prices.of(partner_one, other),
+        ]
+    )
+    crossed = np.argmin(np.round(ways, 9), axis=0)
+    extra = np.round(ways.min(axis=0) - now, 9)
+    root = list(range(int(trail.max()) + 1))
+
+    def find(name: int) -> int:
+        while root[name] != name:
+            root[name] = root[root[name]]
+            name = root[name]
+        return name
+
+    for k in np.argsort(extra, kind="stable").tolist():
+        a, b = int(one[k]), int(other[k])
+        c, d = int(partner_one[k]), int(partner_other[k])
+        first, second = find(int(trail[a])), find(int(trail[b]))
+        # A pair that was exchanged already is no more; it is looked at again in the next round.
+        if first == second or partner[a] != c or partner[b] != d:
+            continue
+        root[first] = second
+        for i, j in ((a, b), (c, d)) if crossed[k] == 0 else ((a, d), (c, b)):
+            partner[i], partner[j] = j, i
+
+
+def _meeting(
+    partner: NDArray[np.int64], trail: NDArray[np.int64], at: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Half-edges of two pairs at one node that are parts of two trails, one of each pair."""
+    pairs = np.flatnonzero(np.arange(len(partner)) < partner)
+    pairs = pairs[np.argsort(at[pairs], kind="stable")]
+    found = [np.empty((0, 2), dtype=np.int64)]
+    node = at[pairs]
+    # The pairs of a node follow each other: each is held against the next, the one after it ...
+    for apart in itertools.count(1):
+        same = np.flatnonzero(node[apart:] == node[:-apart])
+        if not len(same):
+            break
+        both = np.column_stack([pairs[same], pairs[same + apart]])
+        found.append(both[trail[both[:, 0]] != trail[both[:, 1]]])
+    one, other = np.concatenate(found).T
+    return one, other
