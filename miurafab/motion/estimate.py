@@ -119,7 +119,7 @@ class _Run:
         for line in _lines(self.program):
             self._receive(line.size)
             reading = cpu.words_cost(line.words, line.size - 1, line.points)
-            self._work(cpu.LINE_FIXED + reading + cpu.REALTIME)
+            self._work(cpu.LINE_FIXED + reading)
             chord = cpu.ARC_CHORD if len(line.actions) > 1 else 0
             self._work(cpu.ARC_SETUP if chord else 0)
             for action in line.actions:
@@ -134,7 +134,7 @@ class _Run:
 
     def _receive(self, size: int) -> None:
         arrival = self.wire.arrival(size)
-        if arrival <= self.now:
+        if arrival <= self.now + (size - 1) * cpu.CHARACTER:  # the last comes while others are read
             self._work(size * cpu.CHARACTER)
             return
         while True:

@@ -109,13 +109,13 @@ class Planner:
         """
         parameters = self.parameters
         start = self.position if origin is None else tuple(origin)
-        self.cycles += cpu.PLAN_LINE
         steps_per_mm = parameters.steps_per_mm
         end = tuple(
             to_steps(t, k) if k else at
             for t, k, at in zip(target, steps_per_mm, start, strict=True)
         )
         steps = tuple(b - a for a, b in zip(start, end, strict=True))
+        self.cycles += cpu.PLAN_LINE + cpu.PLAN_AXIS * (len(steps) - steps.count(0))
         events = max(map(abs, steps))
         if events == 0:
             return None
@@ -203,8 +203,8 @@ class Planner:
             return 0.0
         if cosine < -_STRAIGHT:
             return _UNLIMITED
-        self.cycles += cpu.PLAN_CORNER
         x, y, z = vx - ux, vy - uy, vz - uz
+        self.cycles += cpu.PLAN_CORNER + cpu.PLAN_CORNER_AXIS * ((x != 0) + (y != 0) + (z != 0))
         length = math.sqrt(x * x + y * y + z * z)
         parameters = self.parameters
         acceleration = along(parameters.acceleration, (x / length, y / length, z / length))
@@ -242,10 +242,7 @@ class Planner:
                 self.planned = index
             move = after
         self.cycles += (
-            cpu.PLAN_NEWEST
-            + (last - planned - 1) * cpu.PLAN_BACKWARD
-            + (last - planned) * cpu.PLAN_FORWARD
-            + rising * cpu.PLAN_FORWARD_RISING
+            cpu.PLAN_NEWEST + (last - planned - 1) * cpu.PLAN_BLOCK + rising * cpu.PLAN_RISING
         )
 
 

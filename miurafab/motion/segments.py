@@ -119,7 +119,7 @@ class SegmentGenerator:
         if self._follows or self.refresh_power:
             self._set_power(move)
         segment.power = self._power
-        self.cycles += cpu.SEGMENT + rounds * cpu.RAMP
+        self.cycles += cpu.SEGMENT + rounds * cpu.ROUND
         if not self._cut(segment, length, duration):
             self.finished = True
             return None
@@ -238,7 +238,6 @@ class SegmentGenerator:
                     span = 2.0 * (length - after) / (self.speed + self.top)
                     self._ramp = FALL if after == self.fall_start else HOLD
                     self.speed = self.top
-                    self.cycles += cpu.RAMP_END
                 else:
                     self.speed += change
             elif self._ramp == HOLD:
@@ -247,14 +246,12 @@ class SegmentGenerator:
                     after = self.fall_start
                     span = (length - after) / self.top
                     self._ramp = FALL
-                    self.cycles += cpu.RAMP_END
             elif self._ramp == FALL_TO_TOP:
                 if self.speed - self.top <= change:
                     after = self.rise_end
                     span = 2.0 * (length - after) / (self.speed + self.top)
                     self._ramp = HOLD
                     self.speed = self.top
-                    self.cycles += cpu.RAMP_END
                 else:
                     after = length - span * (self.speed - 0.5 * change)
                     self.speed -= change
@@ -267,7 +264,6 @@ class SegmentGenerator:
                     total = self.speed + self.exit
                     span = 2.0 * (length - after) / total if total else 0.0
                     self.speed = self.exit
-                    self.cycles += cpu.RAMP_END
             length = after
             duration += span
             if duration < limit:
@@ -288,7 +284,7 @@ class SegmentGenerator:
             return
         word = move.speed_word
         if self._follows:
-            self.cycles += cpu.SEGMENT_POWER
+            self.cycles += cpu.POWER
             word *= self.speed / move.rate if move.rate else 0.0
         self._power = self.to_pwm(word)
 
