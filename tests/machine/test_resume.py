@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from dashes import STROKES, burnt, dashes
 from wires import FakeWire
 
 from miurafab.errors import GcodeError, InputError, JobStopped, MachineError
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program, strokes
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.grbl.virtual import VirtualGrbl, standing_seconds
 from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.journal import JournalRun, job_digest, read_journal
 from miurafab.machine.planning import plan_job
@@ -23,24 +24,7 @@ from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
 
 MACHINE = load_machine("grbl-laser-400")
-STROKES = 200
 KINDS = ("disconnect", "reset", "interrupt", "power", "alarm", "hang")
-
-
-def dashes(style: str) -> Job:
-    """200 strokes of 2 mm in rows of 20, each at a place of its own."""
-    lines = ["G21", "G90", "M4 S0", "M8"]
-    x0, y0 = 0.0, 0.0
-    for n in range(STROKES):
-        x, y = 5 + 3 * (n % 20), 5 + n // 20
-        if style == "absolute":
-            lines += [f"G0 X{x} Y{y}", f"G1 X{x + 2} S500 F3000"]
-        else:
-            dx, dy = x - x0, y - y0
-            words = "G91 G1 F3000 " if n == 0 else ""
-            lines += [f"{words}X{dx:g} Y{dy:g} S0", "X2 S500"]
-        x0, y0 = x + 2, y
-    return Job(f"{style}.nc", "\n".join([*lines, "M5", "G90", "G0 X0 Y0", ""]))
 
 
 def new_device(*faults: str) -> VirtualGrbl:
@@ -70,33 +54,6 @@ def struck(kind: str, at: float) -> FakeWire:
     return wire
 
 
-def burnt(job: Job, devices: list[VirtualGrbl]) -> Counter[int]:
-    """How often each stroke of ``job`` was burnt in full length, rounded up."""
-    table = strokes(parse_program(job))
-    place = {}
-    for index in range(len(table)):
-        (x0, y0), (x1, _) = table.stroke(index)[0][:2], table.stroke(index)[-1][:2]
-        place[index] = (x0, x1, y0)
-    counts: Counter[int] = Counter()
-    for device in devices:
-        assert not any(segment.standing for segment in device.beam_log)
-        seen: dict[int, list[tuple[float, float]]] = {}
-        for segment in device.beam_log:
-            left, right = sorted((segment.x0, segment.x1))
-            row, column = round(segment.y0) - 5, int((left + 0.02 - 5) // 3)
-            seen.setdefault(20 * row + column, []).append((left, right))
-        for index, pieces in seen.items():
-            x0, x1, _ = place[index]
-            length = sum(right - left for left, right in pieces)
-            assert min(left for left, _ in pieces) >= x0 - 0.02
-            assert max(right for _, right in pieces) <= x1 + 0.02
-            whole = length >= (x1 - x0) - 0.03
-            counts[index] += 1 if whole else 0
-            if not whole:
-                counts[1000 + index] += 1
-    return counts
-
-
 def interrupted_and_resumed(
     job: Job, kinds: list[tuple[str, float]], tmp_path: Path
 ) -> tuple[Counter[int], list[Resumption]]:
@@ -112,6 +69,9 @@ def interrupted_and_resumed(
             run(job, wire, journal, rest)
         wire.settle(5.0)
         assert not wire.device.beam_on
+        # A firmware that hangs in mid-move waits its step idle delay ($1) with the beam on.
+        standing = standing_seconds(wire.device.beam_log)
+        assert standing <= (0.026 if kind == "hang" else 0.0)
         rest = resume(job, MACHINE, read_journal(journal))
         rests.append(rest)
     wire = FakeWire(new_device())
@@ -120,7 +80,7 @@ def interrupted_and_resumed(
     assert read_journal(journal)[-1].ended == "done"
     with pytest.raises(InputError, match="nothing is left"):
         resume(job, MACHINE, read_journal(journal))
-    return burnt(job, devices), rests
+    return burnt(job, [device.beam_log for device in devices]), rests
 
 
 def stroke_ends(job: Job) -> list[float]:
