@@ -74,6 +74,37 @@ def sheets(
         bool | None,
         typer.Option("--spread-heat", help="Cut patches beside each other far apart in time."),
     ] = None,
+    quantity: Annotated[
+        int | None, typer.Option(help="How many of the whole model to make [default: 1].")
+    ] = None,
+    stock: Annotated[
+        Path | None,
+        typer.Option(help="A TOML file with the sheets to use: sizes, quantities, defects."),
+    ] = None,
+    margin: Annotated[
+        str | None, typer.Option(help="Kept free along the sheet's edges [default: the machine's].")
+    ] = None,
+    grain: Annotated[
+        str | None,
+        typer.Option(help="How the sheets' fibres run: x, y, none [default: the material's]."),
+    ] = None,
+    along_grain: Annotated[
+        str | None, typer.Option(help="The pattern's axis to lay along the fibres: x or y [x].")
+    ] = None,
+    rotations: Annotated[
+        str | None,
+        typer.Option(help="Degrees by which patches may be turned [default: 0,90,180,270]."),
+    ] = None,
+    engine: Annotated[
+        str | None,
+        typer.Option(help="Nests the patches: raster, auto, packingsolver, spyrrow, rectpack."),
+    ] = None,
+    nesting_time: Annotated[
+        float | None, typer.Option(help="Seconds that the engine may take [default: 30].")
+    ] = None,
+    nesting_seed: Annotated[
+        int | None, typer.Option(help="Seed of engines that draw lots [default: 0].")
+    ] = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -97,6 +128,15 @@ def sheets(
         "bridges": bridges,
         "bridge": bridge,
         "spread_heat": spread_heat,
+        "quantity": quantity,
+        "stock": None if stock is None else str(stock),
+        "margin": margin,
+        "grain": grain,
+        "along_grain": along_grain,
+        "rotations": rotations,
+        "engine": engine,
+        "nesting_time": nesting_time,
+        "nesting_seed": nesting_seed,
     }
     options = miurafab.layout_options(
         {key: value for key, value in given.items() if value is not None}, design
@@ -116,6 +156,10 @@ def sheets(
         "job": str(out),
         "machine": job.layout.machine,
         "material": job.layout.material,
+        "sheets": [
+            {"name": sheet.name, "stock": sheet.stock, "patches": len(sheet.placements)}
+            for sheet in job.layout.sheets
+        ],
         "totals": {
             "patches": totals.patches,
             "sheets": totals.sheets,
@@ -135,6 +179,9 @@ def sheets(
     def show() -> None:
         console.facts({"job": str(out), "machine": job.layout.machine})
         console.facts(answer["totals"])
+        for sheet in job.layout.sheets:
+            if sheet.stock:
+                console.line(f"{sheet.name} is cut from '{sheet.stock}'.")
         if job.layout.untabbed:
             console.line(f"No tab could stand on {len(job.layout.untabbed)} seam edges.")
         for remark in job.layout.remarks:

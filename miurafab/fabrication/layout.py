@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.sheets import Layout, Patch, Placement, Sheet, Totals
+from miurafab.fabrication.framing import Patch
+from miurafab.fabrication.sheets import Layout, NestingRecord, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
-from miurafab.version import __version__
 
 SCHEMA = "miurafab-layout/1"
 
@@ -33,7 +33,7 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
         "sheets": [dataclasses.asdict(sheet) for sheet in layout.sheets],
         "patches": [_patch_table(patch) for patch in layout.patches],
         "totals": dataclasses.asdict(layout.totals),
-        "nesting": {"engine": "miurafab raster", "version": __version__},
+        "nesting": dataclasses.asdict(layout.nesting),
         "untabbed": list(layout.untabbed),
         "unlettered": layout.unlettered,
         "remarks": list(layout.remarks),
@@ -60,6 +60,7 @@ def read_layout(text: str) -> Layout:
             patches=tuple(_patch(table) for table in document["patches"]),
             sheets=tuple(_sheet(table) for table in document["sheets"]),
             totals=Totals(**document["totals"]),
+            nesting=NestingRecord(**document["nesting"]),
             untabbed=tuple(document.get("untabbed", ())),
             unlettered=document.get("unlettered", 0),
             remarks=tuple(str(remark) for remark in document.get("remarks", ())),
@@ -74,6 +75,7 @@ def _patch_table(patch: Patch) -> dict[str, Any]:
     return {
         "id": patch.id,
         "label": patch.label,
+        "copy": patch.copy,
         "faces": patch.faces.tolist(),
         "outline_mm": patch.outline_mm.tolist(),
         "waste_mm": [ring.tolist() for ring in patch.waste_mm],
@@ -114,6 +116,7 @@ def _patch(table: dict[str, Any]) -> Patch:
             )
             for tab in table["tabs"]
         ),
+        copy=int(table.get("copy", 1)),
     )
 
 
@@ -126,6 +129,10 @@ def _sheet(table: dict[str, Any]) -> Sheet:
         back=table.get("back"),
         travel_mm=float(table.get("travel_mm", 0.0)),
         travel_bound_mm=float(table.get("travel_bound_mm", 0.0)),
+        stock=str(table.get("stock", "")),
+        defects_mm=tuple(
+            tuple((float(x), float(y)) for x, y in ring) for ring in table.get("defects_mm", ())
+        ),
     )
 
 

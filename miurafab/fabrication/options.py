@@ -7,13 +7,40 @@ way they come through :func:`read_options`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 
 from miurafab.errors import InputError
-from miurafab.profiles import Table
+from miurafab.fabrication.nesting import ENGINES, RASTER
+from miurafab.profiles import GRAINS, Table
 from miurafab.units import parse_length
 
 TAB_SIDES = ("lower", "upper", "alternate")
+
+
+@dataclass(frozen=True)
+class NestingOptions:
+    """What patches are nested on, and by what.
+
+    ``quantity`` is how many of the whole model are made. ``stock`` is a file that tells the sheets
+    (:mod:`~miurafab.fabrication.stock`), None for as many as it takes, as large as the bed;
+    ``margin_mm`` stands in for the machine's. ``grain`` is which way fibres run in sheets that do
+    not tell, None for the material's, and ``along_grain`` the axis of the pattern that is laid
+    along them. ``rotations`` are the degrees by which a patch may be turned on its sheet.
+
+    ``engine`` is one of :data:`~miurafab.fabrication.nesting.run.ENGINES`; it has ``seconds`` of
+    time, and draws its lots, if any, from ``seed``.
+    """
+
+    quantity: int = 1
+    stock: Path | None = None
+    margin_mm: float | None = None
+    grain: str | None = None
+    along_grain: str = "x"
+    rotations: tuple[int, ...] = (0, 90, 180, 270)
+    engine: str = RASTER
+    seconds: float = 30.0
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -34,6 +61,7 @@ class LayoutOptions:
     ``two_sided`` has valleys that are scored made from the back of the sheet. ``bridges`` is the
     number of places, ``bridge_mm`` long, in which each outline is left whole so that nothing
     falls out; ``spread_heat`` has patches next to each other cut far apart in time.
+    ``nesting`` is how patches are laid on sheets.
     """
 
     gap_mm: float = 2.0
@@ -50,10 +78,12 @@ class LayoutOptions:
     bridges: int = 0
     bridge_mm: float = 0.5
     spread_heat: bool = False
+    nesting: NestingOptions = field(default_factory=NestingOptions)
 
 
-def read_options(table: Table) -> LayoutOptions:
-    """The options in ``table``; its other keys are left to the caller, who finishes it.
+def read_options(table: Table, folder: Path = Path()) -> LayoutOptions:
+    """The options in ``table``; its other keys are left to the caller, who finishes it. Files that
+    it names are looked for from ``folder`` on.
 
     Raises the error of the table, naming the key.
     """
@@ -82,7 +112,36 @@ def read_options(table: Table) -> LayoutOptions:
         bridges=bridges,
         bridge_mm=table.length("bridge", usual.bridge_mm, low=0.1, high=20),
         spread_heat=table.flag("spread_heat", usual.spread_heat),
+        nesting=_nesting(table, folder),
     )
+
+
+def _nesting(table: Table, folder: Path) -> NestingOptions:
+    usual = NestingOptions()
+    margin = table.length("margin", low=0, high=100) if table.has("margin") else None
+    return NestingOptions(
+        quantity=table.whole("quantity", usual.quantity, low=1, high=1000),
+        stock=folder / table.text("stock") if table.has("stock") else None,
+        margin_mm=margin,
+        grain=table.choice("grain", GRAINS) if table.has("grain") else None,
+        along_grain=table.choice("along_grain", ("x", "y"), usual.along_grain),
+        rotations=_rotations(table, usual.rotations),
+        engine=table.choice("engine", ENGINES, usual.engine),
+        seconds=table.number("nesting_time", usual.seconds, low=1, high=86_400),
+        seed=table.whole("nesting_seed", usual.seed, low=0, high=2**31 - 1),
+    )
+
+
+def _rotations(table: Table, usual: tuple[int, ...]) -> tuple[int, ...]:
+    if not table.has("rotations"):
+        return usual
+    text = table.scalar("rotations")
+    parts = [part.strip() for part in text.split(",")]
+    if not all(part.isdigit() and int(part) < 360 for part in parts):
+        raise table.fault(
+            "rotations", f"is '{text}'; write whole degrees from 0 to 359, such as '0,180'"
+        )
+    return tuple(sorted({int(part) for part in parts}))
 
 
 def _size(table: Table, key: str) -> tuple[float, float] | None:

@@ -10,54 +10,26 @@ origin, and from there to its sheet. A point p of the pattern lies on the sheet 
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from miurafab.errors import LayoutError
-from miurafab.fabrication.boxes import best_turn
-from miurafab.fabrication.labels import place_texts
-from miurafab.fabrication.nesting import Problem, SheetKind, Slot, Stock, nest, turned
+from miurafab.fabrication.framing import DIGITS, Framed, Patch, copied, frame_patches
+from miurafab.fabrication.labels import Lettering, place_texts
+from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, check_engine, nest, turned
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.ordering import Strokes, corner_of, order_strokes
-from miurafab.fabrication.pieces import Piece, Pieces, make_pieces
+from miurafab.fabrication.pieces import Pieces
 from miurafab.fabrication.seams import all_seams
+from miurafab.fabrication.stock import LaidStock, lay_stock
 from miurafab.fabrication.strokes import Blank, Motion, sheet_strokes
-from miurafab.fabrication.tabs import FOLDS, Tab
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.fabrication.travel import travel_bound
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, Material
-
-_DIGITS = 6
-"""Decimals of mm that a layout keeps, so that what is written is what was computed."""
-
-
-@dataclass(frozen=True, eq=False)
-class Patch:
-    """One piece, in its own frame. ``faces`` (n,) int64 index the pattern's facets.
-
-    ``outline_mm`` (m, 2) is the cut line with tabs, kerf included, counter-clockwise, and
-    ``waste_mm`` further closed cut lines inside it, around enclosed waste; there rarely are any.
-    A point p of the pattern is R(``rotation_deg``) (p - ``origin_mm``) in this frame.
-    """
-
-    id: int
-    label: str
-    faces: NDArray[np.int64]
-    outline_mm: NDArray[np.float64]
-    waste_mm: tuple[NDArray[np.float64], ...]
-    origin_mm: tuple[float, float]
-    rotation_deg: float
-    tabs: tuple[Tab, ...]
-
-    def from_pattern(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """``points`` (n, 2) of the pattern in the patch frame."""
-        return turned(points - self.origin_mm, self.rotation_deg)
+from miurafab.version import __version__
 
 
 @dataclass(frozen=True)
@@ -78,7 +50,8 @@ class Placement:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A sheet as large as the machine's bed, or an off-cut, and what lies on it.
+    """A sheet and what lies on it. ``stock`` is what its kind is called, empty for one as large as
+    the bed, and ``defects_mm`` are closed curves on which nothing lies.
 
     ``back`` is the name of what is made on its back before its front, or None. ``travel_mm`` is
     what is moved with the beam off, and ``travel_bound_mm`` what no order could do with less than.
@@ -91,6 +64,8 @@ class Sheet:
     back: str | None = None
     travel_mm: float = 0.0
     travel_bound_mm: float = 0.0
+    stock: str = ""
+    defects_mm: tuple[Ring, ...] = ()
 
     @property
     def passes(self) -> tuple[str, ...]:
@@ -115,6 +90,20 @@ class Totals:
     seconds: float | None = None
 
 
+@dataclass(frozen=True)
+class NestingRecord:
+    """What nested the patches: ``engine``, its ``version``, the ``seed``, the ``seconds`` it took
+    (None where the clock had no say in the result, so that the same input gives the same bytes),
+    and the number of sheets below which no layout can go.
+    """
+
+    engine: str
+    version: str
+    seed: int = 0
+    seconds: float | None = None
+    sheets_bound: int | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Layout:
     """A pattern on sheets. ``toolpaths`` holds one for each sheet and ``backs`` one for each back
@@ -130,11 +119,22 @@ class Layout:
     patches: tuple[Patch, ...]
     sheets: tuple[Sheet, ...]
     totals: Totals
+    nesting: NestingRecord = NestingRecord("none", __version__)
     untabbed: tuple[int, ...] = ()
     unlettered: int = 0
     remarks: tuple[str, ...] = ()
     toolpaths: tuple[Toolpath, ...] = ()
     backs: tuple[Toolpath, ...] = ()
+
+    @property
+    def copies(self) -> int:
+        """How many models it makes."""
+        return max((patch.copy for patch in self.patches), default=1)
+
+    @property
+    def model(self) -> Layout:
+        """The same layout with the patches of the first model alone."""
+        return replace(self, patches=tuple(p for p in self.patches if p.copy == 1))
 
     @property
     def passes(self) -> tuple[Toolpath, ...]:
@@ -156,60 +156,39 @@ def lay_out(
 ) -> Layout:
     """The pattern laid out on sheets of the machine's bed as ``options`` want it.
 
-    Deterministic. Raises :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed, or
-    is not a simple polygon, or the material's dashes cannot be drawn, or an option asks for what
-    the pattern or the material does not have.
+    Deterministic, unless an outside engine nests or the time for nesting is over. Raises
+    :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed, or is not a simple
+    polygon, or the material's dashes cannot be drawn, or the stock does not suffice, or an option
+    asks for what the pattern or the material does not have.
     """
     options = options or LayoutOptions()
+    wanted = options.nesting
+    check_engine(wanted.engine)
     material = _with_own_tabs(material, options)
-    bed = machine.bed
-    width, height = bed.width_mm - 2 * bed.margin_mm, bed.height_mm - 2 * bed.margin_mm
-    pieces = make_pieces(pattern, width, height, material, options)
-    numbers = _numbers(pieces)
-    patches = tuple(
-        _patch(pattern, number, piece, pieces, numbers, (width, height))
-        for number, piece in enumerate(pieces.pieces)
-    )
-    offcuts = [_on_bed(size, machine) for size in options.offcuts_mm]
-    quarters = (0, 90, 180, 270)
-    kinds = [
-        *(SheetKind(x - 2 * bed.margin_mm, y - 2 * bed.margin_mm, quarters, 1) for x, y in offcuts),
-        SheetKind(width, height, quarters),
-    ]
+    stock = lay_stock(options, machine.bed, material.grain)
+    framed = frame_patches(pattern, stock, material, options)
+    pieces, numbers = framed.pieces, framed.numbers
+    patches = copied(framed.patches, wanted.quantity)
     nesting = nest(
         Problem(
             tuple(patch.outline_mm for patch in patches),
             tuple(patch.label for patch in patches),
-            Stock(tuple(kinds), options.gap_mm),
-            30.0,
-        )
+            stock.kinds,
+            wanted.seconds,
+            wanted.seed,
+        ),
+        wanted.engine,
     )
-    slots = nesting.slots
-    placements = [
-        Placement(
-            patch=patch.id,
-            x_mm=round(slot.x_mm + bed.margin_mm, _DIGITS),
-            y_mm=round(slot.y_mm + bed.margin_mm, _DIGITS),
-            rotation_deg=float(slot.rotation_deg),
-        )
-        for patch, slot in zip(patches, slots, strict=True)
-    ]
-    sheets = _sheets(placements, slots, [*offcuts, (bed.width_mm, bed.height_mm)])
-    usable = sum(
-        (each.width_mm - 2 * bed.margin_mm) * (each.height_mm - 2 * bed.margin_mm)
-        for each in sheets
-    )
-    motion = _motion(patches, placements, slots)
-    turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
-    names = [patch.label for patch in patches]
-    lettering = place_texts(pattern, pieces.face_patch, names, pieces.tabs, numbers, turns)
+    sheets, placements = _sheets(nesting, patches, stock)
+    motion = _motion(patches, placements, nesting.slots)
+    lettering = _lettering(pattern, framed, patches, motion)
     drawn = sheet_strokes(
         pattern,
         pieces,
         lettering.texts,
         motion,
         material,
-        [Blank(each.name, each.width_mm, each.height_mm, bed.margin_mm) for each in sheets],
+        [Blank(each.name, each.width_mm, each.height_mm, stock.margin_mm) for each in sheets],
         options,
     )
     ways, corner = pattern.edges_vertices, corner_of(machine, material)
@@ -222,17 +201,47 @@ def lay_out(
     backs = [None if each is None else ordered(each) for each in drawn.backs]
     sheets = tuple(_with_passes(*made) for made in zip(sheets, toolpaths, backs, strict=True))
     behind = tuple(back for back in backs if back is not None)
+    usable = sum(stock.kinds.kinds[kind].area for kind in _kinds(nesting))
+    remarks = _remarks(pieces, numbers, lettering.unmarked, drawn.unrelieved, material)
     return Layout(
         machine=machine.name,
         material=material.name,
         patches=patches,
         sheets=sheets,
         totals=_totals(pattern, pieces, patches, sheets, toolpaths + behind, usable),
+        nesting=_record(nesting),
         untabbed=tuple(pieces.untabbed.tolist()),
         unlettered=lettering.left_out,
-        remarks=_remarks(pieces, numbers, lettering.unmarked, drawn.unrelieved, material),
+        remarks=remarks + nesting.remarks,
         toolpaths=toolpaths,
         backs=behind,
+    )
+
+
+def _lettering(
+    pattern: CreasePattern, framed: Framed, patches: tuple[Patch, ...], motion: Motion
+) -> Lettering:
+    """The texts of all copies, each upright as its patch lies."""
+    pieces, count = framed.pieces, len(framed.patches)
+    turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
+    texts, left_out, unmarked = [], 0, 0
+    for first in range(0, len(patches), count):
+        names = [patch.label for patch in patches[first : first + count]]
+        own = turns[first : first + count]
+        found = place_texts(pattern, pieces.face_patch, names, pieces.tabs, framed.numbers, own)
+        texts += [replace(text, patch=text.patch + first) for text in found.texts]
+        left_out += found.left_out
+        unmarked += found.unmarked
+    return Lettering(texts, left_out, unmarked)
+
+
+def _record(nesting: Nesting) -> NestingRecord:
+    return NestingRecord(
+        engine=nesting.engine,
+        version=nesting.version,
+        seed=nesting.seed,
+        seconds=None if nesting.seconds is None else round(nesting.seconds, 1),
+        sheets_bound=nesting.bound,
     )
 
 
@@ -280,88 +289,45 @@ def _remarks(
     return tuple(found)
 
 
-def _numbers(pieces: Pieces) -> NDArray[np.int64]:
-    """The number of each tab, from 1, patch by patch along the outline."""
-    numbers = np.empty(len(pieces.tabs), dtype=np.int64)
-    order = np.concatenate([piece.tabs for piece in pieces.pieces])
-    numbers[order] = np.arange(1, len(order) + 1)
-    return numbers
-
-
-def _patch(
-    pattern: CreasePattern,
-    number: int,
-    piece: Piece,
-    pieces: Pieces,
-    numbers: NDArray[np.int64],
-    size: tuple[float, float],
-) -> Patch:
-    line = piece.cut_lines[0]
-    angle = best_turn(line, *size)
-    if angle is None:
-        raise LayoutError(f"Patch {number} with its tabs does not fit the bed at any angle.")
-    rotation = round(-math.degrees(angle), 9)
-    low = turned(line, rotation).min(axis=0)
-    origin = np.round(turned(low, -rotation), _DIGITS)
-
-    def framed(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.round(turned(points - origin, rotation), _DIGITS)
-
-    tabs = pieces.tabs
-    return Patch(
-        id=number,
-        label=f"P{number + 1}",
-        faces=piece.faces,
-        outline_mm=framed(line),
-        waste_mm=tuple(framed(ring) for ring in piece.cut_lines[1:]),
-        origin_mm=(float(origin[0]), float(origin[1])),
-        rotation_deg=rotation,
-        tabs=tuple(
-            Tab(
-                number=int(numbers[tab]),
-                edge=int(tabs.edge[tab]),
-                mate_edge=int(tabs.seams.edges[tab, 1]),
-                mate_patch=int(pieces.face_patch[tabs.mate_face[tab]]),
-                polygon_mm=framed(tabs.polygon(tab)),
-                fold=FOLDS.get(str(tabs.seams.fold[tab]), "flat"),
-            )
-            for tab in piece.tabs.tolist()
-        ),
-    )
+def _kinds(nesting: Nesting) -> list[int]:
+    """The kind of each sheet."""
+    kind = {slot.sheet: slot.kind for slot in nesting.slots}
+    return [kind[number] for number in range(len(kind))]
 
 
 def _sheets(
-    placements: list[Placement], slots: Sequence[Slot], sizes: list[tuple[float, float]]
-) -> tuple[Sheet, ...]:
-    """The sheets; ``sizes`` are those of the off-cuts, and last that of a whole sheet."""
-    count = max(slot.sheet for slot in slots) + 1
-    on_sheet: list[list[Placement]] = [[] for _ in range(count)]
-    size = [sizes[-1]] * count
-    for placement, slot in zip(placements, slots, strict=True):
-        on_sheet[slot.sheet].append(placement)
-        size[slot.sheet] = sizes[slot.kind]
-    return tuple(
-        Sheet(f"sheet-{number:02d}", *size[number - 1], tuple(placed))
-        for number, placed in enumerate(on_sheet, start=1)
-    )
-
-
-def _on_bed(size: tuple[float, float], machine: MachineProfile) -> tuple[float, float]:
-    """The width and height of what the bed takes of an off-cut, laid along its longer side."""
-    bed = machine.bed
-    long, short = size
-    width, height = (long, short) if bed.width_mm >= bed.height_mm else (short, long)
-    width, height = min(width, bed.width_mm), min(height, bed.height_mm)
-    if min(width, height) <= 2 * bed.margin_mm:
-        raise LayoutError(
-            f"An off-cut of {long:g} mm x {short:g} mm leaves nothing within margins of "
-            f"{bed.margin_mm:g} mm; leave it out."
+    nesting: Nesting, patches: tuple[Patch, ...], stock: LaidStock
+) -> tuple[tuple[Sheet, ...], list[Placement]]:
+    """The sheets with what lies on them, and the placement of each patch."""
+    placements = [
+        Placement(
+            patch=patch.id,
+            x_mm=round(slot.x_mm + stock.margin_mm, DIGITS),
+            y_mm=round(slot.y_mm + stock.margin_mm, DIGITS),
+            rotation_deg=float(slot.rotation_deg),
         )
-    return width, height
+        for patch, slot in zip(patches, nesting.slots, strict=True)
+    ]
+    kinds = _kinds(nesting)
+    on_sheet: list[list[Placement]] = [[] for _ in kinds]
+    for placement, slot in zip(placements, nesting.slots, strict=True):
+        on_sheet[slot.sheet].append(placement)
+    sheets = tuple(
+        Sheet(
+            f"sheet-{number:02d}",
+            stock.sheets[kind].width_mm,
+            stock.sheets[kind].height_mm,
+            tuple(placed),
+            stock=stock.sheets[kind].name,
+            defects_mm=stock.sheets[kind].defects_mm,
+        )
+        for number, (kind, placed) in enumerate(zip(kinds, on_sheet, strict=True), start=1)
+    )
+    return sheets, placements
 
 
 def _motion(
-    patches: tuple[Patch, ...], placements: list[Placement], slots: Sequence[Slot]
+    patches: tuple[Patch, ...], placements: list[Placement], slots: tuple[Slot, ...]
 ) -> Motion:
     """The way of each patch from the pattern to its sheet, in one step."""
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -388,11 +354,12 @@ def _totals(
     seams = all_seams(pattern, pieces.face_patch).edges[:, 0]
     ends = pattern.vertices_coords[pattern.edges_vertices[seams]]
     area = sum(shapely.Polygon(patch.outline_mm).area for patch in patches)
+    copies = len(patches) // len(pieces.pieces)
     return Totals(
         patches=len(patches),
         sheets=len(sheets),
-        seam_mm=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()),
-        tabs=len(pieces.tabs),
+        seam_mm=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()) * copies,
+        tabs=len(pieces.tabs) * copies,
         density=float(area / usable),
         cut_mm=sum(toolpath.length_of("cut") for toolpath in toolpaths),
         perforated_mm=sum(toolpath.length_of("perforate") for toolpath in toolpaths),

@@ -88,19 +88,24 @@ def sheet_strokes(
 ) -> Drawn:
     """The strokes of each sheet, with backs and holding bridges as ``options`` want them.
 
-    Raises :class:`~miurafab.errors.LayoutError` where there are none, or no margin for the
+    ``motion`` moves all patches of one copy of the model after the other; ``texts`` are on all of
+    them. Raises :class:`~miurafab.errors.LayoutError` where there are none, or no margin for the
     registration holes.
     """
     options = options or LayoutOptions()
     if options.two_sided:
         _check_two_sided(material, sheets)
     creases, holes = _creases(pattern, pieces, material)
-    parts = [
-        _engraved(texts),
+    drawn_once = [
         *(_made(creases[kind], kind, material) for kind in CREASE_KINDS),
         _relief(pattern, holes, material),
         _slits(pattern, pieces),
         _outlines(pieces, options, material.kerf_mm),
+    ]
+    copies = range(0, len(motion.sheet), len(pieces.pieces))
+    parts = [
+        _engraved(texts),
+        *(replace(part, patch=part.patch + first) for first in copies for part in drawn_once),
     ]
     count = np.concatenate([part.count for part in parts])
     patch = np.concatenate([part.patch for part in parts])

@@ -24,6 +24,9 @@ MODES = ("perforate", "score", "cut", "none")
 MIN_HOLE_PATH_MM = 0.1
 """A circle of a smaller diameter is a dot to a beam and its controller (judged)."""
 
+GRAINS = ("none", "x", "y")
+"""Which way the fibres of a sheet run as it lies on the bed, if any."""
+
 START_ENDS = ("bridge", "cut")
 FITS = ("centre", "stretch_cut", "stretch_gap")
 
@@ -95,6 +98,7 @@ class Material:
     ``modulus_pa`` is Young's modulus in bending, None where the file does not give it: it is
     needed for energies in joules and for nothing else. ``creases`` holds all of
     :data:`CREASE_KINDS`; ``relief_hole_mm`` is the diameter burnt out at a vertex, 0 for none.
+    ``grain`` is one of :data:`GRAINS`.
     """
 
     name: str
@@ -108,6 +112,7 @@ class Material:
     modulus_pa: float | None = None
     creases: dict[str, Crease] = field(default_factory=_all_perforated)
     relief_hole_mm: float = 0.0
+    grain: str = "none"
 
     def perforation_of(self, kind: str) -> Perforation:
         """The dashes on creases of one kind."""
@@ -138,6 +143,7 @@ def load_material(name: str | Path) -> Material:
         modulus_pa=table.modulus("modulus", low=1e5, high=1e12) if table.has("modulus") else None,
         creases=creases,
         relief_hole_mm=relief_hole,
+        grain=table.choice("grain", GRAINS, "none"),
     )
     table.finish()
     return material

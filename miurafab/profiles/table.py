@@ -156,6 +156,26 @@ class Table:
             raise self.fault(key, f"must be a table [{key}], not {value!r}")
         return Table(value, f"{self.where} [{key}]", self._error)
 
+    def tables(self, key: str) -> list[Table]:
+        """The tables of an array ``[[key]]``, none if it is not there; the caller finishes each."""
+        values = self._take(key, [])
+        if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
+            raise self.fault(key, f"must be tables [[{key}]], not {values!r}")
+        return [
+            Table(value, f"{self.where} [[{key}]] {number}", self._error)
+            for number, value in enumerate(values, start=1)
+        ]
+
+    def points(self, key: str) -> tuple[tuple[float, float], ...]:
+        """A list of points, each a list of two lengths in mm."""
+        values = self._take(key, _REQUIRED)
+        try:
+            return tuple((parse_length(x), parse_length(y)) for x, y in values)
+        except (TypeError, ValueError, UnitError):
+            raise self.fault(
+                key, f"is {values!r}; write points such as [[0, 0], [50, 0], [0, 30]]"
+            ) from None
+
     def scalar(self, key: str) -> str:
         """A text or a plain number, in its written form, for a parser further on."""
         value = self._take(key, _REQUIRED)

@@ -141,7 +141,7 @@ def _from_file(path: Path, given: Mapping[str, str | None]) -> Design:
     layout = table.table("layout", {})
     machine = layout.text("machine") if layout.has("machine") else None
     material = layout.text("material") if layout.has("material") else None
-    options = read_options(layout)
+    options = read_options(layout, path.parent)
     layout.finish()
     table.finish(known=_OPTIONS)
     defaults: dict[str, str | None] = {}

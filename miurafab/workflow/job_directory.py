@@ -86,6 +86,8 @@ def layout_options(given: Mapping[str, Any], design_file: Path | None = None) ->
         values = written.table("layout", {}).rest()
         for key in ("machine", "material"):
             values.pop(key, None)
+        if isinstance(values.get("stock"), str):
+            values["stock"] = str(design_file.parent / values["stock"])
     table = Table(values | dict(given), "The layout options", InputError)
     options = read_options(table)
     table.finish()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
 import miurafab
 from miurafab.errors import InputError, ProfileError
-from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.profiles import load_material, shipped_directory
 from miurafab.profiles.material import Crease, Perforation
 
@@ -34,6 +35,15 @@ def test_every_option_is_read():
             "bridges": 3,
             "bridge": "0.4mm",
             "spread_heat": True,
+            "quantity": 3,
+            "stock": "my/stock.toml",
+            "margin": "8mm",
+            "grain": "y",
+            "along_grain": "y",
+            "rotations": "180, 0",
+            "engine": "rectpack",
+            "nesting_time": 12.5,
+            "nesting_seed": 9,
         }
     )
     assert options == LayoutOptions(
@@ -51,6 +61,17 @@ def test_every_option_is_read():
         bridges=3,
         bridge_mm=0.4,
         spread_heat=True,
+        nesting=NestingOptions(
+            quantity=3,
+            stock=Path("my/stock.toml"),
+            margin_mm=8.0,
+            grain="y",
+            along_grain="y",
+            rotations=(0, 180),
+            engine="rectpack",
+            seconds=12.5,
+            seed=9,
+        ),
     )
 
 
@@ -63,6 +84,10 @@ def test_every_option_is_read():
         ({"max_patch": "300mm x 0"}, "both sides must be longer than 0"),
         ({"seam_rows": "0"}, "'seam_rows' is '0'; write line numbers from 1 up"),
         ({"tab_side": "left"}, "it must be one of lower, upper, alternate"),
+        ({"quantity": 0}, "'quantity' is 0; it must lie between 1 and 1000"),
+        ({"rotations": "0,360"}, "'rotations' is '0,360'; write whole degrees from 0 to 359"),
+        ({"engine": "magic"}, "one of raster, auto, packingsolver, spyrrow, rectpack"),
+        ({"nesting_time": 0}, "'nesting_time' is 0; it must lie between 1 and"),
         ({"bridges": 1}, "'bridges' is 1, on which a piece would swing"),
     ],
 )
@@ -73,9 +98,12 @@ def test_a_wrong_option_is_refused_by_name(given, complaint):
 
 def test_options_of_a_design_file_give_way_to_those_of_the_command_line(tmp_path):
     file = tmp_path / "x.toml"
-    file.write_text('[layout]\nmachine = "m"\ngap = "4mm"\nbridges = 2\n')
+    file.write_text('[layout]\nmachine = "m"\ngap = "4mm"\nbridges = 2\nstock = "s.toml"\n')
     options = miurafab.layout_options({"gap": "1mm"}, file)
-    assert options == LayoutOptions(gap_mm=1.0, bridges=2)
+    beside = NestingOptions(stock=tmp_path / "s.toml")
+    assert options == LayoutOptions(gap_mm=1.0, bridges=2, nesting=beside)
+    own = miurafab.layout_options({"stock": "mine.toml"}, file)
+    assert own.nesting.stock == Path("mine.toml")
 
 
 def with_creases(tmp_path, text, perforation=""):

@@ -314,7 +314,7 @@ def test_offcuts_are_used_up_before_whole_sheets():
         assert (toolpath.points >= 5.0 - 0.2).all()
         assert (toolpath.points <= np.array([sheet.width_mm, sheet.height_mm]) - 5.0 + 0.2).all()
     assert 0 < layout.totals.density < 1
-    with pytest.raises(LayoutError, match="off-cut of 12 mm x 9 mm leaves nothing"):
+    with pytest.raises(LayoutError, match="off-cut of 12 mm x 9 mm' leaves nothing"):
         lay_out(
             pattern, bed(260.0, 200.0), card(), options=LayoutOptions(offcuts_mm=((12.0, 9.0),))
         )

@@ -45,14 +45,15 @@ def assembly_guide(
     canvas = Canvas(stream, invariant=1, pagesize=(_WIDTH * mm, _HEIGHT * mm))
     canvas.setTitle(f"{title}: assembly")
     canvas.setCreator("miurafab")
-    tints = [_tint(patch.id) for patch in layout.patches]
+    model = layout.model
+    tints = [_tint(patch.id % len(model.patches)) for patch in layout.patches]
     face_patch = np.zeros(len(pattern.faces_vertices), dtype=np.int64)
-    for patch in layout.patches:
+    for patch in model.patches:
         face_patch[patch.faces] = patch.id
     _overview(canvas, layout, pattern, machine, material, title, tints, face_patch)
     for number in range(len(layout.sheets)):
         _sheet_page(canvas, layout, number, title, tints)
-    _glue_pages(canvas, layout, pattern, title, tints)
+    _glue_pages(canvas, model, pattern, title, tints, layout.copies)
     canvas.save()
     return stream.getvalue()
 
@@ -245,7 +246,7 @@ def _draw_flat(
         canvas.lines(ends[pattern.edges_assignment == letter].tolist())
     canvas.setFillColor(_INK)
     canvas.setFont("Helvetica-Bold", 11)
-    for patch in layout.patches:
+    for patch in layout.model.patches:
         corners = pattern.faces_vertices[patch.faces]
         x, y = points[corners[corners >= 0]].mean(axis=0) * mm
         canvas.drawCentredString(x, y - 4, patch.label)
@@ -257,7 +258,8 @@ def _sheet_page(
 ) -> None:
     sheet, toolpath = layout.sheets[number], layout.toolpaths[number]
     labels = ", ".join(layout.patches[p.patch].label for p in sheet.placements)
-    top = _heading(canvas, f"{title}: {sheet.name}", f"Patches {labels}")
+    cut_from = f" from '{sheet.stock}'" if sheet.stock else ""
+    top = _heading(canvas, f"{title}: {sheet.name}", f"Patches {labels}{cut_from}")
     room = (_WIDTH - 2 * _MARGIN, top - 40)
     scale = min(room[0] / sheet.width_mm, room[1] / sheet.height_mm)
     canvas.saveState()
@@ -267,6 +269,9 @@ def _sheet_page(
         patch = layout.patches[placement.patch]
         canvas.setFillColor(tints[patch.id])
         _polygon(canvas, placement.from_patch(patch.outline_mm), stroke=0)
+    canvas.setFillColor(_RULE)
+    for ring in sheet.defects_mm:
+        _polygon(canvas, np.array(ring), stroke=0)
     draw_strokes(canvas, toolpath, line_mm=0.12 / scale)
     canvas.setStrokeColor(_RULE)
     canvas.setLineWidth(0.3 / scale * mm)
@@ -286,12 +291,18 @@ def _sheet_page(
 
 
 def _glue_pages(
-    canvas: Canvas, layout: Layout, pattern: CreasePattern, title: str, tints: list[Color]
+    canvas: Canvas,
+    layout: Layout,
+    pattern: CreasePattern,
+    title: str,
+    tints: list[Color],
+    copies: int,
 ) -> None:
     steps = assembly_order(layout, pattern)
+    each = "In this order" if copies == 1 else f"In this order, for each of the {copies} copies"
     labels = [patch.label for patch in layout.patches]
     for start in range(0, len(steps), _ROWS_A_PAGE):
-        top = _heading(canvas, f"{title}: folding and glueing", "In this order")
+        top = _heading(canvas, f"{title}: folding and glueing", each)
         if start == 0:
             top = _instructions(canvas, top)
         for row, step in enumerate(steps[start : start + _ROWS_A_PAGE]):

@@ -2,6 +2,7 @@
 
 from miurafab.fabrication.nesting.problem import (
     Problem,
+    Ring,
     SheetKind,
     Slot,
     Stock,
@@ -9,14 +10,18 @@ from miurafab.fabrication.nesting.problem import (
     place,
     turned,
 )
-from miurafab.fabrication.nesting.run import Nesting, nest
+from miurafab.fabrication.nesting.run import ENGINES, RASTER, Nesting, check_engine, nest
 
 __all__ = [
+    "ENGINES",
+    "RASTER",
     "Nesting",
     "Problem",
+    "Ring",
     "SheetKind",
     "Slot",
     "Stock",
+    "check_engine",
     "layout_faults",
     "nest",
     "place",

@@ -152,6 +152,28 @@ def grown(outline: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
     return corners if shapely.is_ccw(ring) else corners[::-1]
 
 
+def clear_rectangle(kind: SheetKind) -> tuple[float, float, float, float]:
+    """The largest rectangle (low x, low y, high x, high y) of a sheet that no box around a defect
+    reaches into, in mm.
+    """
+    boxes = [shapely.Polygon(ring).bounds for ring in kind.defects]
+    best = (0.0, 0.0, 0.0, 0.0)
+    for low in [0.0, *(box[3] for box in boxes)]:
+        for high in [kind.height, *(box[1] for box in boxes)]:
+            between = sorted(box for box in boxes if box[1] < high and box[3] > low)
+            left = 0.0
+            for right, beyond in [*((b[0], b[2]) for b in between), (kind.width, 0.0)]:
+                found = (left, max(low, 0.0), min(right, kind.width), min(high, kind.height))
+                if min(found[2] - left, found[3] - found[1]) > 0 and _size(found) > _size(best):
+                    best = found
+                left = max(left, beyond)
+    return best
+
+
+def _size(box: tuple[float, float, float, float]) -> float:
+    return (box[2] - box[0]) * (box[3] - box[1])
+
+
 def renumbered(slots: Sequence[Slot]) -> list[Slot]:
     """The same layout with its sheets numbered from 0 without gaps, in their order."""
     used = {sheet: number for number, sheet in enumerate(sorted({slot.sheet for slot in slots}))}

@@ -1,0 +1,178 @@
+"""Patches: pieces in a frame of their own, and as many of each as there are copies of the model.
+
+A piece is turned to the smallest box that fits its sheet and moved until that box begins at the
+origin. Where it has to lie along the fibres of a sheet it keeps the directions of the pattern; then
+it may fit the sheet at any angle but the right one, and the pattern is divided once more, into
+pieces as much smaller as the worst of them is too large, until all fit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import LayoutError
+from miurafab.fabrication.boxes import best_turn
+from miurafab.fabrication.nesting import SheetKind, turned
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.pieces import Piece, Pieces, make_pieces
+from miurafab.fabrication.stock import LaidStock
+from miurafab.fabrication.tabs import FOLDS, Tab
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import Material
+
+DIGITS = 6
+"""Decimals of mm that a layout keeps, so that what is written is what was computed."""
+
+_ATTEMPTS = 12
+"""How often a pattern is divided into smaller pieces before it is given up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """One piece, in its own frame. ``faces`` (n,) int64 index the pattern's facets.
+
+    ``outline_mm`` (m, 2) is the cut line with tabs, kerf included, counter-clockwise, and
+    ``waste_mm`` further closed cut lines inside it, around enclosed waste; there rarely are any.
+    A point p of the pattern is R(``rotation_deg``) (p - ``origin_mm``) in this frame. ``copy`` is
+    the number of the model that it belongs to, from 1.
+    """
+
+    id: int
+    label: str
+    faces: NDArray[np.int64]
+    outline_mm: NDArray[np.float64]
+    waste_mm: tuple[NDArray[np.float64], ...]
+    origin_mm: tuple[float, float]
+    rotation_deg: float
+    tabs: tuple[Tab, ...]
+    copy: int = 1
+
+    def from_pattern(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """``points`` (n, 2) of the pattern in the patch frame."""
+        return turned(points - self.origin_mm, self.rotation_deg)
+
+
+@dataclass(frozen=True, eq=False)
+class Framed:
+    """All ``pieces`` of a pattern, the ``numbers`` (N,) int64 of their tabs, and the patches that
+    they are, of one copy of the model.
+    """
+
+    pieces: Pieces
+    numbers: NDArray[np.int64]
+    patches: tuple[Patch, ...]
+
+
+def frame_patches(
+    pattern: CreasePattern, stock: LaidStock, material: Material, options: LayoutOptions
+) -> Framed:
+    """The patches of a pattern, each no larger than the main sheet of ``stock``.
+
+    Raises :class:`~miurafab.errors.LayoutError` as
+    :func:`~miurafab.fabrication.pieces.make_pieces`, and where no division yields patches that lie
+    along the fibres.
+    """
+    kind = stock.kinds.kinds[stock.main]
+    limit = (max(kind.width, kind.height), min(kind.width, kind.height))
+    if options.max_patch_mm is not None:
+        limit = min(limit[0], options.max_patch_mm[0]), min(limit[1], options.max_patch_mm[1])
+    for _ in range(_ATTEMPTS):
+        smaller = replace(options, max_patch_mm=limit)
+        pieces = make_pieces(pattern, kind.width, kind.height, material, smaller)
+        numbers = _numbers(pieces)
+        size = None if stock.upright else (kind.width, kind.height)
+        patches = tuple(
+            _patch(pattern, number, piece, pieces, numbers, size)
+            for number, piece in enumerate(pieces.pieces)
+        )
+        part = min(_room(patch.outline_mm, kind) for patch in patches) if stock.upright else 1.0
+        if part >= 1.0:
+            return Framed(pieces, numbers, patches)
+        limit = limit[0] * max(part, 0.6) * 0.999, limit[1] * max(part, 0.6) * 0.999
+    raise LayoutError(
+        "The pattern cannot be divided into patches that lie along the fibres of a sheet of "
+        f"{kind.width:.1f} mm x {kind.height:.1f} mm; write grain = 'none', or lay the pattern's "
+        "other axis along them."
+    )
+
+
+def _room(outline: NDArray[np.float64], kind: SheetKind) -> float:
+    """By how much an outline would have to be scaled to fit a sheet, 1 or more if it does."""
+    sizes = [np.ptp(turned(outline, turn), axis=0) for turn in kind.rotations]
+    if any(kind.fits(outline, turn) for turn in kind.rotations):
+        return 1.0
+    return max(float((np.array([kind.width, kind.height]) / size).min()) for size in sizes)
+
+
+def copied(patches: tuple[Patch, ...], quantity: int) -> tuple[Patch, ...]:
+    """The patches of ``quantity`` models, model by model; told apart by their ids and labels."""
+    if quantity == 1:
+        return patches
+    count = len(patches)
+    return tuple(
+        replace(
+            patch,
+            id=patch.id + count * copy,
+            label=f"{patch.label}-{copy + 1}",
+            tabs=tuple(
+                replace(tab, mate_patch=tab.mate_patch + count * copy) for tab in patch.tabs
+            ),
+            copy=copy + 1,
+        )
+        for copy in range(quantity)
+        for patch in patches
+    )
+
+
+def _numbers(pieces: Pieces) -> NDArray[np.int64]:
+    """The number of each tab, from 1, patch by patch along the outline."""
+    numbers = np.empty(len(pieces.tabs), dtype=np.int64)
+    order = np.concatenate([piece.tabs for piece in pieces.pieces])
+    numbers[order] = np.arange(1, len(order) + 1)
+    return numbers
+
+
+def _patch(
+    pattern: CreasePattern,
+    number: int,
+    piece: Piece,
+    pieces: Pieces,
+    numbers: NDArray[np.int64],
+    size: tuple[float, float] | None,
+) -> Patch:
+    line = piece.cut_lines[0]
+    angle = 0.0 if size is None else best_turn(line, *size)
+    if angle is None:
+        raise LayoutError(f"Patch {number} with its tabs does not fit the bed at any angle.")
+    rotation = round(-math.degrees(angle), 9) if angle else 0.0
+    low = turned(line, rotation).min(axis=0)
+    origin = np.round(turned(low, -rotation), DIGITS)
+
+    def framed(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.round(turned(points - origin, rotation), DIGITS)
+
+    tabs = pieces.tabs
+    return Patch(
+        id=number,
+        label=f"P{number + 1}",
+        faces=piece.faces,
+        outline_mm=framed(line),
+        waste_mm=tuple(framed(ring) for ring in piece.cut_lines[1:]),
+        origin_mm=(float(origin[0]), float(origin[1])),
+        rotation_deg=rotation,
+        tabs=tuple(
+            Tab(
+                number=int(numbers[tab]),
+                edge=int(tabs.edge[tab]),
+                mate_edge=int(tabs.seams.edges[tab, 1]),
+                mate_patch=int(pieces.face_patch[tabs.mate_face[tab]]),
+                polygon_mm=framed(tabs.polygon(tab)),
+                fold=FOLDS.get(str(tabs.seams.fold[tab]), "flat"),
+            )
+            for tab in piece.tabs.tolist()
+        ),
+    )
