@@ -14,8 +14,11 @@ from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.program import strokes
 from miurafab.gcode.reading import read_program
+from miurafab.machine.dialects import virtual_machine
 from miurafab.machine.planning import plan_job
-from miurafab.machine.sender import stream_job
+from miurafab.machine.sender import deliver, stream_job
+from miurafab.machine.signals import StopSignals
+from miurafab.machine.transport import VirtualTransport
 from miurafab.posting import post
 from miurafab.profiles import (
     OPERATIONS,
@@ -125,10 +128,14 @@ def test_the_virtual_controller_takes_it_whole(name, pattern) -> None:
 
 
 @pytest.mark.parametrize("machine", [MARLIN, CUTTER], ids=lambda each: each.name)
-def test_what_cannot_be_streamed_is_refused_with_a_way_out(machine, pattern) -> None:
+def test_what_speaks_otherwise_is_streamed_in_its_own_way(machine, pattern) -> None:
     job = post(sheet(pattern, machine), machine, CARD)
-    with pytest.raises(InputError, match=f"{machine.name} speaks {machine.dialect}"):
-        plan_job(job, machine)
+    device = virtual_machine(machine)
+    result = deliver(plan_job(job, machine), VirtualTransport(device), StopSignals())
+    assert result.lines > 20
+    assert device.lost_bytes == 0
+    with pytest.raises(InputError, match=f"{machine.name} speaks {machine.dialect}, which has no"):
+        plan_job(job, machine, check_mode=True)
 
 
 SQUARE = [(20.0, 20.0), (40.0, 20.0), (40.0, 40.0), (20.0, 40.0), (20.0, 20.0)]

@@ -9,6 +9,7 @@ select"). Anything else is refused by name, since what it draws would be left ou
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -35,6 +36,23 @@ def parse_hpgl(job: Job) -> Program:
     return _Reader(job.name).read(job)
 
 
+def instructions(name: str, number: int, line: str) -> Iterator[tuple[str, str]]:
+    """The instructions of one line of the file ``name``: two letters, and what follows them.
+
+    Raises :class:`~miurafab.errors.GcodeError` for what is none.
+    """
+    place = 0
+    while place < len(line):
+        match = _INSTRUCTION.match(line, place)
+        if match is None:
+            raise GcodeError(
+                f"{name}, line {number}: {line[place : place + 12]!r} is not HPGL; preview and cut "
+                "HPGL files with an HPGL machine, G-code with another."
+            )
+        yield match[1].upper(), match[2].strip()
+        place = match.end()
+
+
 class _Reader:
     def __init__(self, name: str) -> None:
         self.name = name
@@ -49,18 +67,10 @@ class _Reader:
 
     def read(self, job: Job) -> Program:
         for number, line in enumerate(job.iter_lines(), 1):
-            place = 0
             if line.strip():
                 self.sent.add(number, len(line) + 1)
-            while place < len(line):
-                match = _INSTRUCTION.match(line, place)
-                if match is None:
-                    raise GcodeError(
-                        f"{self.name}, line {number}: {line[place : place + 12]!r} is not HPGL; "
-                        "preview and cut HPGL files with an HPGL machine, G-code with another."
-                    )
-                self._do(number, match[1].upper(), [*map(float, _NUMBER.findall(match[2]))])
-                place = match.end()
+                for name, parameters in instructions(self.name, number, line):
+                    self._do(number, name, [*map(float, _NUMBER.findall(parameters))])
         return self._program()
 
     def _do(self, number: int, name: str, values: list[float]) -> None:

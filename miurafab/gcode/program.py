@@ -24,6 +24,7 @@ from miurafab.gcode.execution import (
 )
 from miurafab.gcode.faults import BlockFault
 from miurafab.gcode.job import Job, bare_code
+from miurafab.gcode.marlin import grbl_words
 from miurafab.gcode.moves import (
     BEAM_M3,
     BEAM_M4,
@@ -45,7 +46,6 @@ from miurafab.gcode.regular import LEAST_RUN, Lines, read_lines, run_of
 __all__ = ["Context", "Program", "Strokes", "parse_program", "strokes"]
 
 _COMMENT = re.compile(r"\s*\(\s*(sheet|patch|operation)\s+([^()]*?)\s*\)\s*")
-_INLINE = re.compile(r"(M0*[345])I0*(?![\d.])")
 _NO_LETTERS = str.maketrans("", "", "0123456789.+-")
 _CHUNK = 1 << 18  # characters read at once
 
@@ -66,7 +66,7 @@ def parse_program(
 
     ``laser`` is the controller's laser mode ($32), which darkens G0 and lets S change in motion.
     Arcs become chords that stay within ``arc_tolerance_mm`` of the arc ($12). With ``inline`` the
-    program is one for Marlin, whose ``M3 I``, ``M4 I`` and ``M5 I`` do what laser mode does. Raises
+    program is one for Marlin (:mod:`miurafab.gcode.marlin`). Raises
     :class:`~miurafab.errors.GcodeError` naming file and line for what the controller would
     refuse, and for a ``$`` command, which is no part of a program.
     """
@@ -123,6 +123,8 @@ class _Reader:
 
     def _run(self, lines: Lines, first: int, stop: int, number: int) -> bool:
         """A run of regular lines at once; False if the state gives them another meaning."""
+        if self.rules.inline and not lines.commanded[first:stop].all():
+            return False
         run = run_of(lines, first, stop, self.state)
         if run is None:
             return False
@@ -170,7 +172,10 @@ class _Reader:
                 "a program; remove it."
             )
         if self.rules.inline:
-            code = _INLINE.sub(r"\1", code)
+            try:
+                code = grbl_words(code)
+            except ValueError as fault:
+                raise GcodeError(f"{name}, line {number}: {fault}.") from None
         try:
             block = parse_block(code, self.state, self.stored.__getitem__, self.rules)
         except BlockFault as fault:

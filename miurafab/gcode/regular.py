@@ -61,6 +61,11 @@ class Lines:
     words: NDArray[np.int64]
     points: NDArray[np.int64]
 
+    @property
+    def commanded(self) -> NDArray[np.bool_]:
+        """(L,) whether a line says G0 or G1 itself."""
+        return np.asarray(~np.isnan(self.values[_G]))
+
 
 def read_lines(text: str) -> Lines:
     """``text``, whole lines that each end in a newline, split into words where regular."""

@@ -30,13 +30,11 @@ from pathlib import Path
 from typing import IO
 
 from miurafab.errors import JobStopped, MachineError, MiurafabError
-from miurafab.grbl.connection import Connection
+from miurafab.machine.dialects import make_safe, open_machine
 from miurafab.machine.keys import Keys, NoKeys
 from miurafab.machine.planning import Plan
 from miurafab.machine.sender import Progress, StreamResult, stream_plan
-from miurafab.machine.session import Session
 from miurafab.machine.signals import StopSignals
-from miurafab.machine.transport import open_port
 from miurafab.machine.watchdog import BEAT, BEAT_S, STOPS, ParentWatch
 
 _LOOK_S = 0.005  # between two looks at keys and signals
@@ -208,16 +206,15 @@ def _make_safe(order: _Order, begun: bool) -> str:
     """Reset the controller that a dead process left; what became of that, in words."""
     if not begun:
         return "it had not opened the port"
-    unsure = "so switch the laser off at the machine"
     try:
-        transport = open_port(order.port, order.plan.machine.controller.baud)
+        transport = open_machine(order.plan.machine, order.port)
     except MachineError as error:
-        return f"the controller could not be reset ({str(error).rstrip('.')}), {unsure}"
+        return (
+            f"the controller could not be reset ({str(error).rstrip('.')}), so switch the laser "
+            "off at the machine"
+        )
     with contextlib.closing(transport):
-        session = Session(transport, Connection())
-        if session.stop():
-            return "the controller was reset and reports the beam off"
-    return f"the controller was reset but did not confirm that the beam is off, {unsure}"
+        return make_safe(order.plan.machine, transport)
 
 
 def main() -> None:

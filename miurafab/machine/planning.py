@@ -19,13 +19,10 @@ from miurafab.machine.preflight import (
     require_known,
 )
 from miurafab.machine.resume import Resumption
+from miurafab.marlin.connection import FRAME
 from miurafab.profiles import MachineProfile
 
-_GRBL = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc")
-_ELSEWHERE = {
-    "marlin": "a program that waits for Marlin's ok after every line, or from its SD card",
-    "hpgl": "the cutter's own program, or to its port with flow control on",
-}
+_NO_CHECK_MODE = ("marlin", "hpgl")
 
 
 @dataclass(frozen=True)
@@ -78,11 +75,15 @@ def plan_job(
             )
         job, program = resumption.job, None
     require_known(force)
-    if machine.dialect not in _GRBL:
+    if check_mode and machine.dialect in _NO_CHECK_MODE:
         raise InputError(
-            f"{machine.name} speaks {machine.dialect}, which cannot be streamed from here; send "
-            f"the file with {_ELSEWHERE[machine.dialect]}, or choose a machine that speaks "
-            f"{', '.join(_GRBL)}."
+            f"{machine.name} speaks {machine.dialect}, which has no check mode; a --dry-run reads "
+            "the job without a machine."
+        )
+    if (home or at is not None) and machine.dialect == "hpgl":
+        raise InputError(
+            f"{machine.name} speaks hpgl, which starts at the origin set at the cutter's panel; "
+            "leave --home and --at out."
         )
     count, program, findings = examine_job(
         job,
@@ -111,8 +112,10 @@ def examine_job(
 
     Raises :class:`~miurafab.errors.GcodeError` for a line that cannot be sent at all.
     """
-    lines = prepare_lines(job.name, job.iter_lines(), machine.controller.line_chars)
-    count, findings = check_lines(job.name, lines, machine, allow_m3=allow_m3 or check_mode)
+    count, findings = 0, list[Finding]()
+    if machine.dialect != "hpgl":
+        lines = prepare_lines(job.name, job.iter_lines(), longest_line(machine))
+        count, findings = check_lines(job.name, lines, machine, allow_m3=allow_m3 or check_mode)
     try:
         program = read_program(job, machine) if program is None else program
     except GcodeError as error:
@@ -121,4 +124,10 @@ def examine_job(
             findings.append(Finding("program", error))
     else:
         findings.extend(check_program(program, machine, most_power=most_power))
+        count = len(program.line_number)
     return count, program, findings
+
+
+def longest_line(machine: MachineProfile) -> int:
+    """How many characters of code a line may have, besides what the dialect adds to it."""
+    return machine.controller.line_chars - (FRAME if machine.dialect == "marlin" else 0)

@@ -17,18 +17,15 @@ from pathlib import Path
 
 from miurafab.errors import JobStopped, MiurafabError
 from miurafab.gcode.job import Job
-from miurafab.grbl.connection import Connection
-from miurafab.grbl.settings import virtual_settings
-from miurafab.machine.grbl_delivery import GrblDelivery
+from miurafab.machine.dialects import delivery_of, keeps_journal, open_machine
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import Keys, NoKeys
 from miurafab.machine.planning import Plan, plan_job
 from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.resume import Resumption
-from miurafab.machine.session import Session
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transcript import Transcript
-from miurafab.machine.transport import Transport, open_port
+from miurafab.machine.transport import FlowTransport
 from miurafab.profiles import MachineProfile
 
 __all__ = ["Progress", "StreamResult", "deliver", "stream_job", "stream_plan"]
@@ -106,12 +103,7 @@ def stream_plan(
     """Send a planned job; see :func:`stream_job`. ``signals`` are those already caught, if any."""
     with StopSignals() if signals is None else nullcontext(signals) as signals:
         try:
-            transport = open_port(
-                port,
-                plan.machine.controller.baud,
-                virtual_settings(plan.machine),
-                virtual_speed,
-            )
+            transport = open_machine(plan.machine, port, virtual_speed)
             signals.at_once = transport.blocks
             return deliver(
                 plan,
@@ -128,7 +120,7 @@ def stream_plan(
 
 def deliver(
     plan: Plan,
-    transport: Transport,
+    transport: FlowTransport,
     signals: StopSignals,
     *,
     journal_path: Path | None = None,
@@ -144,7 +136,7 @@ def deliver(
         if transcript_path is not None:
             transcript = Transcript(transcript_path, f"{job.name} to {transport.name}")
             at_end.callback(transcript.close)
-        if journal_path is not None and not plan.check_mode:
+        if journal_path is not None and not plan.check_mode and keeps_journal(machine):
             rest = plan.resumption
             journal = Journal(
                 journal_path,
@@ -156,9 +148,9 @@ def deliver(
                 sha256=rest.sha256 if rest else None,
             )
             at_end.callback(journal.close)
-        connection = Connection(machine.controller.rx_bytes)
-        session = Session(transport, connection, transcript, signals.check)
-        delivery = GrblDelivery(plan, session, transcript, journal, on_progress, keys or NoKeys())
+        delivery = delivery_of(
+            plan, transport, transcript, journal, on_progress, keys or NoKeys(), signals.check
+        )
         # A signal between an exception and its handling would skip the handling, not this.
         at_end.callback(delivery.make_safe)
         try:

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 import serial
 import serial.tools.list_ports
@@ -65,22 +66,40 @@ class Transport(Protocol):
         """Release the port; does nothing the second time."""
 
 
+class FlowTransport(Transport, Protocol):
+    """A wire to a machine that holds up its sender by flow control."""
+
+    @property
+    def waiting(self) -> int:
+        """How many bytes were taken and have not left yet."""
+
+    def offer(self, data: bytes) -> int:
+        """How many of ``data``'s first bytes the wire took; never waits."""
+
+
 class SerialTransport:
     """A serial device (``/dev/ttyUSB0``, ``COM3``) or pyserial URL, locked for this process.
 
     The lock is advisory between programs that ask for it (``flock``); Windows locks by itself.
-    Raises :class:`~miurafab.errors.PortError` if the port cannot be opened.
+    ``flow_control`` is "none", "xon-xoff" or "rts-cts". Raises
+    :class:`~miurafab.errors.PortError` if the port cannot be opened.
     """
 
     blocks = True
 
-    def __init__(self, port: str, baud: int) -> None:
+    def __init__(self, port: str, baud: int, flow_control: str = "none") -> None:
         self.name = port
         # pyserial's RFC 2217 client refuses a write timeout.
         patience = None if port.lower().startswith("rfc2217:") else _WRITE_TIMEOUT
         try:
             self._serial = serial.serial_for_url(
-                port, baudrate=baud, timeout=_SLICE, write_timeout=patience, exclusive=True
+                port,
+                baudrate=baud,
+                timeout=_SLICE,
+                write_timeout=patience,
+                exclusive=True,
+                xonxoff=flow_control == "xon-xoff",
+                rtscts=flow_control == "rts-cts",
             )
         except (serial.SerialException, OSError, ValueError) as fault:
             raise PortError(_why_not_opened(port, fault)) from None
@@ -105,6 +124,23 @@ class SerialTransport:
             with contextlib.suppress(*_FAULTS):
                 self._serial.reset_output_buffer()
         self.write(data)
+
+    @property
+    def waiting(self) -> int:
+        """How many bytes were taken and have not left yet, as far as the driver tells."""
+        with self._gone():
+            return self._serial.out_waiting if isinstance(self._serial, serial.Serial) else 0
+
+    def offer(self, data: bytes) -> int:
+        """How many of ``data``'s first bytes the driver took; does not wait for an XON."""
+        with self._gone():
+            if isinstance(self._serial, serial.Serial) and os.name == "posix":
+                try:
+                    return os.write(self._serial.fileno(), data)
+                except BlockingIOError:
+                    return 0
+            self._serial.write(data)
+        return len(data)
 
     def read(self, timeout: float) -> bytes:
         """What has arrived; waits up to ``timeout`` seconds for a first byte."""
@@ -134,14 +170,45 @@ class SerialTransport:
             ) from None
 
 
+class Device(Protocol):
+    """A machine in memory, as :class:`VirtualTransport` drives it: see ``VirtualGrbl``."""
+
+    @property
+    def now(self) -> float:
+        """Its clock, s."""
+
+    @property
+    def connected(self) -> bool:
+        """Whether the cable is in."""
+
+    @property
+    def beam_log(self) -> list[Any]:
+        """What it burnt or drew."""
+
+    def receive(self, data: bytes) -> None:
+        """Bytes start down the wire."""
+
+    def take_output(self) -> bytes:
+        """What it has said since the last call."""
+
+    def advance_to_line(self, seconds: float) -> None:
+        """Let time pass until it has spoken a line, ``seconds`` at the most."""
+
+
 class VirtualTransport:
-    """A controller in memory, as fast as the computer allows or at ``speed`` times real time."""
+    """A controller in memory, as fast as the computer allows or at ``speed`` times real time.
+
+    With ``forgets`` it keeps nothing of what the beam did, which nobody then can ask for.
+    """
 
     name = VIRTUAL
     blocks = False
 
-    def __init__(self, device: VirtualGrbl, speed: float | None = None) -> None:
+    def __init__(
+        self, device: Device, speed: float | None = None, *, forgets: bool = False
+    ) -> None:
         self.device = device
+        self._forgets = forgets
         self._speed = speed
         self._start = time.monotonic()
 
@@ -155,13 +222,24 @@ class VirtualTransport:
         self._require_cable()
         self.device.receive(data)
 
+    @property
+    def waiting(self) -> int:
+        """How many bytes are still on the wire."""
+        return int(getattr(self.device, "waiting", 0))
+
+    def offer(self, data: bytes) -> int:
+        """Hand ``data`` to the controller."""
+        self.write(data)
+        return len(data)
+
     def read(self, timeout: float) -> bytes:
         """Let the controller's time pass until it has spoken a line, or for ``timeout`` seconds."""
         self._require_cable()
         if timeout > 0:
             self.device.advance_to_line(max(timeout, _INSTANT))
         output = self.device.take_output()
-        self.device.beam_log.clear()  # nobody can ask for it here
+        if self._forgets:
+            self.device.beam_log.clear()
         self._keep_pace()
         return output
 
@@ -196,7 +274,7 @@ def open_port(
     :class:`~miurafab.errors.PortError` saying why a port cannot be opened.
     """
     if port == VIRTUAL:
-        return VirtualTransport(VirtualGrbl(settings, baud=baud), speed)
+        return VirtualTransport(VirtualGrbl(settings, baud=baud), speed, forgets=True)
     return SerialTransport(port, baud)
 
 

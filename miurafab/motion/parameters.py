@@ -13,8 +13,8 @@ Triple = tuple[float, float, float]
 _EIGHT_BIT = ("grbl-1.1", "grbl-0.9")
 """Dialects that run on an ATmega328P."""
 COMMON_STEPS = 80.0
-"""What a profile that gives no ``$100`` is taken to have: steps/mm of a belt with 2 mm pitch, 20 teeth and 1/16 steps, the
-usual laser frame."""
+"""What a profile that gives no ``$100`` is taken to have: steps/mm of a belt with 2 mm pitch, 20
+teeth and 1/16 steps, the usual laser frame."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from miurafab.profiles.table import Table, read_toml
 DIALECTS = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc", "marlin", "hpgl")
 TOOLS = ("laser", "pen", "knife")
 STREAMING = ("character-counting", "send-response")
+FLOW_CONTROL = ("none", "xon-xoff", "rts-cts")
 
 
 @dataclass(frozen=True)
@@ -78,13 +79,17 @@ class Tool:
 
 @dataclass(frozen=True)
 class Controller:
-    """How to talk to it: ``rx_bytes`` usable receive buffer, ``line_chars`` usable line length."""
+    """How to talk to it: ``rx_bytes`` usable receive buffer, ``line_chars`` usable line length.
+
+    ``flow_control`` is how a machine that answers nothing holds up its sender.
+    """
 
     baud: int
     streaming: str
     rx_bytes: int
     line_chars: int
     planner_blocks: int
+    flow_control: str = "none"
 
 
 @dataclass(frozen=True)
@@ -198,6 +203,7 @@ def _controller(table: Table) -> Controller:
         rx_bytes=table.whole("rx_bytes", 128, low=16, high=65_536),
         line_chars=table.whole("line_chars", 79, low=20, high=4096),
         planner_blocks=table.whole("planner_blocks", 15, low=1, high=1024),
+        flow_control=table.choice("flow_control", FLOW_CONTROL, "none"),
     )
     table.finish()
     return controller

@@ -1,0 +1,93 @@
+"""What differs between machines by what they speak: the wire, the delivery, and the way to stop.
+
+GRBL and its kin are reset, Marlin is halted, a cutter is told to lift its tool. Whoever needs one
+of these asks here by the machine's profile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from miurafab.grbl.connection import Connection
+from miurafab.grbl.settings import virtual_settings
+from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.machine.delivery import Delivery
+from miurafab.machine.grbl_delivery import NOT_CONFIRMED, WAS_RESET, GrblDelivery
+from miurafab.machine.journal import Journal
+from miurafab.machine.keys import Keys
+from miurafab.machine.marlin_delivery import NOT_CONFIRMED as NOT_HALTED
+from miurafab.machine.marlin_delivery import WAS_HALTED, MarlinDelivery, MarlinWire
+from miurafab.machine.planning import Plan
+from miurafab.machine.plotter_delivery import NOT_TOLD, PEN_SENT_UP, PlotterDelivery, send_up
+from miurafab.machine.progress import Progress
+from miurafab.machine.session import Session
+from miurafab.machine.transcript import Transcript
+from miurafab.machine.transport import (
+    VIRTUAL,
+    Device,
+    FlowTransport,
+    SerialTransport,
+    VirtualTransport,
+)
+from miurafab.marlin.virtual import VirtualMarlin
+from miurafab.motion.parameters import MotionParameters
+from miurafab.plotter.stream import DROP_ALL, PEN_UP
+from miurafab.plotter.virtual import VirtualPlotter
+from miurafab.profiles import MachineProfile
+
+
+def open_machine(machine: MachineProfile, port: str, speed: float | None = None) -> FlowTransport:
+    """The wire to ``machine`` at ``port``: a device, a pyserial URL, or ``virtual``.
+
+    The machine in memory is set up as the profile says and runs as fast as the computer allows, or
+    at ``speed`` times real time. Raises :class:`~miurafab.errors.PortError` saying why a port
+    cannot be opened.
+    """
+    controller = machine.controller
+    if port != VIRTUAL:
+        return SerialTransport(port, controller.baud, controller.flow_control)
+    return VirtualTransport(virtual_machine(machine), speed, forgets=True)
+
+
+def virtual_machine(machine: MachineProfile) -> Device:
+    """A machine in memory, set up as the profile says."""
+    controller = machine.controller
+    if machine.dialect == "marlin":
+        return VirtualMarlin(MotionParameters.from_profile(machine), baud=controller.baud)
+    if machine.dialect == "hpgl":
+        return VirtualPlotter(baud=controller.baud, rx_bytes=controller.rx_bytes)
+    return VirtualGrbl(virtual_settings(machine), baud=controller.baud)
+
+
+def keeps_journal(machine: MachineProfile) -> bool:
+    """Whether the machine tells what it has taken."""
+    return machine.dialect != "hpgl"
+
+
+def delivery_of(
+    plan: Plan,
+    transport: FlowTransport,
+    transcript: Transcript | None,
+    journal: Journal | None,
+    on_progress: Callable[[Progress], None] | None,
+    keys: Keys,
+    check: Callable[[], None],
+) -> Delivery:
+    """How ``plan`` is delivered; ``check`` raises what should interrupt it."""
+    machine = plan.machine
+    if machine.dialect == "marlin":
+        return MarlinDelivery(plan, transport, transcript, journal, on_progress, keys, check)
+    if machine.dialect == "hpgl":
+        return PlotterDelivery(plan, transport, transcript, on_progress, keys, check)
+    session = Session(transport, Connection(machine.controller.rx_bytes), transcript, check)
+    return GrblDelivery(plan, session, transcript, journal, on_progress, keys)
+
+
+def make_safe(machine: MachineProfile, transport: FlowTransport) -> str:
+    """Stop a machine of which nothing is known; what became of that, as a clause."""
+    if machine.dialect == "marlin":
+        return WAS_HALTED if MarlinWire(transport).kill() else NOT_HALTED
+    if machine.dialect == "hpgl":
+        told = send_up(transport, b";PU;" + DROP_ALL + PEN_UP)
+        return PEN_SENT_UP if told else NOT_TOLD
+    return WAS_RESET if Session(transport, Connection()).stop() else NOT_CONFIRMED

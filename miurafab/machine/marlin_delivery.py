@@ -1,0 +1,275 @@
+"""A job on its way to a controller that speaks Marlin, and the one way out of it.
+
+One line is in flight at a time, counted and with a checksum, and sent again when it was damaged
+or its answer is missing. The job is done when ``M400`` was answered, which waits for all motion
+to end.
+
+Every other way out is ``M112``, first of all: it halts the controller with motors and laser off
+until it is reset, and it is the one command that Marlin obeys ahead of the others. ``M410`` stops
+the motion too, but leaves the laser to an ``M5`` behind it, so it is not relied on. A board without
+``EMERGENCY_PARSER`` reads even M112 only between two commands; the user is told.
+
+Marlin has no feed hold: holding is to send nothing more, and what it has planned it still makes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from miurafab.errors import ControllerError, MiurafabError, PortError
+from miurafab.gcode.job import SendLine, prepare_lines
+from miurafab.machine.delivery import Delivery
+from miurafab.machine.journal import Journal
+from miurafab.machine.keys import ABORT, HOLD, KEYS, RESUME, Keys
+from miurafab.machine.planning import Plan, longest_line
+from miurafab.machine.progress import JobAborted, Progress, StreamResult
+from miurafab.machine.session import ANSWER_S, BANNER_S, HOMING_S
+from miurafab.machine.transcript import Transcript
+from miurafab.machine.transport import Transport
+from miurafab.marlin.connection import EMERGENCY, Connection
+from miurafab.marlin.replies import Fault, Killed, Ok, Reply, Started
+
+WAS_HALTED = "the controller was halted (M112) with the laser off; reset it before it is used again"
+NOT_CONFIRMED = (
+    "the controller did not confirm that it halted, so switch the laser off at the machine"
+)
+_TELL_S = 0.2  # between two words to the user
+_LOOK_S = 0.05  # between two looks at the keys
+_KILL_S = 0.8  # from M112 to its answer
+_KILLS = 3
+_NO_PARSER = (
+    "The controller was built without EMERGENCY_PARSER: it obeys a stop only between two commands, "
+    "so keep a switch for the laser in reach."
+)
+
+
+class MarlinDelivery(Delivery):
+    """See the module. ``check`` raises what should interrupt the conversation."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        transport: Transport,
+        transcript: Transcript | None,
+        journal: Journal | None,
+        on_progress: Callable[[Progress], None] | None,
+        keys: Keys,
+        check: Callable[[], None],
+    ) -> None:
+        super().__init__(plan, transcript, journal)
+        self._wire = MarlinWire(transport, transcript, check)
+        self._on_progress = on_progress
+        self._keys = keys
+        self._taken = 0
+        self._last = 0
+        self._held = False
+        self._tell_at = 0.0
+
+    @property
+    def acknowledged(self) -> int:
+        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        return self._taken
+
+    def run(self) -> StreamResult:
+        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        plan, wire = self.plan, self._wire
+        remarks = plan.remarks + self._meet()
+        self.at_risk = True
+        begin = self._tell_at = wire.now()
+        for line in self._lines():
+            while self._held:
+                self._between(begin)
+                wire.receive(_LOOK_S)
+            wire.send(line, lambda: self._between(begin), self._where)
+            self._taken, self._last = self._taken + 1, line.number
+            if self.journal is not None:
+                self.journal.taken(self._taken, line.number, wire.now() - begin)
+            self._between(begin)
+        for code in (b"M400", b"M5"):
+            wire.send(SendLine(0, code), lambda: self._between(begin), self._where)
+        seconds = wire.now() - begin
+        self.at_risk = False
+        if self.journal is not None:
+            self.journal.ended("done", f"{self._taken} lines acknowledged, then at rest")
+        remarks += self.close_records()
+        return StreamResult(self._taken, seconds, (), remarks)
+
+    def _lines(self) -> Iterator[SendLine]:
+        job = self.plan.job
+        return prepare_lines(job.name, job.iter_lines(), longest_line(self.plan.machine))
+
+    def _meet(self) -> tuple[str, ...]:
+        plan, wire = self.plan, self._wire
+        wire.greet()
+        said = wire.send(SendLine(0, b"M115"))
+        if plan.home:
+            self.at_risk = True
+            wire.send(SendLine(0, b"G28XY"), patience=HOMING_S)
+            self.at_risk = False
+        if plan.at is not None:
+            wire.send(SendLine(0, b"G92X%.3fY%.3f" % plan.at))
+        parser = any("EMERGENCY_PARSER:1" in reply.text for reply in said)
+        return () if parser or plan.machine.tool.kind != "laser" else (_NO_PARSER,)
+
+    def _between(self, begin: float) -> None:
+        """What is looked after while an answer is awaited: keys, files, the user."""
+        for key in self._keys.pressed():
+            order = KEYS.get(key)
+            if order == ABORT:
+                raise JobAborted(f"{self.plan.job.name} was stopped at the keyboard.")
+            if order in (HOLD, RESUME):
+                self._held = order == HOLD
+        for record in self.records:
+            record.check()
+        now = self._wire.now()
+        if self._on_progress is not None and now >= self._tell_at:
+            self._tell_at = now + _TELL_S
+            state = "Hold" if self._held else "Run"
+            self._on_progress(
+                Progress(self._taken, self.plan.lines, now - begin, state, None, 0, self._last, 100)
+            )
+
+    @property
+    def _where(self) -> str:
+        name = self.plan.job.name
+        if not self._last:
+            return f"before it took a line of {name}"
+        return f"after it took line {self._last} of {name}"
+
+    def stop(self, error: MiurafabError | None) -> str:
+        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        return WAS_HALTED if self._wire.kill() else NOT_CONFIRMED
+
+
+class MarlinWire:
+    """One conversation with one Marlin controller: the wire, the count, and the time."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        transcript: Transcript | None = None,
+        check: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._transport = transport
+        self._transcript = transcript
+        self._check = check
+        self._connection = Connection()
+        self._start = transport.now()
+
+    def now(self) -> float:
+        """Seconds on the wire's clock since the conversation began."""
+        return self._transport.now() - self._start
+
+    def receive(self, timeout: float) -> list[Reply]:
+        """What is said within ``timeout``; returns as soon as there are bytes."""
+        self._check()
+        data = self._transport.read(max(0.0, timeout))
+        if not data:
+            return []
+        if self._transcript is not None:
+            self._transcript.came(self.now(), data)
+        self._connection.receive_data(data)
+        return list(self._connection.replies())
+
+    def _write(self, data: bytes) -> None:
+        self._transport.write(data)
+        if self._transcript is not None:
+            self._transcript.sent(self.now(), data)
+
+    def greet(self) -> None:
+        """Wait until the controller has started, if the opening of the port resets it, and set the
+        count.
+
+        Raises :class:`~miurafab.errors.PortError` if nothing that speaks Marlin answers.
+        """
+        end = self.now() + BANNER_S
+        started = False
+        while not started and self.now() < end:
+            started = any(isinstance(reply, Started) for reply in self.receive(end - self.now()))
+        try:
+            self._exchange(self._connection.restart_count(), ANSWER_S, lambda: None, "")
+        except ControllerError as error:
+            raise PortError(
+                f"Nothing that speaks Marlin answers at {self._transport.name} ({error}); check "
+                "the port, the baud rate of the machine profile and the machine's power."
+            ) from None
+        # It then says every second that it is alive, so that silence means something.
+        self.send(SendLine(0, b"M113S1"))
+
+    def send(
+        self,
+        line: SendLine,
+        meanwhile: Callable[[], None] = lambda: None,
+        where: str = "",
+        *,
+        patience: float = ANSWER_S,
+    ) -> list[Reply]:
+        """Send ``line``, wait for its ``ok``, and return what was said up to it.
+
+        ``meanwhile`` is called twenty times a second, ``where`` is the tail of a sentence.
+        Raises :class:`~miurafab.errors.ControllerError` for a line that is refused, a halt, a
+        restart, or ``patience`` seconds of silence, twice.
+        """
+        return self._exchange(self._connection.send_line(line), patience, meanwhile, where)
+
+    def _exchange(
+        self, data: bytes, patience: float, meanwhile: Callable[[], None], where: str
+    ) -> list[Reply]:
+        connection = self._connection
+        where = where or "before the job"
+        line = connection.in_flight
+        self._write(data)
+        said: list[Reply] = []
+        heard, asked_again = self.now(), False
+        while True:
+            replies = self.receive(_LOOK_S)
+            for reply in replies:
+                heard = self.now()
+                if isinstance(reply, Ok) and reply.line is line:
+                    return said
+                self._look(reply, line, where)
+                said.append(reply)
+            if connection.wants_again or self.now() - heard > patience:
+                if not connection.wants_again and asked_again:
+                    raise ControllerError(
+                        f"The controller has said nothing for {2 * patience:g} s {where}."
+                    )
+                asked_again = asked_again or not connection.wants_again
+                heard = self.now()
+                again = connection.send_again()
+                if not again:
+                    raise ControllerError(
+                        f"The controller never got line {line.number if line else 0} undamaged "
+                        f"{where}; look at the cable and the baud rate."
+                    )
+                self._write(again)
+            meanwhile()
+
+    def _look(self, reply: Reply, line: SendLine | None, where: str) -> None:
+        text = reply.text.strip()
+        if isinstance(reply, Killed):
+            raise ControllerError(f"The controller halted {where} ('{text}').")
+        if isinstance(reply, Started):
+            raise ControllerError(
+                f"The controller restarted by itself {where}; what it held is lost, so look at its "
+                "power supply and its reset button."
+            )
+        if isinstance(reply, Fault):
+            code = line.data.decode("ascii") if line is not None else ""
+            number = f"line {line.number} ('{code}')" if line and line.number else f"'{code}'"
+            raise ControllerError(f"The controller refused {number}: '{text}'.")
+
+    def kill(self) -> bool:
+        """Halt the controller; whether it said that it did. Never raises for the wire's sake."""
+        try:
+            for _ in range(_KILLS):
+                self._transport.write_now(EMERGENCY)
+                if self._transcript is not None:
+                    self._transcript.sent(self.now(), EMERGENCY)
+                end = self.now() + _KILL_S
+                while self.now() < end:
+                    if any(isinstance(reply, Killed) for reply in self.receive(end - self.now())):
+                        return True
+        except PortError:
+            pass
+        return False

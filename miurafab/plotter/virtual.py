@@ -1,0 +1,175 @@
+"""A cutter in memory that takes HPGL: bytes in, XON and XOFF out, and time only by ``advance``.
+
+It has a receive buffer that overflows when nobody heeds its XOFF, carries out one instruction
+after another, each line at its speed (``VS``, in cm/s, with the pen down), and knows ``ESC.K``. It
+keeps what the tool drew.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import deque
+from dataclasses import dataclass
+
+from miurafab.gcode.hpgl import MM_PER_UNIT
+from miurafab.plotter.stream import DROP_ALL, XOFF, XON
+
+_FULL, _ROOM = 0.8, 0.4
+"""How full the buffer is when it says XOFF, and XON again."""
+_SPEED = 400.0  # mm/s, before any VS and with the pen up
+_TOKEN = re.compile(rb"\s*(?:([A-Za-z]{2})|([-+]?\d+(?:\.\d+)?)(?=[^\d.])|[^A-Za-z\d.+-])")
+"""A word, a number that is whole because something follows it, or what parts them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A line drawn with the pen down from ``t0`` to ``t1`` (s), in mm, with ``force`` (``FS``)."""
+
+    t0: float
+    t1: float
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    force: float
+
+
+class VirtualPlotter:
+    """The device side of the wire; ``rx_bytes`` is its buffer, ``baud`` None takes no time."""
+
+    def __init__(self, *, baud: int | None = None, rx_bytes: int = 1024) -> None:
+        self.now = 0.0
+        self.beam_log: list[Drawn] = []
+        self.lost_bytes = 0
+        self.connected = True
+        self.position = (0.0, 0.0)
+        self.pen_down = False
+        self.pen = 0
+        self.knows_abort = True
+        self._byte = 10.0 / baud if baud else 0.0
+        self._rx_bytes = rx_bytes
+        self._coming: deque[tuple[float, int]] = deque()
+        self._in_free = 0.0
+        self._buffer = bytearray()
+        self._out = bytearray()
+        self._told_off = False
+        self._force, self._speed = 1.0, _SPEED
+        self._relative = False
+        self._way: deque[tuple[float, float]] = deque()
+        self._busy_until = 0.0
+        self._starved = True
+        self._name = b""
+        self._x: float | None = None
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that are still on the wire."""
+        return len(self._coming)
+
+    def advance(self, seconds: float) -> None:
+        """Let ``seconds`` of virtual time pass."""
+        self._run(self.now + max(0.0, seconds), stop=False)
+
+    def advance_to_line(self, seconds: float) -> None:
+        """Let time pass until it has said something, ``seconds`` at the most."""
+        self._run(self.now + max(0.0, seconds), stop=True)
+
+    def _run(self, target: float, *, stop: bool) -> None:
+        while not (stop and self._out):
+            arrival = self._coming[0][0] if self._coming else math.inf
+            able = self._way or not self._starved
+            work = max(self._busy_until, self.now) if able else math.inf
+            event = min(arrival, work)
+            if event > target:
+                self.now = target
+                return
+            self.now = max(self.now, event)
+            if arrival <= self.now:
+                self._arrive(self._coming.popleft()[1])
+            elif self._way:
+                self._go(*self._way.popleft())
+            else:
+                self._take()
+
+    def receive(self, data: bytes) -> None:
+        """Bytes start down the wire to the cutter."""
+        for byte in data:
+            self._in_free = max(self._in_free, self.now) + self._byte
+            self._coming.append((self._in_free, byte))
+
+    def take_output(self) -> bytes:
+        """What it has said since the last call."""
+        out, self._out = bytes(self._out), bytearray()
+        return out
+
+    def _arrive(self, byte: int) -> None:
+        if len(self._buffer) >= self._rx_bytes:
+            self.lost_bytes += 1
+            return
+        self._buffer.append(byte)
+        self._starved = False
+        if self._buffer.endswith(DROP_ALL):
+            del self._buffer[-len(DROP_ALL) :]
+            if self.knows_abort:  # the line being drawn is drawn to its end
+                self._buffer.clear()
+                self._way.clear()
+        if len(self._buffer) >= _FULL * self._rx_bytes and not self._told_off:
+            self._told_off = True
+            self._out.append(XOFF)
+
+    def _take(self) -> None:
+        """Take the next word or number out of the buffer; ``_starved`` if it is not whole yet."""
+        match = _TOKEN.match(self._buffer)
+        if match is None:
+            self._starved = True
+            return
+        word, number = match.groups()
+        del self._buffer[: match.end()]
+        if self._told_off and len(self._buffer) <= _ROOM * self._rx_bytes:
+            self._told_off = False
+            self._out.append(XON)
+        if word:
+            self._begin(bytes(word).upper())
+        elif number:
+            self._number(float(number))
+
+    def _begin(self, name: bytes) -> None:
+        self._name = name
+        self._x = None
+        if name == b"IN":
+            self.pen_down = self._relative = False
+        elif name in (b"PU", b"PD"):
+            self.pen_down = name == b"PD"
+        elif name in (b"PA", b"PR"):
+            self._relative = name == b"PR"
+        elif name == b"SP":
+            self.pen = 0
+        elif name == b"VS":
+            self._speed = _SPEED
+        elif name == b"FS":
+            self._force = 1.0
+
+    def _number(self, value: float) -> None:
+        if self._name == b"SP":
+            self.pen = int(value)
+        elif self._name == b"VS":
+            self._speed = 10.0 * value
+        elif self._name == b"FS":
+            self._force = value
+        elif self._name in (b"PU", b"PD", b"PA", b"PR"):
+            if self._x is None:
+                self._x = value
+            else:
+                self._way.append((self._x, value))
+                self._x = None
+
+    def _go(self, x: float, y: float) -> None:
+        base = self.position if self._relative else (0.0, 0.0)
+        to = (base[0] + x * MM_PER_UNIT, base[1] + y * MM_PER_UNIT)
+        seconds = math.dist(self.position, to) / (self._speed if self.pen_down else _SPEED)
+        self._busy_until = self.now + seconds
+        if self.pen_down and to != self.position:
+            drawn = Drawn(self.now, self._busy_until, *self.position, *to, self._force)
+            self.beam_log.append(drawn)
+        self.position = to
