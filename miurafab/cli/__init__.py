@@ -6,6 +6,7 @@ error is one sentence on standard error, and with ``--json`` an object ``{"error
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import NoReturn
 
@@ -64,13 +65,22 @@ def main() -> NoReturn:
     except MiurafabError as error:
         _fail(str(error), type(error).__name__, error.exit_code)
     except OSError as error:
+        told = error.__context__
+        while told is not None and not isinstance(told, MiurafabError):
+            told = told.__context__
+        if told is not None:  # the terminal went away while this was being shown
+            _fail(str(told), type(told).__name__, told.exit_code)
         where = f"{error.filename}: " if error.filename else ""
         _fail(f"{where}{error.strerror or error}.", type(error).__name__, 2)
     sys.exit(0)
 
 
 def _fail(sentence: str, kind: str, exit_code: int) -> NoReturn:
-    if "--json" in sys.argv:
-        sys.stdout.write(json_text({"error": sentence, "kind": kind}) + "\n")
-    sys.stderr.write(f"miurafab: {sentence}\n")
+    try:
+        if "--json" in sys.argv:
+            sys.stdout.write(json_text({"error": sentence, "kind": kind}) + "\n")
+            sys.stdout.flush()
+        sys.stderr.write(f"miurafab: {sentence}\n")
+    except OSError:  # nobody is there to read it; the exit code still says it
+        os._exit(exit_code)
     sys.exit(exit_code)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Protocol
 
 HOLD, RESUME, ABORT = b"!", b"~", b""
@@ -73,12 +73,15 @@ else:
             self._descriptor = descriptor
 
         def pressed(self) -> str:
-            # In the background, reading from the terminal would stop the whole process.
-            if os.tcgetpgrp(self._descriptor) != os.getpgrp():
+            try:
+                # In the background, reading from the terminal would stop the whole process.
+                if os.tcgetpgrp(self._descriptor) != os.getpgrp():
+                    return ""
+                if not select.select([self._descriptor], [], [], 0)[0]:
+                    return ""
+                return os.read(self._descriptor, 64).decode("ascii", "ignore")
+            except OSError:  # the terminal was closed
                 return ""
-            if not select.select([self._descriptor], [], [], 0)[0]:
-                return ""
-            return os.read(self._descriptor, 64).decode("ascii", "ignore")
 
     @contextmanager
     def _posix_keys() -> Iterator[Keys]:
@@ -90,4 +93,5 @@ else:
         try:
             yield _PosixKeys(descriptor)
         finally:
-            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+            with suppress(termios.error):  # it was closed
+                termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

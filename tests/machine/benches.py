@@ -6,8 +6,12 @@ tests that use this take real seconds.
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
+import os
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -42,9 +46,13 @@ APART = SENDER.format(module="job_process", function="stream_apart")
 
 
 class Bench:
-    """A virtual controller on a pty in real time, and a record of what came down to it."""
+    """A virtual controller on a pty, and a record of what came down to it.
 
-    def __init__(self, *faults: str) -> None:
+    ``speed`` is virtual seconds a real second.
+    """
+
+    def __init__(self, *faults: str, speed: float = 1.0) -> None:
+        self._speed = speed
         self.device = VirtualGrbl(
             virtual_settings(load_machine(MACHINE)), baud=115_200, faults=parse_faults(faults)
         )
@@ -67,16 +75,17 @@ class Bench:
         while not until():
             assert time.monotonic() < end, "the bench waited too long"
             data, opened = self.wire.wait(0.002)
-            self.device.advance(max(0.0, time.monotonic() - self._start - self.device.now))
+            now = (time.monotonic() - self._start) * self._speed
+            self.device.advance(max(0.0, now - self.device.now))
             if opened:
                 self.device.power_cycle()
             if data:
                 self.came.append((time.monotonic(), self.device.now, data))
                 self.device.receive(data)
             self.wire.write(self.device.take_output())
-            if self._plugged and not self.device.connected:
-                self.wire.unplug()
-            self._plugged = self.device.connected
+            if self._plugged != self.device.connected:
+                self._plugged = self.device.connected
+                (self.wire.plug if self._plugged else self.wire.unplug)()
 
     def start(self, code: str, *arguments: str) -> subprocess.Popen[str]:
         """Python ``code`` with the port as its first argument, without waiting for it."""
@@ -92,10 +101,7 @@ class Bench:
         command = [sys.executable, "-m", "miurafab", "cut", str(job), "--machine", MACHINE]
         return subprocess.Popen(
             [*command, "--port", self.wire.address, *options],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            **more,
+            **({"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True} | more),
         )
 
     def until_burning(self, process: subprocess.Popen[str]) -> subprocess.Popen[str]:
@@ -124,6 +130,46 @@ class Bench:
         """As :meth:`assert_dark`, and nothing burnt after ``virtual`` on the controller's clock."""
         self.assert_dark()
         assert all(segment.t1 <= virtual + 0.01 for segment in self.device.beam_log)
+
+
+class Terminal:
+    """A terminal for one command: what is typed there, and what it shows."""
+
+    def __init__(self) -> None:
+        self._master, self._slave = os.openpty()
+        os.set_blocking(self._master, False)
+        self._shown = b""
+
+    def options(self) -> dict[str, object]:
+        """For ``Popen``: the command is the terminal's session, as a shell starts it."""
+        return {
+            "stdin": self._slave,
+            "stdout": self._slave,
+            "stderr": self._slave,
+            "start_new_session": True,
+            "preexec_fn": lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+            "env": os.environ | {"TERM": "xterm", "COLUMNS": "120"},
+        }
+
+    def type(self, data: bytes) -> float:
+        """Press keys; when."""
+        at = time.monotonic()
+        os.write(self._master, data)
+        return at
+
+    @property
+    def shown(self) -> str:
+        """All that the command has shown up to now."""
+        with contextlib.suppress(OSError):
+            while data := os.read(self._master, 65_536):
+                self._shown += data
+        return self._shown.decode("utf-8", "replace")
+
+    def close(self) -> None:
+        """Close the window."""
+        for descriptor in (self._slave, self._master):
+            with contextlib.suppress(OSError):
+                os.close(descriptor)
 
 
 def children(process: subprocess.Popen[str]) -> list[int]:
