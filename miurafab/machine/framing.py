@@ -33,13 +33,15 @@ def frame_job(
         raise InputError(
             f"A pointer of {100 * pointer:g} % could burn; choose at most {100 * MOST_POINTER:g} %."
         )
-    if pointer and (machine.tool.kind != "laser" or machine.dialect == "grbl-0.9"):
+    if machine.dialect == "hpgl":
+        raise InputError(f"{machine.name} speaks hpgl, in which a frame is not traced.")
+    if pointer and (machine.tool.kind != "laser" or machine.dialect in ("grbl-0.9", "marlin")):
         raise InputError(f"{machine.name} has no laser that could point; leave --pointer out.")
     x0, y0, x1, y1 = bounds_mm
     corners = ((x1, y0), (x1, y1), (x0, y1), (x0, y0))
     feed = min(_FEED, *machine.motion.max_rate_mm_min)
     power = round(pointer * machine.tool.s_max)
-    lines = ["G21 G90", "M5", f"G0 X{x0:.3f} Y{y0:.3f}", *([f"M4 S{power}"] if power else [])]
+    lines = ["G21", "G90", "M5", f"G0 X{x0:.3f} Y{y0:.3f}", *([f"M4 S{power}"] if power else [])]
     lines += [f"G1 X{x:.3f} Y{y:.3f} F{feed:g}" for x, y in corners]
     lines += ["M5", f"G0 X{back_to[0]:.3f} Y{back_to[1]:.3f}", ""]
     return Job(f"the frame of {name}", "\n".join(lines))

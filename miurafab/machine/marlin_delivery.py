@@ -35,6 +35,7 @@ NOT_CONFIRMED = (
 )
 _TELL_S = 0.2  # between two words to the user
 _LOOK_S = 0.05  # between two looks at the keys
+_SILENCES = 3  # the line is sent again after each but the last
 _KILL_S = 0.8  # from M112 to its answer
 _KILLS = 3
 _NO_PARSER = (
@@ -208,7 +209,7 @@ class MarlinWire:
 
         ``meanwhile`` is called twenty times a second, ``where`` is the tail of a sentence.
         Raises :class:`~miurafab.errors.ControllerError` for a line that is refused, a halt, a
-        restart, or ``patience`` seconds of silence, twice.
+        restart, or ``patience`` seconds of silence, three times.
         """
         return self._exchange(self._connection.send_line(line), patience, meanwhile, where)
 
@@ -220,7 +221,7 @@ class MarlinWire:
         line = connection.in_flight
         self._write(data)
         said: list[Reply] = []
-        heard, asked_again = self.now(), False
+        heard, silences = self.now(), 0
         while True:
             replies = self.receive(_LOOK_S)
             for reply in replies:
@@ -229,12 +230,13 @@ class MarlinWire:
                     return said
                 self._look(reply, line, where)
                 said.append(reply)
-            if connection.wants_again or self.now() - heard > patience:
-                if not connection.wants_again and asked_again:
+            silent = self.now() - heard > patience
+            if connection.wants_again or silent:
+                silences += silent
+                if silences == _SILENCES:
                     raise ControllerError(
-                        f"The controller has said nothing for {2 * patience:g} s {where}."
+                        f"The controller has said nothing for {silences * patience:g} s {where}."
                     )
-                asked_again = asked_again or not connection.wants_again
                 heard = self.now()
                 again = connection.send_again()
                 if not again:

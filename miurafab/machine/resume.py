@@ -106,6 +106,11 @@ def _require_resumable(job: Job, machine: MachineProfile, run: JournalRun) -> No
         )
     if run.ended == "done":
         raise InputError(f"{job.name} was cut to its end; nothing is left to resume.")
+    if machine.dialect == "marlin":
+        raise InputError(
+            f"{machine.name} loses its place when it is halted, so {job.name} cannot be taken up "
+            "in its middle; cut it from the beginning on fresh material."
+        )
     if machine.tool.kind != "laser" or machine.dialect == "grbl-0.9":
         raise InputError(
             f"{machine.name} has no laser mode, so {job.name} cannot be taken up in its middle; "

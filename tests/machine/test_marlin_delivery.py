@@ -1,0 +1,338 @@
+"""Jobs sent to a Marlin controller in memory, whole and with whatever may go wrong on the way."""
+
+from __future__ import annotations
+
+import random
+import sys
+import threading
+import time
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from miurafab.cli import main
+from miurafab.errors import ControllerError, InputError, JobStopped, PortError
+from miurafab.gcode.job import Job
+from miurafab.machine.dialects import make_safe
+from miurafab.machine.journal import read_journal
+from miurafab.machine.planning import plan_job
+from miurafab.machine.sender import Progress, StreamResult, deliver, stream_job
+from miurafab.machine.signals import StopSignals
+from miurafab.machine.transport import VirtualTransport
+from miurafab.machine.virtual_server import PtyWire
+from miurafab.marlin.virtual import VirtualMarlin
+from miurafab.motion.parameters import MotionParameters
+from miurafab.profiles import load_machine
+
+MACHINE = load_machine("marlin-laser-220")
+DASHES = 40
+
+
+def dashes(count: int = DASHES, feed: int = 1000) -> Job:
+    lines = ["M5", "G21", "G90", "M4 I S0"]
+    for n in range(count):
+        x, y = 10 + 3 * (n % 20), 10 + 3 * (n // 20)
+        lines += [f"G0 X{x} Y{y} S0 F9000", f"G1 X{x + 2} Y{y} S200 F{feed}"]
+    return Job("dashes.nc", "\n".join([*lines, "M5 I", "M5", "G0 X0 Y0 S0 F9000", ""]))
+
+
+def burnt(device: VirtualMarlin) -> list[tuple[int, int, int, int]]:
+    return [
+        (round(s.x0), round(s.y0), round(s.x1), round(s.y1)) for s in device.beam_log if s.power > 0
+    ]
+
+
+WHOLE = [
+    (10 + 3 * (n % 20), 10 + 3 * (n // 20), 12 + 3 * (n % 20), 10 + 3 * (n // 20))
+    for n in range(DASHES)
+]
+
+
+class Wire(VirtualTransport):
+    """To ``device``, each byte changed by chance; ``before_read`` is called with the time."""
+
+    def __init__(
+        self,
+        device: VirtualMarlin,
+        *,
+        wrong: float = 0.0,
+        seed: int = 0,
+        before_read: Callable[[float], None] = lambda now: None,
+    ) -> None:
+        super().__init__(device)
+        self.written = b""
+        self._chance, self._wrong = random.Random(seed), wrong
+        self._before_read = before_read
+
+    def _spoil(self, data: bytes) -> bytes:
+        return bytes(
+            byte ^ 1 << self._chance.randrange(7) if self._chance.random() < self._wrong else byte
+            for byte in data
+        )
+
+    def write(self, data: bytes) -> None:
+        self.written += data
+        super().write(self._spoil(data))
+
+    def write_now(self, data: bytes) -> None:
+        self.written += data
+        super().write_now(data)
+
+    def read(self, timeout: float) -> bytes:
+        self._before_read(self.device.now)
+        return self._spoil(super().read(timeout))
+
+
+def new_device(*, emergency_parser: bool = True) -> VirtualMarlin:
+    parameters = MotionParameters.from_profile(MACHINE)
+    return VirtualMarlin(parameters, baud=115_200, emergency_parser=emergency_parser)
+
+
+def send(
+    job: Job, wire: VirtualTransport, *, force: frozenset[str] = frozenset(), **options: object
+) -> StreamResult:
+    return deliver(plan_job(job, MACHINE, force=force), wire, StopSignals(), **options)
+
+
+def assert_dark(device: VirtualMarlin) -> None:
+    end = max((segment.t1 for segment in device.beam_log), default=0.0)
+    device.advance(60.0)
+    assert not device.beam_on
+    assert max((segment.t1 for segment in device.beam_log), default=0.0) == end
+    assert not any(segment.standing for segment in device.beam_log)
+
+
+def test_a_job_is_burnt_whole_and_ends_dark(tmp_path: Path) -> None:
+    device = new_device()
+    seen: list[Progress] = []
+    journal = tmp_path / "dashes.journal"
+    result = send(dashes(), Wire(device), journal_path=journal, on_progress=seen.append)
+    assert burnt(device) == WHOLE
+    assert {round(s.power * 255) for s in device.beam_log} == {200}
+    assert result.lines == 7 + 2 * DASHES == seen[-1].lines_total
+    assert result.remarks == ()
+    assert [p.lines_acknowledged for p in seen] == sorted(p.lines_acknowledged for p in seen)
+    assert (run := read_journal(journal)[-1]).ended == "done"
+    assert run.taken == result.lines
+    assert_dark(device)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_on_a_noisy_wire_each_dash_is_burnt_once_or_the_job_is_halted(seed: int) -> None:
+    device = new_device()
+    wire = Wire(device, wrong=0.001, seed=seed)
+    try:
+        send(dashes(), wire)
+    except (ControllerError, PortError):
+        assert burnt(device)[:-1] == WHOLE[: max(len(device.beam_log) - 1, 0)]
+        assert wire.written.endswith(b"M112\n")
+    else:
+        assert burnt(device) == WHOLE
+    assert_dark(device)
+
+
+def test_noise_is_mended_and_not_only_noticed() -> None:
+    done = 0
+    for seed in range(8):
+        device = new_device()
+        try:
+            send(dashes(), Wire(device, wrong=0.0005, seed=seed))
+        except (ControllerError, PortError):
+            continue
+        done += burnt(device) == WHOLE
+    assert done >= 6
+
+
+def test_an_answer_that_is_lost_is_asked_for_and_nothing_is_made_twice() -> None:
+    device = new_device()
+
+    class Lossy(Wire):
+        lost = 0
+
+        def read(self, timeout: float) -> bytes:
+            data = super().read(timeout)
+            if self.device.now > 0.5 and self.lost < 2 and b"ok" in data:
+                self.lost += 1
+                return b""
+            return data
+
+    send(dashes(), Lossy(device))
+    assert burnt(device) == WHOLE
+
+
+def test_a_refused_line_halts_the_controller_and_is_named() -> None:
+    job = Job("bad.nc", dashes().text.replace("M5 I\n", "G17\nG1 X100 S200 F500\n"))
+    with pytest.raises(InputError, match=r"bad.nc, line 85: G17 is not a command"):
+        plan_job(job, MACHINE)
+    device = new_device()
+    wire = Wire(device)
+    with pytest.raises(ControllerError, match=r"refused line 85 \('G17'\).*halted \(M112\)"):
+        send(job, wire, force=frozenset({"program"}))
+    assert wire.written.endswith(b"\nM112\n")
+    assert device.killed
+    assert_dark(device)
+
+
+@pytest.mark.parametrize("emergency_parser", [True, False])
+def test_ctrl_c_halts_and_the_halt_is_confirmed(emergency_parser: bool) -> None:
+    device = new_device(emergency_parser=emergency_parser)
+    at: list[float] = []
+
+    def interrupt(now: float) -> None:
+        if now > 4.0 and not at:
+            at.append(now)
+            raise KeyboardInterrupt
+
+    wire = Wire(device, before_read=interrupt)
+    with pytest.raises(JobStopped, match=r"dashes.nc was stopped by Ctrl-C; .*halted \(M112\)"):
+        send(dashes(), wire)
+    assert device.killed
+    assert_dark(device)
+    if emergency_parser:
+        assert device.beam_log[-1].t1 < at[0] + 0.002
+
+
+def test_without_an_emergency_parser_the_user_is_told() -> None:
+    (remark,) = send(dashes(2), Wire(new_device(emergency_parser=False))).remarks
+    assert "built without EMERGENCY_PARSER" in remark
+
+
+def test_a_restart_ends_the_job() -> None:
+    device = new_device()
+
+    def restart(now: float) -> None:
+        if now > 3.0 and not device.homed:
+            device.homed = 1
+            device.power_cycle()
+
+    with pytest.raises(ControllerError, match="restarted by itself after it took line"):
+        send(dashes(), Wire(device, before_read=restart))
+    assert_dark(device)
+
+
+def test_silence_is_asked_again_and_then_told() -> None:
+    device = new_device()
+
+    class Deaf(Wire):
+        def read(self, timeout: float) -> bytes:
+            data = super().read(timeout)
+            return data if self.device.now < 2.0 else b""
+
+    wire = Deaf(device)
+    with pytest.raises(ControllerError, match=r"said nothing for 9 s.*switch the laser off"):
+        send(dashes(), wire)
+    assert wire.written.endswith(b"\nM112\n" * 3)
+    assert_dark(device)
+
+
+def test_a_long_move_is_waited_for_since_the_controller_says_that_it_is_busy() -> None:
+    device = new_device()
+    job = Job("slow.nc", "M5\nG21\nG90\nM4 I S0\nG1 X30 S9 F60\nG1 X60 S9 F60\nM5 I\nM5\n")
+    assert send(job, Wire(device)).seconds == pytest.approx(60.0, abs=1.0)
+    assert [round(s.x1) for s in device.beam_log] == [30, 60]
+
+
+def test_nothing_that_answers_is_no_marlin() -> None:
+    class Mute(Wire):
+        def read(self, timeout: float) -> bytes:
+            super().read(timeout)
+            return b""
+
+    with pytest.raises(PortError, match="Nothing that speaks Marlin answers at virtual"):
+        send(dashes(), Mute(new_device()))
+
+
+def test_homing_and_a_stated_place_come_first() -> None:
+    device = new_device()
+    wire = Wire(device)
+    deliver(plan_job(dashes(2), MACHINE, home=True, at=(5.0, 6.0)), wire, StopSignals())
+    assert device.homed == 1
+    assert wire.written.index(b"G28XY*") < wire.written.index(b"G92X5.000Y6.000*")
+
+
+class Pressed:
+    """Keys pressed at their times."""
+
+    def __init__(self, device: VirtualMarlin, **keys: float) -> None:
+        self._device, self._keys = device, {k: k for k in keys} | {"space": " "}
+        self._due = sorted((at, self._keys[name]) for name, at in keys.items())
+
+    def pressed(self) -> str:
+        now = "".join(key for at, key in self._due if at <= self._device.now)
+        self._due = [(at, key) for at, key in self._due if at > self._device.now]
+        return now
+
+
+def test_space_holds_and_r_goes_on() -> None:
+    device = new_device()
+    states: list[str] = []
+    send(
+        dashes(),
+        Wire(device),
+        keys=Pressed(device, space=3.0, r=20.0),
+        on_progress=lambda progress: states.append(progress.state),
+    )
+    assert "Hold" in states
+    assert burnt(device) == WHOLE
+    ends = [s.t1 for s in device.beam_log]
+    assert max(b - a for a, b in pairwise(ends)) > 12.0
+
+
+def test_q_halts() -> None:
+    device = new_device()
+    with pytest.raises(JobStopped, match=r"stopped at the keyboard.*halted"):
+        send(dashes(), Wire(device), keys=Pressed(device, q=4.0))
+    assert_dark(device)
+
+
+def test_whoever_finds_the_machine_at_work_halts_it() -> None:
+    device = new_device()
+    device.receive(b"M4 I S0\nG1 X100 S200 F600\n")
+    device.advance(2.0)
+    assert device.beam_on
+    assert "halted (M112)" in make_safe(MACHINE, Wire(device))
+    assert_dark(device)
+
+
+def serve(device: VirtualMarlin, wire: PtyWire, stop: threading.Event, speed: float) -> None:
+    start = time.monotonic()
+    while not stop.is_set():
+        data, opened = wire.wait(0.002)
+        device.advance(max(0.0, (time.monotonic() - start) * speed - device.now))
+        if opened:
+            device.power_cycle()
+        if data:
+            device.receive(data)
+        output = device.take_output()
+        if output:
+            wire.write(output)
+
+
+def test_over_a_pseudo_terminal_the_command_cuts_it(tmp_path: Path) -> None:
+    device, wire, stop = new_device(), PtyWire(), threading.Event()
+    thread = threading.Thread(target=serve, args=(device, wire, stop, 20.0))
+    thread.start()
+    try:
+        result = stream_job(dashes(), MACHINE, wire.address)
+    finally:
+        stop.set()
+        thread.join()
+        wire.close()
+    assert result.lines == 7 + 2 * DASHES
+    assert burnt(device) == WHOLE
+
+
+def test_the_command_cuts_on_the_virtual_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "dashes.nc"
+    file.write_text(dashes().text)
+    command = ["miurafab", "cut", str(file), "--machine", MACHINE.name, "--port", "virtual"]
+    for arguments, code in (((), 0), (("--check-mode",), 2)):
+        monkeypatch.setattr(sys, "argv", [*command, "--json", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        assert (ended.value.code or 0) == code
+        capsys.readouterr()
