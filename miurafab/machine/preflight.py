@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -20,12 +21,15 @@ from miurafab.gcode.moves import BEAM_M3, DWELL
 from miurafab.gcode.program import Program
 from miurafab.grbl.events import StatusReport
 from miurafab.grbl.settings import Settings, profile_settings
+from miurafab.machine.loose import burnt_on_loose_pieces, open_outlines, says_operations
 from miurafab.profiles import MachineProfile
 
 CHECKS = {
     "m3": "the job arms the laser with M4, which goes dark whenever motion stops",
     "program": "the job is a program that GRBL 1.1 would run without an error",
     "bounds": "every move of the job lies on the bed",
+    "islands": "nothing is burnt inside an outline that is cut through already",
+    "outlines": "every outline that is cut through closes",
     "dwell": "the beam is off in every dwell (G4)",
     "power": "no S word is above the machine's largest",
     "material": "no S word is above the most that the material takes",
@@ -93,12 +97,13 @@ def check_lines(
 def check_program(
     program: Program, machine: MachineProfile, *, most_power: float = 1.0
 ) -> Iterator[Finding]:
-    """The checks ``bounds``, ``dwell``, ``power`` and ``material``, which need no controller.
+    """The checks of what the job does, which need no controller.
 
     ``most_power`` is the most that the material takes, as a fraction of full power.
     """
     yield from _bounds(program, machine)
     if machine.tool.kind == "laser":
+        yield from _loose(program)
         yield from _dwells(program)
         if most_power < 1.0:
             yield from _material(program, most_power * machine.tool.s_max)
@@ -126,6 +131,30 @@ def _bounds(program: Program, machine: MachineProfile) -> Iterator[Finding]:
             GcodeError(
                 f"{program.name}, line {program.line[index]} moves to X{x:g} Y{y:g}, off the bed "
                 f"of {machine.name} ({size[0]:g} x {size[1]:g} mm)"
+            ),
+        )
+
+
+def _loose(program: Program) -> Iterator[Finding]:
+    """The first stroke on a loose piece and the first outline that does not close, if any."""
+    if not says_operations(program):
+        return
+    for fault in islice(burnt_on_loose_pieces(program), 1):
+        yield Finding(
+            "islands",
+            GcodeError(
+                f"{program.name}, line {fault.line} burns inside the outline that is cut through "
+                f"from line {fault.outline_line} on: that piece lies loose by then and may catch "
+                "fire; cut outlines last"
+            ),
+        )
+    for fault in islice(open_outlines(program), 1):
+        yield Finding(
+            "outlines",
+            GcodeError(
+                f"{program.name}, line {fault.line} ends the outline begun in line "
+                f"{fault.outline_line}, {fault.gap_mm:.2f} mm from where that began: the piece "
+                "would hang on by a thread; close it"
             ),
         )
 

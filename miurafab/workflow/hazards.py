@@ -8,6 +8,7 @@ Facts: gnea/grbl 1.1, doc/markdown/laser_mode.md, serial.c.
 from __future__ import annotations
 
 import re
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.program import Program
 from miurafab.gcode.reading import has_laser_mode
+from miurafab.machine.loose import burnt_on_loose_pieces, says_operations
 from miurafab.profiles import MachineProfile
 
 _HALF_MICRON = 5e-4
@@ -38,6 +40,7 @@ def hazards(job: Job, program: Program, machine: MachineProfile) -> tuple[str, .
     if machine.tool.kind == "laser":
         found += _laser_mode(machine)
         found += _beam(job)
+        found += _loose(program)
     if not program.beam_on.any():
         found.append("The job burns nothing.")
     return tuple(found)
@@ -153,6 +156,17 @@ def _beam(job: Job) -> list[str]:
     if armed != "5":
         found.append(f"The job ends with M{armed} in force; end it with M5.")
     return found
+
+
+def _loose(program: Program) -> list[str]:
+    """Where no operation is said, a closed stroke may be an outline that cuts its piece loose."""
+    if says_operations(program):
+        return []  # the check 'islands' knows
+    return [
+        f"Line {fault.line} burns inside the closed stroke of line {fault.outline_line}; if that "
+        "one cuts through, the piece lies loose by then."
+        for fault in islice(burnt_on_loose_pieces(program), 1)
+    ]
 
 
 def _count(mask: NDArray[np.bool_], noun: str) -> str:

@@ -1,0 +1,84 @@
+"""Every pre-flight check fires by its name, is overridden by that name, and by no other."""
+
+from __future__ import annotations
+
+import pytest
+from wires import BANNER, FakeWire
+
+from miurafab.errors import MiurafabError
+from miurafab.gcode.job import Job
+from miurafab.grbl.settings import virtual_settings
+from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.machine.planning import plan_job
+from miurafab.machine.preflight import CHECKS
+from miurafab.machine.sender import deliver
+from miurafab.machine.signals import StopSignals
+from miurafab.profiles import load_machine
+
+MACHINE = load_machine("grbl-laser-400")
+OUTLINE = "(operation cut)\nG0 X10 Y10\nG1 X60 S500 F3000\nY60\nX10\nY{}\n"
+SOFT_LIMITS = {20: 1, 22: 1, 24: 500, 25: 3000}
+
+JOBS = {
+    "m3": "M3 S500\nG1 X5 F600\nM5\n",
+    "program": "M4 S500\nG1 X5 F600\nG99\nM5\n",
+    "bounds": "G0 X401\n",
+    "islands": "M4 S0\n" + OUTLINE.format(10) + "G0 X20 Y20\nG1 X30\nM5\n",
+    "outlines": "M4 S0\n" + OUTLINE.format(11) + "M5\n",
+    "dwell": "M4\nM3 S500\nG1 X5 F600\nG4 P0.1\nM5\n",
+    "power": "M4 S1001\nG1 X5 F600\nM5\n",
+    "material": "M4 S900\nG1 X5 F600\nM5\n",
+}
+CONTROLLERS = {
+    "idle": {22: 1, 24: 500, 25: 3000},
+    "beam": {},
+    "laser-mode": {32: 0},
+    "s-range": {31: 3},
+    "settings": {120: 1},
+    "travel": SOFT_LIMITS,
+}
+
+
+def test_every_check_is_tried_here() -> None:
+    assert JOBS.keys() | CONTROLLERS.keys() == CHECKS.keys()
+
+
+def attempt(name: str, force: frozenset[str]) -> FakeWire:
+    """Send the job that ``name`` refuses, to the controller that it refuses."""
+    changes = CONTROLLERS.get(name, {})
+    device = VirtualGrbl(virtual_settings(MACHINE) | changes, baud=MACHINE.controller.baud)
+    if name == "beam":
+        device.receive(b"M3S500\nG1F600\n")  # somebody armed it
+        device.advance(0.1)
+    if name == "travel":
+        device.receive(b"$H\n")
+        device.advance(600.0)
+    heard = device.take_output() if name in ("beam", "travel") else b""
+    wire = FakeWire(device)
+    if name == "beam":
+        assert heard.startswith(BANNER)
+        wire.lies = [(0.0, BANNER)]
+    plan = plan_job(
+        Job("job.nc", JOBS.get(name, "G0 X5 Y5\n")),
+        MACHINE,
+        force=force,
+        allow_m3=name == "dwell",
+        most_power=0.5 if name == "material" else 1.0,
+    )
+    deliver(plan, wire, StopSignals())
+    return wire
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_a_check_fires_and_only_its_own_name_overrides_it(name: str) -> None:
+    for force in (frozenset(), frozenset(CHECKS) - {name}):
+        with pytest.raises(MiurafabError) as caught:
+            attempt(name, force)
+        assert str(caught.value).endswith(f" (--force {name} overrides this check).")
+        assert caught.value.exit_code == (2 if name in JOBS else 3)
+    if name in ("idle", "program", "travel"):
+        with pytest.raises(MiurafabError, match=r"locked|refused|ALARM|into Alarm") as caught:
+            attempt(name, frozenset({name}))  # what the controller says to it then
+        assert "--force" not in str(caught.value)
+    else:
+        assert attempt(name, frozenset({name})).device.state == "Idle"
