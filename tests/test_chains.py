@@ -14,6 +14,7 @@ from test_posting import CARD, LASER, PERFORATE, joined, toolpath, toolpaths
 
 import miurafab.posting.job as posting
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program, strokes
 from miurafab.machine.journal import JournalRun, job_digest
 from miurafab.machine.resume import resume
@@ -23,6 +24,7 @@ from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.posting import post
 from miurafab.posting.chains import LONGEST_CHAIN, LONGEST_GAP
 from miurafab.profiles import OPERATIONS, MachineProfile, Material, load_machine
+from miurafab.workflow.dry_run import dry_run
 
 
 @contextmanager
@@ -156,3 +158,17 @@ def test_a_chain_can_be_taken_up_in_its_middle(taken: int) -> None:
     made = strokes(parse_program(rest.job))
     assert len(made) == len(whole) - rest.stroke
     assert made.points == pytest.approx(whole.points[whole.offsets[rest.stroke] :], abs=1e-3)
+
+
+def test_the_preview_says_that_moves_are_relative() -> None:
+    path = perforation(200, 0.3, 0.2)
+    with always_chained():
+        job = post(path, LASER, CARD)
+    number = next(n for n, line in enumerate(job.lines, 1) if line.startswith("G91"))
+    seen = dry_run("sheet-01", job, LASER, (300.0, 300.0))
+    assert [w for w in seen.warnings if "relative" in w] == [
+        f"Moves are relative from line {number} on (G91), as they are posted where the wire is too "
+        "slow for absolute ones."
+    ]
+    plain = Job("a", "(G91)\nG1 F9 X1 ; G91\nG91.1\nG90\n")
+    assert not any("relative" in w for w in dry_run("a", plain, LASER, (300.0, 300.0)).warnings)

@@ -26,6 +26,7 @@ _BEAM_WORD = re.compile(
     r"M0*(?P<spindle>[345])(?:\.0*)?(?![\d.])|(?P<end>M0*(?:2|30))(?:\.0*)?(?![\d.])"
     r"|S(?P<power>\d+\.?\d*|\.\d+)|(?P<dwell>G0*4)(?:\.0*)?(?![\d.])"
 )
+_RELATIVE = re.compile(r"[gG][ \t]*91(?![ \t]*[\d.])")
 _ARMS_OR_WAITS = re.compile(r"M|G[0 \t]*4")
 
 
@@ -36,6 +37,7 @@ def hazards(job: Job, program: Program, machine: MachineProfile) -> tuple[str, .
         *_rates_and_powers(program, machine),
         *_line_lengths(program, machine),
         *_characters(job),
+        *_relative(job),
     ]
     if machine.tool.kind == "laser":
         found += _laser_mode(machine)
@@ -102,6 +104,20 @@ def _characters(job: Job) -> list[str]:
             return [
                 f"Line {number} holds {bad[0]!r} in a comment: other senders pass it on, and the "
                 "controller would obey it."
+            ]
+    return []
+
+
+def _relative(job: Job) -> list[str]:
+    """Where moves are relative; a jump over the text, since most jobs have no G91 at all."""
+    for match in _RELATIVE.finditer(job.text):
+        begin = max(job.text.rfind("\n", 0, match.start()), job.text.rfind("\r", 0, match.start()))
+        before = job.text[begin + 1 : match.end()]
+        if before.rfind("(") <= before.rfind(")") and ";" not in before:
+            number = Job("", job.text[: match.end()]).line_count
+            return [
+                f"Moves are relative from line {number} on (G91), as they are posted where the "
+                "wire is too slow for absolute ones."
             ]
     return []
 
