@@ -3,8 +3,8 @@
 The outline of a piece is the boundary of its patch with each of its own tabs let in on its seam
 edge. Tabs lie in facets of other patches, so this is a simple closed curve, unless the flat pattern
 overlaps itself or a tab stands on the border of the pattern, where nothing keeps it clear of the
-rest; tabs that would collide then are left out by name, as are tabs put on the other side of a
-seam, or made higher, if the piece outgrows the bed by them.
+rest; tabs that would collide then are left out by name. A piece that outgrows the bed by tabs put
+on the other side of a seam, or made higher, does without those.
 """
 
 from __future__ import annotations
@@ -70,10 +70,19 @@ def make_pieces(
         width, height = min(width, along), min(height, across)
     room = 2 * allowance(material.kerf_mm)
     face_patch = split(pattern, width - room, height - room, material, options)
-    tabs, unusual, untabbed = choose_tabs(pattern, face_patch, material, options)
     around = boundaries(pattern, face_patch)
-    size = (width - room, height - room)
-    kept = _without_misfits(pattern, face_patch, around, tabs, unusual, size)
+    tight = np.zeros(len(around), dtype=bool)
+    while True:
+        tabs, unusual, untabbed = choose_tabs(pattern, face_patch, material, options, tight)
+        outlines, standing = _outlines(pattern, face_patch, around, tabs)
+        outgrown = [
+            bool(unusual[own].any()) and best_turn(outline, width - room, height - room) is None
+            for outline, own in zip(outlines, standing, strict=True)
+        ]
+        if not any(outgrown):
+            break
+        tight |= outgrown
+    kept = _without_collisions(pattern, around, outlines, standing, tabs)
     untabbed = np.sort(np.concatenate([untabbed, tabs.edge[~kept]]))
     tabs = tabs.take(kept)
 
@@ -113,26 +122,19 @@ def _outlines(
     return outlines, standing
 
 
-def _without_misfits(
+def _without_collisions(
     pattern: CreasePattern,
-    face_patch: NDArray[np.int64],
     around: list[Boundary],
+    outlines: list[NDArray[np.float64]],
+    standing: list[NDArray[np.int64]],
     tabs: TabRegions,
-    unusual: NDArray[np.bool_],
-    size: tuple[float, float],
 ) -> NDArray[np.bool_]:
     """(N,) which tabs may stay."""
     kept = np.ones(len(tabs), dtype=bool)
-    outlines, standing = _outlines(pattern, face_patch, around, tabs)
-    for outline, own in zip(outlines, standing, strict=True):
-        if unusual[own].any() and best_turn(outline, *size) is None:
-            kept[own[unusual[own]]] = False
-    outlines, standing = _outlines(pattern, face_patch, around, tabs.take(kept))
-    names = np.flatnonzero(kept)
     valid = shapely.is_valid(np.array([shapely.Polygon(outline) for outline in outlines]))
     for patch in np.flatnonzero(~valid).tolist():
         taken: BaseGeometry = shapely.Polygon(pattern.vertices_coords[around[patch].vertices])
-        for tab in names[standing[patch]].tolist():
+        for tab in standing[patch].tolist():
             shape = shapely.Polygon(tabs.polygon(tab))
             if _common_area(taken, shape) < 1e-6 and _meets_in_base(taken, shape):
                 taken = shapely.union(taken, shape, grid_size=1e-9)

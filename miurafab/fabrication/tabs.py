@@ -151,7 +151,8 @@ def tab_regions(
     full_facet: bool = False,
     raised: NDArray[np.bool_] | None = None,
 ) -> TabRegions:
-    """The tabs on N ``seams``, twice as high as the material's where ``raised`` (N,) says so.
+    """The tabs on N ``seams``, where ``raised`` (N,) says so as much higher than the material's as
+    :data:`RAISED` allows and with no limit to their angles.
 
     ``bearing`` (F, k) tells which sides of each facet have a tab glued inside them, and so share
     the facet; without it every tab is computed as if alone, which only makes it larger.
@@ -201,7 +202,8 @@ def tab_regions(
         points, sides = clip_convex(points, sides, towards, np.where(shared, limit, NO_LIMIT))
     points, sides = _base_first(points, sides)
     if material.tabs.max_angle < math.pi and not full_facet:
-        points, sides = _not_steeper(points, sides, material.tabs.max_angle)
+        free = np.zeros(count, dtype=bool) if raised is None else raised
+        points, sides = _not_steeper(points, sides, material.tabs.max_angle, free)
     glued = placed = a[:, None] + np.einsum("nij,nki->nkj", frame, points)
     if (seams.edges[:, 0] != seams.edges[:, 1]).any():
         # The facet that bears the tab has its side running the other way.
@@ -231,14 +233,18 @@ def choose_tabs(
     face_patch: NDArray[np.int64],
     material: Material,
     options: LayoutOptions | None = None,
+    tight: NDArray[np.bool_] | None = None,
 ) -> tuple[TabRegions, NDArray[np.bool_], NDArray[np.int64]]:
     """One tab for each seam of the split ``face_patch`` (F,), the patch id of each facet.
 
     The patch that ``options`` name bears the tab. Where it would have less glue than the material
     asks for, the tab goes to the other patch if it is larger there, and if that is not enough it
-    is drawn up to :data:`RAISED` times as high. Where a sheet is glued to itself the lower pattern
-    edge counts as the lower patch. Returns the tabs, (N,) which of them are not as usual, and (M,)
-    the seam edges where neither patch can bear one. Cuts in the pattern (assignment C) get none.
+    is drawn up to :data:`RAISED` times as high and as wide as its facet lets it. Where a sheet is
+    glued to itself the lower pattern edge counts as the lower patch. Patches that are ``tight``
+    (P,) have no room for any tab that is not as usual.
+
+    Returns the tabs, (N,) which of them are not as usual, and (M,) the seam edges where neither
+    patch can bear one. Cuts in the pattern (assignment C) get none.
     """
     options = options or LayoutOptions()
     seams = all_seams(pattern, face_patch)
@@ -254,11 +260,14 @@ def choose_tabs(
 
     tabs = made(seams)
     weak = tabs.glue < material.tabs.min_area_mm2
-    unusual = weak
+    unusual = np.zeros(len(seams), dtype=bool)
     if weak.any():
-        swapped = weak & (made(seams.swapped(weak)).glue > tabs.glue)
+        free = np.ones(face_patch.max() + 1, dtype=bool) if tight is None else ~tight
+        better = made(seams.swapped(weak)).glue > tabs.glue
+        swapped = weak & better & free[face_patch[seams.faces[:, 1]]]
         tabs = made(seams.swapped(swapped))
         weak = tabs.glue < material.tabs.min_area_mm2
+        weak &= free[face_patch[tabs.own_face]]
         tabs = made(tabs.seams, weak)
         unusual = swapped | weak
     kept = tabs.glue > 0
@@ -288,16 +297,21 @@ def _by_lower(patch: NDArray[np.int64], side: str) -> NDArray[np.bool_]:
 
 
 def _not_steeper(
-    points: NDArray[np.float64], count: NDArray[np.int64], angle: float
+    points: NDArray[np.float64],
+    count: NDArray[np.int64],
+    angle: float,
+    free: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """The polygons with their inner angles at the base, on y = 0, cut to ``angle`` at most."""
+    """The polygons with their inner angles at the base, on y = 0, cut to ``angle`` at most, but for
+    those that are ``free`` (N,).
+    """
     c, s = math.cos(angle), math.sin(angle)
     row = np.arange(len(points))
     for end, normal in ((0, np.array([s, -c])), (1, np.array([-s, -c]))):
         beyond = points[row, 2 if end else np.maximum(count, 1) - 1]
         limit = points[:, end] @ normal
         # Only where the side is too steep: elsewhere the clip would double the corner.
-        steep = (count >= 3) & (beyond @ normal < limit - 1e-9)
+        steep = ~free & (count >= 3) & (beyond @ normal < limit - 1e-9)
         limit = np.where(steep, limit + 1e-9, NO_LIMIT)
         points, count = clip_convex(points, count, np.broadcast_to(normal, (len(points), 2)), limit)
         points, count = _base_first(points, count)

@@ -1,0 +1,156 @@
+"""The last pages of the guide: how to fold, and what is glued to what, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from reportlab.lib.colors import Color
+from reportlab.lib.units import mm
+from reportlab.pdfgen.canvas import Canvas
+
+from miurafab.fabrication.assembly import GlueStep, assembly_order
+from miurafab.fabrication.drawing.instructions import draw_instructions, height_of_instructions
+from miurafab.fabrication.drawing.page import (
+    BOTTOM,
+    HEIGHT,
+    INK,
+    MARGIN,
+    ROOM,
+    Box,
+    Page,
+    count,
+    heading,
+    line_above,
+    tabs_called,
+    text,
+    wrapped,
+)
+from miurafab.fabrication.drawing.views import Views
+from miurafab.fabrication.sheets import Layout
+
+_STEP = (ROOM - 12) / 3
+"""The width of one step of glueing."""
+
+
+@dataclass(frozen=True, eq=False)
+class GluePages:
+    """The pages on folding and glueing in the guide with this ``title``."""
+
+    views: Views
+    title: str
+
+    @property
+    def layout(self) -> Layout:
+        return self.views.layout
+
+    def pages(self) -> Iterator[Page]:
+        """Functions that draw one page each."""
+        steps = assembly_order(self.layout.model, self.views.pattern)
+        top, notes = HEIGHT - MARGIN - 19, self.notes()
+        height = 20.0 + min(_STEP * self.views.aspect, 40.0)
+        glue = self.layout.totals.tabs > 0
+        copies = self.layout.copies
+        each = f", each of the {copies} copies" if copies > 1 else ""
+        taken = height_of_instructions(notes, glue=glue)
+        alone = len(self.views.patches) == 1 and not any(step.closes for step in steps)
+        shown = [] if alone else list(enumerate(steps))
+        first = 3 * int((top - taken - BOTTOM) // height)
+        later = 3 * int((top - BOTTOM) // height)
+        seams = self.seams_by_pair()
+
+        def draw(canvas: Canvas, part: list[tuple[int, GlueStep]], y: float) -> None:
+            for place, (number, step) in enumerate(part):
+                row, column = divmod(place, 3)
+                box = (MARGIN + column * (_STEP + 6), y - row * height, _STEP, height)
+                before = {each.patch for each in steps[:number]}
+                self.step(canvas, number, step, before, seams, box)
+
+        def front(canvas: Canvas) -> None:
+            words = (
+                ("folding and glueing", f"Fold first, then glue{each}") if glue else ("folding", "")
+            )
+            heading(canvas, f"{self.title}: {words[0]}", words[1])
+            draw_instructions(canvas, top, notes, glue=glue)
+            draw(canvas, shown[:first], top - taken)
+
+        yield front
+        for start in range(first, len(shown), later):
+
+            def more(
+                canvas: Canvas, part: list[tuple[int, GlueStep]] = shown[start : start + later]
+            ) -> None:
+                heading(canvas, f"{self.title}: glueing", f"In this order{each}, continued")
+                draw(canvas, part, top)
+
+            yield more
+
+    def notes(self) -> list[str]:
+        """What could not be had and has to be known."""
+        found = list(self.layout.remarks)
+        if self.layout.untabbed:
+            where = count(len(self.layout.untabbed), "seam edge bears", "seam edges bear")
+            found.append(f"{where} no tab: use tape there.")
+        if self.layout.unlettered:
+            names = count(self.layout.unlettered, "name or number", "names and numbers")
+            found.append(f"{names} found no room on the sheets: go by the pictures.")
+        return found
+
+    def seams_by_pair(self) -> dict[tuple[int, int, bool], list[int]]:
+        """The pattern edges of each seam by its two patches and whether it closes the sheet."""
+        found: dict[tuple[int, int, bool], list[int]] = {}
+        for patch in self.views.patches:
+            for tab in patch.tabs:
+                closes = tab.edge != tab.mate_edge
+                low, high = sorted((patch.id, tab.mate_patch))
+                edges = [tab.edge, tab.mate_edge] if closes else [tab.edge]
+                found.setdefault((low, high, closes), []).extend(edges)
+        return found
+
+    def step(
+        self,
+        canvas: Canvas,
+        number: int,
+        step: GlueStep,
+        before: set[int],
+        seams: dict[tuple[int, int, bool], list[int]],
+        box: Box,
+    ) -> None:
+        """One step of glueing, from the top of ``box`` down."""
+        x, top, width, height = box
+        line_above(canvas, x, top, width)
+        canvas.setFillColor(INK)
+        canvas.circle((x + 3.2) * mm, (top - 5.6) * mm, 3.2 * mm, stroke=0, fill=1)
+        text(
+            canvas, x + 3.2, top - 6.7, str(number + 1), 8.5, bold=True,
+            colour=Color(1, 1, 1), align="middle",
+        )  # fmt: skip
+        label = self.views.name(step.patch)
+        if step.closes:
+            title = f"Close {label} to {self.views.name(step.onto[0])}"
+            if step.onto[0] == step.patch:
+                title = "Close the ring"
+        elif step.onto:
+            title = f"{label} onto {', '.join(self.views.name(mate) for mate in step.onto)}"
+        else:
+            title = f"Begin with {label}"
+        text(canvas, x + 8.5, top - 6.8, title, 9.5, bold=True)
+        glued = [
+            edge
+            for mate in step.onto
+            for edge in seams.get((min(mate, step.patch), max(mate, step.patch), step.closes), [])
+        ]
+        words = tabs_called(step.tabs).capitalize() if step.tabs else ""
+        if step.onto and not step.tabs:
+            words = "No tabs: use tape on the seam"
+        lines = wrapped(words, width - 8.5, 8)
+        text(canvas, x + 8.5, top - 11, lines[0] + (" ..." if len(lines) > 1 else ""), 8)
+        tall = min(height - 20, width * self.views.aspect)
+        self.views.map(
+            canvas,
+            (x, top - 14 - tall, width, tall),
+            shown=(step.patch, *(step.onto if step.closes else ())),
+            done=before - {step.patch},
+            seams=np.array(glued, dtype=np.int64),
+        )

@@ -1,0 +1,135 @@
+"""How to fold and glue, in words and two small drawings: what the lines and the tabs say."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from reportlab.lib.colors import Color
+from reportlab.lib.units import mm
+from reportlab.pdfgen.canvas import Canvas
+
+from miurafab.fabrication.drawing.page import (
+    INK,
+    MARGIN,
+    MOUNTAIN,
+    QUIET,
+    ROOM,
+    VALLEY,
+    Floats,
+    paragraph,
+    polygon,
+    text,
+    tint,
+    wrapped,
+)
+
+_FOLDING = (
+    "Crease every line both ways, one row after another, before anything is glued.",
+    "Fold all rows together, a little at a time: the sheet moves as one. Red lines are mountains "
+    "and fold away from you, blue ones valleys and fold towards you, seen from the printed side.",
+)
+_GLUEING = (
+    "On each tab stands its number and the way its own fold goes: M for mountain, V for valley.",
+    "It goes under the facet that bears the same number, edge to edge with the line.",
+    "Patches are glued best half way unfolded, while the seam is nearly flat. Press until it "
+    "holds, then take the next tab.",
+)
+
+
+_COLUMN = (ROOM - 10) / 2
+_STEP = 8.5 * 0.47
+"""From one line of a paragraph to the next."""
+
+
+def height_of_instructions(notes: Sequence[str], *, glue: bool) -> float:
+    """What :func:`draw_instructions` takes of a page."""
+    columns = (
+        sum(len(wrapped(line, _COLUMN - 5, 8.5)) * _STEP + 1.4 for line in lines)
+        for lines in ((_FOLDING, _GLUEING) if glue else (_FOLDING,))
+    )
+    below = sum(len(wrapped(note, ROOM, 8.5)) for note in notes) * _STEP
+    return 48.0 + max(columns) + below + 6.0
+
+
+def draw_instructions(canvas: Canvas, top: float, notes: Sequence[str], *, glue: bool) -> None:
+    """How to fold, and if there are tabs how to ``glue``, from ``top`` down, with ``notes``."""
+    columns: list[tuple[float, str, Sequence[str]]] = [(MARGIN, "Fold", _FOLDING)]
+    _draw_folds(canvas, MARGIN, top - 34)
+    if glue:
+        columns.append((MARGIN + _COLUMN + 10, "Glue", _GLUEING))
+        _draw_tab(canvas, MARGIN + _COLUMN + 10, top - 34)
+    lowest = top
+    for x, title, lines in columns:
+        text(canvas, x, top - 43, title, 11, bold=True)
+        y = top - 49.0
+        for number, line in enumerate(lines, start=1):
+            text(canvas, x, y, f"{number}", 8.5, bold=True, colour=QUIET)
+            y = paragraph(canvas, x + 5, y, line, _COLUMN - 5, 8.5) - 1.4
+        lowest = min(lowest, y)
+    y = lowest
+    for note in notes:
+        y = paragraph(canvas, MARGIN, y, note, ROOM, 8.5, bold=True)
+
+
+def _solid(x: float, y: float, size: float, points: Sequence[tuple[float, float, float]]) -> Floats:
+    """Corners in space, seen from the front and above, on the page at (x, y)."""
+    space = np.array(points)
+    a, b = math.radians(24), math.radians(30)
+    across = space[:, 0] * math.cos(a) - space[:, 1] * math.sin(a)
+    away = space[:, 0] * math.sin(a) + space[:, 1] * math.cos(a)
+    seen = np.column_stack([across, away * math.sin(b) + space[:, 2] * math.cos(b)])
+    placed: Floats = seen * size + np.array([x, y])
+    return placed
+
+
+def _draw_folds(canvas: Canvas, x: float, y: float) -> None:
+    """A mountain and a valley: two leaves that meet in a coloured line."""
+    size = 15.0
+    for place, (name, colour, lift) in enumerate(
+        (("mountain", MOUNTAIN, 0.5), ("valley", VALLEY, -0.5))
+    ):
+        left = x + 10 + place * _COLUMN / 2
+        base = y + (12 if lift < 0 else 5)
+        ridge = [(0.8, 0.0, lift), (0.8, 1.2, lift)]
+        near = [(0.0, 0.0, 0.0), *ridge, (0.0, 1.2, 0.0)]
+        far = [ridge[0], (1.6, 0.0, 0.0), (1.6, 1.2, 0.0), ridge[1]]
+        canvas.setStrokeColor(INK)
+        canvas.setLineWidth(0.25 * mm)
+        canvas.setLineJoin(1)
+        leaves = [(0.4, near), (0.85, far)]
+        # The leaf that is farther from the eye goes first.
+        for strength, corners in leaves if lift < 0 else leaves[::-1]:
+            canvas.setFillColor(tint(0, strength))
+            polygon(canvas, _solid(left, base, size, corners), stroke=True)
+        _line(canvas, _solid(left, base, size, ridge), colour)
+        text(canvas, left + 8, y - 1.5, name, 8.5, colour=colour, bold=True, align="middle")
+
+
+def _draw_tab(canvas: Canvas, x: float, y: float) -> None:
+    """A tab with its number and letter, and the facet that it goes under."""
+    left = np.array([[0, 0], [30, 0], [26, 24], [-4, 24]]) + np.array([x + 6, y + 4])
+    tab = np.array([[29.6, 2.5], [38.5, 5], [35.2, 20], [26.6, 21.5]]) + np.array([x + 6, y + 4])
+    right = np.array([[0, 0], [27, 0], [23, 24], [-4, 24]]) + np.array([x + 49, y + 4])
+    canvas.setStrokeColor(INK)
+    canvas.setLineWidth(0.25 * mm)
+    canvas.setLineJoin(1)
+    for fill, corners in ((tint(1, 0.6), left), (tint(1, 0.3), tab), (tint(2, 0.6), right)):
+        canvas.setFillColor(fill)
+        polygon(canvas, corners, stroke=True)
+    _line(canvas, left[1:3], VALLEY)
+    text(canvas, x + 38.6, y + 14.8, "7V", 9, bold=True, align="middle")
+    text(canvas, x + 55, y + 14.8, "7", 9, bold=True, align="middle")
+    text(canvas, x + 17, y + 14.8, "P1", 9, colour=QUIET, align="middle")
+    text(canvas, x + 66, y + 14.8, "P2", 9, colour=QUIET, align="middle")
+    words = "tab 7 folds as a valley and goes under the facet marked 7"
+    text(canvas, x + _COLUMN / 2, y - 1.5, words, 8.5, colour=QUIET, align="middle")
+
+
+def _line(canvas: Canvas, ends: Floats, colour: Color) -> None:
+    """A crease, heavier than the outlines about it."""
+    canvas.setStrokeColor(colour)
+    canvas.setLineWidth(0.7 * mm)
+    (x0, y0), (x1, y1) = (ends * mm).tolist()
+    canvas.line(x0, y0, x1, y1)

@@ -1,0 +1,226 @@
+"""The printed page: A4 with one set of margins, inks, type sizes and small parts for all guides.
+
+Lengths are mm on the page, its origin at the lower left. Colours of patches are spread over the
+hues by the golden section at one lightness, in OKLCH (Ottosson 2020, "A perceptual color space for
+image processing"), so that neighbours differ and none stands out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from reportlab.lib.colors import Color, HexColor, white
+from reportlab.lib.units import mm
+from reportlab.pdfbase.pdfmetrics import stringWidth
+from reportlab.pdfgen.canvas import Canvas
+
+Floats = NDArray[np.float64]
+Page = Callable[[Canvas], None]
+"""What draws one page."""
+Box = tuple[float, float, float, float]
+"""A rectangle on the page: x, y of its lower left corner, width, height."""
+
+WIDTH, HEIGHT, MARGIN = 210.0, 297.0, 18.0
+ROOM = WIDTH - 2 * MARGIN
+"""Between the margins."""
+BOTTOM = 17.0
+"""Above the foot of the page."""
+
+INK, QUIET, RULE = HexColor("#1d2329"), HexColor("#5c6670"), HexColor("#c3cad2")
+PALE = HexColor("#eef1f4")
+MOUNTAIN, VALLEY, OTHER = HexColor("#c8372d"), HexColor("#2a5fb0"), HexColor("#8a6d3b")
+_GOLDEN = 0.61803398875
+
+
+def tint(number: int, strength: float = 1.0) -> Color:
+    """The colour of patch ``number``; a ``strength`` below 1 is nearer to white."""
+    hue = 2 * math.pi * ((0.12 + number * _GOLDEN) % 1.0)
+    lightness = 1.0 - strength * (0.17 + 0.03 * (number % 3))
+    chroma = 0.095 * strength
+    return _oklch(lightness, chroma, hue)
+
+
+def _oklch(lightness: float, chroma: float, hue: float) -> Color:
+    a, b = chroma * math.cos(hue), chroma * math.sin(hue)
+    long = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3
+    middle = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3
+    short = (lightness - 0.0894841775 * a - 1.2914855480 * b) ** 3
+    linear = (
+        4.0767416621 * long - 3.3077115913 * middle + 0.2309699292 * short,
+        -1.2684380046 * long + 2.6097574011 * middle - 0.3413193965 * short,
+        -0.0041960863 * long - 0.7034186147 * middle + 1.7076147010 * short,
+    )
+    # The transfer curve of sRGB (IEC 61966-2-1).
+    return Color(
+        *(
+            12.92 * c if c <= 0.0031308 else min(1.055 * c ** (1 / 2.4) - 0.055, 1.0)
+            for c in (max(c, 0.0) for c in linear)
+        )
+    )
+
+
+def text(
+    canvas: Canvas,
+    x: float,
+    y: float,
+    words: str,
+    size: float = 9.0,
+    *,
+    bold: bool = False,
+    colour: Color = INK,
+    align: str = "left",
+) -> None:
+    """One line of text with its baseline at ``y``, from, to or about ``x``."""
+    canvas.setFillColor(colour)
+    canvas.setFont(_font(bold), size)
+    draw = {
+        "left": canvas.drawString,
+        "right": canvas.drawRightString,
+        "middle": canvas.drawCentredString,
+    }[align]
+    draw(x * mm, y * mm, words)
+
+
+def _font(bold: bool) -> str:
+    return "Helvetica-Bold" if bold else "Helvetica"
+
+
+def wrapped(words: str, width: float, size: float, *, bold: bool = False) -> list[str]:
+    """``words`` in lines of at most ``width`` mm, as far as single words let them."""
+    lines = [""]
+    for word in words.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and stringWidth(longer, _font(bold), size) > width * mm:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return lines
+
+
+def paragraph(
+    canvas: Canvas,
+    x: float,
+    y: float,
+    words: str,
+    width: float,
+    size: float = 9.0,
+    *,
+    bold: bool = False,
+    colour: Color = INK,
+) -> float:
+    """``words`` in lines from the baseline ``y`` down; returns the baseline that follows."""
+    step = size * 0.47
+    for line in wrapped(words, width, size, bold=bold):
+        text(canvas, x, y, line, size, bold=bold, colour=colour)
+        y -= step
+    return y
+
+
+def heading(canvas: Canvas, title: str, subtitle: str) -> float:
+    """The head of a page; returns the height at which the page goes on."""
+    top = HEIGHT - MARGIN
+    text(canvas, MARGIN, top - 5, title, 18, bold=True)
+    text(canvas, MARGIN, top - 11, subtitle, 9.5, colour=QUIET)
+    canvas.setStrokeColor(RULE)
+    canvas.setLineWidth(0.2 * mm)
+    canvas.line(MARGIN * mm, (top - 14) * mm, (WIDTH - MARGIN) * mm, (top - 14) * mm)
+    return top - 19
+
+
+def foot(canvas: Canvas, title: str, page: int, pages: int) -> None:
+    """What stands below every page."""
+    text(canvas, MARGIN, 10, f"{title}, made with miurafab", 7.5, colour=QUIET)
+    numbers = f"{page} of {pages}"
+    text(canvas, WIDTH - MARGIN, 10, numbers, 7.5, colour=QUIET, align="right")
+
+
+def caption(canvas: Canvas, words: str, x: float, y: float) -> None:
+    """The name of a drawing, its top at ``y``."""
+    text(canvas, x, y - 3.2, words, 10, bold=True)
+
+
+def scale_bar(canvas: Canvas, scale: float, x: float, y: float) -> None:
+    """A bar of a round length in the drawing's own scale (page mm a pattern mm)."""
+    length = next(
+        size for size in (500, 200, 100, 50, 20, 10, 5, 2, 1, 0.5) if size * scale <= 45 or size < 1
+    )
+    canvas.setStrokeColor(INK)
+    canvas.setLineWidth(0.3 * mm)
+    canvas.line(x * mm, y * mm, (x + length * scale) * mm, y * mm)
+    for end in (x, x + length * scale):
+        canvas.line(end * mm, (y - 1) * mm, end * mm, (y + 1) * mm)
+    text(canvas, x + length * scale + 2, y - 1, f"{length:g} mm", 8, colour=QUIET)
+
+
+def legend(canvas: Canvas, entries: Sequence[tuple[str, Color, float]], x: float, y: float) -> None:
+    """Names behind strokes of their colour and weight (mm), from right to left up to ``x``."""
+    for name, colour, weight in reversed(entries):
+        text(canvas, x, y - 1, name, 8, colour=QUIET, align="right")
+        x -= stringWidth(name, "Helvetica", 8) / mm + 1.5
+        canvas.setStrokeColor(colour)
+        canvas.setLineWidth(weight * mm)
+        canvas.line((x - 7) * mm, y * mm, x * mm, y * mm)
+        x -= 12
+
+
+def chip(canvas: Canvas, words: str, x: float, y: float, fill: Color, size: float = 7.0) -> None:
+    """A short word on a rounded patch of colour about (``x``, ``y``)."""
+    wide = stringWidth(words, "Helvetica-Bold", size) / mm + 0.32 * size
+    tall = 0.52 * size
+    canvas.setFillColor(fill)
+    canvas.setStrokeColor(white)
+    canvas.setLineWidth(0.25 * mm)
+    canvas.roundRect(
+        (x - wide / 2) * mm, (y - tall / 2) * mm, wide * mm, tall * mm, tall / 2 * mm, fill=1
+    )
+    text(canvas, x, y - 0.125 * size, words, size, bold=True, align="middle")
+
+
+def polygon(canvas: Canvas, points: Floats, *, stroke: bool = False) -> None:
+    """A closed polygon (n, 2) in the current colours, filled."""
+    path = canvas.beginPath()
+    path.moveTo(points[0, 0] * mm, points[0, 1] * mm)
+    for x, y in points[1:].tolist():
+        path.lineTo(x * mm, y * mm)
+    path.close()
+    canvas.drawPath(path, stroke=int(stroke), fill=1)
+
+
+def fitted(points: Floats, box: Box) -> tuple[Floats, float]:
+    """``points`` (n, 2) scaled and centred into ``box``, and the scale."""
+    low, span = points.min(axis=0), np.ptp(points, axis=0)
+    x, y, width, height = box
+    scale = float(min(width / max(span[0], 1e-9), height / max(span[1], 1e-9)))
+    shift = np.array([x + (width - scale * span[0]) / 2, y + (height - scale * span[1]) / 2])
+    return (points - low) * scale + shift, scale
+
+
+def line_above(canvas: Canvas, x: float, y: float, width: float) -> None:
+    """What parts two pieces of a page."""
+    canvas.setStrokeColor(RULE)
+    canvas.setLineWidth(0.2 * mm)
+    canvas.line(x * mm, y * mm, (x + width) * mm, y * mm)
+
+
+def count(number: int, one: str, many: str) -> str:
+    """``1 sheet``, ``2 sheets``."""
+    return f"{number:,} {one if number == 1 else many}"
+
+
+def runs(numbers: tuple[int, ...]) -> str:
+    """``1-4, 7``: runs of consecutive numbers drawn together."""
+    found: list[list[int]] = []
+    for number in sorted(numbers):
+        if found and number == found[-1][-1] + 1:
+            found[-1].append(number)
+        else:
+            found.append([number])
+    return ", ".join(f"{r[0]}-{r[-1]}" if len(r) > 1 else str(r[0]) for r in found)
+
+
+def tabs_called(numbers: tuple[int, ...]) -> str:
+    """``tabs 1-4, 7``."""
+    return f"{'tab' if len(numbers) == 1 else 'tabs'} {runs(numbers)}"

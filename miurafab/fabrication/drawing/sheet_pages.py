@@ -1,0 +1,318 @@
+"""The pages of the guide on one sheet: what is made of it, and where its patches belong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from reportlab.lib.colors import Color
+from reportlab.lib.units import mm
+from reportlab.pdfgen.canvas import Canvas
+
+from miurafab.fabrication.drawing.page import (
+    BOTTOM,
+    HEIGHT,
+    INK,
+    MARGIN,
+    MOUNTAIN,
+    QUIET,
+    ROOM,
+    RULE,
+    VALLEY,
+    Box,
+    Page,
+    chip,
+    count,
+    heading,
+    legend,
+    line_above,
+    polygon,
+    scale_bar,
+    tabs_called,
+    text,
+    tint,
+    wrapped,
+)
+from miurafab.fabrication.drawing.views import CREASE_COLOURS, OUTLINED, Views, named
+from miurafab.fabrication.sheets import Layout, Placement, Sheet
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.profiles import OPERATIONS
+
+_CARD = 33.0
+"""The least height of what is said of one patch below its sheet; more is used where there is."""
+_TALL_CARD = 66.0
+_PICTURED = 12
+"""Of more patches on a sheet only the words are shown: the sheet itself is the picture."""
+_COLUMNS = 3
+
+_Words = tuple[float, float, str, list[str]]
+"""Where the words on a patch begin, its name, and the lines below."""
+
+
+@dataclass(frozen=True, eq=False)
+class SheetPages:
+    """The pages on one ``sheet`` and its ``toolpath``, in the guide with this ``title``."""
+
+    views: Views
+    sheet: Sheet
+    toolpath: Toolpath
+    title: str
+
+    @property
+    def layout(self) -> Layout:
+        return self.views.layout
+
+    def label(self, patch: int) -> str:
+        return self.layout.patches[patch].label
+
+    def pages(self) -> Iterator[Page]:
+        """Functions that draw one page each."""
+        sheet = self.sheet
+        labels = [self.label(placed.patch) for placed in sheet.placements]
+        subtitle = f"{'Patch' if len(labels) == 1 else 'Patches'} {', '.join(labels)}"
+        if len(subtitle) > 95:
+            subtitle = f"{len(labels)} patches"
+        if sheet.stock:
+            subtitle += f" from '{sheet.stock}'"
+        scale = min(ROOM / sheet.width_mm, 122.0 / sheet.height_mm)
+        top = HEIGHT - MARGIN - 19
+        under = top - sheet.height_mm * scale - 16
+        if sheet.back is not None:
+            under -= 6
+        placed = [each.patch for each in sheet.placements]
+        if len(placed) > _PICTURED:
+            yield from self.listed(placed, subtitle, scale, under)
+            return
+        # The cards that stand below the drawing, and those on a page of their own.
+        first = max(int((under - BOTTOM) // _CARD), 0) * 2
+
+        def front(canvas: Canvas) -> None:
+            heading(canvas, f"{self.title}: {sheet.name}", subtitle)
+            self.draw_sheet(canvas, top, scale)
+            if len(placed) == 1:
+                self.one_card(canvas, placed[0], under)
+            else:
+                self.cards(canvas, placed[:first], under)
+
+        def more(canvas: Canvas) -> None:
+            heading(canvas, f"{self.title}: {sheet.name}", "Its patches, continued")
+            self.cards(canvas, placed[first:], top)
+
+        yield front
+        if len(placed) > max(first, 1):
+            yield more
+
+    def listed(
+        self, patches: list[int], subtitle: str, scale: float, under: float
+    ) -> Iterator[Page]:
+        """The sheet, and the words on many patches in columns, on as many pages as it takes."""
+        top = HEIGHT - MARGIN - 19
+        width = (ROOM - 6 * (_COLUMNS - 1)) / _COLUMNS
+        blocks = [
+            (self.label(patch), [n for r in self.relations(patch) for n in wrapped(r, width, 7.5)])
+            for patch in patches
+        ]
+        pages: list[list[_Words]] = [[]]
+        column, start, y = 0, under, under
+        for label, lines in blocks:
+            tall = 7.5 + 3.6 * len(lines)
+            if y - tall < BOTTOM:
+                column, y = column + 1, start
+            if column == _COLUMNS:
+                pages.append([])
+                column, start, y = 0, top, top
+            pages[-1].append((MARGIN + column * (width + 6), y, label, lines))
+            y -= tall
+
+        def draw(canvas: Canvas, part: list[_Words]) -> None:
+            for x, upper, label, lines in part:
+                line_above(canvas, x, upper, width)
+                text(canvas, x, upper - 4.2, label, 8.5, bold=True)
+                for number, line in enumerate(lines):
+                    text(canvas, x, upper - 8 - 3.6 * number, line, 7.5)
+
+        def front(canvas: Canvas) -> None:
+            heading(canvas, f"{self.title}: {self.sheet.name}", subtitle)
+            self.draw_sheet(canvas, top, scale)
+            draw(canvas, pages[0])
+
+        yield front
+        for part in pages[1:]:
+
+            def more(canvas: Canvas, part: list[_Words] = part) -> None:
+                heading(canvas, f"{self.title}: {self.sheet.name}", "Its patches, continued")
+                draw(canvas, part)
+
+            yield more
+
+    def draw_sheet(self, canvas: Canvas, top: float, scale: float) -> None:
+        """The sheet with what is drawn on it, in the middle of the page."""
+        sheet, toolpath = self.sheet, self.toolpath
+        x = MARGIN + (ROOM - sheet.width_mm * scale) / 2
+        low = top - sheet.height_mm * scale
+        canvas.saveState()
+        canvas.translate(x * mm, low * mm)
+        canvas.scale(scale, scale)
+        for placed in sheet.placements:
+            patch = self.layout.patches[placed.patch]
+            canvas.setFillColor(tint(self.views.base(patch.id), 0.4))
+            polygon(canvas, placed.from_patch(patch.outline_mm))
+        canvas.setFillColor(RULE)
+        for ring in sheet.defects_mm:
+            polygon(canvas, np.array(ring))
+        self.draw_strokes(canvas, scale)
+        canvas.setStrokeColor(RULE)
+        canvas.setLineWidth(0.3 / scale * mm)
+        canvas.rect(0, 0, sheet.width_mm * mm, sheet.height_mm * mm)
+        canvas.restoreState()
+        for placed in sheet.placements:
+            self.draw_names(canvas, placed, (x, low), scale)
+        scale_bar(canvas, scale, MARGIN, low - 6)
+        entries = [
+            ("mountain", MOUNTAIN, 0.3),
+            ("valley", VALLEY, 0.3),
+            ("cut", INK, 0.45),
+        ]
+        legend(canvas, entries, MARGIN + ROOM, low - 6)
+        figures = (
+            f"{sheet.width_mm:g} x {sheet.height_mm:g} mm, drawn at 1:{1 / scale:.3g}; "
+            f"{toolpath.length_of('cut') / 1000:.2f} m cut, "
+            f"{toolpath.length_of('perforate') / 1000:.2f} m perforated"
+        )
+        text(canvas, MARGIN + ROOM, low - 11.5, figures, 8, colour=QUIET, align="right")
+        if sheet.back is not None:
+            words = (
+                f"First run {sheet.back}, turn the sheet over left to right onto its three holes, "
+                f"then run {sheet.name}."
+            )
+            text(canvas, MARGIN, low - 17.5, words, 9, bold=True)
+
+    def draw_strokes(self, canvas: Canvas, scale: float) -> None:
+        """The strokes in colours for people: mountains, valleys, cuts, and lettering."""
+        toolpath = self.toolpath
+        letters = np.where(toolpath.edge >= 0, self.views.letters[toolpath.edge], "")
+        engraved = toolpath.operation == OPERATIONS.index("engrave")
+        cut = toolpath.operation == OPERATIONS.index("cut")
+        kinds: list[tuple[Color, float, NDArray[np.bool_]]] = [
+            (INK, 0.12, engraved),
+            *((colour, 0.17, ~cut & (letters == name)) for name, colour in CREASE_COLOURS.items()),
+            (INK, 0.28, cut),
+        ]
+        canvas.setLineJoin(1)
+        for colour, weight, chosen in kinds:
+            path = canvas.beginPath()
+            for index in np.flatnonzero(chosen).tolist():
+                for k, (x, y) in enumerate((toolpath.stroke(index) * mm).tolist()):
+                    (path.lineTo if k else path.moveTo)(x, y)
+            canvas.setStrokeColor(colour)
+            canvas.setLineWidth(weight / scale * mm)
+            canvas.drawPath(path, stroke=1, fill=0)
+
+    def draw_names(
+        self, canvas: Canvas, placed: Placement, corner: tuple[float, float], scale: float
+    ) -> None:
+        """The name of a patch, and along each of its seams that of the patch beyond."""
+        patch = self.layout.patches[placed.patch]
+        pattern = self.views.pattern
+
+        def on_page(points: NDArray[np.float64]) -> NDArray[np.float64]:
+            moved = placed.from_patch(patch.from_pattern(points)) * scale
+            placed_there: NDArray[np.float64] = moved + np.array(corner)
+            return placed_there
+
+        corners = pattern.faces_vertices[patch.faces]
+        points = on_page(pattern.vertices_coords[corners[corners >= 0]])
+        middle, span = points.mean(axis=0), float(np.ptp(points, axis=0).min())
+        size = min(max(span / 2.2, 4.0), 16.0)
+        named(canvas, patch.label, float(middle[0]), float(middle[1]), size)
+        if span < 26:
+            return
+        for mate, edges in self.seams_of(patch.id).items():
+            ends = on_page(pattern.vertices_coords[pattern.edges_vertices[edges]].mean(axis=1))
+            at = ends[np.argmin(np.linalg.norm(ends - ends.mean(axis=0), axis=1))]
+            way = middle - at
+            at = at + way / max(float(np.linalg.norm(way)), 1e-9) * 9.0
+            chip(
+                canvas,
+                self.label(mate),
+                float(at[0]),
+                float(at[1]),
+                tint(self.views.base(mate)),
+                6.5,
+            )
+
+    def seams_of(self, patch: int) -> dict[int, list[int]]:
+        """The pattern edges of a patch that are glued, by the patch beyond."""
+        found: dict[int, list[int]] = {}
+        for other in self.layout.patches:
+            for tab in other.tabs:
+                if other.id == patch:
+                    found.setdefault(tab.mate_patch, []).append(tab.edge)
+                elif tab.mate_patch == patch:
+                    found.setdefault(other.id, []).append(tab.mate_edge)
+        return found
+
+    def cards(self, canvas: Canvas, patches: list[int], top: float) -> None:
+        """What is to be known of each patch, in two columns."""
+        rows = math.ceil(len(patches) / 2)
+        if not rows:
+            return
+        width, height = (ROOM - 6) / 2, min((top - BOTTOM) / rows, _TALL_CARD)
+        for number, patch in enumerate(patches):
+            row, column = divmod(number, 2)
+            x, y = MARGIN + column * (width + 6), top - row * height
+            line_above(canvas, x, y, width)
+            beside = 0.4 * width
+            tall = min(height - 8, beside * self.views.aspect)
+            self.views.map(canvas, (x, y - 4 - tall, beside, tall), shown=(self.views.base(patch),))
+            self.say(canvas, patch, (x + beside + 5, y, width - beside - 5, height))
+
+    def one_card(self, canvas: Canvas, patch: int, top: float) -> None:
+        """The same for a patch that has the page for itself, with its place in the folded form."""
+        third = (ROOM - 12) / 3
+        room = min(top - BOTTOM, 80.0)
+        line_above(canvas, MARGIN, top, ROOM)
+        tall = min(room - 10, third * self.views.aspect)
+        self.views.map(
+            canvas, (MARGIN, top - 5 - tall, third, tall), shown=(self.views.base(patch),)
+        )
+        if self.views.pattern.folded_coords is not None and len(self.views.face_patch) <= OUTLINED:
+            box = (MARGIN + third + 6, top - room + 2, third, room - 5)
+            self.views.folded_view(canvas, box, shown=(self.views.base(patch),))
+        self.say(canvas, patch, (MARGIN + 2 * third + 12, top, third, room))
+
+    def say(self, canvas: Canvas, patch: int, box: Box) -> None:
+        """The name of a patch and what it is glued to, in the upper part of ``box``."""
+        x, top, width, height = box
+        facets = count(len(self.layout.patches[patch].faces), "facet", "facets")
+        text(canvas, x, top - 6, self.label(patch), 11, bold=True)
+        text(canvas, x + width, top - 6, facets, 8, colour=QUIET, align="right")
+        lines = [line for words in self.relations(patch) for line in wrapped(words, width, 8)]
+        room = int((height - 12) / 4)
+        if len(lines) > room:
+            lines = [*lines[: room - 1], "and more: see the steps"]
+        for number, line in enumerate(lines):
+            text(canvas, x, top - 11.5 - 4 * number, line, 8)
+
+    def relations(self, patch: int) -> list[str]:
+        """A sentence for each neighbour of a patch and each side that bears the tabs."""
+        own: dict[int, list[int]] = {}
+        others: dict[int, list[int]] = {}
+        for tab in self.layout.patches[patch].tabs:
+            own.setdefault(tab.mate_patch, []).append(tab.number)
+        for other in self.layout.patches:
+            for tab in other.tabs:
+                if tab.mate_patch == patch and other.id != patch:
+                    others.setdefault(other.id, []).append(tab.number)
+        found = []
+        for mate, numbers in sorted(own.items()):
+            under = "its own far border" if mate == patch else self.label(mate)
+            found.append(f"{tabs_called(tuple(numbers)).capitalize()} under {under}")
+        found += [
+            f"Over {tabs_called(tuple(numbers))} of {self.label(mate)}"
+            for mate, numbers in sorted(others.items())
+        ]
+        return found or ["Stands alone: nothing is glued to it."]

@@ -1,0 +1,225 @@
+"""Views of a pattern and its patches on a printed page: folded, flat, and as a small map.
+
+All views of one guide show a patch in the same colour, and all flat ones lie the same way round.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from reportlab.lib.colors import Color, white
+from reportlab.lib.units import mm
+from reportlab.pdfgen.canvas import Canvas
+
+from miurafab.fabrication.drawing.page import (
+    INK,
+    MOUNTAIN,
+    OTHER,
+    PALE,
+    VALLEY,
+    Box,
+    Floats,
+    fitted,
+    polygon,
+    text,
+    tint,
+)
+from miurafab.fabrication.framing import Patch
+from miurafab.fabrication.patches import boundaries
+from miurafab.fabrication.sheets import Layout
+from miurafab.geometry.angles import facet_normals
+from miurafab.origami.crease_pattern import CreasePattern
+
+CREASE_COLOURS = {"M": MOUNTAIN, "V": VALLEY, "U": OTHER}
+
+_AZIMUTH, _ELEVATION = math.radians(-55), math.radians(28)
+_TALL = 1.25
+"""A flat pattern so many times taller than wide is shown lying on its side."""
+
+OUTLINED = 30_000
+"""In views of more facets than this the outline of each would be all that is seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """The views of one ``layout`` of ``pattern``."""
+
+    layout: Layout
+    pattern: CreasePattern
+
+    @cached_property
+    def patches(self) -> tuple[Patch, ...]:
+        """The patches of one model: of several copies the views show the first."""
+        return self.layout.model.patches
+
+    def base(self, patch: int) -> int:
+        """The patch of the first copy that any patch is a copy of."""
+        return patch % len(self.patches)
+
+    def name(self, patch: int) -> str:
+        """What a patch is called in every copy."""
+        return self.patches[self.base(patch)].label.partition("-")[0]
+
+    @cached_property
+    def face_patch(self) -> NDArray[np.int64]:
+        """(F,) the patch of each facet."""
+        found = np.zeros(len(self.pattern.faces_vertices), dtype=np.int64)
+        for patch in self.patches:
+            found[patch.faces] = patch.id
+        return found
+
+    @cached_property
+    def flat(self) -> Floats:
+        """(V, 2) the flat pattern, lying on its side if it is tall."""
+        points = self.pattern.vertices_coords
+        width, height = np.ptp(points, axis=0)
+        turned = points[:, ::-1] * [-1.0, 1.0]
+        return turned if height > _TALL * width else points
+
+    @property
+    def aspect(self) -> float:
+        """The height of flat views over their width."""
+        width, height = np.ptp(self.flat, axis=0)
+        return float(height / max(width, 1e-9))
+
+    @cached_property
+    def rings(self) -> list[NDArray[np.int64]]:
+        """The vertices around each patch."""
+        return [each.vertices for each in boundaries(self.pattern, self.face_patch)]
+
+    @cached_property
+    def letters(self) -> NDArray[np.str_]:
+        """(E,) the assignment of each edge, a border that is glued having that of its fold."""
+        letters = self.pattern.edges_assignment.copy()
+        for patch in self.patches:
+            for tab in patch.tabs:
+                if tab.edge != tab.mate_edge:
+                    letters[[tab.edge, tab.mate_edge]] = {"mountain": "M", "valley": "V"}.get(
+                        tab.fold, "F"
+                    )
+        return letters
+
+    def folded_view(self, canvas: Canvas, box: Box, shown: Collection[int] | None = None) -> float:
+        """An orthographic view, far facets first, lit from the upper left; returns its scale. With
+        ``shown`` all other patches are pale.
+        """
+        assert self.pattern.folded_coords is not None
+        points = self.pattern.folded_coords - self.pattern.folded_coords.mean(axis=0)
+        ca, sa = math.cos(_AZIMUTH), math.sin(_AZIMUTH)
+        ce, se = math.cos(_ELEVATION), math.sin(_ELEVATION)
+        towards = np.array([ce * ca, ce * sa, se])
+        right = np.array([-sa, ca, 0.0])
+        seen, scale = fitted(
+            np.stack([points @ right, points @ np.cross(towards, right)], axis=1), box
+        )
+        faces = self.pattern.faces_vertices
+        corners = np.where(faces >= 0, faces, faces[:, :1])
+        depth = (points @ towards)[corners].mean(axis=1)
+        quads = corners[:, [0, 1, 2, min(3, corners.shape[1] - 1)]]
+        normals = np.nan_to_num(facet_normals(points, quads))
+        light = np.array([0.35 * ca - 0.5 * sa, 0.35 * sa + 0.5 * ca, 0.8])
+        facing = np.where(normals @ towards < 0, -1.0, 1.0)
+        shade = 0.6 + 0.4 * np.clip(
+            (normals * facing[:, None]) @ (light / np.linalg.norm(light)), 0, 1
+        )
+        fills = [
+            tint(patch.id) if shown is None or patch.id in shown else PALE for patch in self.patches
+        ]
+        outlined = len(faces) <= OUTLINED
+        canvas.setLineWidth(0.08 * mm)
+        canvas.setLineJoin(1)
+        for face in np.argsort(depth, kind="stable").tolist():
+            base, level = fills[self.face_patch[face]], float(shade[face])
+            fill = Color(base.red * level, base.green * level, base.blue * level)
+            canvas.setFillColor(fill)
+            canvas.setStrokeColor(Color(fill.red * 0.75, fill.green * 0.75, fill.blue * 0.75))
+            polygon(canvas, seen[[v for v in faces[face].tolist() if v >= 0]], stroke=outlined)
+        return scale
+
+    def flat_view(self, canvas: Canvas, box: Box) -> float:
+        """The flat pattern with its creases and the names of its patches; returns its scale."""
+        points, scale = fitted(self.flat, box)
+        for patch in self.patches:
+            canvas.setFillColor(tint(patch.id, 0.75))
+            polygon(canvas, points[self.rings[patch.id]])
+        ends = (points[self.pattern.edges_vertices] * mm).reshape(-1, 4)
+        canvas.setLineCap(1)
+        for letter, colour in CREASE_COLOURS.items():
+            canvas.setStrokeColor(colour)
+            canvas.setLineWidth(0.12 * mm)
+            canvas.lines(ends[self.pattern.edges_assignment == letter].tolist())
+        self._around(canvas, points, 0.3, INK)
+        size = _fitting(11.0, len(self.patches))
+        for patch in self.patches:
+            self._name(canvas, points, patch.id, size)
+        return scale
+
+    def _around(self, canvas: Canvas, points: Floats, weight: float, colour: Color) -> None:
+        canvas.setStrokeColor(colour)
+        canvas.setLineWidth(weight * mm)
+        canvas.setLineJoin(1)
+        path = canvas.beginPath()
+        for ring in self.rings:
+            for k, (x, y) in enumerate((points[ring] * mm).tolist()):
+                (path.lineTo if k else path.moveTo)(x, y)
+            path.close()
+        canvas.drawPath(path, stroke=1, fill=0)
+
+    def _name(self, canvas: Canvas, points: Floats, patch: int, size: float) -> None:
+        """The name of a patch in its middle."""
+        corners = self.pattern.faces_vertices[self.patches[patch].faces]
+        x, y = points[corners[corners >= 0]].mean(axis=0)
+        named(canvas, self.name(patch), x, y, size)
+
+    def map(
+        self,
+        canvas: Canvas,
+        box: Box,
+        shown: Collection[int],
+        done: Collection[int] = (),
+        seams: NDArray[np.int64] | None = None,
+    ) -> None:
+        """The patches alone: those ``shown`` in colour, those ``done`` lighter, all others pale,
+        and the pattern edges ``seams`` drawn heavily.
+        """
+        points, _ = fitted(self.flat, box)
+        for patch in range(len(self.patches)):
+            strength = 1.0 if patch in shown else 0.45
+            known = patch in shown or patch in done
+            canvas.setFillColor(tint(patch, strength) if known else PALE)
+            polygon(canvas, points[self.rings[patch]])
+        self._around(canvas, points, 0.2, white)
+        if seams is not None and len(seams):
+            canvas.setStrokeColor(INK)
+            canvas.setLineWidth(0.7 * mm)
+            canvas.setLineCap(1)
+            canvas.lines((points[self.pattern.edges_vertices[seams]] * mm).reshape(-1, 4).tolist())
+        size = _fitting(8.0, len(self.patches))
+        for patch in {*shown, *done}:
+            self._name(canvas, points, patch, size)
+
+
+def named(canvas: Canvas, label: str, x: float, y: float, size: float) -> None:
+    """A label about a point of a drawing, with a rim of white."""
+    at = canvas.beginText()
+    canvas.setLineWidth(0.14 * size / 72 * 25.4 * mm)
+    canvas.setLineJoin(1)
+    at.setFont("Helvetica-Bold", size)
+    width = canvas.stringWidth(label, "Helvetica-Bold", size)
+    at.setTextOrigin(x * mm - width / 2, y * mm - 0.35 * size)
+    at.setTextRenderMode(1)
+    canvas.setStrokeColor(white)
+    at.textOut(label)
+    at.setTextRenderMode(0)
+    canvas.drawText(at)
+    text(canvas, x, y - 0.35 * size / 72 * 25.4, label, size, bold=True, align="middle")
+
+
+def _fitting(size: float, patches: int) -> float:
+    """The type size of the names of so many patches."""
+    return max(size * min(1.0, math.sqrt(16 / max(patches, 1))), 3.5)
