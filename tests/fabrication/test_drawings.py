@@ -1,5 +1,6 @@
 """One sheet, four drawings: read back by independent readers, they hold the same strokes."""
 
+import dataclasses
 import io
 import re
 from itertools import pairwise
@@ -10,6 +11,7 @@ import pypdf
 import pytest
 import svgelements
 from problems import regular
+from rings import tube
 from scipy.spatial import cKDTree
 
 from miurafab.errors import InputError
@@ -17,8 +19,10 @@ from miurafab.fabrication.assembly import assembly_order
 from miurafab.fabrication.drawing.assembly_guide import assembly_guide
 from miurafab.fabrication.drawing.dxf import VERSIONS, sheet_dxf
 from miurafab.fabrication.drawing.hpgl import UNITS_PER_MM, sheet_hpgl
+from miurafab.fabrication.drawing.page import INK, tint
 from miurafab.fabrication.drawing.pdf import Tiling, sheets_pdf, tiled_pdf
 from miurafab.fabrication.drawing.svg import COLOURS, sheet_svg
+from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out
 from miurafab.profiles import OPERATIONS, load_machine, load_material
 
@@ -162,15 +166,102 @@ def test_tiles_cover_the_sheet_at_real_size(layout):
         tiled_pdf(layout.toolpaths, "test", Tiling(margin_mm=120))
 
 
+def pages_of(guide):
+    return [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(guide)).pages]
+
+
+def numbers_in(text):
+    """All numbers that a text names, runs of them written out."""
+    found = []
+    for words in re.findall(r"^Tabs? ([\d, -]+)$", text, re.MULTILINE):
+        for run in words.split(","):
+            first, _, last = run.strip().partition("-")
+            found += range(int(first), int(last or first) + 1)
+    return found
+
+
 def test_the_guide_names_every_patch_and_tab(layout):
     pattern = regular(61, 41)
     guide = assembly_guide(layout, pattern, MACHINE, MATERIAL, "Test")
     assert guide == assembly_guide(layout, pattern, MACHINE, MATERIAL, "Test")
-    text = "\n".join(page.extract_text() for page in pypdf.PdfReader(io.BytesIO(guide)).pages)
+    pages = pages_of(guide)
+    overview = pages[0]
     for patch in layout.patches:
-        assert re.search(rf"\b{patch.label}\b", text)
-    assert MATERIAL.title in text
-    assert MACHINE.title in text
+        # The rim of white about a name is a text, too.
+        assert re.search(rf"^{patch.label}{patch.label}$", overview, re.MULTILINE)
+    assert MATERIAL.title in overview
+    assert MACHINE.title in overview
+    for sheet in layout.sheets:
+        text = next(page for page in pages if page.startswith(f"Test: {sheet.name}"))
+        for placed in sheet.placements:
+            assert layout.patches[placed.patch].label in text
+    last = pages[len(layout.sheets) + 1 :]
+    assert last[0].startswith("Test: folding and glueing")
+    # Each tab is glued in one step.
+    numbers = sorted(n for page in last for n in numbers_in(page))
+    assert numbers == list(range(1, layout.totals.tabs + 1))
+    assert all(f"{k} of {len(pages)}" in page for k, page in enumerate(pages, start=1))
+
+
+def test_the_guide_to_a_ring_closes_it_last():
+    pattern = tube()
+    layout = lay_out(pattern, MACHINE, MATERIAL)
+    *_, last = pages_of(assembly_guide(layout, pattern, MACHINE, MATERIAL, "Tube"))
+    steps = re.findall(r"^(Begin with P1|Close the ring)$", last, re.MULTILINE)
+    assert steps == ["Begin with P1", "Close the ring"]
+    assert numbers_in(last) == list(range(1, layout.totals.tabs + 1))
+
+
+def test_the_guide_to_one_patch_says_nothing_of_glue():
+    pattern = regular(9, 9)
+    layout = lay_out(pattern, MACHINE, MATERIAL)
+    pages = pages_of(assembly_guide(layout, pattern, MACHINE, MATERIAL, "One"))
+    assert len(pages) == 3
+    assert not any(re.search("glue", page, re.IGNORECASE) for page in pages[2:])
+
+
+def test_the_guide_says_what_could_not_be_had():
+    pattern = regular(61, 41)
+    layout = lay_out(pattern, MACHINE, MATERIAL)
+    layout = dataclasses.replace(layout, untabbed=(3, 7), unlettered=5, remarks=("Mind the gap.",))
+    text = "\n".join(pages_of(assembly_guide(layout, pattern, MACHINE, MATERIAL, "Test")))
+    assert "2 seam edges bear no tab: use tape there." in text
+    assert "5 names and numbers found no room" in text
+    assert "Mind the gap." in text
+
+
+def test_copies_have_one_guide():
+    pattern = tube()
+    options = LayoutOptions(max_patch_mm=(120.0, 60.0), nesting=NestingOptions(quantity=2))
+    layout = lay_out(pattern, MACHINE, MATERIAL, options=options)
+    pages = pages_of(assembly_guide(layout, pattern, MACHINE, MATERIAL, "Two"))
+    assert "2 copies" in pages[0]
+    glue = "\n".join(page for page in pages if re.match("Two: .*glueing", page))
+    tabs = layout.totals.tabs
+    assert sorted(numbers_in(glue)) == list(
+        range(1, max(tab.number for patch in layout.patches for tab in patch.tabs) + 1)
+    )
+    assert tabs in (max(numbers_in(glue)), 2 * max(numbers_in(glue)))
+    for patch in layout.patches:
+        assert any(patch.label in page for page in pages)
+
+
+@pytest.mark.parametrize("number", range(60))
+def test_patches_side_by_side_have_colours_that_differ(number):
+    """And dark type stands out on all of them (WCAG 2.2: contrast of 7 at least)."""
+
+    def light(colour):
+        parts = [
+            c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4
+            for c in (colour.red, colour.green, colour.blue)
+        ]
+        return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
+
+    assert (light(tint(number)) + 0.05) / (light(INK) + 0.05) > 7
+    for other in range(number + 1, number + 4):
+        one, another = tint(number), tint(other)
+        apart = np.subtract(one.rgb(), another.rgb())
+        assert np.abs(apart).max() > 0.1
 
 
 def test_each_patch_is_glued_onto_what_is_assembled(layout):

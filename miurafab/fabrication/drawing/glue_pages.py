@@ -64,7 +64,7 @@ class GluePages:
             for place, (number, step) in enumerate(part):
                 row, column = divmod(place, 3)
                 box = (MARGIN + column * (_STEP + 6), y - row * height, _STEP, height)
-                before = {each.patch for each in steps[:number]}
+                before = {earlier.patch for earlier in steps[:number]}
                 self.step(canvas, number, step, before, seams, box)
 
         def front(canvas: Canvas) -> None:

@@ -26,7 +26,7 @@ from miurafab.fabrication.drawing.page import (
 )
 
 _FOLDING = (
-    "Crease every line both ways, one row after another, before anything is glued.",
+    "Crease every line both ways, one row after another.",
     "Fold all rows together, a little at a time: the sheet moves as one. Red lines are mountains "
     "and fold away from you, blue ones valleys and fold towards you, seen from the printed side.",
 )

@@ -43,7 +43,6 @@ from miurafab.profiles import OPERATIONS
 
 _CARD = 33.0
 """The least height of what is said of one patch below its sheet; more is used where there is."""
-_TALL_CARD = 66.0
 _PICTURED = 12
 """Of more patches on a sheet only the words are shown: the sheet itself is the picture."""
 _COLUMNS = 3
@@ -260,12 +259,13 @@ class SheetPages:
         rows = math.ceil(len(patches) / 2)
         if not rows:
             return
-        width, height = (ROOM - 6) / 2, min((top - BOTTOM) / rows, _TALL_CARD)
+        width = (ROOM - 6) / 2
+        beside = 0.4 * width
+        height = min((top - BOTTOM) / rows, max(_CARD, beside * self.views.aspect + 14))
         for number, patch in enumerate(patches):
             row, column = divmod(number, 2)
             x, y = MARGIN + column * (width + 6), top - row * height
             line_above(canvas, x, y, width)
-            beside = 0.4 * width
             tall = min(height - 8, beside * self.views.aspect)
             self.views.map(canvas, (x, y - 4 - tall, beside, tall), shown=(self.views.base(patch),))
             self.say(canvas, patch, (x + beside + 5, y, width - beside - 5, height))
