@@ -1,9 +1,10 @@
 """Where a job that was interrupted goes on: at a stroke boundary, with nothing left out.
 
-An acknowledged line is planned, not burnt. GRBL keeps at most 15 moves in its planner and one in
-the stepper, and an acknowledgement follows when the move of its line is in: so of the lines that
-move, the 17th before the last acknowledged one is behind it for certain. A controller that says
-in ``$I`` that it plans further ahead is believed. Lines are counted, not chords: an arc has as
+An acknowledged line is planned, not burnt, and an acknowledgement follows when the move of its line
+is in the planner. GRBL plans at most 15 moves there and has five segments cut from the moves before
+them, each of which may be the rest of a move of its own where moves are short: so of the lines
+that move, the 21st before the last acknowledged one is behind it for certain. A controller that
+says in ``$I`` that it plans further ahead is believed. Lines are counted, not chords: an arc has as
 many moves on the controller as its ``$12`` gives it, one at the least.
 
 At the other end, what may have been burnt already reaches past the last acknowledged line by
@@ -31,9 +32,10 @@ from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST, NO_MOTION
 from miurafab.machine.journal import JournalRun, job_digest
 from miurafab.profiles import MachineProfile
 
-MOVES_BACK = 17
-"""How many moves before the last acknowledged one the job goes on, at least: 15 in GRBL's planner
-(``planner.h``), one in the stepper, one to be sure."""
+GRBL_BLOCKS, GRBL_SEGMENTS, OTHER_SEGMENTS = 15, 5, 12
+"""What GRBL 1.1 holds of moves that it has acknowledged: planned (``planner.h``: 16 places, one
+free) and cut into segments (``stepper.h``: 6 places, one free). GrblHAL has up to 10 segments,
+FluidNC 12 (``segments`` in its ``config.yaml``)."""
 JOURNAL_LAG_S = 1.0
 """How far the journal on the disk may be behind the wire when the sender dies: a quarter of a
 second to the record, another to the disk, and twice that for a slow disk."""
@@ -118,6 +120,13 @@ def _require_resumable(job: Job, machine: MachineProfile, run: JournalRun) -> No
         )
 
 
+def moves_back(machine: MachineProfile, run: JournalRun) -> int:
+    """How many moves before the last acknowledged one the job goes on: all held, one to be sure."""
+    blocks = max(GRBL_BLOCKS, machine.controller.planner_blocks, run.blocks or 0)
+    segments = GRBL_SEGMENTS if machine.dialect == "grbl-1.1" else OTHER_SEGMENTS
+    return blocks + segments + 1
+
+
 def _reach(
     program: Program, machine: MachineProfile, runs: Sequence[JournalRun]
 ) -> tuple[int, int]:
@@ -131,9 +140,7 @@ def _reach(
     for run in runs:
         if run.from_line <= 1:
             certain, possible = 1, 0
-        blocks = max(machine.controller.planner_blocks, run.blocks or 0)
-        back = max(MOVES_BACK, blocks + 2)
-        behind = int(np.searchsorted(moving, run.line, side="right")) - back
+        behind = int(np.searchsorted(moving, run.line, side="right")) - moves_back(machine, run)
         if behind >= 0:
             certain = max(certain, int(moving[behind]))
         unseen = machine.controller.rx_bytes
