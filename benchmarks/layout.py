@@ -48,7 +48,7 @@ from miurafab.profiles.material import Perforation
 
 BED_MM, MARGIN_MM = (600.0, 400.0), 5.0
 STAGES = {
-    "make_pieces": "patches and tabs",
+    "frame_patches": "patches and tabs",
     "nest": "nesting",
     "place_texts": "lettering",
     "sheet_strokes": "perforation",

@@ -27,8 +27,11 @@ from miurafab.profiles import Material
 DIGITS = 6
 """Decimals of mm that a layout keeps, so that what is written is what was computed."""
 
-_ATTEMPTS = 12
+_ATTEMPTS = 24
 """How often a pattern is divided into smaller pieces before it is given up."""
+
+_STEP = 0.6, 0.92
+"""The least and the greatest factor by which pieces are made smaller at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +95,8 @@ def frame_patches(
         part = min(_room(patch.outline_mm, kind) for patch in patches) if stock.upright else 1.0
         if part >= 1.0:
             return Framed(pieces, numbers, patches)
-        limit = limit[0] * max(part, 0.6) * 0.999, limit[1] * max(part, 0.6) * 0.999
+        factor = min(max(part, _STEP[0]), _STEP[1])
+        limit = limit[0] * factor, limit[1] * factor
     raise LayoutError(
         "The pattern cannot be divided into patches that lie along the fibres of a sheet of "
         f"{kind.width:.1f} mm x {kind.height:.1f} mm; write grain = 'none', or lay the pattern's "

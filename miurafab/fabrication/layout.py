@@ -130,6 +130,7 @@ def _sheet(table: dict[str, Any]) -> Sheet:
         travel_mm=float(table.get("travel_mm", 0.0)),
         travel_bound_mm=float(table.get("travel_bound_mm", 0.0)),
         stock=str(table.get("stock", "")),
+        grain=str(table.get("grain", "none")),
         defects_mm=tuple(
             tuple((float(x), float(y)) for x, y in ring) for ring in table.get("defects_mm", ())
         ),

@@ -51,7 +51,8 @@ class Placement:
 @dataclass(frozen=True)
 class Sheet:
     """A sheet and what lies on it. ``stock`` is what its kind is called, empty for one as large as
-    the bed, and ``defects_mm`` are closed curves on which nothing lies.
+    the bed; ``grain`` is which way its fibres run on the bed (``x``, ``y`` or ``none``), and
+    ``defects_mm`` are closed curves on which nothing lies.
 
     ``back`` is the name of what is made on its back before its front, or None. ``travel_mm`` is
     what is moved with the beam off, and ``travel_bound_mm`` what no order could do with less than.
@@ -65,6 +66,7 @@ class Sheet:
     travel_mm: float = 0.0
     travel_bound_mm: float = 0.0
     stock: str = ""
+    grain: str = "none"
     defects_mm: tuple[Ring, ...] = ()
 
     @property
@@ -319,6 +321,7 @@ def _sheets(
             stock.sheets[kind].height_mm,
             tuple(placed),
             stock=stock.sheets[kind].name,
+            grain=stock.fibres[kind],
             defects_mm=stock.sheets[kind].defects_mm,
         )
         for number, (kind, placed) in enumerate(zip(kinds, on_sheet, strict=True), start=1)

@@ -54,16 +54,21 @@ class StockSheet:
 
 @dataclass(frozen=True)
 class LaidStock:
-    """The ``sheets`` that may be used on a bed, the same ``kinds`` less their ``margin_mm`` for
-    nesting, the number of the ``main`` one, which patches are made to fit, and whether patches are
-    kept ``upright`` because fibres run in some sheet.
+    """The ``sheets`` that may be used on a bed, which way the ``fibres`` of each run, the same
+    ``kinds`` less their ``margin_mm`` for nesting, and the number of the ``main`` one, which
+    patches are made to fit.
     """
 
     sheets: tuple[StockSheet, ...]
+    fibres: tuple[str, ...]
     kinds: Stock
     main: int
     margin_mm: float
-    upright: bool
+
+    @property
+    def upright(self) -> bool:
+        """Whether patches keep the directions of the pattern because fibres run in some sheet."""
+        return any(way != "none" for way in self.fibres)
 
 
 def read_stock(path: Path) -> tuple[StockSheet, ...]:
@@ -150,10 +155,10 @@ def lay_stock(options: LayoutOptions, bed: Bed, grain: str) -> LaidStock:
 
     return LaidStock(
         tuple(sheets),
+        tuple(fibres),
         Stock(tuple(kinds), options.gap_mm),
         max(range(len(kinds)), key=rank),
         margin,
-        any(way != "none" for way in fibres),
     )
 
 

@@ -122,13 +122,21 @@ def sheet_strokes(
         scored = operation == OPERATIONS.index("score")
         behind[scored] = pattern.edges_assignment[edge[scored]] == "V"
 
-    def taken(chosen: NDArray[np.bool_], blank: Blank, name: str) -> Strokes:
+    side = 2 * motion.sheet[patch] + behind
+    by_side = np.argsort(side, kind="stable")
+    begin = np.searchsorted(side[by_side], np.arange(2 * len(sheets) + 1))
+    first = np.cumsum(count) - count
+
+    def taken(number: int, blank: Blank, name: str) -> Strokes:
+        chosen = by_side[begin[number] : begin[number + 1]]
+        own = count[chosen]
+        offsets = np.concatenate([[0], np.cumsum(own)])
         toolpath = Toolpath(
             sheet=name,
             width_mm=blank.width,
             height_mm=blank.height,
-            points=moved[np.repeat(chosen, count)],
-            offsets=np.concatenate([[0], np.cumsum(count[chosen])]),
+            points=moved[np.repeat(first[chosen] - offsets[:-1], own) + np.arange(offsets[-1])],
+            offsets=offsets,
             operation=operation[chosen],
             patch=patch[chosen],
             edge=edge[chosen],
@@ -138,14 +146,9 @@ def sheet_strokes(
     fronts: list[Strokes] = []
     backs: list[Strokes | None] = []
     for number, blank in enumerate(sheets):
-        here = motion.sheet[patch] == number
-        fronts.append(taken(here & ~behind, blank, blank.name))
-        back = here & behind
-        if back.any():
-            drawn = _turned_over(taken(back, blank, f"{blank.name}-back"))
-            backs.append(_with_pins(drawn, blank, material))
-        else:
-            backs.append(None)
+        fronts.append(taken(2 * number, blank, blank.name))
+        drawn = _turned_over(taken(2 * number + 1, blank, f"{blank.name}-back"))
+        backs.append(_with_pins(drawn, blank, material) if len(drawn.toolpath) else None)
     return Drawn(fronts, backs, holes.left_out)
 
 

@@ -71,12 +71,13 @@ def path_bound(strokes: Toolpath) -> float:
     """
     if len(strokes) < 2:
         return 0.0
-    ends, balls = _balls(strokes)
+    places, balls = _balls(strokes)
     found = _sum_but_two(balls)
-    if (np.diff(strokes.offsets) == 2).all():
+    straight = (np.diff(strokes.offsets) == 2).all() and len(balls) == 2 * len(strokes)
+    if places is not None and straight:
         centres, radii = _disks(strokes, balls)
-        disks = _travel_within(strokes, centres, radii)
-        clear = _clear_of(ends, balls, centres, radii)
+        disks = _travel_within(strokes, places, centres, radii)
+        clear = _clear_of(places, balls, centres, radii)
         found = max(found, _sum_but_two(np.concatenate([clear, disks])))
     return found
 
@@ -85,9 +86,9 @@ def _sum_but_two(parts: NDArray[np.float64]) -> float:
     return float(np.sort(parts)[:-2].sum())
 
 
-def _balls(strokes: Toolpath) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The ends (E, 2) of the open strokes, first all starts, and half the way (E,) from each to
-    the nearest place on another stroke.
+def _balls(strokes: Toolpath) -> tuple[scipy.spatial.KDTree | None, NDArray[np.float64]]:
+    """The places where strokes may be entered, first of all E ends of the open ones, all starts
+    before all others, and half the way (E,) from each end to the nearest place on another stroke.
     """
     owner = np.repeat(np.arange(len(strokes)), np.diff(strokes.offsets))
     closed = (strokes.starts == strokes.ends).all(axis=1)
@@ -98,11 +99,12 @@ def _balls(strokes: Toolpath) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     places = np.concatenate([ends, strokes.points[corners]])
     names = np.concatenate([owners, owner[corners]])
     if not len(ends):
-        return ends, np.empty(0)
+        return None, np.empty(0)
+    tree = scipy.spatial.KDTree(places, balanced_tree=False)
     # Of three places at most two are the stroke's own.
-    way, near = scipy.spatial.KDTree(places).query(ends, k=min(3, len(places)))
+    way, near = tree.query(ends, k=min(3, len(places)))
     way = np.where(names[near] == owners[:, None], np.inf, way).min(axis=1)
-    return ends, np.where(np.isfinite(way), way, 0.0) / 2
+    return tree, np.where(np.isfinite(way), way, 0.0) / 2
 
 
 def _disks(
@@ -123,30 +125,47 @@ def _disks(
 
 
 def _clear_of(
-    ends: NDArray[np.float64],
+    places: scipy.spatial.KDTree,
     balls: NDArray[np.float64],
     centres: NDArray[np.float64],
     radii: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The radii ``balls`` (E,) about ``ends``, cut to what keeps clear of the disks."""
+    """The radii ``balls`` (E,) about the first E ``places``, cut to what keeps clear of the
+    disks.
+    """
     room = balls.copy()
-    reach = radii + balls.max(initial=0.0)
-    near = scipy.spatial.KDTree(ends).query_ball_point(centres, reach)
-    disk = np.repeat(np.arange(len(centres)), [len(each) for each in near])
-    end = np.array([e for each in near for e in each], dtype=np.int64)
-    np.minimum.at(room, end, np.linalg.norm(ends[end] - centres[disk], axis=1) - radii[disk])
+    disk, end = _near(places, centres, radii + balls.max(initial=0.0))
+    way = np.linalg.norm(places.data[end] - centres[disk], axis=1)
+    np.minimum.at(room, end, way - radii[disk])
     return np.maximum(room, 0.0)
 
 
+def _near(
+    places: scipy.spatial.KDTree, centres: NDArray[np.float64], reach: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The pairs (N,) of a centre and a place within ``reach`` (D,) of it."""
+    found = places.query_ball_point(centres, reach)
+    disk = np.repeat(np.arange(len(centres)), [len(each) for each in found])
+    return disk, np.array([place for each in found for place in each], dtype=np.int64)
+
+
 def _travel_within(
-    strokes: Toolpath, centres: NDArray[np.float64], radii: NDArray[np.float64]
+    strokes: Toolpath,
+    places: scipy.spatial.KDTree,
+    centres: NDArray[np.float64],
+    radii: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(D,) what the legs of a closed tour through the ``strokes`` have in each disk at least."""
-    lines = np.asarray(shapely.linestrings(strokes.points.reshape(-1, 2, 2)), dtype=object)
+    """(D,) what the legs of a closed tour through the ``strokes`` have in each disk at least;
+    ``places`` are their starts and then their ends.
+    """
+    # A line that meets a disk has its ends no farther from it than it is long.
+    _, end = _near(places, centres, radii + strokes.lengths.max(initial=0.0))
+    close = np.unique(end % len(strokes))
+    both = strokes.points.reshape(-1, 2, 2)[close]
+    lines = np.asarray(shapely.linestrings(both), dtype=object)
     middles = np.asarray(shapely.points(centres), dtype=object)
     disk, line = shapely.STRtree(lines).query(middles, predicate="dwithin", distance=radii)
-    start = np.linalg.norm(strokes.starts[line] - centres[disk], axis=1)
-    end = np.linalg.norm(strokes.ends[line] - centres[disk], axis=1)
+    start, end = np.linalg.norm(both[line] - centres[disk, None], axis=2).T
     near, far = np.minimum(start, end), np.maximum(start, end)
     foot = np.minimum(shapely.distance(middles[disk], lines[line]), near)
     # How often a circle is crossed changes by 2 at the foot of a line, by -1 at each of its ends.

@@ -23,7 +23,7 @@ from miurafab.fabrication.nesting import (
     raster,
     turned,
 )
-from miurafab.fabrication.nesting.problem import grown, sheet_bound
+from miurafab.fabrication.nesting.problem import grown
 from miurafab.fabrication.nesting.raster import raster_engine
 
 ANY = (0, 90, 180, 270)
@@ -239,12 +239,14 @@ def test_an_outline_larger_than_the_bed_is_refused_with_its_size():
 
 
 def test_the_bound_counts_area_and_patches_that_cannot_share():
-    bed = Stock((SheetKind(98.0, 98.0, ANY),), 2.0)
-    assert sheet_bound([rectangle(8, 8)] * 100, bed) == 1
-    assert sheet_bound([rectangle(48, 48)] * 5, bed) == 2
-    assert sheet_bound([rectangle(88, 58)] * 7, bed) == 7
-    small = Stock((SheetKind(98.0, 98.0, ANY), SheetKind(48.0, 98.0, ANY, 3)), 2.0)
-    assert sheet_bound([rectangle(98, 98)] * 2, small) == 2
+    bed = SheetKind(98.0, 98.0, ANY)
+    assert problem([rectangle(8, 8)] * 100, bed).bound == 1
+    assert problem([rectangle(48, 48)] * 5, bed).bound == 2
+    assert problem([rectangle(88, 58)] * 7, bed).bound == 7
+    kinds = [bed, SheetKind(48.0, 98.0, ANY, 3)]
+    assert problem([rectangle(98, 98)] * 2, kinds).bound == 2
+    kinds = [SheetKind(98.0, 98.0, ANY, 1), SheetKind(48.0, 98.0, ANY)]
+    assert problem([rectangle(38, 38)] * 10, kinds).bound == 3
 
 
 @settings(derandomize=True, max_examples=60, deadline=None)

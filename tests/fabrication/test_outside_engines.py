@@ -101,8 +101,6 @@ def test_auto_asks_others_only_where_the_bound_is_not_reached(monkeypatch):
     answering(monkeypatch, layouts=[GOOD])
     monkeypatch.setattr(run, "installed", lambda engine: engine == "spyrrow")
     assert nest(ONE, "auto").engine == "raster"
-    monkeypatch.setattr(run, "sheet_bound", lambda *given: 0)
-    assert nest(ONE, "auto").engine == "raster"
 
     def wasteful(asked, report):
         report(WORSE)

@@ -129,7 +129,8 @@ def test_patches_lie_along_the_fibres_of_every_sheet(tmp_path):
     layout = lay_out(miura(16, 16), bed(260.0, 200.0), card(), options=wanted)
     assert {sheet.stock for sheet in layout.sheets} == {"left over", "sheet 2"}
     for sheet in layout.sheets:
-        along = np.array([[0.0, 1.0]] if sheet.stock == "left over" else [[1.0, 0.0]])
+        assert sheet.grain == ("y" if sheet.stock == "left over" else "x")
+        along = np.array([[0.0, 1.0]] if sheet.grain == "y" else [[1.0, 0.0]])
         shapes = []
         for placement in sheet.placements:
             patch = layout.patches[placement.patch]

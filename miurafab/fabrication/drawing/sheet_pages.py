@@ -76,6 +76,8 @@ class SheetPages:
             subtitle = f"{len(labels)} patches"
         if sheet.stock:
             subtitle += f" from '{sheet.stock}'"
+        if sheet.grain != "none":
+            subtitle += f", fibres along the bed's {sheet.grain}"
         scale = min(ROOM / sheet.width_mm, 122.0 / sheet.height_mm)
         top = HEIGHT - MARGIN - 19
         under = top - sheet.height_mm * scale - 16

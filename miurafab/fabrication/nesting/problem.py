@@ -90,6 +90,33 @@ class Problem:
     seconds: float
     seed: int = 0
 
+    @cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """(N,) the areas of the outlines grown by half the gap, in mm², or a little less."""
+        shapes = [shapely.Polygon(outline) for outline in self.outlines]
+        found: NDArray[np.float64] = shapely.area(shapely.buffer(shapes, self.stock.gap / 2))
+        return found
+
+    @cached_property
+    def bound(self) -> int:
+        """A number of sheets below which no layout can go.
+
+        The sheets have at least the area of the outlines, both grown by half the gap, when the
+        largest are used first; and no two outlines share a sheet that each of them fills by more
+        than half.
+        """
+        kinds, gap = self.stock.kinds, self.stock.gap
+        room = [(kind.width + gap) * (kind.height + gap) for kind in kinds]
+        left, sheets = float(self.areas.sum()) * (1 - 1e-9), 0
+        for k in sorted(range(len(room)), key=lambda k: -room[k]):
+            most = kinds[k].quantity
+            need = math.ceil(left / room[k])
+            sheets += need if most is None else min(need, most)
+            left -= room[k] * (need if most is None else most)
+            if left <= 0:
+                break
+        return max(sheets, int((self.areas > max(room) / 2 * (1 + 1e-9)).sum()), 1)
+
 
 @dataclass(frozen=True)
 class Slot:
@@ -189,26 +216,6 @@ def cost(slots: Sequence[Slot], stock: Stock) -> tuple[float, float]:
     kinds = [stock.kinds[kind] for _, kind in sorted({(slot.sheet, slot.kind) for slot in slots})]
     sizes = [(kind.width * kind.height, kind.quantity is None) for kind in kinds]
     return sum(size for size, endless in sizes if endless), sum(size for size, _ in sizes)
-
-
-def sheet_bound(outlines: Sequence[NDArray[np.float64]], stock: Stock) -> int:
-    """A number of sheets below which no layout can go.
-
-    The sheets have at least the area of the outlines, both grown by half the gap, when the largest
-    are used first; and no two outlines share a sheet that each of them fills by more than half.
-    """
-    half = stock.gap / 2
-    areas = shapely.area(shapely.buffer([shapely.Polygon(o) for o in outlines], half))
-    room = [(kind.width + 2 * half) * (kind.height + 2 * half) for kind in stock.kinds]
-    left, sheets = float(areas.sum()) * (1 - 1e-9), 0
-    for k in sorted(range(len(room)), key=lambda k: -room[k]):
-        most = stock.kinds[k].quantity
-        need = math.ceil(left / room[k])
-        sheets += need if most is None else min(need, most)
-        left -= room[k] * (need if most is None else most)
-        if left <= 0:
-            break
-    return max(sheets, int((areas > max(room) / 2 * (1 + 1e-9)).sum()), 1)
 
 
 def layout_faults(problem: Problem, slots: Sequence[Slot]) -> list[str]:

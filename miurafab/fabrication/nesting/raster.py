@@ -41,7 +41,6 @@ from miurafab.fabrication.nesting.problem import (
     buffered,
     cost,
     renumbered,
-    sheet_bound,
     turned,
 )
 
@@ -224,8 +223,7 @@ class _Search:
         self.problem, self.clock = problem, clock
         self.end = clock() + problem.seconds
         self.stock = problem.stock
-        shapes = [shapely.Polygon(outline) for outline in problem.outlines]
-        self.areas = shapely.area(shapely.buffer(shapes, self.stock.gap / 2))
+        self.areas = problem.areas
         first: dict[bytes, int] = {}
         self.alike = [first.setdefault(o.tobytes(), len(first)) for o in problem.outlines]
         parts = {
@@ -314,7 +312,7 @@ class _Search:
         used = {(slot.sheet, slot.kind) for slot in slots}
         kinds, gap = self.stock.kinds, self.stock.gap
         if len(kinds) == 1:
-            return len(used) <= sheet_bound(self.problem.outlines, self.stock)
+            return len(used) <= self.problem.bound
         endless = [k for k, kind in enumerate(kinds) if kind.quantity is None]
         if len(endless) != 1:
             return False

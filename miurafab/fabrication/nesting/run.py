@@ -17,7 +17,6 @@ from miurafab.fabrication.nesting.problem import (
     Slot,
     cost,
     layout_faults,
-    sheet_bound,
 )
 from miurafab.fabrication.nesting.raster import raster_engine
 from miurafab.version import __version__
@@ -115,7 +114,7 @@ def _raster(problem: Problem) -> Nesting:
         __version__,
         problem.seed,
         None if finished else seconds,
-        sheet_bound(problem.outlines, problem.stock),
+        problem.bound,
         tuple(remarks),
     )
 
@@ -137,9 +136,10 @@ def _outside(problem: Problem, engine: str) -> Nesting:
     best = min(sound, key=lambda slots: cost(slots, problem.stock), default=[])
     if not best:
         remarks.append(f"The nesting engine '{engine}' found no layout in {seconds:.0f} s.")
-    bound = sheet_bound(problem.outlines, problem.stock)
     version = proposals.version
-    return Nesting(tuple(best), engine, version, problem.seed, seconds, bound, tuple(remarks))
+    return Nesting(
+        tuple(best), engine, version, problem.seed, seconds, problem.bound, tuple(remarks)
+    )
 
 
 def _with_remarks(nesting: Nesting, remarks: tuple[str, ...]) -> Nesting:

@@ -9,6 +9,7 @@ largest rectangle without any is used.
 
 from __future__ import annotations
 
+import itertools
 import time
 
 import numpy as np
@@ -24,11 +25,14 @@ from miurafab.fabrication.nesting.problem import (
     clear_rectangle,
     grown,
     renumbered,
-    sheet_bound,
 )
 
 _SHARES = (0.9, 0.86, 0.82, 0.78, 0.72, 0.64, 0.5, 0.3)
-"""Shares of a sheet that are tried in turn; the last outline is tried alone at the end."""
+"""Shares of a sheet that are tried in turn; an outline alone is tried after them."""
+
+_EASY = 3
+"""With which of the shares the first layout begins, each further one a step higher, so that there
+is a layout soon."""
 
 _LEAST = 1
 """The shortest time in s that sparrow can be given; it counts in whole seconds."""
@@ -43,19 +47,18 @@ def spyrrow_engine(problem: Problem, report: Report) -> bool:
     shapes = [grown(outline, problem.stock.gap) for outline in problem.outlines]
     areas = np.array([shapely.Polygon(shape).area for shape in shapes])
     end = time.monotonic() + problem.seconds
-    bound = sheet_bound(problem.outlines, problem.stock)
-    best, seed = len(shapes) + 1, problem.seed
-    while time.monotonic() < end:
-        slots = _layout(problem, shapes, areas, end, seed)
+    best = len(shapes) + 1
+    for number in itertools.count():
+        shares = (*_SHARES[max(_EASY - number, 0) :], 0.0)
+        slots = _layout(problem, shapes, areas, end, shares, problem.seed + number)
         if slots is None:
             break
         sheets = max(slot.sheet for slot in slots) + 1
         if sheets < best:
             best = sheets
             report(renumbered(slots))
-        if best <= bound:
+        if best <= problem.bound:
             return True
-        seed += 1
     return False
 
 
@@ -64,6 +67,7 @@ def _layout(
     shapes: list[NDArray[np.float64]],
     areas: NDArray[np.float64],
     end: float,
+    shares: tuple[float, ...],
     seed: int,
 ) -> list[Slot] | None:
     """One layout; None if the time was over first, or the stock does not suffice."""
@@ -74,7 +78,7 @@ def _layout(
         kind = problem.stock.kinds[k]
         count = 0
         while left and (kind.quantity is None or count < kind.quantity):
-            placed = _sheet(shapes, areas, left, kind, problem.stock.gap, end, seed)
+            placed = _sheet(shapes, areas, left, kind, problem.stock.gap, end, shares, seed)
             if not placed:
                 break
             for number, (x, y, rotation) in placed.items():
@@ -91,13 +95,14 @@ def _sheet(
     kind: SheetKind,
     gap: float,
     end: float,
+    shares: tuple[float, ...],
     seed: int,
 ) -> _Placed:
     """Outlines of those ``left`` on one sheet: the most of it that a strip could hold."""
     low_x, low_y, high_x, high_y = clear_rectangle(kind)
     long, wide = high_x - low_x + gap, high_y - low_y + gap
     tried: list[int] = []
-    for share in (*_SHARES, 0.0):
+    for share in shares:
         chosen: list[int] = []
         room = share * long * wide
         for number in left:
