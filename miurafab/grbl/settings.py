@@ -38,10 +38,14 @@ def virtual_settings(machine: MachineProfile) -> dict[int, float]:
     """The settings that make a virtual controller this machine.
 
     What :func:`profile_settings` expects, and the bed, the motion and the motor steps that the
-    time estimate assumes where the profile does not give them as settings.
+    time estimate assumes where the profile does not give them as settings; and the tool, which
+    firmware without ``$30`` to ``$32`` keeps elsewhere.
     """
-    bed, motion = machine.bed, machine.motion
+    bed, motion, tool = machine.bed, machine.motion, machine.tool
     pairs = dict.fromkeys((100, 101, 102), COMMON_STEPS) | {
+        30: tool.s_max,
+        31: tool.s_min,
+        32: 1.0 if tool.kind == "laser" and machine.dialect != "grbl-0.9" else 0.0,
         11: motion.junction_deviation_mm,
         110: motion.max_rate_mm_min[0],
         111: motion.max_rate_mm_min[1],

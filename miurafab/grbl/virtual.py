@@ -1,4 +1,4 @@
-"""A GRBL 1.1h controller in memory: bytes in, bytes out, and time only by ``advance``.
+"""A GRBL controller in memory: bytes in, bytes out, and time only by ``advance``.
 
 It is the firmware's own machinery in virtual time. The main program (``virtual_protocol`` and
 what it calls) runs as a coroutine that yields when it works or waits; the interrupts (received
@@ -7,7 +7,9 @@ when the planner has room, a status report shows what the machine does at that m
 writes lose bytes, and a job takes the time that it takes.
 
 Whatever is done to it, however it is cut into calls, the same bytes at the same times give the
-same output. ``faults`` (:mod:`miurafab.grbl.virtual_faults`) befall it and its cable on their own.
+same output. It is GRBL 1.1h unless it is given another dialect
+(:mod:`miurafab.grbl.virtual_dialect`). ``faults`` (:mod:`miurafab.grbl.virtual_faults`) befall it
+and its cable on their own.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from miurafab.errors import ProfileError
 from miurafab.grbl.settings import parse_dump
 from miurafab.grbl.virtual_beam import BeamSegment, standing_seconds
 from miurafab.grbl.virtual_cable import Cable
+from miurafab.grbl.virtual_dialect import DIALECTS
 from miurafab.grbl.virtual_faults import Fault
 from miurafab.grbl.virtual_protocol import firmware
 from miurafab.grbl.virtual_settings import Settings
@@ -35,7 +38,9 @@ class VirtualGrbl:
     ``settings`` maps a ``$`` number to its value, over the firmware's stock defaults (None: just
     those); an unknown number raises :class:`~miurafab.errors.ProfileError`. ``baud`` paces the
     wire both ways, ten bit times a byte; None: bytes take no time. ``homing_switches`` False:
-    ``$H`` finds none. ``faults`` strike once each. At power-up the banner is in the output.
+    ``$H`` finds none. ``dialect`` is a name in
+    :data:`~miurafab.grbl.virtual_dialect.DIALECTS`. ``faults`` strike once each. At power-up the
+    banner is in the output.
     """
 
     def __init__(
@@ -44,14 +49,15 @@ class VirtualGrbl:
         *,
         baud: int | None = None,
         homing_switches: bool = True,
+        dialect: str = "grbl-1.1",
         faults: Iterable[Fault] = (),
     ) -> None:
         stored = Settings()
         unknown = sorted(set(settings or {}) - set(stored.values))
         if unknown:
             raise ProfileError(f"${unknown[0]} is not a setting of GRBL 1.1.")
-        stored.write(settings or {})
-        self._machine = Machine(stored, baud, homing_switches)
+        stored.write({10: DIALECTS[dialect].report_mask} | dict(settings or {}))
+        self._machine = Machine(stored, baud, homing_switches, DIALECTS[dialect])
         self._seconds = 0.0
         self._frozen = False
         self._thaws_at: int | None = None

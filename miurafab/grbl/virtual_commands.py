@@ -26,7 +26,7 @@ def command(machine: Machine, line: str) -> Run:
     kind = line[1:2]
     if kind == "":
         yield from say(machine, report.HELP)
-    elif kind == "J":
+    elif kind == "J" and machine.dialect.jogs:
         yield from _jog(machine, line)
     elif kind in "$GCX":
         if len(line) > 2:
@@ -35,6 +35,8 @@ def command(machine: Machine, line: str) -> Run:
             yield from _AT_ANY_TIME[kind](machine)
     elif machine.state not in (State.IDLE, State.ALARM):
         machine.answer = _NOT_IDLE
+    elif kind == "S" and not machine.dialect.sleeps:
+        yield from _setting(machine, line)
     else:
         yield from _AT_REST.get(kind, _setting)(machine, line)
 
@@ -44,10 +46,10 @@ def run_startup_lines(machine: Machine) -> Run:
     for index in range(STARTUP_LINES):
         text = yield from _startup_text(machine, index)
         if text is None:
-            yield from say(machine, f">:{report.status_code(_READ_FAILED)}")
+            yield from say(machine, f">:{report.status_code(machine, _READ_FAILED)}")
         elif text:
             yield from run_gcode(machine, text)
-            yield from say(machine, f">{text}:{report.status_code(machine.answer)}")
+            yield from say(machine, f">{text}:{report.status_code(machine, machine.answer)}")
 
 
 def _startup_text(machine: Machine, index: int) -> Ask:
@@ -65,9 +67,9 @@ def _recall(machine: Machine, stored: bytes | None, store: Callable[[bytes], int
     """A stored text, read into the line buffer; one that is damaged is None and made empty."""
     if stored is None:
         machine.line[0] = 0
-        yield from remember(machine, store(bytes(machine.line)))
+        yield from remember(machine, store(bytes(machine.line[:LINE_SIZE])))
         return None
-    machine.line[:] = stored
+    machine.line[:LINE_SIZE] = stored
     return stored.partition(b"\0")[0].decode("latin-1")
 
 
@@ -94,17 +96,17 @@ def _list_modes(machine: Machine) -> Run:
 def _check_mode(machine: Machine) -> Run:
     if machine.state is State.CHECK:
         machine.reset()
-        yield from say(machine, report.message("Disabled"))
+        yield from say(machine, report.message(machine, "Disabled"))
     elif machine.state is not State.IDLE:
         machine.answer = _NOT_IDLE
     else:
         machine.state = State.CHECK
-        yield from say(machine, report.message("Enabled"))
+        yield from say(machine, report.message(machine, "Enabled"))
 
 
 def _unlock(machine: Machine) -> Run:
     if machine.state is State.ALARM:
-        yield from say(machine, report.message("Caution: Unlocked"))
+        yield from say(machine, report.message(machine, "Caution: Unlocked"))
         machine.state = State.IDLE
 
 
@@ -143,12 +145,12 @@ def _build_info(machine: Machine, line: str) -> Run:
     settings = machine.settings
     if len(line) == 2:
         note = yield from _recall(machine, settings.build_note(), settings.store_build_note)
-        yield from say(machine, report.build_info(note or ""))
+        yield from say(machine, report.build_info(machine, note or ""))
     elif line[2] != "=":
         machine.answer = _UNKNOWN
     else:
         _shift(machine, 3)
-        yield from remember(machine, settings.store_build_note(bytes(machine.line)))
+        yield from remember(machine, settings.store_build_note(bytes(machine.line[:LINE_SIZE])))
 
 
 def _restore(machine: Machine, line: str) -> Run:
@@ -157,7 +159,7 @@ def _restore(machine: Machine, line: str) -> Run:
         return
     yield from remember(machine, machine.settings.wipe(line[5]))
     take_settings(machine)
-    yield from say(machine, report.message("Restoring defaults"))
+    yield from say(machine, report.message(machine, "Restoring defaults"))
     machine.reset()
 
 
@@ -165,7 +167,11 @@ def _startup(machine: Machine, line: str) -> Run:
     if len(line) == 2:
         for index in range(STARTUP_LINES):
             text = yield from _startup_text(machine, index)
-            shown = report.status_code(_READ_FAILED) if text is None else f"$N{index}={text}\r\n"
+            shown = (
+                report.status_code(machine, _READ_FAILED)
+                if text is None
+                else f"$N{index}={text}\r\n"
+            )
             yield from say(machine, shown)
         return
     if machine.state is not State.IDLE:
@@ -188,7 +194,7 @@ def _startup(machine: Machine, line: str) -> Run:
     if machine.answer == 0:
         yield from synchronize(machine)
         index = whole_byte(read_single(number[0]))
-        waits = machine.settings.store_startup_line(index, bytes(machine.line))
+        waits = machine.settings.store_startup_line(index, bytes(machine.line[:LINE_SIZE]))
         yield from remember(machine, waits)
 
 
@@ -209,6 +215,10 @@ def _setting(machine: Machine, line: str) -> Run:
         machine.answer = _UNKNOWN
         return
     number = to_unsigned(parameter) & 0xFF
+    listed = machine.dialect.settings
+    if listed is not None and number not in listed:
+        machine.answer = _UNKNOWN
+        return
     machine.answer, waits = machine.settings.store(number, read_single(value[0]))
     if machine.answer == 0:
         take_settings(machine)
@@ -221,14 +231,14 @@ def _setting(machine: Machine, line: str) -> Run:
 
 def take_settings(machine: Machine) -> None:
     """The settings changed: planner and stepper go by the new ones."""
-    machine.planner.parameters = machine.settings.motion()
+    machine.planner.parameters = machine.motion()
     machine.stepper.idle_lock = machine.idle_cycles
 
 
 def _shift(machine: Machine, start: int) -> None:
     """The firmware moves a stored text to the front of its line buffer, its end included."""
     line = machine.line
-    end = line.index(0, start) + 1 if 0 in line[start:] else LINE_SIZE
+    end = line.index(0, start) + 1 if 0 in line[start:] else len(line)
     line[: end - start] = line[start:end]
 
 

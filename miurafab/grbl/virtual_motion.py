@@ -67,7 +67,7 @@ def run_gcode(machine: Machine, line: str, *, jog: bool = False) -> Run:
 def remember(machine: Machine, waits: int) -> Run:
     """Write to the EEPROM: deaf while waiting for each byte that must be programmed first."""
     for _ in range(waits):
-        machine.uart.deaf = True
+        machine.uart.deaf = machine.dialect.deaf_writes
         yield float(_EEPROM_BYTE)
         machine.uart.hear(machine.now)
 
@@ -233,4 +233,4 @@ def _end_program(machine: Machine) -> Run:
         yield from offsets_changed(machine)
         set_spindle(machine, 0, 0.0)
         set_flood(machine, False)
-    yield from say(machine, report.message("Pgm End"))
+    yield from say(machine, report.message(machine, "Pgm End"))

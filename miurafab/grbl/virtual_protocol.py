@@ -8,7 +8,6 @@ from miurafab.grbl.virtual_commands import command, run_startup_lines, take_sett
 from miurafab.grbl.virtual_motion import run_gcode
 from miurafab.grbl.virtual_output import reset_motors, say, sync_positions
 from miurafab.grbl.virtual_realtime import realtime, start_when_idle
-from miurafab.grbl.virtual_settings import LINE_SIZE
 from miurafab.grbl.virtual_state import Machine, Run, State
 from miurafab.motion import cpu
 
@@ -21,7 +20,7 @@ def firmware(machine: Machine) -> Run:
     while True:
         yield from _restart(machine)
         machine.booting = False
-        yield from say(machine, report.BANNER)
+        yield from say(machine, report.banner(machine))
         yield from _serve(machine)
 
 
@@ -42,9 +41,9 @@ def _restart(machine: Machine) -> Run:
 def _serve(machine: Machine) -> Run:
     if machine.settings.values[21] and machine.engaged_limits():
         machine.state = State.ALARM
-        yield from say(machine, report.message("Check Limits"))
+        yield from say(machine, report.message(machine, "Check Limits"))
     if machine.state in (State.ALARM, State.SLEEP):
-        yield from say(machine, report.message("'$H'|'$X' to unlock"))
+        yield from say(machine, report.message(machine, "'$H'|'$X' to unlock"))
         machine.state = State.ALARM
     else:
         machine.state = State.IDLE
@@ -85,7 +84,7 @@ def _line(machine: Machine, reader: _LineReader) -> Run:
         machine.answer = _LOCKED
     else:
         yield from run_gcode(machine, text)
-    yield from say(machine, report.status_code(machine.answer))
+    yield from say(machine, report.status_code(machine, machine.answer))
 
 
 class _LineReader:
@@ -108,7 +107,7 @@ class _LineReader:
             pass
         elif character in "(;":
             self.skipping = character
-        elif self.length >= LINE_SIZE - 1:
+        elif self.length >= len(self.buffer) - 1:
             self.skipping = "too long"
         else:
             self.buffer[self.length] = ord(character.upper())

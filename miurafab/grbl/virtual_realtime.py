@@ -121,10 +121,10 @@ def _flags(machine: Machine) -> Run:
 
 def _raise_alarm(machine: Machine) -> Run:
     machine.state = State.ALARM
-    yield from say(machine, f"ALARM:{machine.alarm}\r\n")
+    yield from say(machine, machine.dialect.alarm_text(machine.alarm))
     yield _ALARM_PAUSE * cpu.CLOCK
     if machine.alarm in (HARD_LIMIT, SOFT_LIMIT):
-        yield from say(machine, report.message("Reset to continue"))
+        yield from say(machine, report.message(machine, "Reset to continue"))
         machine.requests.discard(Request.RESET)
         while Request.RESET not in machine.requests:
             yield None
@@ -147,7 +147,7 @@ def _hold(machine: Machine, requests: set[Request]) -> Run:
         if Request.HOLD in requests and held:
             machine.state = State.HOLD
         if Request.DOOR in requests:
-            yield from say(machine, report.message("Check Door"))
+            yield from say(machine, report.message(machine, "Check Door"))
             if Suspend.JOG_CANCEL not in suspend:
                 if machine.state is State.DOOR and Suspend.RESTORING in suspend:
                     suspend -= {Suspend.RETRACTED, Suspend.RESTORING, Suspend.RESTORED}
@@ -286,7 +286,7 @@ def _progress(machine: Machine) -> tuple[object, ...]:
 
 
 def _sleep(machine: Machine) -> Run:
-    yield from say(machine, report.message("Sleeping"))
+    yield from say(machine, report.message(machine, "Sleeping"))
     set_spindle(machine, 0, 0.0)
     set_flood(machine, False)
     yield from rest_motors(machine)
@@ -343,7 +343,7 @@ def _held(machine: Machine, restore: tuple[int, float, bool]) -> Run:
             machine.stop_override = StopOverride.ON
     elif stop in (StopOverride.RESTORE, StopOverride.RESTORE_AND_START):
         if machine.parser.spindle:
-            yield from say(machine, report.message("Restoring spindle"))
+            yield from say(machine, report.message(machine, "Restoring spindle"))
             if machine.settings.laser:
                 machine.generator.refresh_power = True
             else:

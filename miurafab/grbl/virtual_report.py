@@ -8,13 +8,8 @@ from miurafab.gcode.numbers import single
 from miurafab.gcode.words import PROBES
 from miurafab.grbl.codes import setting_codes
 from miurafab.grbl.virtual_state import Machine, State, Suspend
-from miurafab.grbl.virtual_wire import RX_RING
 
-BANNER = "\r\nGrbl 1.1h ['$' for help]\r\n"
 HELP = "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n"
-VERSION = "1.1h.20190830"
-PLANNER_BLOCKS = 15
-"""16 slots of which one stays free (``planner.h``)."""
 _INCHES = single(0.0393701)
 _BUSY_OFFSET, _IDLE_OFFSET = 30, 10
 _BUSY_OVERRIDE, _IDLE_OVERRIDE = 20, 10
@@ -35,14 +30,19 @@ def number(value: float, decimals: int) -> str:
     return f"{sign}{digits[:-decimals]}.{digits[-decimals:]}" if decimals else sign + digits
 
 
-def message(text: str) -> str:
+def banner(machine: Machine) -> str:
+    """What a start says."""
+    return f"\r\n{machine.dialect.banner}\r\n"
+
+
+def message(machine: Machine, text: str) -> str:
     """A feedback message."""
-    return f"[MSG:{text}]\r\n"
+    return machine.dialect.message.format(text)
 
 
-def status_code(code: int) -> str:
+def status_code(machine: Machine, code: int) -> str:
     """The answer to a line: ``ok``, or ``error:`` and why."""
-    return f"error:{code}\r\n" if code else "ok\r\n"
+    return machine.dialect.error_text(code) if code else "ok\r\n"
 
 
 def coordinate(machine: Machine, value: float) -> str:
@@ -65,11 +65,15 @@ def _vector(machine: Machine, values: Sequence[float]) -> str:
 
 def settings_list(machine: Machine) -> str:
     """The answer to ``$$``."""
-    values = machine.settings.values
-    return "".join(
-        f"${code.number}={number(values[code.number], code.decimals)}\r\n"
-        for code in setting_codes().values()
-    )
+    values, listed = machine.settings.values, machine.dialect.settings
+    lines = []
+    for code in setting_codes().values():
+        if listed is not None and code.number not in listed:
+            continue
+        remark = "" if listed is None else listed[code.number].format(int(values[code.number]))
+        tail = f" ({remark})" if remark else ""
+        lines.append(f"${code.number}={number(values[code.number], code.decimals)}{tail}\r\n")
+    return "".join(lines)
 
 
 def probe(machine: Machine) -> str:
@@ -110,12 +114,12 @@ def modes(machine: Machine) -> str:
         f"F{rate(machine, parser.feed)}",
         f"S{number(parser.speed, 0)}",
     ]
-    return f"[GC:{' '.join(words)}]\r\n"
+    return machine.dialect.modes.format(" ".join(words))
 
 
-def build_info(note: str) -> str:
-    """The answer to ``$I``: version, the note of ``$I=``, and the buffer sizes."""
-    return f"[VER:{VERSION}:{note}]\r\n[OPT:V,{PLANNER_BLOCKS},{RX_RING}]\r\n"
+def build_info(machine: Machine, note: str) -> str:
+    """The answer to ``$I``: version, the note of ``$I=``, and what the dialect says besides."""
+    return "".join(f"{line}\r\n" for line in machine.dialect.build_info).format(note)
 
 
 def status(machine: Machine) -> str:
@@ -126,6 +130,8 @@ def status(machine: Machine) -> str:
     parser = machine.parser
     offset = [single(a + b) for a, b in zip(parser.coord_system, parser.coord_offset, strict=True)]
     offset[2] = single(offset[2] + parser.tool_offset)
+    if machine.dialect.commas:
+        return _status_with_commas(machine, position, offset)
     if mask & 1:
         where = f"MPos:{_vector(machine, position)}"
     else:
@@ -133,7 +139,8 @@ def status(machine: Machine) -> str:
         where = f"WPos:{_vector(machine, work)}"
     fields = [_state(machine), where]
     if mask & 2:
-        fields.append(f"Bf:{PLANNER_BLOCKS - len(machine.planner.moves)},{machine.uart.room}")
+        blocks = machine.dialect.planner_blocks - len(machine.planner.moves)
+        fields.append(f"Bf:{blocks},{machine.uart.room}")
     speed = machine.generator.speed * 60.0 if machine.state in _BUSY else 0.0
     fields.append(f"FS:{rate(machine, speed)},{number(machine.spindle_speed, 0)}")
     pins = _pins(machine)
@@ -141,6 +148,24 @@ def status(machine: Machine) -> str:
         fields.append(f"Pn:{pins}")
     fields += _occasional(machine, offset)
     return f"<{'|'.join(fields)}>\r\n"
+
+
+def _status_with_commas(
+    machine: Machine, position: Sequence[float], offset: Sequence[float]
+) -> str:
+    """As GRBL 0.9 says it: both positions and what lies in the buffers, by the bits of $10."""
+    mask = int(machine.settings.values[10])
+    fields = [_state(machine).partition(":")[0]]
+    if mask & 1:
+        fields.append(f"MPos:{_vector(machine, position)}")
+    if mask & 2:
+        work = [single(a - b) for a, b in zip(position, offset, strict=True)]
+        fields.append(f"WPos:{_vector(machine, work)}")
+    if mask & 4:
+        fields.append(f"Buf:{len(machine.planner.moves)}")
+    if mask & 8:
+        fields.append(f"RX:{len(machine.uart.ring)}")
+    return f"<{','.join(fields)}>\r\n"
 
 
 def _state(machine: Machine) -> str:

@@ -9,15 +9,17 @@ once, and the main program finds the flags when it looks.
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 from miurafab.gcode.numbers import single
 from miurafab.gcode.parser import ModalState
 from miurafab.grbl.virtual_beam import BeamLog
+from miurafab.grbl.virtual_dialect import Dialect
 from miurafab.grbl.virtual_settings import LINE_SIZE, Settings
 from miurafab.grbl.virtual_wire import Uart
 from miurafab.motion import cpu
+from miurafab.motion.parameters import MotionParameters
 from miurafab.motion.planner import Planner
 from miurafab.motion.segments import Segment, SegmentGenerator
 from miurafab.motion.stepper import Stepper, steps_taken
@@ -87,14 +89,12 @@ class StopOverride(Enum):
 HARD_LIMIT, SOFT_LIMIT, RESET_IN_MOTION, PROBE_BEFORE, PROBE_NOTHING = 1, 2, 3, 4, 5
 HOMING_RESET, HOMING_DOOR, HOMING_PULL_OFF, HOMING_NO_SWITCH = 6, 7, 8, 9
 """``ALARM:`` codes."""
-MOTION_OVERRIDES = frozenset(range(0x90, 0x98))
-ACCESSORY_OVERRIDES = frozenset((*range(0x99, 0x9F), 0xA0))
 SPINDLE_STOP = 0x9E
 _COMMANDS = {
-    ord("?"): Request.STATUS,
-    ord("~"): Request.START,
-    ord("!"): Request.HOLD,
-    0x84: Request.DOOR,
+    "status": Request.STATUS,
+    "start": Request.START,
+    "hold": Request.HOLD,
+    "door": Request.DOOR,
 }
 _PIN_REQUESTS = {"hold": Request.HOLD, "start": Request.START}
 
@@ -110,12 +110,15 @@ class Machine:
     until the banner is written.
     """
 
-    def __init__(self, settings: Settings, baud: int | None, homing_switches: bool) -> None:
+    def __init__(
+        self, settings: Settings, baud: int | None, homing_switches: bool, dialect: Dialect
+    ) -> None:
         self.now = 0
+        self.dialect = dialect
         self.settings = settings
         self.homing_switches = homing_switches
-        self.uart = Uart(baud, self.realtime_byte)
-        self.planner = Planner(settings.motion())
+        self.uart = Uart(baud, dialect, self.realtime_byte)
+        self.planner = Planner(self.motion())
         self.generator = SegmentGenerator(self.planner, self.to_pwm)
         self.stepper = Stepper()
         self.stepper.on_segment = self._on_segment
@@ -139,7 +142,7 @@ class Machine:
         homing = bool(self.settings.values[22])
         self.state = State.ALARM if homing else State.IDLE
         self.switches: list[tuple[int, int] | None] = [None, None, None]
-        self.line = bytearray(LINE_SIZE)
+        self.line = bytearray(max(self.dialect.line_chars + 1, LINE_SIZE))
         self.clockwise = True
         self._follows = False
         self.flood = False
@@ -166,21 +169,27 @@ class Machine:
         self.planner.feed_override = self.planner.rapid_override = 100
         self.interrupt_delay = 0
 
+    def motion(self) -> MotionParameters:
+        """What of the settings and the firmware shapes motion."""
+        blocks = self.dialect.planner_blocks
+        return replace(self.settings.motion(), planner_blocks=blocks)
+
     # What happens in interrupts
 
     def realtime_byte(self, now: int, byte: int) -> None:
         """The receive interrupt took ``byte`` out of the stream."""
         self.now = now
-        if byte == 0x18:
+        command = self.dialect.realtime[byte]
+        if command == "reset":
             self.reset()
-        elif byte in _COMMANDS:
-            self.requests.add(_COMMANDS[byte])
-        elif byte == 0x85:
+        elif command in _COMMANDS:
+            self.requests.add(_COMMANDS[command])
+        elif command == "cancel jog":
             if self.state is State.JOG:
                 self.requests.add(Request.CANCEL)
-        elif byte in MOTION_OVERRIDES:
+        elif command == "motion override":
             self.motion_overrides.add(byte)
-        elif byte in ACCESSORY_OVERRIDES:
+        else:
             self.accessory_overrides.add(byte)
 
     def reset(self) -> None:

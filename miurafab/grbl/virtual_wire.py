@@ -1,9 +1,9 @@
 """The virtual controller's serial port: bytes that take time, and rings that run full.
 
 Received bytes go through the interrupt (``serial.c``): realtime commands are taken out wherever
-they stand, other bytes from 0x80 up are dropped, the rest goes into a ring of 128, and what finds
-it full is lost. While an EEPROM write keeps interrupts off, the hardware holds two bytes and the
-one being shifted in; the others are lost too.
+they stand, other bytes from 0x80 up are dropped (or kept: that is the dialect's), the rest goes
+into a ring of 128 or so, and what finds it full is lost. While an EEPROM write keeps interrupts
+off, the hardware holds two bytes and the one being shifted in; the others are lost too.
 """
 
 from __future__ import annotations
@@ -12,13 +12,11 @@ import math
 from collections import deque
 from collections.abc import Callable
 
+from miurafab.grbl.virtual_dialect import Dialect
 from miurafab.motion import cpu
 
-RX_RING = 128
-TX_RING = 104
 _DEAF_BYTES = 3
 _NEWLINE = 10
-REALTIME = frozenset(b"!?~\x18")
 
 
 class Uart:
@@ -28,7 +26,10 @@ class Uart:
     time.
     """
 
-    def __init__(self, baud: int | None, on_realtime: Callable[[int, int], None]) -> None:
+    def __init__(
+        self, baud: int | None, dialect: Dialect, on_realtime: Callable[[int, int], None]
+    ) -> None:
+        self.dialect = dialect
         self.byte = 10.0 * cpu.CLOCK / baud if baud else 0.0
         self.on_realtime = on_realtime
         self.ring: deque[int] = deque()
@@ -69,9 +70,11 @@ class Uart:
             self._interrupt(now, byte)
 
     def _interrupt(self, now: int, byte: int) -> None:
-        if byte in REALTIME or byte >= 0x80:
+        if byte in self.dialect.realtime:
             self.on_realtime(now, byte)
-        elif len(self.ring) < RX_RING:
+        elif byte >= 0x80 and not self.dialect.keeps_high_bytes:
+            pass
+        elif len(self.ring) < self.dialect.rx_bytes:
             self.ring.append(byte)
         else:
             self.lost += 1
@@ -79,18 +82,18 @@ class Uart:
     @property
     def room(self) -> int:
         """Free places in the receive ring."""
-        return RX_RING - len(self.ring)
+        return self.dialect.rx_bytes - len(self.ring)
 
     def write(self, now: int, data: bytes) -> int:
         """Print ``data``: when the last byte of it is in the transmit ring."""
         for byte in data:
             self._tx_free = max(self._tx_free, now) + self.byte
             self._going.append((math.ceil(self._tx_free), byte))
-        return max(now, math.ceil(self._tx_free - TX_RING * self.byte))
+        return max(now, math.ceil(self._tx_free - self.dialect.tx_bytes * self.byte))
 
     def cut(self, now: int) -> None:
         """A reset ends a print that waits for room: what is not in the ring yet is not sent."""
-        room = TX_RING + 1
+        room = self.dialect.tx_bytes + 1
         sent = sum(done <= now for done, _ in self._going)
         while len(self._going) > sent + room:
             self._going.pop()

@@ -56,7 +56,7 @@ def virtual_machine(machine: MachineProfile) -> Device:
         return VirtualMarlin(MotionParameters.from_profile(machine), baud=controller.baud)
     if machine.dialect == "hpgl":
         return VirtualPlotter(baud=controller.baud, rx_bytes=controller.rx_bytes)
-    return VirtualGrbl(virtual_settings(machine), baud=controller.baud)
+    return VirtualGrbl(virtual_settings(machine), baud=controller.baud, dialect=machine.dialect)
 
 
 def keeps_journal(machine: MachineProfile) -> bool:

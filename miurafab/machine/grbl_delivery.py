@@ -21,7 +21,7 @@ from miurafab.grbl.settings import Settings
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.delivery import Delivery
 from miurafab.machine.journal import Journal
-from miurafab.machine.keys import ABORT, KEYS, Keys, NoKeys
+from miurafab.machine.keys import ABORT, Keys, NoKeys, keys_of
 from miurafab.machine.planning import Plan
 from miurafab.machine.preflight import (
     check_settings,
@@ -148,7 +148,8 @@ class GrblDelivery(Delivery):
 
     def _obey(self) -> None:
         """Do what was asked for at the keyboard."""
-        self._orders += [KEYS[key] for key in self._keys.pressed() if key in KEYS]
+        known = keys_of(self.plan.machine.dialect)
+        self._orders += [known[key] for key in self._keys.pressed() if key in known]
         if ABORT in self._orders:
             raise JobAborted(f"{self.plan.job.name} was stopped at the keyboard.")
         if not self._session.connection.writing_eeprom:

@@ -26,6 +26,13 @@ KEYS = {
 """What each key sends (GRBL 1.1 ``config.h``): feed +10 %, -10 %, as written; power likewise."""
 
 
+def keys_of(dialect: str) -> dict[str, bytes]:
+    """The keys that a firmware knows: GRBL 0.9 has no overrides, and takes their bytes for code."""
+    if dialect == "grbl-0.9":
+        return {key: order for key, order in KEYS.items() if order in (HOLD, RESUME, ABORT)}
+    return KEYS
+
+
 class Keys(Protocol):
     """Where keys come from."""
 

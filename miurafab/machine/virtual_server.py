@@ -20,14 +20,15 @@ import os
 import select
 import socket
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TextIO
 
-from miurafab.errors import InputError, PortError
+from miurafab.errors import InputError, PortError, ProfileError
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.grbl.virtual_dialect import DIALECTS
 from miurafab.grbl.virtual_faults import Fault
 from miurafab.machine.actions import read_dump
 from miurafab.machine.signals import StopSignals
@@ -179,17 +180,29 @@ class TcpWire:
         self._listener.close()
 
 
-def load_virtual_settings(source: str) -> Mapping[int, float] | None:
-    """The settings meant by ``stock``, a machine profile's name or file, or a ``$$`` dump's file.
+def load_controller(source: str, faults: Iterable[Fault] = ()) -> VirtualGrbl:
+    """The controller meant by ``stock``, a machine profile's name or file, or a ``$$`` dump's file.
 
-    Raises :class:`~miurafab.errors.ProfileError` if it is none of them.
+    A profile's answers as its dialect does, the others are GRBL 1.1h. Raises
+    :class:`~miurafab.errors.ProfileError` if ``source`` is none of them or speaks no GRBL.
     """
-    if source == STOCK:
-        return None
     path = Path(source)
+    if source == STOCK:
+        return VirtualGrbl(baud=BAUD, faults=faults)
     if path.is_file() and path.suffix != ".toml":
-        return read_dump(path).values
-    return virtual_settings(load_machine(source))
+        return VirtualGrbl(read_dump(path).values, baud=BAUD, faults=faults)
+    machine = load_machine(source)
+    if machine.dialect not in DIALECTS:
+        raise ProfileError(
+            f"{machine.name} speaks {machine.dialect}, and the controller that is served here "
+            f"speaks {', '.join(DIALECTS)}; 'miurafab cut --port virtual' has it in memory."
+        )
+    return VirtualGrbl(
+        virtual_settings(machine),
+        baud=machine.controller.baud,
+        dialect=machine.dialect,
+        faults=faults,
+    )
 
 
 @dataclass(frozen=True)
@@ -215,14 +228,14 @@ def serve_virtual(
 
     Over TCP at ``tcp`` (``HOST:PORT``), else over a pseudo-terminal; ``announce`` is called with
     the address to open, and again if it is another after the cable was out. ``settings``: see
-    :func:`load_virtual_settings`. ``speed`` is virtual seconds a real second. With
+    :func:`load_controller`. ``speed`` is virtual seconds a real second. With
     ``reset_on_open`` the controller is switched off and on when a sender opens the port.
     ``faults`` strike once each, in all. Raises :class:`~miurafab.errors.InputError` for an option
     at fault, :class:`~miurafab.errors.PortError` for an address that is taken.
     """
     if not 0 < speed < math.inf:
         raise InputError(f"A speed of {speed:g} does not run; give a positive number.")
-    device = VirtualGrbl(load_virtual_settings(settings), baud=BAUD, faults=faults)
+    device = load_controller(settings, faults)
     with contextlib.ExitStack() as at_end:
         log = _BeamLog(device, beam_log)
         at_end.callback(log.close)
