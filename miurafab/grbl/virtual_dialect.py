@@ -46,11 +46,12 @@ class Dialect:
     """One firmware, as a sender sees it.
 
     ``build_info`` are the lines of ``$I``, ``{}`` the owner's note. ``rx_bytes`` are usable,
-    ``line_chars`` too; ``planner_blocks`` can be filled. ``realtime`` are the bytes that are commands, and which; other bytes from 0x80 up are dropped
-    or, with ``keeps_high_bytes``, go into the line. ``errors`` and ``alarms`` are words for the
-    codes, None for bare numbers; ``settings`` those that ``$$`` lists with their remarks, None for
-    all of GRBL 1.1's without; ``report_mask`` is $10 as it is born. ``deaf_writes``: what comes
-    while a setting is stored is lost.
+    ``line_chars`` too; ``planner_blocks`` can be filled. ``realtime`` are the bytes that are
+    commands, and which; other bytes from 0x80 up are dropped or, with ``keeps_high_bytes``, go
+    into the line. ``errors`` and ``alarms`` are words for the codes, None for bare numbers;
+    ``settings`` those that ``$$`` lists with their remarks, None for all of GRBL 1.1's without;
+    ``report_mask`` is $10 as it is born. ``deaf_writes``: what comes while a setting is stored is
+    lost.
     """
 
     banner: str
