@@ -1,6 +1,10 @@
 """``miurafab sheets`` and ``miurafab cut``: the main job, and every way in which it is refused."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
 
 import pytest
 from command_line import sentence
@@ -172,13 +176,19 @@ def test_an_interrupted_sheet_is_resumed_from_its_journal(run, job):
     assert 0 < sheet["seconds"] < whole["sheets"][0]["seconds"]
 
 
-def test_machines_share_the_sheets_and_one_failing_hurts_no_other(run, job):
+@pytest.fixture
+def three_sheets(job):
+    """The job directory, its sheet three times."""
     layout = json.loads((job / "layout.json").read_text())
     (first,) = layout["sheets"]
     layout["sheets"] += [{**first, "name": f"sheet-0{n}", "placements": []} for n in (2, 3)]
     (job / "layout.json").write_text(json.dumps(layout))
     for n in (2, 3):
         (job / f"sheet-0{n}.nc").write_bytes((job / "sheet-01.nc").read_bytes())
+    return job
+
+
+def test_machines_share_the_sheets_and_one_failing_hurts_no_other(run, three_sheets):
     done = run("cut", "job", "--port", "virtual", "--port", "/dev/no-such-port", "--json")
     assert done.returncode == 3
     answer = json.loads(done.stdout)
@@ -186,6 +196,58 @@ def test_machines_share_the_sheets_and_one_failing_hurts_no_other(run, job):
     assert [sheet["port"] for sheet in failed] == ["/dev/no-such-port"]
     assert "/dev/no-such-port" in failed[0]["why"]
     assert sum(sheet["port"] == "virtual" for sheet in answer["sheets"]) == 2
+
+
+def test_machines_go_on_with_what_each_had(run, three_sheets):
+    arguments = ("cut", "job", "--port", "virtual", "--port", "virtual")
+    assert "interrupted" in sentence(run(*arguments, "--resume", "--at", "0,0", "--quiet"), 2)
+    assert "one machine at a time" in sentence(run(*arguments, "--frame", "--quiet"), 2)
+    whole = run(*arguments, "--sheet", "1", "--sheet", "2", "--json")
+    assert whole.returncode == 0, whole.stderr
+    journal = three_sheets / "sheet-01.journal"
+    head, _, rest = journal.read_text().lstrip().partition("\n")
+    cut_off = [line for line in rest.splitlines() if '"taken"' in line][3]
+    journal.write_text(f"\n{head}\n{cut_off}\n".replace("virtual", "/dev/elsewhere"))
+    elsewhere = sentence(run(*arguments, "--resume", "--at", "0,0", "--quiet"), 2)
+    assert "sheet-01 was interrupted at a machine that is not named now" in elsewhere
+    journal.write_text(f"\n{head}\n{cut_off}\n")
+    done = run(*arguments, "--resume", "--at", "0,0", "--json")
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert [sheet["sheet"] for sheet in answer["sheets"]] == ["sheet-01", "sheet-03"]
+    assert all(sheet["done"] for sheet in answer["sheets"])
+    assert '"from_line": 1,' not in journal.read_text().rpartition("miurafab-journal")[2]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_every_machine_is_stopped_with_the_command(how, three_sheets):
+    from machine.benches import Bench
+
+    first, second = benches = Bench(), Bench()
+
+    def both(until):
+        def step():
+            once = iter((False, True))
+            second.run(lambda: next(once))
+            return until()
+
+        first.run(step, 60)
+
+    command = [sys.executable, "-m", "miurafab", "cut", str(three_sheets), "--quiet"]
+    ports = [word for bench in benches for word in ("--port", bench.wire.address)]
+    with subprocess.Popen([*command, *ports], stderr=subprocess.PIPE, text=True) as process:
+        both(lambda: all(bench.device.beam_on for bench in benches))
+        process.send_signal(how)
+        both(lambda: all(b"\x18" in bench.bytes_came for bench in benches))
+        dark = [bench.came[-1][1] for bench in benches]
+        both(lambda: process.poll() is not None)
+        if how == signal.SIGINT:
+            assert process.returncode == 3
+            assert "was stopped by Ctrl-C on every machine." in process.stderr.read()
+    for bench, at in zip(benches, dark, strict=True):
+        bench.assert_dark_from(at)
+        bench.wire.close()
 
 
 def test_a_frame_is_traced(run, job):
