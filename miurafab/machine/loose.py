@@ -65,7 +65,8 @@ def burnt_on_loose_pieces(program: Program) -> Iterator[Fault]:
     In a job that says no operations, each closed stroke counts as an outline.
     """
     table = strokes(program)
-    outlines = [path for path in _paths(table, program) if path.gap <= _CLOSED]
+    paths = _paths(table, program, _may_close(table))
+    outlines = [path for path in paths if path.gap <= _CLOSED]
     if not outlines:
         return
     burns = np.flatnonzero(program.beam_on)
@@ -92,7 +93,9 @@ def open_outlines(program: Program) -> Iterator[Fault]:
     One whose ends are near other cut strokes is not meant: it is one of several that make an
     outline held by bridges.
     """
-    paths = [path for path in _paths(strokes(program), program) if says_operations(program)]
+    table = strokes(program)
+    every = np.ones(len(table), dtype=bool)
+    paths = _paths(table, program, every) if says_operations(program) else []
     ends = np.array([(path.points[0], path.points[-1]) for path in paths]).reshape(-1, 2, 2)
     for index, path in enumerate(paths):
         length = float(np.linalg.norm(np.diff(path.points, axis=0), axis=1).sum())
@@ -105,10 +108,20 @@ def open_outlines(program: Program) -> Iterator[Fault]:
             yield Fault(line, int(program.line[path.first_move]), path.gap)
 
 
-def _paths(table: Strokes, program: Program) -> list[_Path]:
-    """The cut strokes (all strokes, where no operation is said), joined where they meet in turn."""
+def _may_close(table: Strokes) -> NDArray[np.bool_]:
+    """(S,) all strokes but lone dashes, which are most and can be no part of an outline."""
+    first, last = table.points[table.offsets[:-1], :2], table.points[table.offsets[1:] - 1, :2]
+    meets = np.zeros(len(table) + 1, dtype=bool)  # the stroke before it
+    meets[1:-1] = np.linalg.norm(first[1:] - last[:-1], axis=1) <= _CLOSED
+    return np.asarray((np.diff(table.offsets) > _LEAST_MOVES) | meets[:-1] | meets[1:])
+
+
+def _paths(table: Strokes, program: Program, wanted: NDArray[np.bool_]) -> list[_Path]:
+    """The cut strokes (all strokes, where no operation is said) among those ``wanted`` (S,), joined
+    where they meet in turn.
+    """
     cut = np.array([c.operation == CUT for c in table.contexts], dtype=bool)
-    chosen = np.flatnonzero(cut[table.context] | (not says_operations(program)))
+    chosen = np.flatnonzero(wanted & (cut[table.context] | (not says_operations(program))))
     paths: list[_Path] = []
     for index in chosen.tolist():
         for path in _rounds(table.stroke(index)[:, :2], int(table.first_move[index])):
