@@ -60,7 +60,7 @@ def read_layout(text: str) -> Layout:
             patches=tuple(_patch(table) for table in document["patches"]),
             sheets=tuple(_sheet(table) for table in document["sheets"]),
             totals=Totals(**document["totals"]),
-            nesting=NestingRecord(**document["nesting"]),
+            nesting=NestingRecord(**document.get("nesting", {})),
             untabbed=tuple(document.get("untabbed", ())),
             unlettered=document.get("unlettered", 0),
             remarks=tuple(str(remark) for remark in document.get("remarks", ())),

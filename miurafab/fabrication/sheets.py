@@ -99,8 +99,8 @@ class NestingRecord:
     and the number of sheets below which no layout can go.
     """
 
-    engine: str
-    version: str
+    engine: str = "none"
+    version: str = __version__
     seed: int = 0
     seconds: float | None = None
     sheets_bound: int | None = None
@@ -121,7 +121,7 @@ class Layout:
     patches: tuple[Patch, ...]
     sheets: tuple[Sheet, ...]
     totals: Totals
-    nesting: NestingRecord = NestingRecord("none", __version__)
+    nesting: NestingRecord = NestingRecord()
     untabbed: tuple[int, ...] = ()
     unlettered: int = 0
     remarks: tuple[str, ...] = ()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -130,6 +132,17 @@ def test_an_engine_that_does_not_end_is_killed_and_its_best_layout_stands(monkey
     assert time.monotonic() - started < 30.0
     assert (found.version, found.layouts, found.finished) == ("9.9", [GOOD], False)
     assert found.complaint == ""
+
+
+def test_a_worker_ends_when_whoever_started_it_is_gone():
+    code = (
+        "import threading, time; "
+        "from miurafab.fabrication.nesting.worker import _end_with_parent; "
+        "threading.Thread(target=_end_with_parent, daemon=True).start(); time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE) as process:
+        process.stdin.close()
+        assert process.wait(30) == 1
 
 
 def test_an_engine_that_crashes_is_told_with_its_last_words(monkeypatch):

@@ -196,6 +196,9 @@ def test_the_layout_file_tells_stock_copies_and_what_nested_it(tmp_path):
     assert read.sheets[0].stock == "left over"
     assert [patch.copy for patch in read.patches] == [patch.copy for patch in layout.patches]
     assert write_layout(read, "x.fold", "0" * 64) == text
+    plain = json.loads(text)
+    del plain["nesting"]
+    assert read_layout(json.dumps(plain)).nesting.engine == "none"
 
 
 @settings(derandomize=True, max_examples=12, deadline=None)
