@@ -65,8 +65,8 @@ def burnt_on_loose_pieces(program: Program) -> Iterator[Fault]:
     In a job that says no operations, each closed stroke counts as an outline.
     """
     table = strokes(program)
-    paths = _paths(table, program, _may_close(table))
-    outlines = [path for path in paths if path.gap <= _CLOSED]
+    chosen = _without_lone_dashes(table, _through(table, program))
+    outlines = [path for path in _paths(table, chosen) if path.gap <= _CLOSED]
     if not outlines:
         return
     burns = np.flatnonzero(program.beam_on)
@@ -94,8 +94,7 @@ def open_outlines(program: Program) -> Iterator[Fault]:
     outline held by bridges.
     """
     table = strokes(program)
-    every = np.ones(len(table), dtype=bool)
-    paths = _paths(table, program, every) if says_operations(program) else []
+    paths = _paths(table, _through(table, program)) if says_operations(program) else []
     ends = np.array([(path.points[0], path.points[-1]) for path in paths]).reshape(-1, 2, 2)
     for index, path in enumerate(paths):
         length = float(np.linalg.norm(np.diff(path.points, axis=0), axis=1).sum())
@@ -108,20 +107,23 @@ def open_outlines(program: Program) -> Iterator[Fault]:
             yield Fault(line, int(program.line[path.first_move]), path.gap)
 
 
-def _may_close(table: Strokes) -> NDArray[np.bool_]:
-    """(S,) all strokes but lone dashes, which are most and can be no part of an outline."""
-    first, last = table.points[table.offsets[:-1], :2], table.points[table.offsets[1:] - 1, :2]
-    meets = np.zeros(len(table) + 1, dtype=bool)  # the stroke before it
-    meets[1:-1] = np.linalg.norm(first[1:] - last[:-1], axis=1) <= _CLOSED
-    return np.asarray((np.diff(table.offsets) > _LEAST_MOVES) | meets[:-1] | meets[1:])
-
-
-def _paths(table: Strokes, program: Program, wanted: NDArray[np.bool_]) -> list[_Path]:
-    """The cut strokes (all strokes, where no operation is said) among those ``wanted`` (S,), joined
-    where they meet in turn.
-    """
+def _through(table: Strokes, program: Program) -> NDArray[np.int64]:
+    """Which strokes are cut, or all of them where no operation is said."""
     cut = np.array([c.operation == CUT for c in table.contexts], dtype=bool)
-    chosen = np.flatnonzero(wanted & (cut[table.context] | (not says_operations(program))))
+    return np.flatnonzero(cut[table.context] | (not says_operations(program)))
+
+
+def _without_lone_dashes(table: Strokes, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
+    """``chosen`` without the short ones that meet no other in turn: most, and no outline."""
+    begin, end = table.offsets[:-1][chosen], table.offsets[1:][chosen]
+    first, last = table.points[begin, :2], table.points[end - 1, :2]
+    meets = np.zeros(len(chosen) + 1, dtype=bool)  # the one before it
+    meets[1:-1] = np.linalg.norm(first[1:] - last[:-1], axis=1) <= _CLOSED
+    return chosen[(end - begin > _LEAST_MOVES) | meets[:-1] | meets[1:]]
+
+
+def _paths(table: Strokes, chosen: NDArray[np.int64]) -> list[_Path]:
+    """The ``chosen`` strokes, joined where they meet in turn."""
     paths: list[_Path] = []
     for index in chosen.tolist():
         for path in _rounds(table.stroke(index)[:, :2], int(table.first_move[index])):
