@@ -12,8 +12,8 @@ job in check mode adds to the sender's memory, after the job was read and checke
 On a busy computer let the controller's time pass more slowly than real time (``--speed 0.25``): all
 figures are in its time, and the latency is stretched with it.
 
-``--rivals`` is a Python in which ``pip install grbl-streamer grbl-link`` was done: both send the
-micro job too. A sender that burns fewer dashes than the job has lost lines on the way.
+``--rivals`` is a Python in which ``pip install grbl-streamer pygrbl-streamer`` was done: both send
+the micro job too. A sender that burns fewer dashes than the job has lost lines on the way.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ DASHES = 1500
 WIRE_BYTES_S = 11_520
 
 STREAMER = """
-import sys, time
+import os, sys, time
 from grbl_streamer import GrblStreamer
 done, booted = [], []
 def tell(event, *data):
@@ -58,24 +58,22 @@ g.setup_logging()
 g.cnect(sys.argv[1], 115200)
 while not booted: time.sleep(0.01)
 time.sleep(1)
+done.clear()  # it says so of nothing, too
 g.incremental_streaming = False
 g.load_file(sys.argv[2])
 g.job_run()
 end = time.time() + 300
 while not done and time.time() < end: time.sleep(0.05)
 time.sleep(1)
+os._exit(0)  # its threads end for nothing else
 """
-LINK = """
-import sys, time, serial
-from grbl_link.protocol import CharacterCountProtocol
-port = serial.Serial(sys.argv[1], 115200, timeout=1)
-time.sleep(1)
-p = CharacterCountProtocol(port)
-p.start()
-for line in open(sys.argv[2]): p.enqueue(line.strip())
-end = time.time() + 300
-while (not p.send_queue.empty() or p.planner_size) and time.time() < end: time.sleep(0.05)
-time.sleep(1)
+PYGRBL = """
+import sys
+from pygrbl_streamer import GrblStreamer
+g = GrblStreamer(sys.argv[1], 115200)
+g.connect()
+g.send_file(sys.argv[2])
+g.disconnect()
 """
 OURS = """
 import sys
@@ -226,14 +224,17 @@ def main() -> None:
         print(f"wire: {share:.4f} of {WIRE_BYTES_S} bytes a second in check mode")
     senders = [("miurafab", sys.executable, OURS)]
     if given.rivals:
-        senders += [("grbl-streamer", given.rivals, STREAMER), ("grbl-link", given.rivals, LINK)]
+        senders += [
+            ("grbl-streamer", given.rivals, STREAMER),
+            ("pygrbl-streamer", given.rivals, PYGRBL),
+        ]
     for latency in (0.001, 0.016):
         best = ideal(latency)
         print(f"micro, {1000 * latency:g} ms: an ideal sender {best:.2f} s", flush=True)
         for name, python, sender in senders:
             seconds, dashes = micro(python, sender, latency, given.speed)
             share = f"{seconds:7.2f} s  {seconds / best:.3f} of ideal"
-            print(f"  {name:14} {share}  {dashes} of {DASHES} dashes", flush=True)
+            print(f"  {name:15} {share}  {dashes} of {DASHES} dashes", flush=True)
     if given.lines:
         share, added = check_mode(given.lines, given.memory_speed)
         print(f"memory: {given.lines} lines, streaming added {added:.1f} MB ({share:.2f} of wire)")
