@@ -25,7 +25,12 @@ def sheets(
     material: MaterialOption = None,
     formats: Annotated[
         list[str] | None,
-        typer.Option("--format", help="Also draw each sheet as dxf, pdf or hpgl; may be repeated."),
+        typer.Option(
+            "--format",
+            "--formats",
+            help="Draw more than SVG: dxf, dxf-r2010, pdf, hpgl, tiled-a4, tiled-a3, tiled-letter, "
+            "tiled-legal (pages to join), picture (of the pattern); several parted by commas.",
+        ),
     ] = None,
     design: Annotated[
         Path | None,

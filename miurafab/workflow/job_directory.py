@@ -17,14 +17,10 @@ from typing import Any
 
 from miurafab.errors import InputError, LayoutError
 from miurafab.fabrication.drawing.assembly_guide import assembly_guide
-from miurafab.fabrication.drawing.dxf import sheet_dxf
-from miurafab.fabrication.drawing.hpgl import sheet_hpgl
-from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.layout import read_layout, write_layout
 from miurafab.fabrication.options import LayoutOptions, read_options
 from miurafab.fabrication.sheets import Layout, lay_out
-from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.job import Job
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fold_format import read_fold
@@ -38,16 +34,11 @@ from miurafab.profiles import (
     read_toml,
 )
 from miurafab.profiles.shipped import Kind, shipped_directory
+from miurafab.workflow.drawings import ENDINGS, PICTURE, drawings, read_formats
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 
 LAYOUT = "layout.json"
 GUIDE = "assembly.pdf"
-FORMATS: Mapping[str, Callable[[Toolpath], bytes]] = {
-    "dxf": lambda toolpath: sheet_dxf(toolpath).encode("ascii"),
-    "pdf": lambda toolpath: sheets_pdf((toolpath,), toolpath.sheet),
-    "hpgl": lambda toolpath: sheet_hpgl(toolpath).encode("ascii"),
-}
-"""The drawings that are made of a sheet on request, by file ending."""
 Progress = Callable[[float, str], None]
 
 
@@ -107,13 +98,11 @@ def write_job(
     """Lay the pattern of a FOLD file out and write its job directory.
 
     ``machine`` and ``material`` are shipped names or TOML files; ``formats`` are further drawings
-    of each sheet (:data:`FORMATS`), ``options`` what is asked of the layout. Sheets of an earlier
-    job in the same directory are removed; files that are no part of a job are left alone. Raises
-    :class:`~miurafab.errors.InputError` where the directory holds something else than a job.
+    (:mod:`~miurafab.workflow.drawings`), ``options`` what is asked of the layout. Sheets of an
+    earlier job in the same directory are removed; files that are no part of a job are left alone.
+    Raises :class:`~miurafab.errors.InputError` where the directory holds something else than a job.
     """
-    unknown = sorted(set(formats) - set(FORMATS))
-    if unknown:
-        raise InputError(f"'{unknown[0]}' is not a drawing format; there are {', '.join(FORMATS)}.")
+    wanted = read_formats(formats)
     tell = on_progress or (lambda fraction, note: None)
     tell(0.0, "patches, tabs, perforation, nesting")
     profile, stock = load_machine(machine), load_material(material)
@@ -130,8 +119,8 @@ def write_job(
         dry_runs.append(dry_run(toolpath.sheet, job, profile, size))
         write_text(directory / f"{toolpath.sheet}{profile.job_suffix}", job.text)
         write_text(directory / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
-        for name in formats:
-            (directory / f"{toolpath.sheet}.{name}").write_bytes(FORMATS[name](toolpath))
+    for name, content in drawings(layout, pattern, wanted, pattern_file.stem):
+        (directory / name).write_bytes(content)
     seconds = round(float(sum(sheet.seconds for sheet in dry_runs)), 1)
     layout = replace(layout, totals=replace(layout.totals, seconds=seconds))
     tell(0.9, "drawing the assembly guide")
@@ -211,8 +200,9 @@ def make_room(directory: Path) -> None:
         ) from None
     layout.unlink()
     for name in names:
-        for suffix in ("nc", "plt", "svg", *FORMATS):
-            (directory / f"{Path(name).name}.{suffix}").unlink(missing_ok=True)
+        for ending in (".nc", ".plt", ".svg", *ENDINGS):
+            (directory / f"{Path(name).name}{ending}").unlink(missing_ok=True)
+    (directory / PICTURE).unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:

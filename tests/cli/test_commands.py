@@ -140,3 +140,27 @@ def test_the_module_runs_as_a_process_and_starts_light():
     )
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "miurafab: gone.fold does not exist.\n"
+
+
+def test_every_drawing_is_reached_by_sheets_and_goes_with_its_job(run, tmp_path):
+    fold, job = tmp_path / "small.fold", tmp_path / "job"
+    assert run("fit", "plane", "--facets", "6x6", "--size", "80mm", "-o", fold).returncode == 0
+    drawn = "svg,dxf,dxf-r2010,pdf,hpgl,tiled-a4,tiled-a3,tiled-letter,tiled-legal,picture"
+    done = run("sheets", fold, "-o", job, "--formats", drawn, "--json")
+    assert done.returncode == 0, done.stderr
+    sheet = {
+        ".nc", ".svg", ".dxf", "-r2010.dxf", ".pdf", ".hpgl",
+        "-a4.pdf", "-a3.pdf", "-letter.pdf", "-legal.pdf",
+    }  # fmt: skip
+    own = {"layout.json", "assembly.pdf", "small.fold", "pattern.svg"}
+    assert {path.name for path in job.iterdir()} == own | {f"sheet-01{end}" for end in sheet}
+    assert "$INSUNITS" in (job / "sheet-01-r2010.dxf").read_text()
+    # A job made anew in the same place leaves nothing of this one behind.
+    assert run("sheets", fold, "-o", job, "--json").returncode == 0
+    left = {"sheet-01.nc", "sheet-01.svg", *own} - {"pattern.svg"}
+    assert {path.name for path in job.iterdir()} == left
+    wrong = run("sheets", fold, "-o", job, "--format", "tiled-a5")
+    assert wrong.returncode == 2
+    assert "did you mean 'tiled-a4'?" in wrong.stderr
+    helped = run("sheets", "--help").stdout
+    assert all(name in helped for name in drawn.split(",")[1:])

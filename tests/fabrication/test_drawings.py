@@ -20,8 +20,10 @@ from miurafab.fabrication.drawing.assembly_guide import assembly_guide
 from miurafab.fabrication.drawing.dxf import VERSIONS, sheet_dxf
 from miurafab.fabrication.drawing.hpgl import UNITS_PER_MM, sheet_hpgl
 from miurafab.fabrication.drawing.page import INK, tint
-from miurafab.fabrication.drawing.pdf import Tiling, sheets_pdf, tiled_pdf
+from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.svg import COLOURS, sheet_svg
+from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, tiled_pdf
+from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out
 from miurafab.profiles import OPERATIONS, load_machine, load_material
@@ -155,15 +157,90 @@ def test_hpgl(layout):
         assert_same(found, toolpath, 0.5 / UNITS_PER_MM + 1e-9)
 
 
-def test_tiles_cover_the_sheet_at_real_size(layout):
-    tiling = Tiling(page="letter")
-    reader = pypdf.PdfReader(io.BytesIO(tiled_pdf(layout.toolpaths[:1], "test", tiling)))
-    assert len(reader.pages) == 3 * 2
-    assert float(reader.pages[0].mediabox.width) * POINT_MM == pytest.approx(215.9, abs=1e-3)
+@pytest.mark.parametrize("page", PAGES_MM)
+def test_tiles_joined_by_their_crosses_are_the_sheet(layout, page):
+    """Every page is laid onto the sheet by the crosses that it shares with those laid before."""
+    toolpath = layout.toolpaths[0]
+    letters = edge_letters(layout, regular(61, 41))
+    guide = tiled_pdf((toolpath,), letters, "test", Tiling(page=page))
+    reader = pypdf.PdfReader(io.BytesIO(guide))
+    first, *tiles = reader.pages
+    sides = sorted(float(side) * POINT_MM for side in first.mediabox[2:])
+    assert sides == pytest.approx(sorted(PAGES_MM[page]), abs=1e-3)
+    laid, known, waiting = [], {}, list(tiles)
+    while waiting:
+        for tile in waiting:
+            crosses, pieces = read_tile(tile, reader)
+            shared = set(crosses) & set(known)
+            if known and not shared:
+                continue
+            moves = np.array([known[n] - crosses[n] for n in shared] or [np.zeros(2)])
+            assert np.abs(moves - moves[0]).max() < 1e-3
+            known |= {n: at + moves[0] for n, at in crosses.items()}
+            laid.append((tile.extract_text(), moves[0], pieces))
+            waiting.remove(tile)
+            break
+        else:
+            raise AssertionError("a page shares no cross with the others")
+    origin = next(move for words, move, _ in laid if re.search(r"^A1$", words, re.MULTILINE))
+    wanted = segments(toolpath)[:, 1:]
+    drawn = np.concatenate([p + np.tile(move - origin, 2) for _, move, p in laid])
+    drawn -= np.tile(Tiling().margin_mm, 4)
+    for ends in (wanted, wanted[:, [2, 3, 0, 1]]):
+        gap, _ = cKDTree(np.concatenate([drawn, drawn[:, [2, 3, 0, 1]]])).query(ends, p=np.inf)
+        assert gap.max() < 1e-3
+
+
+def read_tile(page, reader):
+    """The crosses of a tile by number, and its straight pieces (n, 4), in mm on the page."""
+    content = pypdf.generic.ContentStream(page.get_contents(), reader)
+    move, stack, lines, at, words = np.zeros(2), [], [], None, {}
+    text_at = np.zeros(2)
+    for operands, operator in content.operations:
+        numbers = [float(o) for o in operands if isinstance(o, int | float)]
+        if operator == b"q":
+            stack.append(move)
+        elif operator == b"Q":
+            move = stack.pop()
+        elif operator == b"cm":
+            assert numbers[:4] == [1, 0, 0, 1], "true to scale"
+            move = move + numbers[4:]
+        elif operator in (b"m", b"l"):
+            point = move + numbers
+            if operator == b"l":
+                lines.append((*at, *point))
+            at = point
+        elif operator == b"Tm":
+            text_at = move + numbers[4:]
+        elif operator == b"Tj" and str(operands[0]).isdigit():
+            words[int(operands[0])] = text_at * POINT_MM
+    lines = np.array(lines) * POINT_MM
+    middle = (lines[:, :2] + lines[:, 2:]) / 2
+    size = np.abs(lines[:, :2] - lines[:, 2:])
+    flat = (np.abs(size - [8.0, 0.0]) < 1e-3).all(axis=1)
+    crosses = {}
+    for number, place in words.items():
+        off = np.linalg.norm(middle[flat] - (place - [1.2, 2.2]), axis=1)
+        assert off.min() < 1e-2
+        crosses[number] = middle[flat][off.argmin()]
+    return crosses, lines
+
+
+def test_blank_tiles_are_not_printed():
+    pattern = regular(9, 9)
+    layout = lay_out(pattern, MACHINE, MATERIAL)
+    tiled = tiled_pdf(layout.toolpaths, edge_letters(layout, pattern), "one", Tiling())
+    pages = pages_of(tiled)
+    assert "on 1 page," in pages[0]
+    assert len(pages) == 2
+
+
+def test_a_page_that_cannot_be_is_refused(layout):
+    letters = edge_letters(layout, regular(61, 41))
     with pytest.raises(InputError, match="'a9'"):
-        tiled_pdf(layout.toolpaths, "test", Tiling(page="a9"))
+        tiled_pdf(layout.toolpaths, letters, "test", Tiling(page="a9"))
     with pytest.raises(InputError, match="no room"):
-        tiled_pdf(layout.toolpaths, "test", Tiling(margin_mm=120))
+        tiled_pdf(layout.toolpaths, letters, "test", Tiling(margin_mm=120))
 
 
 def pages_of(guide):

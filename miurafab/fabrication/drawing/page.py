@@ -1,13 +1,10 @@
 """The printed page: A4 with one set of margins, inks, type sizes and small parts for all guides.
 
-Lengths are mm on the page, its origin at the lower left. Colours of patches are spread over the
-hues by the golden section at one lightness, in OKLCH (Ottosson 2020, "A perceptual color space for
-image processing"), so that neighbours differ and none stands out.
+Lengths are mm on the page, its origin at the lower left.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -16,6 +13,8 @@ from reportlab.lib.colors import Color, HexColor, white
 from reportlab.lib.units import mm
 from reportlab.pdfbase.pdfmetrics import stringWidth
 from reportlab.pdfgen.canvas import Canvas
+
+from miurafab.fabrication.drawing.colours import patch_colour
 
 Floats = NDArray[np.float64]
 Page = Callable[[Canvas], None]
@@ -32,34 +31,12 @@ BOTTOM = 17.0
 INK, QUIET, RULE = HexColor("#1d2329"), HexColor("#5c6670"), HexColor("#c3cad2")
 PALE = HexColor("#eef1f4")
 MOUNTAIN, VALLEY, OTHER = HexColor("#c8372d"), HexColor("#2a5fb0"), HexColor("#8a6d3b")
-_GOLDEN = 0.61803398875
+CREASE_COLOURS = {"M": MOUNTAIN, "V": VALLEY, "U": OTHER}
 
 
 def tint(number: int, strength: float = 1.0) -> Color:
     """The colour of patch ``number``; a ``strength`` below 1 is nearer to white."""
-    hue = 2 * math.pi * ((0.12 + number * _GOLDEN) % 1.0)
-    lightness = 1.0 - strength * (0.17 + 0.03 * (number % 3))
-    chroma = 0.095 * strength
-    return _oklch(lightness, chroma, hue)
-
-
-def _oklch(lightness: float, chroma: float, hue: float) -> Color:
-    a, b = chroma * math.cos(hue), chroma * math.sin(hue)
-    long = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3
-    middle = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3
-    short = (lightness - 0.0894841775 * a - 1.2914855480 * b) ** 3
-    linear = (
-        4.0767416621 * long - 3.3077115913 * middle + 0.2309699292 * short,
-        -1.2684380046 * long + 2.6097574011 * middle - 0.3413193965 * short,
-        -0.0041960863 * long - 0.7034186147 * middle + 1.7076147010 * short,
-    )
-    # The transfer curve of sRGB (IEC 61966-2-1).
-    return Color(
-        *(
-            12.92 * c if c <= 0.0031308 else min(1.055 * c ** (1 / 2.4) - 0.055, 1.0)
-            for c in (max(c, 0.0) for c in linear)
-        )
-    )
+    return Color(*patch_colour(number, strength))
 
 
 def text(

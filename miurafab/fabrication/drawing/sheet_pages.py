@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from reportlab.lib.colors import Color
 from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 
@@ -36,10 +35,10 @@ from miurafab.fabrication.drawing.page import (
     tint,
     wrapped,
 )
-from miurafab.fabrication.drawing.views import CREASE_COLOURS, OUTLINED, Views, named
+from miurafab.fabrication.drawing.pdf import draw_for_people
+from miurafab.fabrication.drawing.views import OUTLINED, Views, named
 from miurafab.fabrication.sheets import Layout, Placement, Sheet
 from miurafab.fabrication.toolpath import Toolpath
-from miurafab.profiles import OPERATIONS
 
 _CARD = 33.0
 """The least height of what is said of one patch below its sheet; more is used where there is."""
@@ -164,7 +163,7 @@ class SheetPages:
         canvas.setFillColor(RULE)
         for ring in sheet.defects_mm:
             polygon(canvas, np.array(ring))
-        self.draw_strokes(canvas, scale)
+        draw_for_people(canvas, toolpath, self.views.letters, scale)
         canvas.setStrokeColor(RULE)
         canvas.setLineWidth(0.3 / scale * mm)
         canvas.rect(0, 0, sheet.width_mm * mm, sheet.height_mm * mm)
@@ -190,27 +189,6 @@ class SheetPages:
                 f"then run {sheet.name}."
             )
             text(canvas, MARGIN, low - 17.5, words, 9, bold=True)
-
-    def draw_strokes(self, canvas: Canvas, scale: float) -> None:
-        """The strokes in colours for people: mountains, valleys, cuts, and lettering."""
-        toolpath = self.toolpath
-        letters = np.where(toolpath.edge >= 0, self.views.letters[toolpath.edge], "")
-        engraved = toolpath.operation == OPERATIONS.index("engrave")
-        cut = toolpath.operation == OPERATIONS.index("cut")
-        kinds: list[tuple[Color, float, NDArray[np.bool_]]] = [
-            (INK, 0.12, engraved),
-            *((colour, 0.17, ~cut & (letters == name)) for name, colour in CREASE_COLOURS.items()),
-            (INK, 0.28, cut),
-        ]
-        canvas.setLineJoin(1)
-        for colour, weight, chosen in kinds:
-            path = canvas.beginPath()
-            for index in np.flatnonzero(chosen).tolist():
-                for k, (x, y) in enumerate((toolpath.stroke(index) * mm).tolist()):
-                    (path.lineTo if k else path.moveTo)(x, y)
-            canvas.setStrokeColor(colour)
-            canvas.setLineWidth(weight / scale * mm)
-            canvas.drawPath(path, stroke=1, fill=0)
 
     def draw_names(
         self, canvas: Canvas, placed: Placement, corner: tuple[float, float], scale: float

@@ -17,6 +17,7 @@ import numpy as np
 import svgwrite
 from numpy.typing import NDArray
 
+from miurafab.fabrication.drawing.colours import hex_of, patch_colour
 from miurafab.fabrication.sheets import Layout
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
@@ -43,7 +44,6 @@ _CREASES = {
     "C": ("cut", "#222222"),
     "B": ("border", "#222222"),
 }
-_TINTS = ("#f6e7c8", "#dbe8d2", "#d5e3ee", "#ecd9de", "#e4ddec", "#f0e0d0", "#d6e6e3", "#eeeacb")
 
 
 def sheet_svg(toolpath: Toolpath) -> str:
@@ -111,9 +111,9 @@ def _add_facets(
 ) -> None:
     groups = [np.arange(len(pattern.faces_vertices))]
     if layout is not None:
-        groups = [patch.faces for patch in layout.patches]
+        groups = [patch.faces for patch in layout.model.patches]
     for number, faces in enumerate(groups):
-        tint = _TINTS[number % len(_TINTS)]
+        tint = hex_of(patch_colour(number, 0.6))
         data = []
         for corners in pattern.faces_vertices[faces].tolist():
             ring = [points[v] for v in corners if v >= 0]
@@ -130,9 +130,13 @@ def _add_names(
 ) -> None:
     size = np.ptp(points, axis=0).max() / 30
     group = drawing.g(
-        font_family="sans-serif", font_size=_short(size), text_anchor="middle", fill="#222222"
-    )
-    for patch in layout.patches:
+        font_family="sans-serif", font_size=_short(size), font_weight="bold",
+        text_anchor="middle", fill="#222222", stroke="#ffffff", stroke_width=_short(0.16 * size),
+        stroke_linejoin="round",
+    )  # fmt: skip
+    # The rim goes under the letters, so that creases do not spoil them.
+    group.attribs["paint-order"] = "stroke"
+    for patch in layout.model.patches:
         corners = pattern.faces_vertices[patch.faces]
         x, y = points[corners[corners >= 0]].mean(axis=0)
         group.add(drawing.text(patch.label, insert=(_short(x), _short(y + 0.35 * size))))

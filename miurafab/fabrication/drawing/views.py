@@ -17,11 +17,9 @@ from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.drawing.page import (
+    CREASE_COLOURS,
     INK,
-    MOUNTAIN,
-    OTHER,
     PALE,
-    VALLEY,
     Box,
     Floats,
     fitted,
@@ -35,14 +33,23 @@ from miurafab.fabrication.sheets import Layout
 from miurafab.geometry.angles import facet_normals
 from miurafab.origami.crease_pattern import CreasePattern
 
-CREASE_COLOURS = {"M": MOUNTAIN, "V": VALLEY, "U": OTHER}
-
 _AZIMUTH, _ELEVATION = math.radians(-55), math.radians(28)
 _TALL = 1.25
 """A flat pattern so many times taller than wide is shown lying on its side."""
 
 OUTLINED = 30_000
 """In views of more facets than this the outline of each would be all that is seen."""
+
+
+def edge_letters(layout: Layout, pattern: CreasePattern) -> NDArray[np.str_]:
+    """(E,) the assignment of each edge, a border that is glued having that of its fold."""
+    letters = pattern.edges_assignment.copy()
+    for patch in layout.patches:
+        for tab in patch.tabs:
+            if tab.edge != tab.mate_edge:
+                fold = {"mountain": "M", "valley": "V"}.get(tab.fold, "F")
+                letters[[tab.edge, tab.mate_edge]] = fold
+    return letters
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,15 +101,8 @@ class Views:
 
     @cached_property
     def letters(self) -> NDArray[np.str_]:
-        """(E,) the assignment of each edge, a border that is glued having that of its fold."""
-        letters = self.pattern.edges_assignment.copy()
-        for patch in self.patches:
-            for tab in patch.tabs:
-                if tab.edge != tab.mate_edge:
-                    letters[[tab.edge, tab.mate_edge]] = {"mountain": "M", "valley": "V"}.get(
-                        tab.fold, "F"
-                    )
-        return letters
+        """(E,) as :func:`edge_letters`."""
+        return edge_letters(self.layout, self.pattern)
 
     def folded_view(self, canvas: Canvas, box: Box, shown: Collection[int] | None = None) -> float:
         """An orthographic view, far facets first, lit from the upper left; returns its scale. With

@@ -1,0 +1,258 @@
+"""Sheets over the pages of an ordinary printer, true to scale, to be joined by hand.
+
+First comes a page that shows the sheet and its tiles, then one page for each tile on which
+something is drawn, named like a field of a chess board: A1 is at the lower left. Neighbouring pages
+share a strip. In it lie numbered crosses, each at one place of the sheet and so on both pages: laid
+cross upon cross the pages match. Mountains, valleys and cuts are told apart by colour.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from reportlab.lib.units import mm
+from reportlab.pdfgen.canvas import Canvas
+
+from miurafab.errors import InputError
+from miurafab.fabrication.drawing.page import (
+    INK,
+    MOUNTAIN,
+    PALE,
+    QUIET,
+    RULE,
+    VALLEY,
+    Floats,
+    count,
+    legend,
+    paragraph,
+    text,
+)
+from miurafab.fabrication.drawing.pdf import draw_for_people, new_canvas
+from miurafab.fabrication.toolpath import Toolpath
+
+PAGES_MM = {
+    "a4": (210.0, 297.0),
+    "a3": (297.0, 420.0),
+    "letter": (215.9, 279.4),
+    "legal": (215.9, 355.6),
+}
+"""Page sizes by name: width and height in mm (ISO 216; ANSI/ASME Y14.1, US legal)."""
+
+CHECK_MM = 50.0
+"""The length of the bar by which the scale of a print is checked."""
+
+_HOW = (
+    "Print at 100 %, without fitting to the page, and check the bar of 50 mm at the foot of each. "
+    "Cut each page along its frame at the left and below, lay it over its neighbours so that "
+    "crosses of the same number meet, and glue the strip."
+)
+
+
+@dataclass(frozen=True)
+class Tiling:
+    """How a sheet is cut into pages: a size of :data:`PAGES_MM`, upright or lying as it takes
+    fewer of them, the ``margin_mm`` that printers leave blank, and the ``overlap_mm`` that
+    neighbouring pages share.
+    """
+
+    page: str = "a4"
+    margin_mm: float = 10.0
+    overlap_mm: float = 10.0
+
+
+def tiled_pdf(
+    toolpaths: tuple[Toolpath, ...], letters: NDArray[np.str_], title: str, tiling: Tiling
+) -> bytes:
+    """All sheets, tile by tile. ``letters`` (E,) is the assignment of each pattern edge.
+
+    Raises :class:`~miurafab.errors.InputError` for an unknown page or one without room.
+    """
+    size = PAGES_MM.get(tiling.page.lower())
+    if size is None:
+        raise InputError(f"The page '{tiling.page}' is not one of {', '.join(PAGES_MM)}.")
+    if min(size) <= 2 * tiling.margin_mm + tiling.overlap_mm:
+        raise InputError("The page has no room left within its margins and overlap.")
+    stream = io.BytesIO()
+    canvas = new_canvas(stream, title)
+    for toolpath in toolpaths:
+        both = [_Tiles(toolpath, letters, each, tiling) for each in (size, size[::-1])]
+        tiles = min(both, key=lambda each: each.columns * each.rows)
+        canvas.setPageSize((tiles.page[0] * mm, tiles.page[1] * mm))
+        tiles.overview(canvas, title)
+        for row, column in tiles.printed:
+            tiles.draw(canvas, title, row, column)
+    canvas.save()
+    return stream.getvalue()
+
+
+class _Tiles:
+    """The tiles of one sheet on pages of one size."""
+
+    def __init__(
+        self,
+        toolpath: Toolpath,
+        letters: NDArray[np.str_],
+        page: tuple[float, float],
+        tiling: Tiling,
+    ) -> None:
+        self.toolpath, self.letters, self.page = toolpath, letters, page
+        self.margin, self.overlap = tiling.margin_mm, tiling.overlap_mm
+        self.shown = tuple(side - 2 * self.margin for side in page)
+        self.step = tuple(side - self.overlap for side in self.shown)
+        self.sheet = (toolpath.width_mm, toolpath.height_mm)
+        self.columns, self.rows = (
+            max(1, math.ceil((length - self.overlap) / step))
+            for length, step in zip(self.sheet, self.step, strict=True)
+        )
+
+    def corner(self, row: int, column: int) -> tuple[float, float]:
+        """Where on the sheet a tile begins."""
+        return column * self.step[0], row * self.step[1]
+
+    def strokes_in(self, row: int, column: int) -> NDArray[np.int64]:
+        """The strokes that touch a tile."""
+        x, y = self.corner(row, column)
+        window = shapely.box(x, y, x + self.shown[0], y + self.shown[1])
+        found: NDArray[np.int64] = np.sort(self._tree.query(window, predicate="intersects"))
+        return found
+
+    @cached_property
+    def _tree(self) -> shapely.STRtree:
+        path = self.toolpath
+        which = np.repeat(np.arange(len(path)), np.diff(path.offsets))
+        return shapely.STRtree(np.asarray(shapely.linestrings(path.points, indices=which)))
+
+    @cached_property
+    def printed(self) -> list[tuple[int, int]]:
+        """The tiles with something on them, row by row."""
+        places = [(row, column) for row in range(self.rows) for column in range(self.columns)]
+        return [place for place in places if len(self.strokes_in(*place))]
+
+    def crosses(self) -> Iterator[tuple[int, float, float]]:
+        """The number and place on the sheet of each cross: two on each side of a tile that has a
+        neighbour there.
+        """
+        number = 0
+        for axis, (tiles, others) in enumerate(
+            ((self.columns, self.rows), (self.rows, self.columns))
+        ):
+            for boundary in range(1, tiles):
+                at = boundary * self.step[axis] + self.overlap / 2
+                for other in range(others):
+                    begin = other * self.step[1 - axis]
+                    end = min(begin + self.shown[1 - axis], self.sheet[1 - axis])
+                    for part in (0.3, 0.7):
+                        along = begin + part * (end - begin)
+                        number += 1
+                        yield (number, at, along) if axis == 0 else (number, along, at)
+
+    def overview(self, canvas: Canvas, title: str) -> None:
+        """The sheet with its tiles and what to do with them."""
+        margin = self.margin + 6
+        room = self.page[0] - 2 * margin
+        top = self.page[1] - margin
+        text(canvas, margin, top - 5, f"{title}: {self.toolpath.sheet}", 18, bold=True)
+        printed = self.printed
+        words = (
+            f"{self.sheet[0]:g} x {self.sheet[1]:g} mm on {count(len(printed), 'page', 'pages')}, "
+            f"{self.columns} columns by {self.rows} rows"
+        )
+        text(canvas, margin, top - 11, words, 9.5, colour=QUIET)
+        y = paragraph(canvas, margin, top - 20, _HOW, room, 9.5)
+        whole = (
+            (self.columns - 1) * self.step[0] + self.shown[0],
+            (self.rows - 1) * self.step[1] + self.shown[1],
+        )
+        scale = min(room / whole[0], (y - margin - 16) / whole[1])
+        low = y - 4 - whole[1] * scale
+        canvas.saveState()
+        canvas.translate(margin * mm, low * mm)
+        canvas.scale(scale, scale)
+        canvas.setFillColor(PALE)
+        for row in range(self.rows):
+            for column in range(self.columns):
+                if (row, column) not in printed:
+                    a, b = self.corner(row, column)
+                    canvas.rect(a * mm, b * mm, self.step[0] * mm, self.step[1] * mm, 0, 1)
+        draw_for_people(canvas, self.toolpath, self.letters, scale)
+        canvas.setStrokeColor(RULE)
+        canvas.setLineWidth(0.3 / scale * mm)
+        for row, column in printed:
+            a, b = self.corner(row, column)
+            canvas.rect(a * mm, b * mm, self.shown[0] * mm, self.shown[1] * mm)
+        canvas.restoreState()
+        for row, column in printed:
+            a, b = self.corner(row, column)
+            at = (margin + (a + self.shown[0] / 2) * scale, low + (b + self.shown[1] / 2) * scale)
+            canvas.setFillColor(INK, alpha=0.75)
+            canvas.circle(at[0] * mm, at[1] * mm, 4.5 * mm, stroke=0, fill=1)
+            canvas.setFillAlpha(1)
+            name = _field(row, column)
+            text(canvas, at[0], at[1] - 1.3, name, 10, bold=True, colour=PALE, align="middle")
+        entries = [("mountain", MOUNTAIN, 0.3), ("valley", VALLEY, 0.3), ("cut", INK, 0.45)]
+        legend(canvas, entries, margin + room, low - 7)
+        canvas.showPage()
+
+    def draw(self, canvas: Canvas, title: str, row: int, column: int) -> None:
+        """One tile."""
+        margin, shown = self.margin, self.shown
+        x, y = self.corner(row, column)
+        canvas.saveState()
+        canvas.translate(margin * mm, margin * mm)
+        window = canvas.beginPath()
+        window.rect(0, 0, shown[0] * mm, shown[1] * mm)
+        canvas.clipPath(window, stroke=0, fill=0)
+        canvas.translate(-x * mm, -y * mm)
+        draw_for_people(canvas, self.toolpath, self.letters, chosen=self.strokes_in(row, column))
+        for number, a, b in self.crosses():
+            if x <= a <= x + shown[0] and y <= b <= y + shown[1]:
+                _cross(canvas, number, a, b)
+        canvas.restoreState()
+        canvas.setStrokeColor(RULE)
+        canvas.setLineWidth(0.15 * mm)
+        canvas.rect(margin * mm, margin * mm, shown[0] * mm, shown[1] * mm)
+        foot = margin - 5.5
+        text(canvas, margin, foot, _field(row, column), 11, bold=True)
+        words = f"{title}, {self.toolpath.sheet}; {self.columns} columns by {self.rows} rows"
+        text(canvas, margin + 10, foot, words, 7.5, colour=QUIET)
+        _check_bar(canvas, self.page[0] - margin, foot)
+        canvas.showPage()
+
+
+def _field(row: int, column: int) -> str:
+    """``A1`` for the lower left tile, columns by letters."""
+    name = ""
+    column += 1
+    while column:
+        column, rest = divmod(column - 1, 26)
+        name = chr(65 + rest) + name
+    return f"{name}{row + 1}"
+
+
+def _cross(canvas: Canvas, number: int, x: float, y: float) -> None:
+    canvas.setStrokeColor(QUIET)
+    canvas.setLineWidth(0.12 * mm)
+    canvas.line((x - 4) * mm, y * mm, (x + 4) * mm, y * mm)
+    canvas.line(x * mm, (y - 4) * mm, x * mm, (y + 4) * mm)
+    canvas.circle(x * mm, y * mm, 2 * mm, stroke=1, fill=0)
+    text(canvas, x + 1.2, y + 2.2, str(number), 6.5, colour=QUIET)
+
+
+def _check_bar(canvas: Canvas, right: float, y: float) -> None:
+    """The bar that ends at ``right``, with its length."""
+    left = right - CHECK_MM
+    ends: Floats = np.array([left, right])
+    canvas.setStrokeColor(INK)
+    canvas.setLineWidth(0.25 * mm)
+    canvas.line(left * mm, (y + 1) * mm, right * mm, (y + 1) * mm)
+    for x in ends.tolist():
+        canvas.line(x * mm, y * mm, x * mm, (y + 2) * mm)
+    text(canvas, left - 2, y, f"print at 100 %: this is {CHECK_MM:g} mm", 7.5, colour=QUIET,
+         align="right")  # fmt: skip

@@ -1,0 +1,87 @@
+"""What a job is drawn as, besides the SVG of each sheet and the guide: formats by name.
+
+============ ============================ ======================================================
+format       file                         is for
+============ ============================ ======================================================
+dxf          sheet-01.dxf                 cutters and CAD: R12, which everything reads
+dxf-r2010    sheet-01-r2010.dxf           the same, saying that its unit is mm; outlines are whole
+pdf          sheet-01.pdf                 large printers and cutters: the page is the sheet
+hpgl         sheet-01.hpgl                cutting plotters
+tiled-a4     sheet-01-a4.pdf              ordinary printers, likewise -a3, -letter, -legal: pages
+                                          to be joined, mountains and valleys in their colours
+picture      pattern.svg                  people: the flat pattern with its patches
+============ ============================ ======================================================
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import InputError
+from miurafab.fabrication.drawing.dxf import sheet_dxf
+from miurafab.fabrication.drawing.hpgl import sheet_hpgl
+from miurafab.fabrication.drawing.pdf import sheets_pdf
+from miurafab.fabrication.drawing.svg import pattern_svg
+from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, tiled_pdf
+from miurafab.fabrication.drawing.views import edge_letters
+from miurafab.fabrication.sheets import Layout
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.origami.crease_pattern import CreasePattern
+
+PICTURE = "pattern.svg"
+Draw = Callable[[Toolpath, NDArray[np.str_], str], bytes]
+
+
+def _tiled(page: str) -> Draw:
+    return lambda path, letters, title: tiled_pdf((path,), letters, title, Tiling(page))
+
+
+_SHEETS: Mapping[str, tuple[str, Draw]] = {
+    "dxf": (".dxf", lambda path, letters, title: sheet_dxf(path).encode("ascii")),
+    "dxf-r2010": (
+        "-r2010.dxf",
+        lambda path, letters, title: sheet_dxf(path, "R2010").encode("utf-8"),
+    ),
+    "pdf": (".pdf", lambda path, letters, title: sheets_pdf((path,), path.sheet)),
+    "hpgl": (".hpgl", lambda path, letters, title: sheet_hpgl(path).encode("ascii")),
+    **{f"tiled-{page}": (f"-{page}.pdf", _tiled(page)) for page in PAGES_MM},
+}
+FORMATS = (*_SHEETS, "picture")
+ENDINGS = tuple(ending for ending, _ in _SHEETS.values())
+"""What the names of drawings end in, behind the name of their sheet."""
+
+
+def read_formats(given: Iterable[str]) -> tuple[str, ...]:
+    """The formats that are named, several in one word being parted by commas, each once.
+
+    Raises :class:`~miurafab.errors.InputError` naming one that there is not.
+    """
+    names = [name.strip().lower() for word in given for name in word.split(",")]
+    # Every sheet is drawn as SVG in any case.
+    names = list(dict.fromkeys(name for name in names if name != "svg"))
+    for name in names:
+        if name not in FORMATS:
+            near = difflib.get_close_matches(name, FORMATS, 1)
+            hint = f"; did you mean '{near[0]}'?" if near else f": there are {', '.join(FORMATS)}."
+            raise InputError(f"'{name}' is not a drawing format{hint}")
+    return tuple(names)
+
+
+def drawings(
+    layout: Layout, pattern: CreasePattern, formats: Iterable[str], title: str
+) -> Iterable[tuple[str, bytes]]:
+    """The name and content of each drawing of ``layout`` in the ``formats`` of
+    :func:`read_formats`.
+    """
+    letters = edge_letters(layout, pattern)
+    for name in formats:
+        if name == "picture":
+            yield PICTURE, pattern_svg(pattern, layout).encode("utf-8")
+            continue
+        ending, draw = _SHEETS[name]
+        for toolpath in layout.passes:
+            yield f"{toolpath.sheet}{ending}", draw(toolpath, letters, title)
