@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +13,7 @@ import typer
 import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
 from miurafab.cli.sheets import MachineOption, MaterialOption
-from miurafab.errors import InputError
+from miurafab.errors import InputError, MachineError
 from miurafab.units import parse_length
 
 if TYPE_CHECKING:
@@ -103,6 +105,7 @@ def cut(
         prepared = miurafab.prepare(
             thing, machine=machine, material=material, out=out, on_progress=progress
         )
+        progress(1.0, "")
     if prepared.refusal is not None:
         _refuse(console, prepared)
     if dry_run:
@@ -113,12 +116,11 @@ def cut(
         _share(console, prepared, port, sheet, options)
         return
     waits = pause if pause is not None else port[0] != "virtual" and sys.stdin.isatty()
-    with console.progress("cutting") as bar:
+    with _way_on(console, prepared), console.progress("cutting") as bar:
 
         def show_progress(now: SheetProgress) -> None:
-            share = now.stream.lines_acknowledged / max(now.stream.lines_total, 1)
             bar(
-                share,
+                now.stroke / max(now.strokes, 1),
                 f"sheet {now.number} of {len(prepared.jobs)}, stroke {now.stroke} of "
                 f"{now.strokes}, {clock(now.seconds_left)} left, {now.stream.state}",
             )
@@ -229,6 +231,22 @@ def _report_dry_run(console: Console, prepared: Prepared, allow_m3: bool) -> Non
     console.answer(answer, show)
     if found:
         raise typer.Exit(1)
+
+
+@contextmanager
+def _way_on(console: Console, prepared: Prepared) -> Iterator[None]:
+    """Say, when a machine has failed in mid-job, how the job is taken up again."""
+    from miurafab.workflow.cut_sheets import can_go_on
+
+    try:
+        yield
+    except MachineError:
+        if can_go_on(prepared):
+            console.remark(
+                "When the machine is ready again, go on with --resume and --home, or --at X,Y for "
+                "where the head stands then."
+            )
+        raise
 
 
 def _put_in(prepared: Prepared, number: int) -> str:

@@ -60,7 +60,7 @@ def virtual(
         line = json_text({"address": address}) if as_json else address
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
-        console.remark("A virtual GRBL 1.1h listens there; Ctrl-C ends it.")
+        console.remark("A virtual controller listens there; Ctrl-C ends it.")
 
     served = serve_virtual(
         tcp=tcp,

@@ -96,7 +96,7 @@ else:
         before = termios.tcgetattr(descriptor)
         raw = termios.tcgetattr(descriptor)
         raw[3] &= ~(termios.ICANON | termios.ECHO)
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, raw)
+        termios.tcsetattr(descriptor, termios.TCSAFLUSH, raw)  # what was typed before is not meant
         try:
             yield _PosixKeys(descriptor)
         finally:

@@ -265,6 +265,20 @@ def _placed(
     return tell
 
 
+def can_go_on(prepared: Prepared) -> bool:
+    """Whether a sheet was begun and not ended, and its journal can be resumed."""
+    for job in prepared.jobs:
+        path = journal_path(prepared, job)
+        runs = read_journal(path) if path is not None and path.is_file() else []
+        if runs and runs[-1].ended != "done" and runs[-1].line:
+            try:
+                resume(job, prepared.machine, runs)
+            except InputError:
+                continue
+            return True
+    return False
+
+
 def journal_path(prepared: Prepared, job: Job) -> Path | None:
     """Where the journal of ``job`` is."""
     return _beside(prepared, job, ".journal")
