@@ -210,6 +210,16 @@ def test_patches_that_fill_a_sheet_each_are_placed_without_a_search(monkeypatch)
     assert (sheets_of(found.slots), found.bound) == (60, 60)
 
 
+def test_the_work_grows_with_the_outlines_and_not_with_their_pairs(monkeypatch):
+    tried = []
+    take = raster._Sheet.take
+    monkeypatch.setattr(raster._Sheet, "take", lambda *a: tried.append(1) or take(*a))
+    asked = problem([rectangle(90.0, 80.0)] * 2000, SheetKind(100.0, 90.0, ANY))
+    found = nest(asked)
+    assert (sheets_of(found.slots), found.bound) == (2000, 2000)
+    assert len(tried) == 2000
+
+
 def test_copies_of_an_outline_share_their_masks(monkeypatch):
     made = []
     mark = raster._scan

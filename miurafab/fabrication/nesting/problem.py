@@ -243,8 +243,14 @@ def layout_faults(problem: Problem, slots: Sequence[Slot]) -> list[str]:
         if kind.defects and _common(shape, kind.flaws) > TOLERANCE * shape.length:
             faults.append(f"patch {name} lies on a defect")
     faults += _stock_faults(slots, stock)
-    tree = shapely.STRtree(shapes)
-    near = tree.query(shapes, predicate="dwithin", distance=max(stock.gap - TOLERANCE, 0.0))
+    # Sheets are laid side by side, so that only what lies on the same one is near.
+    step = max(kind.width for kind in stock.kinds) + stock.gap + 1.0
+    beside = [
+        shapely.Polygon(place(outline, slot) + np.array([slot.sheet * step, 0.0]))
+        for outline, slot in zip(outlines, slots, strict=True)
+    ]
+    tree = shapely.STRtree(beside)
+    near = tree.query(beside, predicate="dwithin", distance=max(stock.gap - TOLERANCE, 0.0))
     for one, other in near.T.tolist():
         if one >= other or slots[one].sheet != slots[other].sheet:
             continue

@@ -40,7 +40,6 @@ from miurafab.fabrication.nesting.problem import (
     Stock,
     buffered,
     cost,
-    renumbered,
     turned,
 )
 
@@ -155,13 +154,13 @@ class _Sheet:
         self._taken: NDArray[np.float32] | None = None
         self._transform: NDArray[np.complex64] | None = None
 
-    def take(self, number: int, part: int, weights: tuple[float, float]) -> Slot | None:
-        """The slot of outline ``number``, which is as ``part``, at the free position whose far
-        corner is least by ``weights``; None if there is no position.
+    def take(self, number: int, part: int, weights: tuple[float, float]) -> bool:
+        """Lay outline ``number``, which is as ``part``, at the free position whose far corner is
+        least by ``weights``, if there is a position.
         """
         shape = self.raster.parts[part]
         if self.free < shape.area * (1 - 1e-6) or part in self._refused:
-            return None
+            return False
         rotations = [r for r in self.allowed.rotations if self.allowed.fits(shape.outline, r)]
         empty = not self.placed and not self.allowed.defects
         found = [
@@ -171,14 +170,14 @@ class _Sheet:
         open_places = [(*at, r) for at, r in zip(found, rotations, strict=True) if at is not None]
         if not open_places:
             self._refused.add(part)
-            return None
+            return False
         _, i, j, rotation = min(open_places, key=lambda place: place[0])
         self._waiting.append((part, rotation, i, j))
         self.free -= shape.area
         shift = np.array([i, j]) * self.raster.cell + shape.turned(rotation)[1]
         slot = Slot(0, self.kind, float(shift[0]), float(shift[1]), rotation)
         self.placed.append((number, slot))
-        return slot
+        return True
 
     def _corner(
         self, part: int, rotation: int, weights: tuple[float, float]
@@ -214,6 +213,44 @@ class _Sheet:
             self._waiting.clear()
             self._transform = scipy.fft.rfft2(self._taken)
         return self._transform
+
+
+class _Rack:
+    """Sheets of some kinds: those ``begun``, of them those that are still looked at, and of each
+    kind one that is blank, as long as there are any.
+    """
+
+    def __init__(self, stock: Stock, rasters: list[_Raster], kinds: list[int]) -> None:
+        self.stock, self.rasters = stock, rasters
+        self.begun: list[_Sheet] = []
+        self._open: list[_Sheet] = []
+        self._blank = {k: _Sheet(k, stock, rasters[k]) for k in kinds}
+
+    def take(
+        self, number: int, part: int, weights: tuple[float, float], rest: float, late: bool
+    ) -> bool:
+        """Lay outline ``number`` on the first sheet with room for it, if there is one. No outline
+        after it is smaller than ``rest`` mm²; if it is ``late`` only the last sheets are tried.
+        """
+        near = self._open[-_LAST:] if late else self._open
+        for sheet in (*near, *self._blank.values()):
+            if sheet.take(number, part, weights):
+                break
+        else:
+            return False
+        if len(sheet.placed) == 1:
+            self._begin(sheet)
+        if sheet.free < rest * (1 - 1e-6):
+            self._open.remove(sheet)
+        return True
+
+    def _begin(self, sheet: _Sheet) -> None:
+        self.begun.append(sheet)
+        self._open.append(sheet)
+        del self._blank[sheet.kind]
+        most = self.stock.kinds[sheet.kind].quantity
+        if most is None or len(self.begun) < most:
+            self._blank[sheet.kind] = _Sheet(sheet.kind, self.stock, self.rasters[sheet.kind])
 
 
 class _Search:
@@ -253,39 +290,23 @@ class _Search:
         self, order: list[int], weights: tuple[float, float], endless: list[int], first: bool
     ) -> list[Slot] | None:
         """The slots of one pass; None if the time was over, unless this is the ``first``."""
-        kinds, count = self.stock.kinds, len(order)
-        sheets = [
-            _Sheet(k, self.stock, self.rasters[k])
-            for k, kind in enumerate(kinds)
-            if kind.quantity is not None
-            for _ in range(min(kind.quantity, count))
+        given = [k for k in self.stock.in_turn if self.stock.kinds[k].quantity is not None]
+        racks = [
+            _Rack(self.stock, self.rasters, kinds) for kinds in (*([k] for k in given), endless)
         ]
-        for number in order:
+        least = np.append(np.minimum.accumulate(self.areas[order][::-1])[::-1], np.inf)
+        for position, number in enumerate(order):
             late = self.clock() >= self.end
             if late and not first:
                 return None
-            part = self.alike[number]
-            begun = [sheet for sheet in sheets if sheet.placed]
-            blank = {sheet.kind: sheet for sheet in reversed(sheets) if not sheet.placed}
-            near = begun[-_LAST:] + list(blank.values()) if late else sheets
-            for sheet in near:
-                if not sheet.placed and sheet is not blank[sheet.kind]:
-                    continue
-                if sheet.take(number, part, weights) is not None:
-                    break
-            else:
-                for kind in endless:
-                    sheet = _Sheet(kind, self.stock, self.rasters[kind])
-                    if sheet.take(number, part, weights) is not None:
-                        sheets.append(sheet)
-                        break
-                else:
-                    raise LayoutError(self._no_room(number))
-        found = [Slot(0, 0, 0.0, 0.0, 0)] * count
-        for index, sheet in enumerate(sheets):
+            part, rest = self.alike[number], float(least[position + 1])
+            if not any(rack.take(number, part, weights, rest, late) for rack in racks):
+                raise LayoutError(self._no_room(number))
+        found = [Slot(0, 0, 0.0, 0.0, 0)] * len(order)
+        for index, sheet in enumerate(sheet for rack in racks for sheet in rack.begun):
             for number, slot in sheet.placed:
                 found[number] = replace(slot, sheet=index)
-        return renumbered(found)
+        return found
 
     def _no_room(self, number: int) -> str:
         """Why the outline has no place."""
