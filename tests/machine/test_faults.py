@@ -25,6 +25,7 @@ from miurafab.errors import JobStopped, MiurafabError
 from miurafab.gcode.job import Job, prepare
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl, standing_seconds
+from miurafab.grbl.virtual_dialect import DIALECTS
 from miurafab.grbl.virtual_faults import KINDS, parse_faults
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
@@ -43,6 +44,7 @@ JOB = Job(
 LINES = prepare(JOB)
 SECONDS = 8.0  # a little longer than the job takes
 NO_SHRINKING = (Phase.explicit, Phase.generate)  # it would take minutes, and the faults are short
+REALTIME = bytes(DIALECTS["grbl-1.1"].realtime)
 PATIENCE = 60.0  # of the controller's time: then somebody presses Ctrl-C
 
 HARMLESS = {"delay=300ms", "delay-reply=300ms", "slow=5ms", "hang=300ms"}
@@ -80,11 +82,36 @@ def test_no_kind_of_fault_is_left_out() -> None:
     assert {fault.partition("=")[0] for fault in FAULTS} == set(KINDS)
 
 
+class Typed:
+    """A keyboard on which ``keys`` are pressed, each at its time on the controller's clock."""
+
+    def __init__(self, device: VirtualGrbl, keys: list[tuple[float, str]]) -> None:
+        self._device = device
+        self._keys = sorted(keys)
+
+    def pressed(self) -> str:
+        keys = ""
+        while self._keys and self._device.now >= self._keys[0][0]:
+            keys += self._keys.pop(0)[1]
+        return keys
+
+
 class Run:
     """The job over a wire with faults, and what was seen of it."""
 
-    def __init__(self, faults: list[str], latency: float, seed: int, stop_at: float) -> None:
-        device = VirtualGrbl(virtual_settings(MACHINE), baud=115_200, faults=parse_faults(faults))
+    def __init__(
+        self,
+        faults: list[str],
+        latency: float,
+        seed: int,
+        stop_at: float,
+        keys: list[tuple[float, str]] | None = None,
+    ) -> None:
+        # What a hold leaves standing for $1 is the firmware's (test_virtual_beam.py).
+        idle = {1: 255} if keys else {}
+        device = VirtualGrbl(
+            virtual_settings(MACHINE) | idle, baud=115_200, faults=parse_faults(faults)
+        )
         self.error: MiurafabError | None = None
         self.seen: list[Progress] = []
 
@@ -103,6 +130,7 @@ class Run:
                     signals,
                     journal_path=journal,
                     on_progress=self.seen.append,
+                    keys=Typed(device, keys) if keys else None,
                 )
             except MiurafabError as raised:
                 self.error = raised
@@ -141,9 +169,7 @@ class Run:
                 assert self.wire.commands.endswith(b"\x18")
         # Lines went out once each, in order; those taken are the first of them.
         lines = b"".join(line.data + b"\n" for line in LINES)
-        assert lines.startswith(
-            sent.replace(b"?", b"").replace(b"!", b"").replace(b"\x18", b"").partition(b"$$\n")[2]
-        )
+        assert lines.startswith(sent.translate(None, REALTIME).partition(b"$$\n")[2])
         assert all(0 <= now.in_flight <= 128 for now in self.seen)
         assert [p.lines_acknowledged for p in self.seen] == sorted(
             p.lines_acknowledged for p in self.seen
@@ -181,3 +207,23 @@ def test_several_faults_and_an_interrupt(
     faults: list[str], latency: float, seed: int, stop: float
 ) -> None:
     Run(faults, latency, seed, stop).check(faults)
+
+
+@given(
+    faults=st.lists(st.builds("{}@{}".format, st.sampled_from(FAULTS), dates), max_size=1),
+    keys=st.lists(
+        st.tuples(
+            st.floats(0.1, SECONDS), st.sampled_from([" ", "r", "+", "-", "0", "]", "[", "p"])
+        ),
+        min_size=1,
+        max_size=12,
+    ),
+    latency=latencies,
+    seed=st.integers(0, 1000),
+    stop=st.sampled_from([PATIENCE, 6.0]),
+)
+@settings(max_examples=40, phases=NO_SHRINKING)
+def test_any_keys_between_any_replies(
+    faults: list[str], keys: list[tuple[float, str]], latency: float, seed: int, stop: float
+) -> None:
+    Run(faults, latency, seed, stop, [*keys, (2 * SECONDS, "r")]).check(faults)
