@@ -23,7 +23,7 @@ from miurafab.gcode.moves import DWELL, RAPID, Program
 from miurafab.motion import cpu
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.motion.planner import Planner
-from miurafab.motion.segments import Segment, SegmentGenerator
+from miurafab.motion.segments import QUEUE, Segment, SegmentGenerator
 from miurafab.motion.stepper import Processor, Stepper
 
 _OK_BYTES = 4
@@ -196,13 +196,13 @@ class _Run:
             self._prepare()
 
     def _prepare(self) -> None:
-        stepper, generator = self.stepper, self.generator
-        while stepper.room:
+        queue, generator = self.stepper.queue, self.generator
+        while len(queue) < QUEUE:
             segment = generator.next()
             if segment is None:
                 return
             self._work(0)
-            stepper.queue.append(segment)
+            queue.append(segment)
 
     def _wait(self, until: int) -> None:
         change = self.stepper.next_change()

@@ -109,17 +109,20 @@ class Planner:
         """
         parameters = self.parameters
         start = self.position if origin is None else tuple(origin)
-        steps_per_mm = parameters.steps_per_mm
-        end = tuple(
-            to_steps(t, k) if k else at
-            for t, k, at in zip(target, steps_per_mm, start, strict=True)
-        )
-        steps = tuple(b - a for a, b in zip(start, end, strict=True))
-        self.cycles += cpu.PLAN_LINE + cpu.PLAN_AXIS * (len(steps) - steps.count(0))
+        kx, ky, kz = parameters.steps_per_mm
+        x0, y0, z0 = start
+        x1 = to_steps(target[0], kx) if kx else x0
+        y1 = to_steps(target[1], ky) if ky else y0
+        z1 = to_steps(target[2], kz) if kz else z0
+        end = (x1, y1, z1)
+        steps = (x1 - x0, y1 - y0, z1 - z0)
+        self.cycles += cpu.PLAN_LINE + cpu.PLAN_AXIS * (3 - steps.count(0))
         events = max(map(abs, steps))
         if events == 0:
             return None
-        x, y, z = (n / k if k else 0.0 for n, k in zip(steps, steps_per_mm, strict=True))
+        x = steps[0] / kx if kx else 0.0
+        y = steps[1] / ky if ky else 0.0
+        z = steps[2] / kz if kz else 0.0
         length = math.sqrt(x * x + y * y + z * z)
         direction = (x / length, y / length, z / length)
         move = Move()

@@ -14,6 +14,7 @@ backwards.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 
 from miurafab.motion import cpu
@@ -33,27 +34,23 @@ RISE, HOLD, FALL, FALL_TO_TOP = range(4)
 
 
 class Segment:
-    """``ticks`` interrupts, ``period`` cycles apart, each ``stride`` micro-steps of ``move``.
+    """``ticks`` interrupts, ``period`` cycles apart, each ``stride`` micro-steps of ``move``;
+    ``cycles`` in all.
 
     ``done`` is the progress before it in micro-steps; ``power`` the PWM value while it runs;
     ``follows`` whether the power follows the speed; ``last`` whether it completes its move.
     """
 
-    __slots__ = ("done", "follows", "last", "move", "period", "power", "stride", "ticks")
+    __slots__ = ("cycles", "done", "follows", "last", "move", "period", "power", "stride", "ticks")
 
     def __init__(self, move: Move, done: int, power: int, follows: bool) -> None:
         self.move = move
         self.done = done
         self.power = power
         self.follows = follows
-        self.ticks = self.period = 0
+        self.ticks = self.period = self.cycles = 0
         self.stride = MICRO
         self.last = False
-
-    @property
-    def cycles(self) -> int:
-        """How long it runs."""
-        return self.ticks * self.period
 
 
 class SegmentGenerator:
@@ -298,10 +295,11 @@ class SegmentGenerator:
         duration += self._late
         per_step = duration / ((self._steps_left - left) or 1.0)
         cycles = math.ceil(cpu.CLOCK * per_step)
-        level = sum(cycles >= bound for bound in _SMOOTHING)
+        level = bisect_right(_SMOOTHING, cycles)
         segment.ticks = steps << level
         segment.period = min(cycles >> level, _SLOWEST_PERIOD)
         segment.stride = MICRO >> level
+        segment.cycles = segment.ticks * segment.period
         self._late = (whole - left) * per_step
         self._steps_left = whole
         self._done += steps * MICRO

@@ -43,18 +43,13 @@ class Stepper:
         self.settling: int | None = None
         self.stopped = False
         self.began = 0
+        self.share = 1.0
+        self._change: int | None = None
 
     @property
     def room(self) -> bool:
         """Whether another segment fits."""
         return len(self.queue) < QUEUE
-
-    @property
-    def share(self) -> float:
-        """The part of the processor that is left to the main program now, 0 to 1."""
-        if self.running:
-            return max(1.0 - cpu.STEP_TICK / max(self.queue[0].period, 1), _LEAST_SHARE)
-        return 0.0 if self.settling is not None else 1.0
 
     def wake(self, now: int) -> None:
         """Start stepping at ``now`` unless it is under way."""
@@ -64,30 +59,32 @@ class Stepper:
 
     def next_change(self) -> int | None:
         """The cycle at which the running segment, or the settling, ends."""
-        if self.running:
-            return self.began + self.queue[0].cycles
-        return self.settling
+        return self._change
 
     def run_to(self, now: int) -> None:
         """Let everything end that ends by ``now``."""
         while self.running:
-            end = self.began + self.queue[0].cycles
-            if end > now:
+            assert self._change is not None
+            if self._change > now:
                 return
             del self.queue[0]
-            self._begin(end)
+            self._begin(self._change)
         if self.settling is not None and self.settling <= now:
             settled, self.settling = self.settling, None
+            self.share, self._change = 1.0, None
             self.stopped = True
             self.on_settled(settled)
 
     def _begin(self, now: int) -> None:
         if self.queue:
-            self.began = now
-            self.on_segment(now, self.queue[0])
+            segment = self.queue[0]
+            self.began, self._change = now, now + segment.cycles
+            self.share = max(1.0 - cpu.STEP_TICK / max(segment.period, 1), _LEAST_SHARE)
+            self.on_segment(now, segment)
         else:
             self.running = False
-            self.settling = now + self.idle_lock
+            self.settling = self._change = now + self.idle_lock
+            self.share = 0.0
             self.on_end(now)
 
     def progress(self, now: int) -> tuple[Move, int] | None:
