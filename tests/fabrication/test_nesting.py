@@ -201,6 +201,16 @@ def test_of_several_sizes_without_end_the_less_wasteful_layout_wins():
     assert slot.kind == 1
 
 
+def test_sheets_of_several_sizes_are_begun_in_the_order_of_the_stock():
+    kinds = [
+        SheetKind(100.0, 50.0, ANY),
+        SheetKind(105.0, 50.0, ANY),
+        SheetKind(99.0, 49.0, ANY, 0),
+    ]
+    asked = problem([rectangle(98, 48)] * 4, kinds)
+    assert [slot.kind for slot in nest(asked).slots] == [0, 0, 0, 0]
+
+
 def test_patches_that_fill_a_sheet_each_are_placed_without_a_search(monkeypatch):
     outlines = [rectangle(90.0 + n * 0.01, 80.0) for n in range(60)]
     asked = problem(outlines, SheetKind(100.0, 90.0, ANY))

@@ -221,10 +221,12 @@ class _Rack:
     """
 
     def __init__(self, stock: Stock, rasters: list[_Raster], kinds: list[int]) -> None:
-        self.stock, self.rasters = stock, rasters
+        self.stock, self.rasters, self.kinds = stock, rasters, kinds
         self.begun: list[_Sheet] = []
         self._open: list[_Sheet] = []
-        self._blank = {k: _Sheet(k, stock, rasters[k]) for k in kinds}
+        self._blank: dict[int, _Sheet] = {}
+        for kind in kinds:
+            self._supply(kind)
 
     def take(
         self, number: int, part: int, weights: tuple[float, float], rest: float, late: bool
@@ -233,7 +235,8 @@ class _Rack:
         after it is smaller than ``rest`` mm²; if it is ``late`` only the last sheets are tried.
         """
         near = self._open[-_LAST:] if late else self._open
-        for sheet in (*near, *self._blank.values()):
+        blank = [self._blank[kind] for kind in self.kinds if kind in self._blank]
+        for sheet in (*near, *blank):
             if sheet.take(number, part, weights):
                 break
         else:
@@ -248,9 +251,12 @@ class _Rack:
         self.begun.append(sheet)
         self._open.append(sheet)
         del self._blank[sheet.kind]
-        most = self.stock.kinds[sheet.kind].quantity
+        self._supply(sheet.kind)
+
+    def _supply(self, kind: int) -> None:
+        most = self.stock.kinds[kind].quantity
         if most is None or len(self.begun) < most:
-            self._blank[sheet.kind] = _Sheet(sheet.kind, self.stock, self.rasters[sheet.kind])
+            self._blank[kind] = _Sheet(kind, self.stock, self.rasters[kind])
 
 
 class _Search:
