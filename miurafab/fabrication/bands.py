@@ -18,7 +18,7 @@ which is how the tabs are given out later; tabs that share a facet only become s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -68,6 +68,11 @@ class GridShape:
             self.right_mm[here],
             self.top_mm[here],
         )
+
+    def with_every(self, n: int) -> GridShape:
+        """The same grid with every ``n``-th angle alone."""
+        here = (slice(None), slice(None), slice(None, None, n))
+        return replace(self, body=self.body[here], right=self.right[here], top=self.top[here])
 
     def exchanged(self) -> GridShape:
         """The same grid with rows and columns exchanged."""

@@ -75,7 +75,7 @@ def fits(values: NDArray[np.float32], width: float, height: float) -> NDArray[np
 
 def box_of(points: NDArray[np.float64]) -> tuple[float, float]:
     """The longer and the shorter side in mm of the smallest box around ``points`` (n, 2)."""
-    _, sizes = _turns(points, 0.0, 0.0)
+    _, sizes = boxes_at(points, 0.0, 0.0)
     best = int(np.argmin(sizes.prod(axis=1)))
     return float(sizes[best].max()), float(sizes[best].min())
 
@@ -84,7 +84,7 @@ def best_turn(points: NDArray[np.float64], width: float, height: float) -> float
     """The angle θ in radians, -π/2 < θ <= π/2, whose turn by -θ fits ``points`` (n, 2) into the
     rectangle with the smallest box, or None if no angle fits. Exact up to :data:`TOLERANCE`.
     """
-    angles, sizes = _turns(points, width, height)
+    angles, sizes = boxes_at(points, width, height)
     fit = (sizes[:, 0] <= width + TOLERANCE) & (sizes[:, 1] <= height + TOLERANCE)
     if not fit.any():
         return None
@@ -95,7 +95,9 @@ def best_turn(points: NDArray[np.float64], width: float, height: float) -> float
     return float(angles[np.lexsort((angles, np.round(np.abs(angles), 9)))[0]])
 
 
-def _turns(points: NDArray[Any], width: float, height: float) -> tuple[NDArray[Any], NDArray[Any]]:
+def boxes_at(
+    points: NDArray[Any], width: float, height: float
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Candidate angles (A,) in [0, π) and the extents (A, 2) along u and v at each."""
     hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(points)))
     sides = np.diff(hull, axis=0) if len(hull) > 1 else np.array([[1.0, 0.0]])

@@ -2,7 +2,8 @@
 
 A pattern that fits is one patch. Otherwise a grid of facets is cut into bands and runs
 (:mod:`~miurafab.fabrication.bands`), and any other mesh is grown into regions
-(:mod:`~miurafab.fabrication.growing`). A flat pattern may overlap itself; a patch may not, and
+(:mod:`~miurafab.fabrication.growing`). Either is then made better without regard to grid lines
+(:mod:`~miurafab.fabrication.improving`). A flat pattern may overlap itself; a patch may not, and
 one that does is grown again in halves until none does.
 """
 
@@ -19,14 +20,18 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.bands import GridShape, Rectangle, split_grid
 from miurafab.fabrication.boxes import best_turn, box_of, fan, fits, support
 from miurafab.fabrication.growing import grow_patches, is_disk
+from miurafab.fabrication.improving import improved
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.seams import inner_seams
 from miurafab.fabrication.tabs import TabRegions, choose_tabs, ring_tabs, tab_regions
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
-_TURNS = 30
-"""Angles in a right angle at which boxes are tried: steps of 3 degrees."""
+_TURNS = 48
+"""Angles in a right angle at which boxes are tried at first: steps of 1.9 degrees."""
+
+_MANY = 30_000
+"""In grids of more facets only every other angle is tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,19 +91,20 @@ def split(
     reach = _with_tabs(body, tabs, tab_values)
     _check_alone(pattern, ~fits(reach, width, height), tabs, width, height)
 
-    room = _tab_room(pattern, tabs) if both else 0.0
-    small = (width - room, height - room)
+    depth = _tab_room(pattern, tabs)
+    small = (width - depth, height - depth) if both else (width, height)
+    part = np.zeros(faces, dtype=np.int64)
+    if cells is not None:
+        blocks.sort()
+        for number, (r0, r1, c0, c1) in enumerate(blocks):
+            part[cells[r0:r1, c0:c1]] = number
+    found = np.empty(faces, dtype=np.int64)
+    count = 0
     if cells is None or (both and not fits(reach, *small).all()):
-        if cells is not None and len(blocks) > 1:
-            found = np.empty(faces, dtype=np.int64)
-            count = 0
-            for r0, r1, c0, c1 in blocks:
-                part = cells[r0:r1, c0:c1].ravel()
-                grown = grow_patches(pattern, reach, width, height, part)[part]
-                found[part] = grown + count
-                count += int(grown.max()) + 1
-        else:
-            found = grow_patches(pattern, reach, width, height)
+        for number in range(len(blocks)):
+            facets = np.flatnonzero(part == number)
+            found[facets] = grow_patches(pattern, reach, width, height, facets)[facets] + count
+            count = int(found[facets].max()) + 1
     else:
         if both:
             place = _places(cells)[pattern.edges_faces[edges, sides]]
@@ -106,12 +112,16 @@ def split(
             upward = place > own
             tabs, tab_values = tabs.take(upward), tab_values[upward]
         shape = _grid_shape(pattern, cells, body, tabs, tab_values)
-        found = np.empty(faces, dtype=np.int64)
-        count = 0
-        for r0, r1, c0, c1 in sorted(blocks):
-            for a0, a1, b0, b1 in split_grid(shape.part(r0, r1, c0, c1), *small):
-                found[cells[r0 + a0 : r0 + a1, c0 + b0 : c0 + b1]] = count
+        for r0, r1, c0, c1 in blocks:
+            block = cells[r0:r1, c0:c1]
+            here = shape.part(r0, r1, c0, c1)
+            if faces > _MANY:
+                here = here.with_every(2)
+            for a0, a1, b0, b1 in split_grid(here, *small):
+                found[block[a0:a1, b0:b1]] = count
                 count += 1
+    size = (width, height)
+    found = improved(pattern, found, part, size, ring, depth, material, options)
     found = _without_overlaps(pattern, found, reach, width, height)
     return found.max() - found if turned else found
 
