@@ -1,10 +1,15 @@
-"""The order in which patches are glued: always onto what is already one piece.
+"""The order in which patches are glued: always onto what is already one piece, from its rim.
 
-The first patch is the one with the longest seams. Each next one is the patch that shares the
-longest seam with what is assembled, so that the assembly grows round and holes are closed before
-they are ringed in, while fingers still reach the inner side. A seam between two borders of the
-pattern, which makes a ring or a tube of the sheet, is closed when everything else is glued: until
-then it is reached from both sides.
+A step is reachable if the patch meets what is assembled along one unbroken line: then the seam is
+closed from one end to the other with fingers on both sides, and what is assembled stays a disk,
+without a hole that would have to be closed from the outside. A disk of patches always has such a
+step left, wherever one begins (Danaraj and Klee 1978: every shelling of a disk can be finished).
+Where the pattern itself has a hole, the step that closes the ring is the last resort.
+
+The first patch is the one with the longest seams. Of the reachable ones the next is the one that
+shares the longest seam with what is assembled, so that the assembly grows round. A seam between
+two borders of the pattern, which makes a ring or a tube of the sheet, is closed when everything
+else is glued: until then it is reached from both sides.
 """
 
 from __future__ import annotations
@@ -13,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from miurafab.fabrication.patches import boundaries
 from miurafab.fabrication.sheets import Layout
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -54,17 +60,31 @@ def assembly_order(layout: Layout, pattern: CreasePattern) -> tuple[GlueStep, ..
                 continue
             low, high = sorted((patch.id, tab.mate_patch))
             tabs.setdefault((low, high), []).append(tab.number)
+    around = boundaries(pattern, owner)
+    assembled = np.zeros(len(pattern.faces_vertices) + 1, dtype=bool)
+    touched = np.zeros(len(pattern.vertices_coords), dtype=bool)
+
+    def reachable(patch: int) -> bool:
+        edges, corners = around[patch].edges, around[patch].vertices
+        # The facet -1, beyond the border of the pattern, is never assembled.
+        met = assembled[pattern.edges_faces[edges]].any(axis=1)
+        lines = int((met & ~np.roll(met, 1)).sum())
+        return lines == 1 and int(touched[corners].sum()) == int(met.sum()) + 1
+
     left = set(range(count))
     done: list[int] = []
     steps = []
     while left:
         contact = seam[:, done].sum(axis=1) if done else np.zeros(count)
-        best = max(left, key=lambda p: (contact[p], seam[p].sum(), -p))
+        order = sorted(left, key=lambda p: (-contact[p], -seam[p].sum(), p))
+        best = next((p for p in order if reachable(p)), order[0])
         onto = tuple(sorted(p for p in done if seam[best, p] > 0))
         numbers = sorted(n for p in onto for n in tabs.get((min(p, best), max(p, best)), []))
         steps.append(GlueStep(best, onto, tuple(numbers)))
         done.append(best)
         left.remove(best)
+        assembled[layout.patches[best].faces] = True
+        touched[around[best].vertices] = True
     steps += [
         GlueStep(patch, (mate,), tuple(sorted(numbers)), closes=True)
         for (patch, mate), numbers in sorted(closing.items())
