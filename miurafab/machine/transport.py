@@ -185,6 +185,19 @@ class Device(Protocol):
     def beam_log(self) -> list[Any]:
         """What it burnt or drew."""
 
+    @property
+    def lost_bytes(self) -> int:
+        """Bytes that it had no room for."""
+
+    def power_cycle(self) -> None:
+        """Switch off and on."""
+
+    def next_event_in(self) -> float | None:
+        """Seconds until something changes by itself; None if nothing will."""
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+
     def receive(self, data: bytes) -> None:
         """Bytes start down the wire."""
 

@@ -31,8 +31,10 @@ from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.grbl.virtual_dialect import DIALECTS
 from miurafab.grbl.virtual_faults import Fault
 from miurafab.machine.actions import read_dump
+from miurafab.machine.dialects import virtual_machine
 from miurafab.machine.signals import StopSignals
-from miurafab.machine.transport import BAUD
+from miurafab.machine.transport import BAUD, Device
+from miurafab.plotter.virtual import VirtualPlotter
 from miurafab.profiles import load_machine
 
 STOCK = "stock"
@@ -180,11 +182,12 @@ class TcpWire:
         self._listener.close()
 
 
-def load_controller(source: str, faults: Iterable[Fault] = ()) -> VirtualGrbl:
-    """The controller meant by ``stock``, a machine profile's name or file, or a ``$$`` dump's file.
+def load_controller(source: str, faults: Iterable[Fault] = ()) -> Device:
+    """The machine meant by ``stock``, a machine profile's name or file, or a ``$$`` dump's file.
 
     A profile's answers as its dialect does, the others are GRBL 1.1h. Raises
-    :class:`~miurafab.errors.ProfileError` if ``source`` is none of them or speaks no GRBL.
+    :class:`~miurafab.errors.ProfileError` if ``source`` is none of them, or for ``faults`` of a
+    machine that speaks no GRBL.
     """
     path = Path(source)
     if source == STOCK:
@@ -193,10 +196,12 @@ def load_controller(source: str, faults: Iterable[Fault] = ()) -> VirtualGrbl:
         return VirtualGrbl(read_dump(path).values, baud=BAUD, faults=faults)
     machine = load_machine(source)
     if machine.dialect not in DIALECTS:
-        raise ProfileError(
-            f"{machine.name} speaks {machine.dialect}, and the controller that is served here "
-            f"speaks {', '.join(DIALECTS)}; 'miurafab cut --port virtual' has it in memory."
-        )
+        if list(faults):
+            raise ProfileError(
+                f"{machine.name} speaks {machine.dialect}, and faults are made for machines that "
+                f"speak {', '.join(DIALECTS)}; leave --fault out."
+            )
+        return virtual_machine(machine)
     return VirtualGrbl(
         virtual_settings(machine),
         baud=machine.controller.baud,
@@ -236,6 +241,8 @@ def serve_virtual(
     if not 0 < speed < math.inf:
         raise InputError(f"A speed of {speed:g} does not run; give a positive number.")
     device = load_controller(settings, faults)
+    # A cutter is not reset by the line that resets a controller board.
+    reset_on_open = reset_on_open and not isinstance(device, VirtualPlotter)
     with contextlib.ExitStack() as at_end:
         log = _BeamLog(device, beam_log)
         at_end.callback(log.close)
@@ -250,7 +257,7 @@ def serve_virtual(
 
 
 def _serve(
-    device: VirtualGrbl,
+    device: Device,
     wire: Wire,
     speed: float,
     log: _BeamLog,
@@ -297,7 +304,7 @@ def _replug(wire: Wire, plugged: bool, announce: Callable[[str], None]) -> None:
 class _BeamLog:
     """Takes the segments that ``device`` burns as they come, and writes them to ``path``."""
 
-    def __init__(self, device: VirtualGrbl, path: Path | None) -> None:
+    def __init__(self, device: Device, path: Path | None) -> None:
         self.seconds = 0.0
         self._device = device
         self._due = 0.0

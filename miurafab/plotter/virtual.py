@@ -24,7 +24,10 @@ _TOKEN = re.compile(rb"\s*(?:([A-Za-z]{2})|([-+]?\d+(?:\.\d+)?)(?=[^\d.])|[^A-Za
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A line drawn with the pen down from ``t0`` to ``t1`` (s), in mm, with ``force`` (``FS``)."""
+    """A line drawn with the pen down from ``t0`` to ``t1`` (s), in mm, with ``force`` (``FS``).
+
+    ``power`` is that of a pen that is down.
+    """
 
     t0: float
     t1: float
@@ -33,6 +36,7 @@ class Drawn:
     x1: float
     y1: float
     force: float
+    power: float = 1.0
 
 
 class VirtualPlotter:
@@ -43,20 +47,24 @@ class VirtualPlotter:
         self.beam_log: list[Drawn] = []
         self.lost_bytes = 0
         self.connected = True
-        self.position = (0.0, 0.0)
-        self.pen_down = False
-        self.pen = 0
         self.knows_abort = True
         self._byte = 10.0 / baud if baud else 0.0
         self._rx_bytes = rx_bytes
         self._coming: deque[tuple[float, int]] = deque()
         self._in_free = 0.0
+        self._way: deque[tuple[float, float]] = deque()
+        self.power_cycle()
+
+    def power_cycle(self) -> None:
+        """Switch off and on: what it held is forgotten, the tool is up and stands at its origin."""
+        self._coming.clear()
+        self._way.clear()
+        self.position = (0.0, 0.0)
+        self.pen_down = self._relative = self._told_off = False
+        self.pen = 0
         self._buffer = bytearray()
         self._out = bytearray()
-        self._told_off = False
         self._force, self._speed = 1.0, _SPEED
-        self._relative = False
-        self._way: deque[tuple[float, float]] = deque()
         self._busy_until = 0.0
         self._starved = True
         self._name = b""
@@ -75,11 +83,22 @@ class VirtualPlotter:
         """Let time pass until it has said something, ``seconds`` at the most."""
         self._run(self.now + max(0.0, seconds), stop=True)
 
+    def next_event_in(self) -> float | None:
+        """Seconds until something changes by itself; None if nothing will."""
+        event = min(self._events())
+        return None if math.isinf(event) else max(0.0, event - self.now)
+
+    def _events(self) -> tuple[float, float]:
+        """When the next byte comes, and when it can go on."""
+        able = self._way or not self._starved
+        return (
+            self._coming[0][0] if self._coming else math.inf,
+            max(self._busy_until, self.now) if able else math.inf,
+        )
+
     def _run(self, target: float, *, stop: bool) -> None:
         while not (stop and self._out):
-            arrival = self._coming[0][0] if self._coming else math.inf
-            able = self._way or not self._starved
-            work = max(self._busy_until, self.now) if able else math.inf
+            arrival, work = self._events()
             event = min(arrival, work)
             if event > target:
                 self.now = target

@@ -13,17 +13,19 @@ from pathlib import Path
 import pytest
 
 from miurafab.cli import main
-from miurafab.errors import ControllerError, InputError, JobStopped, PortError
+from miurafab.errors import ControllerError, InputError, JobStopped, PortError, ProfileError
 from miurafab.gcode.job import Job
+from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.dialects import make_safe
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import Progress, StreamResult, deliver, stream_job
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
-from miurafab.machine.virtual_server import PtyWire
+from miurafab.machine.virtual_server import PtyWire, load_controller
 from miurafab.marlin.virtual import VirtualMarlin
 from miurafab.motion.parameters import MotionParameters
+from miurafab.plotter.virtual import VirtualPlotter
 from miurafab.profiles import load_machine
 
 MACHINE = load_machine("marlin-laser-220")
@@ -294,6 +296,13 @@ def test_whoever_finds_the_machine_at_work_halts_it() -> None:
     assert device.beam_on
     assert "halted (M112)" in make_safe(MACHINE, Wire(device))
     assert_dark(device)
+
+
+def test_it_is_served_as_a_practice_machine_without_faults() -> None:
+    assert isinstance(load_controller(MACHINE.name), VirtualMarlin)
+    assert isinstance(load_controller("hpgl-cutter-a3"), VirtualPlotter)
+    with pytest.raises(ProfileError, match="speaks marlin, and faults are made for machines"):
+        load_controller(MACHINE.name, parse_faults(["reset@1s"]))
 
 
 def serve(device: VirtualMarlin, wire: PtyWire, stop: threading.Event, speed: float) -> None:
