@@ -16,8 +16,8 @@ firmwares' sources and what they print:
     1024 and lines of 256; ``$I`` as boards print it. Settings go to flash or FRAM: nothing is lost
     meanwhile.
 ``fluidnc``
-    bdring/FluidNC 3.7: ``Report.cpp`` (banner, ``[OPT:`` without sizes), a UART queue of 256, issue
-    1036 (``$$`` lists ``$10`` alone; the rest stands in ``config.yaml``).
+    bdring/FluidNC 3.7: ``Report.cpp`` (banner, ``[OPT:`` without sizes), a UART queue of 256,
+    bdring/FluidNC#1036 (``$$`` lists ``$10`` alone; the rest stands in ``config.yaml``).
 
 Not modelled: the speed of 32-bit processors (all take GRBL's time), grblHAL's and FluidNC's own
 commands and reports, 0.9's waiting states.

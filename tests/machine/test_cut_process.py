@@ -188,6 +188,7 @@ def test_a_disk_that_fills_up(nc: Path) -> None:
     end(bench)
 
 
+@pytest.mark.large
 def test_a_journal_that_cannot_be_written_stops_before_the_port_is_used(nc: Path) -> None:
     nc.with_suffix(".journal").mkdir()
     bench = Bench()
@@ -200,6 +201,7 @@ def test_a_journal_that_cannot_be_written_stops_before_the_port_is_used(nc: Path
     end(bench)
 
 
+@pytest.mark.large
 def test_a_second_command_on_the_same_port_is_refused(nc: Path, tmp_path: Path) -> None:
     bench = Bench()
     process = bench.until_burning(bench.cut(nc))
@@ -220,6 +222,7 @@ def test_a_second_command_on_the_same_port_is_refused(nc: Path, tmp_path: Path) 
     end(bench)
 
 
+@pytest.mark.large
 def test_nothing_is_left_running(nc: Path) -> None:
     bench = Bench(speed=20)
     process = bench.cut(nc, "--json")

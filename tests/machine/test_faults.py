@@ -190,7 +190,7 @@ latencies = st.sampled_from([0.0, 0.002, 0.016])
 
 @pytest.mark.parametrize("fault", FAULTS)
 @given(when=dates, latency=latencies, seed=st.integers(0, 1000))
-@settings(max_examples=6, phases=NO_SHRINKING)
+@settings(max_examples=4, phases=NO_SHRINKING)
 def test_done_whole_or_ended_dark(fault: str, when: str, latency: float, seed: int) -> None:
     faults = [f"{fault}@{when}"]
     Run(faults, latency, seed, PATIENCE).check(faults)
@@ -202,7 +202,7 @@ def test_done_whole_or_ended_dark(fault: str, when: str, latency: float, seed: i
     seed=st.integers(0, 1000),
     stop=st.floats(0.5, 2 * SECONDS),
 )
-@settings(max_examples=40, phases=NO_SHRINKING)
+@settings(max_examples=25, phases=NO_SHRINKING)
 def test_several_faults_and_an_interrupt(
     faults: list[str], latency: float, seed: int, stop: float
 ) -> None:
@@ -222,7 +222,7 @@ def test_several_faults_and_an_interrupt(
     seed=st.integers(0, 1000),
     stop=st.sampled_from([PATIENCE, 6.0]),
 )
-@settings(max_examples=40, phases=NO_SHRINKING)
+@settings(max_examples=25, phases=NO_SHRINKING)
 def test_any_keys_between_any_replies(
     faults: list[str], keys: list[tuple[float, str]], latency: float, seed: int, stop: float
 ) -> None:

@@ -117,7 +117,7 @@ def test_a_fault_after_a_stroke(style: str, first: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("style", ["absolute", "relative"])
 @given(at=st.floats(0.3, 11.0), kind=st.sampled_from(KINDS))
-@settings(max_examples=20, phases=[Phase.generate])
+@settings(max_examples=10, phases=[Phase.generate])
 def test_a_fault_at_any_moment(style: str, at: float, kind: str) -> None:
     with TemporaryDirectory() as folder:
         check(dashes(style), [(kind, at)], Path(folder))
