@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 import shapely
 from flat_patterns import card, facet_polygons, miura, triangles, without_grid, zigzag
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.boxes import best_turn
 from miurafab.fabrication.growing import is_disk
+from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.patches import boundaries, split
 from miurafab.fabrication.pieces import make_pieces
 from miurafab.fabrication.tabs import choose_tabs
@@ -187,6 +190,53 @@ def _fits_with_tabs(pattern, face_patch, patch, material) -> bool:
     own = np.flatnonzero(face_patch[tabs.own_face] == patch)
     parts = [pattern.vertices_coords[faces].reshape(-1, 2), *(tabs.polygon(i) for i in own)]
     return best_turn(np.concatenate(parts), 75.0, 62.0) is not None
+
+
+@st.composite
+def jobs(draw):
+    """A pattern, a bed that takes a part of it, and on which side of a seam the tabs stand."""
+    kind = draw(st.sampled_from(["miura", "zigzag", "fan", "triangles", "ring"]))
+    columns, rows = draw(st.integers(4, 22)), draw(st.integers(4, 18))
+    if kind in ("triangles", "ring"):
+        seed, count = draw(st.integers(0, 999)), draw(st.integers(6, 13))
+        pattern = triangles(seed, count, 26.0 * count, hole=kind == "ring")
+    elif kind == "fan":
+        radius = draw(st.floats(120.0, 900.0))
+        pattern = flat_patterns.fan(columns, rows, radius=radius)
+    elif kind == "miura":
+        pattern = miura(columns, rows, sector=draw(st.floats(0.7, 1.5)))
+    else:
+        pattern = zigzag(columns, rows, sector=draw(st.floats(0.6, 1.2)))
+    if draw(st.booleans()):
+        pattern = without_grid(pattern)
+    bed = (draw(st.floats(90.0, 220.0)), draw(st.floats(90.0, 220.0)))
+    return pattern, bed, draw(st.sampled_from(["lower", "upper", "alternate"]))
+
+
+@settings(derandomize=True, max_examples=25, deadline=None)
+@given(jobs())
+def test_any_split_is_of_disks_that_fit_with_their_tabs(job):
+    pattern, bed, tab_side = job
+    options = LayoutOptions(tab_side=tab_side)
+    pieces = make_pieces(pattern, *bed, card(), options)
+    assert_patches_are_sound(pattern, pieces.face_patch, *bed)
+    for piece in pieces.pieces:
+        assert best_turn(piece.cut_lines[0], *bed) is not None
+    split_again = make_pieces(pattern, *bed, card(), options).face_patch
+    np.testing.assert_array_equal(pieces.face_patch, split_again)
+
+
+@pytest.mark.parametrize("tab_side", ["lower", "upper", "alternate"])
+def test_asked_for_seams_stay_when_a_split_is_made_better(tab_side):
+    pattern = miura(40, 24)
+    options = LayoutOptions(seam_rows=(7,), seam_columns=(9, 25), tab_side=tab_side)
+    patch = split(pattern, 150.0, 110.0, card(), options).reshape(24, 40)
+    for r0, r1 in ((0, 7), (7, 24)):
+        for c0, c1 in ((0, 9), (9, 25), (25, 40)):
+            inside = np.unique(patch[r0:r1, c0:c1])
+            outside = patch.copy()
+            outside[r0:r1, c0:c1] = -1
+            assert not np.isin(inside, outside).any()
 
 
 @pytest.mark.parametrize(
