@@ -21,6 +21,7 @@ import serial
 import serial.rfc2217
 from benches import ALONE, Bench
 
+from miurafab.errors import PortError
 from miurafab.machine.actions import machine_info
 from miurafab.machine.virtual_server import PtyWire
 
@@ -143,6 +144,24 @@ def test_the_virtual_controller_serves_sender_after_sender(how: str, tmp_path: P
     assert header == "t0,t1,x0,y0,x1,y1,power"
     ways = [[float(value) for value in row.split(",")] for row in rows]
     assert sum(way[4] - way[2] for way in ways) == pytest.approx(10, abs=0.05)
+
+
+@pytest.mark.parametrize("where", [["--pty"], ["--tcp", "127.0.0.1:0"]], ids=["pty", "tcp"])
+def test_a_served_controller_is_unplugged_and_plugged_in_again(where: list[str]) -> None:
+    command = [sys.executable, "-m", "miurafab", "virtual", *where, "--quiet"]
+    faults = ["--fault", "disconnect=300ms@2", "--settings", "fluidnc-laser-600"]
+    with subprocess.Popen([*command, *faults], stdout=subprocess.PIPE, text=True) as server:
+        try:
+            address = server.stdout.readline().strip()
+            with pytest.raises(PortError, match="went away"):
+                machine_info(address)
+            time.sleep(0.5)
+            ready, _, _ = select.select([server.stdout], [], [], 0.1)
+            if ready:  # it came back under another name
+                address = server.stdout.readline().strip()
+            assert machine_info(address).build == "3.7 FluidNC v3.7.8"
+        finally:
+            server.terminate()
 
 
 @pytest.mark.filterwarnings("ignore:set\\w+:DeprecationWarning")  # pyserial's own
