@@ -3,9 +3,8 @@
 Small beside the virtual GRBL, and enough to be sent to: the count and the checksum of lines, the
 queue of four commands, ``ok`` withheld while the planner is full, ``busy`` every two seconds, M112
 and M410 as the emergency parser sees them or as they wait without it, and a laser whose power goes
-with the moves (``M3 I``, ``M4 I``). A move takes the time of its trapezoid, joined to the next by
-junction deviation; the time of parsing is left out. Sources of the facts: MarlinFirmware/Marlin,
-``queue.cpp``, ``e_parser.cpp``, ``M3-M5.cpp``, ``planner.cpp`` (``BLOCK_DELAY_FOR_1ST_MOVE``).
+with the moves (``M3 I``, ``M4 I``). The time of parsing is left out. Sources of the facts:
+MarlinFirmware/Marlin, ``queue.cpp``, ``e_parser.cpp``, ``M3-M5.cpp``.
 """
 
 from __future__ import annotations
@@ -21,8 +20,8 @@ from miurafab.gcode.faults import BlockFault
 from miurafab.gcode.marlin import grbl_words
 from miurafab.gcode.parser import ModalState, parse_block
 from miurafab.marlin.connection import checksum
+from miurafab.marlin.virtual_motion import Burn, Carriage
 from miurafab.motion.parameters import MotionParameters
-from miurafab.motion.planner import Move, Planner
 
 QUEUE = 4
 """Commands that wait (``BUFSIZE``)."""
@@ -30,7 +29,6 @@ RX_RING = 128
 LONGEST_LINE = 95
 """Characters kept of a line; what follows is dropped (``MAX_CMD_SIZE``)."""
 _BUSY_S = 2.0  # unless M113 says otherwise
-_FIRST_MOVE_S = 0.1
 _STOCK_FEED = 1500.0  # mm/min, before any F
 _LINE = re.compile(r"(?:N(\d+) ?)?([^*]*)(?:\*(\d+))?")
 _WORD = re.compile(r"([A-Z])([-+]?[\d.]*)")
@@ -39,26 +37,6 @@ _CUTTER = re.compile(r"M0*([345])(I?)(?:S([\d.]+))?(I?)$")
 
 Command = Generator[Callable[[], bool], None, None]
 """A command under way: it yields what must be true before it goes on."""
-
-
-@dataclass(frozen=True, slots=True)
-class Burn:
-    """The beam on from ``t0`` to ``t1`` (s), from (``x0``, ``y0``) to (``x1``, ``y1``) in mm, at
-    ``power``, a fraction of full.
-    """
-
-    t0: float
-    t1: float
-    x0: float
-    y0: float
-    x1: float
-    y1: float
-    power: float
-
-    @property
-    def standing(self) -> bool:
-        """Whether the beam burnt in place."""
-        return self.x0 == self.x1 and self.y0 == self.y1
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +71,7 @@ class VirtualMarlin:
         self._coming: deque[tuple[float, int]] = deque()
         self._going: deque[tuple[float, int]] = deque()
         self._in_free = self._out_free = 0.0
+        self._carriage = Carriage(parameters, self.beam_log)
         self.power_cycle()
 
     def power_cycle(self) -> None:
@@ -101,9 +80,9 @@ class VirtualMarlin:
         self._going.clear()
         self.killed = False
         self._state = ModalState()
-        self._planner = Planner(self._parameters)
-        self._running: tuple[Move, float, float] | None = None  # its begin and its end
-        self._start_at = math.inf
+        self._carriage.halt(self.now)
+        self._carriage.stand(self.now, 0.0)
+        self._carriage = Carriage(self._parameters, self.beam_log)
         self._ring: deque[int] = deque()
         self._text = bytearray()
         self._early = bytearray()
@@ -113,8 +92,7 @@ class VirtualMarlin:
         self._busy_at = self._wake_at = math.inf
         self._busy_period = _BUSY_S
         self._count = 0
-        self._inline = self._constant = False
-        self._standing: tuple[float, float] | None = None  # since when, power
+        self._inline = False
         self._power = 0.0
         self._say("start")
 
@@ -137,7 +115,7 @@ class VirtualMarlin:
         return (
             self._coming[0][0] if self._coming else math.inf,
             next((at for at, _ in self._going if at > self.now), math.inf),
-            self._running[2] if self._running else self._start_at,
+            self._carriage.due,
             self._busy_at,
             self._wake_at,
         )
@@ -148,7 +126,7 @@ class VirtualMarlin:
                 line = next((at for at, byte in self._going if byte == ord("\n")), math.inf)
                 target = min(target, max(line, self.now))
             arrival = self._coming[0][0] if self._coming else math.inf
-            motion = self._running[2] if self._running else self._start_at
+            motion = self._carriage.due
             event = min(arrival, motion, self._busy_at, self._wake_at)
             if event > target:
                 break
@@ -156,7 +134,7 @@ class VirtualMarlin:
             if arrival <= self.now:
                 self._arrive(self._coming.popleft()[1])
             if motion <= self.now:
-                self._next_move()
+                self._carriage.go_on(self.now)
             if self._busy_at <= self.now:
                 self._say("echo:busy: processing")
                 self._busy_at = self.now + self._busy_period
@@ -207,17 +185,9 @@ class VirtualMarlin:
 
     def _emergency(self, kill: bool) -> None:
         """Stop dead; with ``kill`` for good."""
-        if self._running is not None:
-            self._burn(self.now)
-            x, y, _ = self._at(self.now)
-            steps = self._parameters.steps_per_mm
-            self._planner.reset((round(x * steps[0]), round(y * steps[1]), 0))
-            self._state.position = [x, y, 0.0]
-        else:
-            self._planner.reset(self._planner.position)
-        self._running, self._start_at = None, math.inf
+        self._state.position = self._carriage.halt(self.now)
         if kill:
-            self._stand(0.0)
+            self._carriage.stand(self.now, 0.0)
             self._ring.clear()
             self._queue.clear()
             self._command, self._busy_at = None, math.inf
@@ -292,14 +262,14 @@ class VirtualMarlin:
             yield from self._cutter(cutter)
         elif said in ("M110", "M112", "M410", "M106", "M107", "M8", "M9", "M17", "M220"):
             if said == "M220" and "S" in words:
-                self._planner.override(round(float(words["S"])), 100)
+                self._carriage.planner.override(round(float(words["S"])), 100)
         elif said == "M113":
             self._busy_period = float(words.get("S") or 0) or math.inf
         elif said == "M115":
             self._say("FIRMWARE_NAME:Marlin 2.1.2 (virtual) PROTOCOL_VERSION:1.0 EXTRUDER_COUNT:0")
             self._say(f"Cap:EMERGENCY_PARSER:{int(self._emergency_parser)}")
         elif said == "M114":
-            x, y, z = self._at(self.now)
+            x, y, z = self._carriage.place(self.now)
             self._say(f"X:{x:.2f} Y:{y:.2f} Z:{z:.2f} E:0.00")
         elif said == "M400":
             yield self._at_rest
@@ -311,8 +281,8 @@ class VirtualMarlin:
             yield self._at_rest
             self.homed += 1
             yield from self._until(self.now + 3.0)
-            self._planner.reset((0, 0, 0))
             self._state.position = [0.0, 0.0, 0.0]
+            self._carriage.put(self._state.position)
         else:
             yield from self._gcode(code)
 
@@ -325,11 +295,11 @@ class VirtualMarlin:
         self._inline = bool(match[2] or match[4]) and not off
         power = float(match[3] or 0) / self._parameters.s_max
         if self._inline:
-            self._constant, self._power = match[1] == "3", 0.0
+            self._power = 0.0
             return
         yield self._at_rest
         self._power = 0.0
-        self._stand(0.0 if off else power)
+        self._carriage.stand(self.now, 0.0 if off else power)
 
     def _gcode(self, code: str) -> Command:
         try:
@@ -348,81 +318,19 @@ class VirtualMarlin:
         self._power = 0.0 if rapid else block.words.get("S", self._power)
         for action in execute(block, state, rules):
             if isinstance(action, Line):
-                yield lambda: not self._planner.full
-                move = self._planner.append(
-                    action.target,
-                    state.feed / 60.0,
-                    spindle=3 if self._inline else 0,
-                    speed_word=self._power if self._inline else 0.0,
-                )
-                if move is not None and self._running is None and math.isinf(self._start_at):
-                    self._start_at = self.now + _FIRST_MOVE_S
-
-    # Motion
+                yield lambda: not self._carriage.planner.full
+                power = self._power if self._inline else 0.0
+                self._carriage.plan(self.now, action.target, state.feed / 60.0, power)
 
     def _at_rest(self) -> bool:
-        if not math.isinf(self._start_at):
-            self._start_at = min(self._start_at, self.now)
-        return not self._planner.moves
-
-    def _next_move(self) -> None:
-        """The move in hand is done; the next begins at once."""
-        self._start_at = math.inf
-        if self._running is not None:
-            self._burn(self._running[2])
-            self._planner.discard()
-        self._running = None
-        if self._planner.moves:
-            move = self._planner.moves[0]
-            speeds = math.sqrt(move.entry_sqr), math.sqrt(self._planner.exit_sqr())
-            seconds = _seconds(move, *speeds, self._planner.nominal_speed(move))
-            self._running = move, self.now, self.now + seconds
-
-    def _at(self, time: float) -> tuple[float, float, float]:
-        steps = self._parameters.steps_per_mm
-        if self._running is None:
-            x, y, z = (n / k for n, k in zip(self._planner.position, steps, strict=True))
-            return x, y, z
-        move, begin, end = self._running
-        part = min(1.0, (time - begin) / (end - begin)) if end > begin else 1.0
-        x, y, z = (
-            (start + part * way) / k
-            for start, way, k in zip(move.origin, move.steps, steps, strict=True)
-        )
-        return x, y, z
-
-    def _burn(self, until: float) -> None:
-        """Note what the move in hand has burnt until then."""
-        assert self._running is not None
-        move, begin, _ = self._running
-        if move.speed_word > 0 and until > begin:
-            (x0, y0, _), (x1, y1, _) = self._at(begin), self._at(until)
-            power = move.speed_word / self._parameters.s_max
-            self.beam_log.append(Burn(begin, until, x0, y0, x1, y1, power))
-
-    def _stand(self, power: float) -> None:
-        """The beam is at ``power`` from now on, whatever moves."""
-        if self._standing is not None:
-            x, y, _ = self._at(self.now)
-            since, before = self._standing
-            self.beam_log.append(Burn(since, self.now, x, y, x, y, before))
-        self._standing = (self.now, power) if power > 0 else None
+        self._carriage.hurry(self.now)
+        return not self._carriage.planner.moves
 
     @property
     def beam_on(self) -> bool:
         """Whether the beam burns now."""
-        moving = self._running is not None and self._running[0].speed_word > 0
-        return moving or self._standing is not None
+        return self._carriage.burning
 
 
 def _now() -> bool:
     return True
-
-
-def _seconds(move: Move, entry: float, leave: float, nominal: float) -> float:
-    """The time of a trapezoid: up from ``entry``, on at ``nominal``, down to ``leave`` (mm/s)."""
-    acceleration, length = move.acceleration, move.length
-    top = min(nominal, math.sqrt(acceleration * length + 0.5 * (entry**2 + leave**2)))
-    top = max(top, entry, leave)
-    ramps = (2 * top**2 - entry**2 - leave**2) / (2 * acceleration)
-    return (2 * top - entry - leave) / acceleration + max(0.0, length - ramps) / top
