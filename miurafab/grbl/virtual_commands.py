@@ -231,7 +231,7 @@ def _setting(machine: Machine, line: str) -> Run:
 
 def take_settings(machine: Machine) -> None:
     """The settings changed: planner and stepper go by the new ones."""
-    machine.planner.parameters = machine.motion()
+    machine.planner.configure(machine.motion())
     machine.stepper.idle_lock = machine.idle_cycles
 
 

@@ -83,7 +83,7 @@ def _leg(
     for axis in axes:
         direction, _ = machine.home_switch(axis)
         target[axis] = direction * distance if approach else -direction * distance
-    speed = rate * math.sqrt(len(axes)) / 60.0
+    speed = rate * math.sqrt(len(axes))
     made = machine.planner.make(target, speed, steady=True, origin=machine.position)
     generator, stepper = machine.generator, machine.stepper
     moving = set(axes)

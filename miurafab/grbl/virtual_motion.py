@@ -131,7 +131,7 @@ def line(machine: Machine, move: Line) -> Run:
             yield None
     planned = planner.append(
         move.target,
-        move.feed / 60.0,
+        move.feed,
         rapid=move.rapid,
         inverse_time=move.inverse_time,
         steady=move.steady,

@@ -141,7 +141,7 @@ def status(machine: Machine) -> str:
     if mask & 2:
         blocks = machine.dialect.planner_blocks - len(machine.planner.moves)
         fields.append(f"Bf:{blocks},{machine.uart.room}")
-    speed = machine.generator.speed * 60.0 if machine.state in _BUSY else 0.0
+    speed = machine.generator.speed if machine.state in _BUSY else 0.0
     fields.append(f"FS:{rate(machine, speed)},{number(machine.spindle_speed, 0)}")
     pins = _pins(machine)
     if pins:

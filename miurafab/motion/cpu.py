@@ -24,9 +24,9 @@ CLOCK = 16_000_000
 DWELL_STEP = CLOCK // 20
 """A dwell is a number of these, 50 ms each (``config.h``)."""
 
-STEP_TICK = 330
-"""Cycles of one stepper interrupt with its pulse end: 310 where most ticks make no step, 350 where
-all do and blocks are short."""
+STEP_TICK = 326
+STEP_AXIS = 16
+"""Cycles of one stepper interrupt with its pulse end, and more for each axis that moves."""
 
 CHARACTER = 105 + 70
 """Receiving a byte in the interrupt, then taking it from the ring and filtering it."""
@@ -51,8 +51,8 @@ def dwell_steps(seconds: float) -> int:
     return math.ceil(single(20.0 * single(seconds))) & 0xFFFF
 
 
-PLAN_LINE = 5200
-PLAN_AXIS = 2150
+PLAN_LINE = 4800
+PLAN_AXIS = 2350
 """Planning one line, and more for each axis that moves."""
 PLAN_CORNER = 3200
 PLAN_CORNER_AXIS = 950
@@ -67,13 +67,14 @@ ARC_SETUP = 7000
 ARC_CHORD = 1850
 """Turning the radius by one chord, every twelfth time by sine and cosine (``mc_arc``)."""
 
-LOAD_BLOCK = 2000
+LOAD_BLOCK = 500
 LOAD_RATE = 500
 """Taking up a block for stepping, and more where power follows the speed."""
-PROFILE = 3400
+PROFILE = 2000
 """Laying the speed profile over the rest of a block."""
-SEGMENT = 280
-ROUND = 3200
-"""One segment, and each stretch of a ramp or of steady speed that it runs over."""
+SEGMENT = 2520
+ROUND = 1300
+RAMP_END = 2400
+"""One segment, each stretch of a ramp or of steady speed that it runs over, and a ramp's end."""
 POWER = 950
 """The power of a segment."""

@@ -315,7 +315,7 @@ def _moves(program: Program, begin: int, stop: int) -> list[_Move]:
     return list(
         zip(
             program.end[begin:stop].tolist(),
-            (program.feed_mm_min[begin:stop] / 60.0).tolist(),
+            program.feed_mm_min[begin:stop].tolist(),
             (program.motion[begin:stop] == RAPID).tolist(),
             program.spindle[begin:stop].tolist(),
             program.power[begin:stop].tolist(),

@@ -10,24 +10,37 @@ that bound, entry speeds e_i obey, with a_i and l_i the moves' accelerations and
 
 A new move only touches what the last passes left open, which :attr:`Planner.planned` marks.
 
-Legend: ``_sqr`` squared speeds in (mm/s)^2, speeds in mm/s, lengths in mm, counts in motor steps.
+All is kept in single precision, in the firmware's units and order of operations: the last bit
+decides whether a hold that ends on a whole motor step goes on to the next.
+
+Legend: speeds in mm/min, ``_sqr`` their squares, accelerations in mm/min², lengths in mm, counts in
+motor steps.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import cast
+
+import numpy as np
 
 from miurafab.motion import cpu
 from miurafab.motion.parameters import MotionParameters
 
+single = cast("Callable[[float], float]", np.float32)
+"""Round to single precision; what is calculated with the result stays in it."""
+
 _STRAIGHT = 0.999999
+_PERCENT = single(0.01)
 _UNLIMITED = 1e38
 _MOST_STEPS = 2.0**31 - 1.0
-_SLOWEST = 1.0 / 60.0
-"""mm/s; no move is planned slower (``config.h``, 1 mm/min)."""
-_LEAST_ACCELERATION = 1e-6
-"""mm/s²; the firmware divides by a zero $120, this keeps the arithmetic finite."""
+_FARTHEST = 1e30
+"""mm; what is farther would not fit into single precision."""
+_SLOWEST = 1.0
+"""mm/min; no move is planned slower (``config.h``)."""
+_LEAST_ACCELERATION = 3.6e-3
+"""mm/min²; the firmware divides by a zero $120, this keeps the arithmetic finite."""
 
 
 class Move:
@@ -61,12 +74,20 @@ class Planner:
     """
 
     def __init__(self, parameters: MotionParameters) -> None:
-        self.parameters = parameters
+        self.configure(parameters)
         self.on_replan: Callable[[], None] = lambda: None
         self.feed_override = 100
         self.rapid_override = 100
         self.cycles = 0
         self.reset((0, 0, 0))
+
+    def configure(self, parameters: MotionParameters) -> None:
+        """Take other settings, for the moves to come."""
+        self.parameters = parameters
+        self._steps_per_mm = tuple(map(single, parameters.steps_per_mm))
+        self._max_rate = tuple(map(single, parameters.max_rate_mm_min))
+        self._acceleration = tuple(single(a) * 60 * 60 for a in parameters.acceleration)
+        self._deviation = single(parameters.junction_deviation)
 
     def reset(self, position: Sequence[int]) -> None:
         """Forget all moves and stand at ``position`` (motor steps)."""
@@ -85,10 +106,10 @@ class Planner:
         """The speed ``move`` is meant to have under the overrides."""
         speed = move.rate
         if move.rapid:
-            speed *= 0.01 * self.rapid_override
+            speed *= _PERCENT * self.rapid_override
         else:
             if not move.steady:
-                speed *= 0.01 * self.feed_override
+                speed *= _PERCENT * self.feed_override
             speed = min(speed, move.rapid_rate)
         return max(speed, _SLOWEST)
 
@@ -102,14 +123,13 @@ class Planner:
         steady: bool = False,
         origin: Sequence[int] | None = None,
     ) -> tuple[Move, tuple[float, float, float], tuple[int, ...]] | None:
-        """A move to ``target`` (mm) at ``feed`` (mm/s, or 1/s), its direction and its end.
+        """A move to ``target`` (mm) at ``feed`` (mm/min, or 1/min), its direction and its end.
 
         None if it is shorter than half a motor step. ``origin`` other than :attr:`position` is
         for the system's own motion.
         """
-        parameters = self.parameters
         start = self.position if origin is None else tuple(origin)
-        kx, ky, kz = parameters.steps_per_mm
+        kx, ky, kz = self._steps_per_mm
         x0, y0, z0 = start
         x1 = to_steps(target[0], kx) if kx else x0
         y1 = to_steps(target[1], ky) if ky else y0
@@ -123,14 +143,16 @@ class Planner:
         x = steps[0] / kx if kx else 0.0
         y = steps[1] / ky if ky else 0.0
         z = steps[2] / kz if kz else 0.0
-        length = math.sqrt(x * x + y * y + z * z)
-        direction = (x / length, y / length, z / length)
+        length = single(math.sqrt(x * x + y * y + z * z))
+        inverse = 1.0 / length
+        direction = (x * inverse, y * inverse, z * inverse)
         move = Move()
         move.origin, move.steps, move.events = start, steps, events
         move.length = length
-        move.acceleration = max(along(parameters.acceleration, direction), _LEAST_ACCELERATION)
-        move.rapid_rate = along(parameters.max_rate_mm_min, direction) / 60.0
+        move.acceleration = max(along(self._acceleration, direction), _LEAST_ACCELERATION)
+        move.rapid_rate = along(self._max_rate, direction)
         move.rapid, move.steady = rapid, steady
+        feed = single(feed)
         move.rate = move.rapid_rate if rapid else feed * length if inverse_time else feed
         return move, direction, end
 
@@ -146,7 +168,7 @@ class Planner:
         speed_word: float = 0.0,
         tag: int = 0,
     ) -> Move | None:
-        """Plan a line to ``target`` (mm) at ``feed`` (mm/s, or 1/s with ``inverse_time``).
+        """Plan a line to ``target`` (mm) at ``feed`` (mm/min, or 1/min with ``inverse_time``).
 
         Returns None if it is shorter than half a motor step. There must be room for it.
         """
@@ -208,13 +230,10 @@ class Planner:
             return _UNLIMITED
         x, y, z = vx - ux, vy - uy, vz - uz
         self.cycles += cpu.PLAN_CORNER + cpu.PLAN_CORNER_AXIS * ((x != 0) + (y != 0) + (z != 0))
-        length = math.sqrt(x * x + y * y + z * z)
-        parameters = self.parameters
-        acceleration = along(parameters.acceleration, (x / length, y / length, z / length))
-        half_sine = math.sqrt(0.5 * (1.0 - cosine))
-        return max(
-            0.0, acceleration * parameters.junction_deviation * half_sine / (1.0 - half_sine)
-        )
+        inverse = 1.0 / single(math.sqrt(x * x + y * y + z * z))
+        acceleration = along(self._acceleration, (x * inverse, y * inverse, z * inverse))
+        half_sine = single(math.sqrt(0.5 * (1.0 - cosine)))
+        return max(0.0, acceleration * self._deviation * half_sine / (1.0 - half_sine))
 
     def _plan(self) -> None:
         moves, planned = self.moves, self.planned
@@ -251,7 +270,7 @@ class Planner:
 
 def to_steps(value: float, steps_per_mm: float) -> int:
     """``value`` in mm as motor steps, rounded half away from zero, within 32 bits; NaN is 0."""
-    steps = value * steps_per_mm
+    steps = float(single(min(max(value, -_FARTHEST), _FARTHEST)) * steps_per_mm)
     if not -_MOST_STEPS <= steps <= _MOST_STEPS:
         return 0 if steps != steps else int(math.copysign(_MOST_STEPS, steps))
     return int(steps + 0.5) if steps >= 0.0 else -int(0.5 - steps)

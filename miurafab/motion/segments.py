@@ -18,9 +18,10 @@ from bisect import bisect_right
 from collections.abc import Callable
 
 from miurafab.motion import cpu
-from miurafab.motion.planner import Move, Planner
+from miurafab.motion.planner import Move, Planner, single
 
-SEGMENT_TIME = 0.01
+SEGMENT_TIME = single(1.0 / 6000.0)
+"""Minutes."""
 QUEUE = 5
 """Segments that can wait, the running one included: 6 slots of which one stays free."""
 _LEAST_STEPS = 1.25
@@ -38,13 +39,17 @@ class Segment:
     ``cycles`` in all.
 
     ``done`` is the progress before it in micro-steps; ``power`` the PWM value while it runs;
-    ``follows`` whether the power follows the speed; ``last`` whether it completes its move.
+    ``follows`` whether the power follows the speed; ``last`` whether it completes its move;
+    ``tick`` how many cycles each interrupt takes.
     """
 
-    __slots__ = ("cycles", "done", "follows", "last", "move", "period", "power", "stride", "ticks")
+    __slots__ = (
+        "cycles", "done", "follows", "last", "move", "period", "power", "stride", "tick", "ticks",
+    )  # fmt: skip
 
     def __init__(self, move: Move, done: int, power: int, follows: bool) -> None:
         self.move = move
+        self.tick = cpu.STEP_TICK + cpu.STEP_AXIS * (len(move.steps) - move.steps.count(0))
         self.done = done
         self.power = power
         self.follows = follows
@@ -158,13 +163,13 @@ class SegmentGenerator:
         self._steps_left = move.events
         self._done = 0
         self._late = 0.0
-        self._steps_per_mm = move.events / move.length
+        self._steps_per_mm = move.events / single(move.length)
         if self.holding or self._entry_forced:
             self.speed = self.exit
             move.entry_sqr = self.exit * self.exit
             self._entry_forced = False
         else:
-            self.speed = math.sqrt(move.entry_sqr)
+            self.speed = single(math.sqrt(move.entry_sqr))
         self._follows = self.planner.parameters.laser and move.spindle == 4
         if self._follows:
             self.cycles += cpu.LOAD_RATE
@@ -173,31 +178,32 @@ class SegmentGenerator:
         """Choose among the seven shapes that rise, hold and fall can make of what is left."""
         self.cycles += cpu.PROFILE
         length, entry_sqr, twice = move.length, move.entry_sqr, 2.0 * move.acceleration
+        per_speed_sqr = 0.5 / move.acceleration
         self.goal = 0.0
         if self.holding:
             self._ramp = FALL
-            stop = length - entry_sqr / twice
+            stop = length - per_speed_sqr * entry_sqr
             if stop < 0.0:
-                self.exit = math.sqrt(entry_sqr - twice * length)
+                self.exit = single(math.sqrt(max(entry_sqr - twice * length, 0.0)))
             else:
                 self.goal, self.exit = stop, 0.0
             return
         exit_sqr = 0.0 if self.system_move is not None else self.planner.exit_sqr()
         nominal = self.planner.nominal_speed(move)
         nominal_sqr = nominal * nominal
-        self.exit = math.sqrt(exit_sqr)
+        self.exit = single(math.sqrt(exit_sqr))
         self._ramp = RISE
         self.rise_end = length
-        meeting = 0.5 * (length + (entry_sqr - exit_sqr) / twice)
+        meeting = 0.5 * (length + per_speed_sqr * (entry_sqr - exit_sqr))
         if entry_sqr > nominal_sqr:
-            self.rise_end = length - (entry_sqr - nominal_sqr) / twice
+            self.rise_end = length - per_speed_sqr * (entry_sqr - nominal_sqr)
             if self.rise_end <= 0.0:
                 self._ramp = FALL
-                self.exit = math.sqrt(entry_sqr - twice * length)
+                self.exit = single(math.sqrt(max(entry_sqr - twice * length, 0.0)))
                 self._entry_forced = True
             else:
                 self._ramp = FALL_TO_TOP
-                self.fall_start = (nominal_sqr - exit_sqr) / twice
+                self.fall_start = per_speed_sqr * (nominal_sqr - exit_sqr)
                 self.top = nominal
         elif meeting <= 0.0:
             self.rise_end = 0.0
@@ -206,16 +212,16 @@ class SegmentGenerator:
         elif meeting >= length:
             self._ramp = FALL
         else:
-            self.fall_start = (nominal_sqr - exit_sqr) / twice
+            self.fall_start = per_speed_sqr * (nominal_sqr - exit_sqr)
             if self.fall_start >= meeting:
                 self.rise_end = self.fall_start = meeting
-                self.top = math.sqrt(twice * meeting + exit_sqr)
+                self.top = single(math.sqrt(twice * meeting + exit_sqr))
             else:
                 self.top = nominal
                 if entry_sqr == nominal_sqr:
                     self._ramp = HOLD
                 else:
-                    self.rise_end -= (nominal_sqr - entry_sqr) / twice
+                    self.rise_end -= per_speed_sqr * (nominal_sqr - entry_sqr)
 
     def _travel(self, move: Move) -> tuple[float, float, int]:
         """Follow the profile for a segment: what is left of the move, the time, the rounds."""
@@ -232,9 +238,10 @@ class SegmentGenerator:
                 after = length - span * (self.speed + 0.5 * change)
                 if after < self.rise_end:
                     after = self.rise_end
-                    span = 2.0 * (length - after) / (self.speed + self.top)
+                    span = 2.0 * (move.length - after) / (self.speed + self.top)
                     self._ramp = FALL if after == self.fall_start else HOLD
                     self.speed = self.top
+                    self.cycles += cpu.RAMP_END
                 else:
                     self.speed += change
             elif self._ramp == HOLD:
@@ -243,12 +250,14 @@ class SegmentGenerator:
                     after = self.fall_start
                     span = (length - after) / self.top
                     self._ramp = FALL
+                    self.cycles += cpu.RAMP_END
             elif self._ramp == FALL_TO_TOP:
                 if self.speed - self.top <= change:
                     after = self.rise_end
-                    span = 2.0 * (length - after) / (self.speed + self.top)
+                    span = 2.0 * (move.length - after) / (self.speed + self.top)
                     self._ramp = HOLD
                     self.speed = self.top
+                    self.cycles += cpu.RAMP_END
                 else:
                     after = length - span * (self.speed - 0.5 * change)
                     self.speed -= change
@@ -261,6 +270,7 @@ class SegmentGenerator:
                     total = self.speed + self.exit
                     span = 2.0 * (length - after) / total if total else 0.0
                     self.speed = self.exit
+                    self.cycles += cpu.RAMP_END
             length = after
             duration += span
             if duration < limit:
@@ -282,7 +292,7 @@ class SegmentGenerator:
         word = move.speed_word
         if self._follows:
             self.cycles += cpu.POWER
-            word *= self.speed / move.rate if move.rate else 0.0
+            word *= self.speed * (1.0 / move.rate) if move.rate else 0.0
         self._power = self.to_pwm(word)
 
     def _cut(self, segment: Segment, length: float, duration: float) -> bool:
@@ -294,7 +304,7 @@ class SegmentGenerator:
             return False
         duration += self._late
         per_step = duration / ((self._steps_left - left) or 1.0)
-        cycles = math.ceil(cpu.CLOCK * per_step)
+        cycles = math.ceil(60 * cpu.CLOCK * per_step)
         level = bisect_right(_SMOOTHING, cycles)
         segment.ticks = steps << level
         segment.period = min(cycles >> level, _SLOWEST_PERIOD)

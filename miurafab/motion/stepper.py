@@ -1,10 +1,10 @@
 """The stepper interrupt in time, and the main program that it steals time from.
 
 Time is counted in processor cycles. Segments run one after another; while one runs, each of its
-ticks takes :data:`~miurafab.motion.cpu.STEP_TICK` cycles from the main program, so that work of
-w cycles lasts w / (1 - tick / period). When the queue runs dry the interrupt stops the motors and
-holds them for the idle lock time before it returns: the main program stands still for that long
-at every stop (``st_go_idle`` in ``stepper.c``).
+ticks takes some 340 cycles from the main program, so that work of w cycles lasts
+w / (1 - tick / period). When the queue runs dry the interrupt stops the motors and holds them for
+the idle lock time before it returns: the main program stands still for that long at every stop
+(``st_go_idle`` in ``stepper.c``).
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from miurafab.motion import cpu
 from miurafab.motion.planner import Move
 from miurafab.motion.segments import MICRO, QUEUE, Segment
 
@@ -79,7 +78,7 @@ class Stepper:
         if self.queue:
             segment = self.queue[0]
             self.began, self._change = now, now + segment.cycles
-            self.share = max(1.0 - cpu.STEP_TICK / max(segment.period, 1), _LEAST_SHARE)
+            self.share = max(1.0 - segment.tick / max(segment.period, 1), _LEAST_SHARE)
             self.on_segment(now, segment)
         else:
             self.running = False

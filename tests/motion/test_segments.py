@@ -34,7 +34,7 @@ def trapezoid(length: float, speed: float) -> float:
 @given(st.integers(80, 40000), st.floats(2, 200))
 def test_one_move_takes_the_time_of_its_trapezoid(steps: int, speed: float) -> None:
     planner = Planner(machine())
-    planner.append((steps / 80, 0, 0), speed)
+    planner.append((steps / 80, 0, 0), 60 * speed)
     segments = generate(planner)
     expected = trapezoid(steps / 80, speed)
     # Each segment's step rate is rounded up to a whole number of cycles, and to AMASS's ticks.
@@ -46,7 +46,7 @@ targets = st.lists(
 )
 
 
-@given(targets, st.sampled_from([5.0, 50.0, 200.0]))
+@given(targets, st.sampled_from([300.0, 3000.0, 12000.0]))
 def test_every_step_is_made_once(points: list[tuple[int, int]], feed: float) -> None:
     planner = Planner(machine())
     for x, y in points:
@@ -66,7 +66,7 @@ def test_every_step_is_made_once(points: list[tuple[int, int]], feed: float) -> 
 
 def test_power_that_follows_the_speed_falls_to_nothing_at_rest() -> None:
     planner = Planner(machine())
-    planner.append((5, 0, 0), 50, spindle=4, speed_word=1000)
+    planner.append((5, 0, 0), 3000, spindle=4, speed_word=1000)
     generator = SegmentGenerator(planner, lambda word: round((word or 0) * 0.255))
     powers = [segment.power for segment in iter(generator.next, None)]
     assert max(powers) == 255
@@ -76,16 +76,16 @@ def test_power_that_follows_the_speed_falls_to_nothing_at_rest() -> None:
 
 def test_constant_power_is_constant() -> None:
     planner = Planner(machine())
-    planner.append((5, 0, 0), 50, spindle=3, speed_word=1000)
+    planner.append((5, 0, 0), 3000, spindle=3, speed_word=1000)
     assert {segment.power for segment in generate(planner, 200)} == {200}
 
 
 def test_a_hold_brakes_as_fast_as_it_may_and_can_go_on() -> None:
     planner = Planner(machine())
-    planner.append((20, 0, 0), 50)
+    planner.append((20, 0, 0), 3000)
     generator = SegmentGenerator(planner, lambda word: 0)
     made = [generator.next() for _ in range(10)]
-    speed, left = generator.speed, planner.moves[0].length
+    speed, left = generator.speed / 60, planner.moves[0].length
     generator.hold()
     made += list(iter(generator.next, None))
     braked = left - planner.moves[0].length
@@ -117,7 +117,7 @@ def test_the_closed_line_is_bresenhams(x: int, y: int, z: int, level: int) -> No
 
 def test_the_processor_is_slowed_by_the_steps_and_stands_still_while_motion_settles() -> None:
     planner = Planner(machine())
-    planner.append((10, 0, 0), 100)
+    planner.append((10, 0, 0), 6000)
     stepper = Stepper()
     stepper.idle_lock = 400_000
     stepper.queue += generate(planner)[:3]
@@ -126,7 +126,7 @@ def test_the_processor_is_slowed_by_the_steps_and_stands_still_while_motion_sett
     assert processor.run(0, 16_000) == 16_000
     stepper.wake(0)
     slowed = processor.run(0, 16_000)
-    period = stepper.queue[0].period
-    assert slowed == math.ceil(16_000 / (1 - cpu.STEP_TICK / period))
+    tick = (cpu.STEP_TICK + cpu.STEP_AXIS) / stepper.queue[0].period
+    assert slowed == math.ceil(16_000 / (1 - tick))
     assert processor.run(total - 1, 16_000) > total + 400_000
     assert stepper.stopped
