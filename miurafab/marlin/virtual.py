@@ -320,7 +320,7 @@ class VirtualMarlin:
             if isinstance(action, Line):
                 yield lambda: not self._carriage.planner.full
                 power = self._power if self._inline else 0.0
-                self._carriage.plan(self.now, action.target, state.feed / 60.0, power)
+                self._carriage.plan(self.now, action.target, state.feed, power)
 
     def _at_rest(self) -> bool:
         self._carriage.hurry(self.now)

@@ -59,7 +59,7 @@ class Carriage:
         return moving or self._standing is not None
 
     def plan(self, now: float, target: Sequence[float], feed: float, power: float) -> None:
-        """A line to ``target`` at ``feed`` mm/s with ``power`` (S). There must be room for it."""
+        """A line to ``target`` at ``feed`` mm/min with ``power`` (S). There must be room for it."""
         spindle = 3 if power > 0 else 0
         move = self.planner.append(target, feed, spindle=spindle, speed_word=power)
         if move is not None and self._running is None and math.isinf(self.due):
@@ -79,7 +79,7 @@ class Carriage:
         if self.planner.moves:
             move = self.planner.moves[0]
             ends = math.sqrt(move.entry_sqr), math.sqrt(self.planner.exit_sqr())
-            self.due = now + _seconds(move, *ends, self.planner.nominal_speed(move))
+            self.due = now + 60.0 * float(_minutes(move, *ends, self.planner.nominal_speed(move)))
             self._running = move, now
 
     def halt(self, now: float) -> list[float]:
@@ -126,8 +126,8 @@ class Carriage:
         self._standing = (now, power) if power > 0 else None
 
 
-def _seconds(move: Move, entry: float, leave: float, nominal: float) -> float:
-    """The time of a trapezoid: up from ``entry``, on at ``nominal``, down to ``leave`` (mm/s)."""
+def _minutes(move: Move, entry: float, leave: float, nominal: float) -> float:
+    """The time of a trapezoid: up from ``entry``, on at ``nominal``, down to ``leave`` (mm/min)."""
     acceleration, length = move.acceleration, move.length
     top = min(nominal, math.sqrt(acceleration * length + 0.5 * (entry**2 + leave**2)))
     top = max(top, entry, leave)
