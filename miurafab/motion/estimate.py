@@ -55,12 +55,13 @@ def estimate(program: Program, parameters: MotionParameters, link: Link | None =
 
 
 class _Wire:
-    """When each line has arrived, under character counting."""
+    """When each line has arrived, under character counting (without a buffer: one by one)."""
 
     def __init__(self, link: Link) -> None:
         self.byte = 10.0 * cpu.CLOCK / link.baud
         self.latency = link.latency * cpu.CLOCK
         self.room = link.rx_bytes
+        self.overhead = link.line_overhead
         self.unanswered: deque[tuple[int, float]] = deque()
         self.free = 0.0
         self.out_free = 0.0
@@ -73,7 +74,7 @@ class _Wire:
             self.room += freed
             start = max(start, seen)
         self.room -= size
-        self.free = start + size * self.byte
+        self.free = start + (size + self.overhead) * self.byte
         return math.ceil(self.free)
 
     def answer(self, now: int, size: int) -> None:

@@ -9,6 +9,8 @@ from miurafab.errors import ProfileError
 from miurafab.profiles import MachineProfile
 
 _NEEDED = (1, 11, 12, 30, 31, 32, 100, 101, 102, 110, 111, 112, 120, 121, 122)
+_COUNT_AND_CHECKSUM = len("N12345 *123")
+"""What Marlin's lines have besides their code, mostly."""
 Triple = tuple[float, float, float]
 _EIGHT_BIT = ("grbl-1.1", "grbl-0.9")
 """Dialects that run on an ATmega328P."""
@@ -87,12 +89,25 @@ class MotionParameters:
 @dataclass(frozen=True)
 class Link:
     """The wire: ``baud`` (10 bits a byte), the host's ``latency`` in s from the controller's
-    answer to its next byte, and the controller's ``rx_bytes``.
+    answer to its next byte, the controller's ``rx_bytes`` (0: one line at a time), and
+    ``line_overhead``, the bytes that the dialect adds to each line.
     """
 
     baud: int = 115_200
     latency: float = 1e-3
     rx_bytes: int = 128
+    line_overhead: int = 0
+
+    @classmethod
+    def from_profile(cls, profile: MachineProfile) -> Link:
+        """How jobs are sent to the machine of ``profile``."""
+        controller = profile.controller
+        one_by_one = controller.streaming == "send-response" and profile.dialect != "hpgl"
+        return cls(
+            baud=controller.baud,
+            rx_bytes=0 if one_by_one else controller.rx_bytes,
+            line_overhead=_COUNT_AND_CHECKSUM if profile.dialect == "marlin" else 0,
+        )
 
 
 def _triple(settings: Mapping[int, float], first: int) -> Triple:

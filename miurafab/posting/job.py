@@ -145,8 +145,7 @@ def _wire_is_short(
 
 
 def _seconds(job: Job, machine: MachineProfile) -> float:
-    controller = machine.controller
-    link = Link(baud=controller.baud, rx_bytes=controller.rx_bytes)
+    link = Link.from_profile(machine)
     return estimate(parse_program(job), MotionParameters.from_profile(machine), link).seconds
 
 

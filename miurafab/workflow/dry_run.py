@@ -94,9 +94,7 @@ def dry_run(
     controller would refuse.
     """
     program = read_program(job, machine)
-    controller = machine.controller
-    link = Link(baud=controller.baud, rx_bytes=controller.rx_bytes)
-    times = estimate(program, MotionParameters.from_profile(machine), link)
+    times = estimate(program, MotionParameters.from_profile(machine), Link.from_profile(machine))
     burning = program.beam_on
     layer = np.where(burning, _layers(program), np.int8(_TRAVEL))
     lengths = program.lengths

@@ -27,6 +27,7 @@ from miurafab.marlin.virtual import VirtualMarlin
 from miurafab.motion.parameters import MotionParameters
 from miurafab.plotter.virtual import VirtualPlotter
 from miurafab.profiles import load_machine
+from miurafab.workflow.dry_run import dry_run
 
 MACHINE = load_machine("marlin-laser-220")
 DASHES = 40
@@ -345,3 +346,15 @@ def test_the_command_cuts_on_the_virtual_one(
             main()
         assert (ended.value.code or 0) == code
         capsys.readouterr()
+
+
+@pytest.mark.parametrize(("dash", "gap", "feed"), [(0.3, 0.2, 6000), (2.0, 1.0, 1500)])
+def test_the_estimate_knows_that_lines_go_one_by_one(dash: float, gap: float, feed: int) -> None:
+    lines = ["M5", "G21", "G90", "M4 I S0"]
+    for n in range(150):
+        x, y = 10 + (dash + gap) * (n % 50), 10 + n // 50
+        lines += [f"G0 X{x:g} Y{y} S0 F9000", f"G1 X{x + dash:g} Y{y} S200 F{feed}"]
+    job = Job("estimate.nc", "\n".join([*lines, "M5 I", "M5", ""]))
+    took = send(job, Wire(new_device())).seconds
+    told = dry_run("estimate", job, MACHINE, (220.0, 220.0)).seconds
+    assert took == pytest.approx(told, rel=0.06, abs=0.2)
