@@ -120,7 +120,10 @@ def sheet_strokes(
     behind = np.zeros(len(patch), dtype=bool)
     if options.two_sided:
         scored = operation == OPERATIONS.index("score")
-        behind[scored] = pattern.edges_assignment[edge[scored]] == "V"
+        folds = pattern.edges_assignment.copy()
+        # Where two borders are joined the fold is told by the seam alone.
+        folds[pieces.tabs.edge] = pieces.tabs.seams.fold
+        behind[scored] = folds[edge[scored]] == "V"
 
     side = 2 * motion.sheet[patch] + behind
     by_side = np.argsort(side, kind="stable")

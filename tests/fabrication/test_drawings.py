@@ -3,14 +3,13 @@
 import dataclasses
 import io
 import re
-from itertools import pairwise
 
 import ezdxf
 import numpy as np
 import pypdf
 import pytest
-import svgelements
 from problems import regular
+from readers import POINT_MM, assert_same, read_dxf, read_hpgl, read_pdf, read_svg, segments
 from rings import tube
 from scipy.spatial import cKDTree
 
@@ -21,15 +20,14 @@ from miurafab.fabrication.drawing.dxf import VERSIONS, sheet_dxf
 from miurafab.fabrication.drawing.hpgl import UNITS_PER_MM, sheet_hpgl
 from miurafab.fabrication.drawing.page import INK, tint
 from miurafab.fabrication.drawing.pdf import sheets_pdf
-from miurafab.fabrication.drawing.svg import COLOURS, sheet_svg
+from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, tiled_pdf
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out
-from miurafab.profiles import OPERATIONS, load_machine, load_material
+from miurafab.profiles import load_machine, load_material
 
 MACHINE, MATERIAL = load_machine("grbl-laser-400"), load_material("card-250")
-POINT_MM = 25.4 / 72
 
 
 @pytest.fixture(scope="module")
@@ -37,123 +35,31 @@ def layout():
     return lay_out(regular(61, 41), MACHINE, MATERIAL)
 
 
-def segments(toolpath):
-    """(n, 5) straight pieces: operation, then both ends."""
-    return np.array(
-        [
-            (operation, *a, *b)
-            for index, operation in enumerate(toolpath.operation.tolist())
-            for a, b in pairwise(toolpath.stroke(index).tolist())
-        ]
-    )
-
-
-def assert_same(found, toolpath, within):
-    """The pieces ``found`` are those of ``toolpath``, one to one, whatever their direction."""
-    wanted, found = segments(toolpath), np.array(found)
-    for operation in range(len(OPERATIONS)):
-        ours = wanted[wanted[:, 0] == operation][:, 1:]
-        theirs = found[found[:, 0] == operation][:, 1:]
-        assert len(ours) == len(theirs)
-        if len(ours):
-            both = np.concatenate([theirs, theirs[:, [2, 3, 0, 1]]])
-            gap, taken = cKDTree(both).query(ours, p=np.inf)
-            assert gap.max() <= within
-            assert len(set((taken % len(theirs)).tolist())) == len(ours), "drawn twice"
-
-
 @pytest.mark.parametrize("version", VERSIONS)
 def test_dxf(layout, version):
     for toolpath in layout.toolpaths:
-        document = ezdxf.read(io.StringIO(sheet_dxf(toolpath, version)))
-        assert not document.audit().has_errors
-        found = []
-        for entity in document.modelspace():
-            operation = OPERATIONS.index(entity.dxf.layer)
-            if entity.dxftype() == "LINE":
-                start, end = entity.dxf.start, entity.dxf.end
-                found.append((operation, start.x, start.y, end.x, end.y))
-            else:
-                points = [tuple(p) for p in entity.get_points("xy")]
-                points += points[:1] if entity.closed else []
-                found += [(operation, *a, *b) for a, b in pairwise(points)]
-        assert_same(found, toolpath, 1e-3)
+        text = sheet_dxf(toolpath, version)
+        assert_same(read_dxf(text), toolpath, 1e-3)
         if version == "R2010":
-            assert document.header["$INSUNITS"] == 4
+            assert ezdxf.read(io.StringIO(text)).header["$INSUNITS"] == 4
 
 
 def test_svg(layout):
-    """svgelements converts to pixels at 96 dpi; that it comes back to mm proves the real size."""
-    operation_of = {colour.lower(): OPERATIONS.index(name) for name, colour in COLOURS.items()}
     for toolpath in layout.toolpaths:
-        document = svgelements.SVG.parse(io.StringIO(sheet_svg(toolpath)))
-        found = []
-        for path in document.elements(lambda e: isinstance(e, svgelements.Path)):
-            operation = operation_of[path.stroke.hexrgb or path.stroke.hex]
-            for piece in path:
-                if isinstance(piece, svgelements.Line | svgelements.Close) and piece.start:
-                    ends = [
-                        (p.x * 25.4 / 96, toolpath.height_mm - p.y * 25.4 / 96)
-                        for p in (piece.start, piece.end)
-                    ]
-                    if np.hypot(*np.subtract(*ends)) > 1e-6:
-                        found.append((operation, *ends[0], *ends[1]))
-        assert_same(found, toolpath, 1e-3)
+        assert_same(read_svg(sheet_svg(toolpath), toolpath.height_mm), toolpath, 1e-3)
 
 
 def test_pdf(layout):
-    reader = pypdf.PdfReader(io.BytesIO(sheets_pdf(layout.toolpaths, "test")))
-    assert len(reader.pages) == len(layout.toolpaths)
-    for page, toolpath in zip(reader.pages, layout.toolpaths, strict=True):
-        width, height = float(page.mediabox.width), float(page.mediabox.height)
-        assert width * POINT_MM == pytest.approx(toolpath.width_mm, abs=1e-3)
-        assert height * POINT_MM == pytest.approx(toolpath.height_mm, abs=1e-3)
-        assert_same(list(_pdf_segments(page, reader)), toolpath, 1e-3)
-
-
-def _pdf_segments(page, reader):
-    by_colour = {
-        tuple(round(int(value[k : k + 2], 16) / 255, 3) for k in (1, 3, 5)): name
-        for name, value in COLOURS.items()
-    }
-    content = pypdf.generic.ContentStream(page.get_contents(), reader)
-    operation, pieces, start, at = None, [], None, None
-    for operands, operator in content.operations:
-        numbers = [float(o) for o in operands if isinstance(o, int | float)]
-        if operator == b"RG":
-            operation = OPERATIONS.index(by_colour[tuple(round(n, 3) for n in numbers)])
-        elif operator == b"m":
-            start = at = numbers
-        elif operator == b"l":
-            pieces.append((*at, *numbers))
-            at = numbers
-        elif operator == b"h":
-            pieces.append((*at, *start))
-            at = start
-        elif operator in (b"S", b"s"):
-            for piece in pieces:
-                yield (operation, *(n * POINT_MM for n in piece))
-            pieces = []
+    sheets = read_pdf(sheets_pdf(layout.toolpaths, "test"))
+    assert len(sheets) == len(layout.toolpaths)
+    for (size, found), toolpath in zip(sheets, layout.toolpaths, strict=True):
+        assert size == pytest.approx((toolpath.width_mm, toolpath.height_mm), abs=1e-3)
+        assert_same(found, toolpath, 1e-3)
 
 
 def test_hpgl(layout):
     for toolpath in layout.toolpaths:
-        text = sheet_hpgl(toolpath)
-        assert text.startswith("IN;")
-        assert text.rstrip().endswith("SP0;")
-        found, pen, at = [], None, (0, 0)
-        for word in re.findall(r"([A-Z]{2})([\d,]*);", text):
-            numbers = [int(n) for n in word[1].split(",") if n]
-            points = list(zip(numbers[::2], numbers[1::2], strict=False))
-            if word[0] == "SP":
-                pen = numbers[0]
-            elif word[0] == "PD":
-                for point in points:
-                    found.append((pen - 1, *at, *point))
-                    at = point
-            elif word[0] == "PU" and points:
-                at = points[-1]
-        found = [(o, *(n / UNITS_PER_MM for n in rest)) for o, *rest in found]
+        found = read_hpgl(sheet_hpgl(toolpath))
         assert_same(found, toolpath, 0.5 / UNITS_PER_MM + 1e-9)
 
 
