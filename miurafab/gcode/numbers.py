@@ -7,14 +7,20 @@ controller must round as it does; a program that is only read back uses plain ``
 
 from __future__ import annotations
 
-from ctypes import c_float
+import math
+from struct import Struct
 
 _DIGITS = 8
+_pack, _unpack = Struct("=f").pack, Struct("=f").unpack
 
 
 def single(value: float) -> float:
     """``value`` rounded to the nearest 32-bit float; beyond the range, infinity."""
-    return float(c_float(value).value)
+    try:
+        rounded: float = _unpack(_pack(value))[0]
+    except OverflowError:
+        return math.copysign(math.inf, value)
+    return rounded
 
 
 def read_single(text: str) -> float:
