@@ -51,7 +51,7 @@ class Dialect:
     into the line. ``errors`` and ``alarms`` are words for the codes, None for bare numbers;
     ``settings`` those that ``$$`` lists with their remarks, None for all of GRBL 1.1's without;
     ``report_mask`` is $10 as it is born. ``deaf_writes``: what comes while a setting is stored is
-    lost.
+    lost. With ``program_flow``, ``$G`` tells M0 and ends its rates in a point.
     """
 
     banner: str
@@ -70,6 +70,7 @@ class Dialect:
     realtime: Mapping[int, str] = field(default_factory=lambda: MappingProxyType(_1_1_BYTES))
     keeps_high_bytes: bool = False
     commas: bool = False
+    program_flow: bool = False
     report_mask: int = 1
     jogs: bool = True
     sleeps: bool = True
@@ -173,6 +174,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             ),
             keeps_high_bytes=True,
             commas=True,
+            program_flow=True,
             report_mask=3,
             jogs=False,
             sleeps=False,

@@ -101,6 +101,7 @@ def modes(machine: Machine) -> str:
     parser = machine.parser
     probing = parser.motion in PROBES
     motion = f"38.{PROBES.index(parser.motion) + 2}" if probing else str(parser.motion)
+    point = "." if machine.dialect.program_flow else ""
     words = [
         f"G{motion}",
         f"G{54 + parser.offset}",
@@ -108,11 +109,12 @@ def modes(machine: Machine) -> str:
         f"G{21 - parser.inches}",
         f"G{90 + parser.distance}",
         f"G{94 - parser.inverse_time}",
+        *(["M0"] if machine.dialect.program_flow else []),
         f"M{parser.spindle or 5}",
         f"M{8 if parser.coolant else 9}",
         f"T{parser.tool}",
-        f"F{rate(machine, parser.feed)}",
-        f"S{number(parser.speed, 0)}",
+        f"F{rate(machine, parser.feed)}{point}",
+        f"S{number(parser.speed, 0)}{point}",
     ]
     return machine.dialect.modes.format(" ".join(words))
 

@@ -63,7 +63,7 @@ def test_what_0_9_says_is_in_words_and_commas() -> None:
     assert said(device, b"G1X5\n") == ["error: Undefined feed rate"]
     assert said(device, b"G2X5F100\n") == ["error: Invalid gcode ID:35"]
     assert parse_reply("error: Undefined feed rate") == Error(None, "Undefined feed rate")
-    assert said(device, b"$G\n")[0] == "[G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]"
+    assert said(device, b"$G\n")[0] == "[G0 G54 G17 G21 G90 G94 M0 M5 M9 T0 F0. S0.]"
     assert said(device, b"$I\n") == ["[0.9j.20160303:]", "ok"]
     listed = said(device, b"$$\n")
     assert listed[0] == "$0=10 (step pulse, usec)"
