@@ -23,7 +23,7 @@ from miurafab.fabrication.thinning import CoverSearch
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
-_EFFORT, _EFFORT_EACH = 1000.0, 1.5
+_EFFORT, _EFFORT_EACH = 500.0, 1.5
 """Evaluations in a search for one patch less, at most, and for one facet; more facets get more in
 all and fewer each.
 """
