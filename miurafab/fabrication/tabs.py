@@ -158,6 +158,7 @@ def tab_regions(
     the facet; without it every tab is computed as if alone, which only makes it larger.
     """
     mate, count = seams.faces[:, 1], len(seams)
+    ends_of = pattern.edges_vertices[seams.edges[:, 1]]
     a, _, frame = _frames(pattern, seams.edges[:, 1], mate)
 
     corners = pattern.faces_vertices[mate]
@@ -201,6 +202,16 @@ def tab_regions(
         limit = offset[:, k] + inset * np.linalg.norm(towards, axis=1)
         points, sides = clip_convex(points, sides, towards, np.where(shared, limit, NO_LIMIT))
     points, sides = _base_first(points, sides)
+    # Where the facet is not convex at an end of its side, the line of the side runs on inside it.
+    length = np.linalg.norm(np.diff(pattern.vertices_coords[ends_of], axis=1)[:, 0], axis=1)
+    for way, reach_out, limit in (
+        (1.0, points[:, 0, 0] < -1e-9, zero),
+        (-1.0, points[:, 1, 0] > length + 1e-9, -length),
+    ):
+        normals = np.broadcast_to(np.array([way, 0.0]), (count, 2))
+        over = (sides >= 3) & reach_out
+        points, sides = clip_convex(points, sides, normals, np.where(over, limit, NO_LIMIT))
+        points, sides = _base_first(points, sides)
     if material.tabs.max_angle < math.pi and not full_facet:
         free = np.zeros(count, dtype=bool) if raised is None else raised
         points, sides = _not_steeper(points, sides, material.tabs.max_angle, free)

@@ -375,3 +375,11 @@ def test_what_is_written_of_anything_reads_back_the_same(pattern, size, material
         ]
         assert_same(found, path, 1e-3)
         assert (visited >= -1e-9).all()
+
+
+@pytest.mark.parametrize("side", ["upper", "lower"])
+def test_tabs_on_facets_that_are_not_convex_stand_on_their_own_edge(side):
+    """The line of an edge runs on inside such a facet, and a whole facet's tab with it."""
+    options = LayoutOptions(seam_columns=(1,), tab_side=side, tab_angle=2.22, full_facet=True)
+    material = replace(flat_patterns.card(kerf=0.35), tabs=TabRule(26.4, 1.68))
+    assert check(RINGS[0], (161.5, 198.26), material, options) is not None
