@@ -68,9 +68,11 @@ def measure(case: str) -> tuple[dict[str, Any], CreasePattern, np.ndarray]:
     seen: dict[str, Any] = {}
     improved = patches.improved
 
-    def watched(pattern: CreasePattern, patch: np.ndarray, *rest: Any) -> np.ndarray:
+    def watched(
+        pattern: CreasePattern, patch: np.ndarray, *rest: Any, straight: bool
+    ) -> np.ndarray:
         seen["before"], seen["search"] = patch, time.process_time()
-        found = improved(pattern, patch, *rest)
+        found = improved(pattern, patch, *rest, straight=straight)
         seen["search"] = time.process_time() - seen["search"]
         return found
 

@@ -4,7 +4,7 @@ Covers with fewer and fewer frames are looked for, beginning with the frames of 
 are and with brickwork (:mod:`~miurafab.fabrication.thinning`). Each facet goes to the frame that it
 lies deepest in, and the seams are then cut between the frames (:mod:`~miurafab.fabrication.cuts`).
 The result counts only if every facet and every tab is inside the frame of its patch and every patch
-is a disk; else the split stays as it was, but for its seams.
+is a disk; else the split stays as it was, but for its seams where they followed no grid.
 """
 
 from __future__ import annotations
@@ -51,12 +51,15 @@ def improved(
     depth: float,
     material: Material,
     options: LayoutOptions,
+    *,
+    straight: bool,
 ) -> NDArray[np.int64]:
     """(F,) a split no worse than ``patch`` (F,), ids from 0, of which the lower one bears tabs.
 
     Patches lie within one ``part`` (F,) of the pattern each, and patches of a lower part have lower
     numbers. ``size`` is that of the bed in mm, ``ring`` the tabs that stand on the border of the
-    pattern, and no tab stands out of its facet by more than ``depth`` mm.
+    pattern, and no tab stands out of its facet by more than ``depth`` mm. ``straight`` seams, along
+    the lines of a grid, are the easiest to glue: they stay as they are unless a patch is saved.
     """
     room = _room(pattern, ring)
     alternate = options.tab_side == "alternate"
@@ -87,6 +90,8 @@ def improved(
         if found is not None:
             break
     else:
+        if straight:
+            return patch
         found = recut(patch, _frames(room, patch, np.arange(len(patch)), size))
         if found is not None and _seam_mm(pattern, found) >= _seam_mm(pattern, patch):
             found = None

@@ -120,8 +120,17 @@ def split(
             for a0, a1, b0, b1 in split_grid(here, *small):
                 found[block[a0:a1, b0:b1]] = count
                 count += 1
-    size = (width, height)
-    found = improved(pattern, found, part, size, ring, depth, material, options)
+    found = improved(
+        pattern,
+        found,
+        part,
+        (width, height),
+        ring,
+        depth,
+        material,
+        options,
+        straight=cells is not None,
+    )
     found = _without_overlaps(pattern, found, reach, width, height)
     return found.max() - found if turned else found
 
