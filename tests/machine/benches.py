@@ -175,5 +175,8 @@ class Terminal:
 def children(process: subprocess.Popen[str]) -> list[int]:
     """The processes that ``process`` has started (Linux)."""
     task = Path(f"/proc/{process.pid}/task")
-    pids = [pid for each in task.iterdir() for pid in (each / "children").read_text().split()]
+    pids: list[str] = []
+    for thread in task.iterdir():
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # it ended meanwhile
+            pids += (thread / "children").read_text().split()
     return [int(pid) for pid in pids]
