@@ -239,3 +239,33 @@ def test_nothing_is_left_running(nc: Path) -> None:
     assert len(seen) == 1
     assert not any(Path(f"/proc/{pid}").exists() for pid in seen)
     end(bench)
+
+
+def test_an_odd_file_is_cut_like_a_plain_one(nc: Path) -> None:
+    lines = JOB.text.splitlines()
+    for index in range(6, len(lines), 80):
+        lines.insert(index, "G10 L2 P2 X1 Y1")  # stored while other lines are on their way
+    for index, line in enumerate(lines):
+        bare = line.replace(" ", "")
+        if line.startswith("G1 X") and "." not in bare and index % 3 == 0:
+            lines[index] = line.replace(" S", "." + "0" * (78 - len(bare)) + " S")
+    assert 79 in {len(line.replace(" ", "")) for line in lines}
+    nc.write_text("".join(f"{line} ; careful! schön? ~\r\n" for line in lines), newline="")
+    bench = Bench(speed=4)
+    process = bench.cut(nc, "--at", "0,0", "--quiet")
+    assert "miurafab:" not in bench.finish(process, 60)
+    assert process.returncode == 0
+    assert bench.device.lost_bytes == 0
+    counts = burnt(JOB, [bench.device.beam_log])
+    assert all(counts[index] + counts[1000 + index] == 1 for index in range(STROKES))
+
+
+@pytest.mark.parametrize("length", [80, 100, 200])
+def test_a_line_too_long_is_refused_and_nothing_sent(length: int, nc: Path) -> None:
+    nc.write_text(JOB.text + "G1 X5." + "0" * (length - 5) + "\n")
+    bench = Bench()
+    process = bench.cut(nc, "--at", "0,0", "--quiet")
+    assert f"{length} " in words(bench.finish(process, 60))
+    assert process.returncode == 2
+    assert not bench.device.beam_log
+    assert bench.device.state == "Idle"
