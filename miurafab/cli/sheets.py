@@ -49,6 +49,13 @@ def sheets(
     seam_columns: Annotated[
         str | None, typer.Option(help="Columns of facets after which to cut in any case.")
     ] = None,
+    open_row: Annotated[
+        int | None,
+        typer.Option(help="Open a closed ring after this row of facets, and count rows from it."),
+    ] = None,
+    open_column: Annotated[
+        int | None, typer.Option(help="The same along columns of facets.")
+    ] = None,
     tab_height: Annotated[
         str | None, typer.Option(help="Height of the tabs [default: the material's].")
     ] = None,
@@ -124,6 +131,8 @@ def sheets(
         "max_patch": max_patch,
         "seam_rows": seam_rows,
         "seam_columns": seam_columns,
+        "open_row": open_row,
+        "open_column": open_column,
         "tab_height": tab_height,
         "tab_inset": tab_inset,
         "tab_angle": tab_angle,

@@ -50,7 +50,9 @@ class LayoutOptions:
     ``gap_mm`` is kept between patches on a sheet. ``offcuts_mm`` (longer, shorter side) are left
     over from other jobs and used up before whole sheets. ``max_patch_mm`` (longer, shorter side)
     limits patches more than the bed does. ``seam_rows`` and ``seam_columns`` are lines of the
-    vertex grid along which the pattern is cut in any case, from 1.
+    vertex grid along which the pattern is cut in any case, from 1. ``open_row`` and ``open_column``
+    are the lines along which a closed ring is opened, None for those where it is open already; the
+    other lines are counted from there.
 
     ``tab_height_mm``, ``tab_inset_mm`` and ``tab_angle`` (rad, the largest inner angle at the base)
     stand in for the material's. ``tab_side`` says which
@@ -69,6 +71,8 @@ class LayoutOptions:
     max_patch_mm: tuple[float, float] | None = None
     seam_rows: tuple[int, ...] = ()
     seam_columns: tuple[int, ...] = ()
+    open_row: int | None = None
+    open_column: int | None = None
     tab_height_mm: float | None = None
     tab_inset_mm: float | None = None
     tab_angle: float | None = None
@@ -92,6 +96,9 @@ def read_options(table: Table, folder: Path = Path()) -> LayoutOptions:
     def length_or_none(key: str, low: float) -> float | None:
         return table.length(key, low=low, high=100) if table.has(key) else None
 
+    def line_or_none(key: str) -> int | None:
+        return table.whole(key, low=1, high=10**6) if table.has(key) else None
+
     bridges = table.whole("bridges", usual.bridges, low=0, high=12)
     if bridges == 1:
         raise table.fault("bridges", "is 1, on which a piece would swing; use 0, or 2 and more")
@@ -101,6 +108,8 @@ def read_options(table: Table, folder: Path = Path()) -> LayoutOptions:
         max_patch_mm=_size(table, "max_patch"),
         seam_rows=_lines(table, "seam_rows"),
         seam_columns=_lines(table, "seam_columns"),
+        open_row=line_or_none("open_row"),
+        open_column=line_or_none("open_column"),
         tab_height_mm=length_or_none("tab_height", 0.5),
         tab_inset_mm=length_or_none("tab_inset", 0.0),
         tab_angle=table.angle("tab_angle", 0.0, low=0.1, high=math.pi)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from miurafab.fabrication.framing import DIGITS, Framed, Patch, copied, frame_patches
 from miurafab.fabrication.labels import Lettering, place_texts
 from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, check_engine, nest, turned
+from miurafab.fabrication.opening import opened
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.ordering import Strokes, corner_of, order_strokes
 from miurafab.fabrication.pieces import Pieces
@@ -109,7 +110,8 @@ class NestingRecord:
 @dataclass(frozen=True, eq=False)
 class Layout:
     """A pattern on sheets. ``toolpaths`` holds one for each sheet and ``backs`` one for each back
-    that is worked on; both are empty if the layout was read from a file.
+    that is worked on; both are empty if the layout was read from a file. ``pattern`` is the one
+    whose facets and edges it names, opened where that was asked; None if it was read from a file.
 
     ``untabbed`` are the pattern edges of seams on which no tab could stand, ``unlettered`` is how
     many names and numbers found no room, and ``remarks`` are sentences on what else could not be
@@ -127,6 +129,7 @@ class Layout:
     remarks: tuple[str, ...] = ()
     toolpaths: tuple[Toolpath, ...] = ()
     backs: tuple[Toolpath, ...] = ()
+    pattern: CreasePattern | None = None
 
     @property
     def copies(self) -> int:
@@ -156,7 +159,8 @@ def lay_out(
     *,
     options: LayoutOptions | None = None,
 ) -> Layout:
-    """The pattern laid out on sheets of the machine's bed as ``options`` want it.
+    """The pattern, opened if that is asked, laid out on sheets of the machine's bed as ``options``
+    want it.
 
     Deterministic, unless an outside engine nests or the time for nesting is over. Raises
     :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed, or is not a simple
@@ -166,6 +170,7 @@ def lay_out(
     options = options or LayoutOptions()
     wanted = options.nesting
     check_engine(wanted.engine)
+    pattern = opened(pattern, options)
     material = _with_own_tabs(material, options)
     stock = lay_stock(options, machine.bed, material.grain)
     framed = frame_patches(pattern, stock, material, options)
@@ -217,6 +222,7 @@ def lay_out(
         remarks=remarks + nesting.remarks,
         toolpaths=toolpaths,
         backs=behind,
+        pattern=pattern,
     )
 
 

@@ -32,7 +32,7 @@ def unfold(
 ) -> CreasePattern:
     """The crease pattern of ``tessellation``, rows along x, in the first quadrant."""
     grid = tessellation.grid
-    flat = _turned_upright(_develop(tessellation.points))
+    flat = turned_upright(_develop(tessellation.points))
     folded = tessellation.vertices
     edges = grid.edges_vertices
     angle = grid_fold_angles(folded, grid)
@@ -142,7 +142,7 @@ def _unit(angle: Floats) -> Floats:
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
-def _turned_upright(flat: Floats) -> Floats:
+def turned_upright(flat: Floats) -> Floats:
     """The mean row direction along x, and the lower left of the bounding box at the origin."""
     heading = flat[:, -1] - flat[:, 0]
     mean = heading.sum(axis=0)

@@ -2,7 +2,8 @@
 
 ``layout.json`` is written last and removed first, so that a directory with a layout is whole and
 one that was interrupted is no job. The pattern, and a machine or material of the user's own, are
-copied in: the directory can be carried to the machine's computer and cut there.
+copied in: the directory can be carried to the machine's computer and cut there. A ring that was
+opened for the job is in it as it was laid out, under a name of its own.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from miurafab.fabrication.options import LayoutOptions, read_options
 from miurafab.fabrication.sheets import Layout, lay_out
 from miurafab.gcode.job import Job
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fold_format import read_fold
+from miurafab.origami.fold_format import fold_text, read_fold
 from miurafab.posting import post
 from miurafab.profiles import (
     MachineProfile,
@@ -39,6 +40,8 @@ from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 
 LAYOUT = "layout.json"
 GUIDE = "assembly.pdf"
+OPENED = "-opened"
+"""What the name of a pattern that was opened for the job ends in."""
 Progress = Callable[[float, str], None]
 
 
@@ -106,8 +109,9 @@ def write_job(
     tell = on_progress or (lambda fraction, note: None)
     tell(0.0, "patches, tabs, perforation, nesting")
     profile, stock = load_machine(machine), load_material(material)
-    pattern = read_fold(pattern_file)
-    layout = lay_out(pattern, profile, stock, options=options)
+    given = read_fold(pattern_file)
+    layout = lay_out(given, profile, stock, options=options)
+    pattern = layout.pattern or given
     labels = {patch.id: patch.label for patch in layout.patches}
     make_room(directory)
     jobs, dry_runs = [], []
@@ -127,7 +131,10 @@ def write_job(
     guide = assembly_guide(layout, pattern, profile, stock, pattern_file.stem)
     (directory / GUIDE).write_bytes(guide)
     copy = directory / pattern_file.name
-    if copy.resolve() != pattern_file.resolve():
+    if pattern is not given:
+        copy = directory / f"{pattern_file.stem}{OPENED}.fold"
+        write_text(copy, fold_text(pattern, pattern_file.stem))
+    elif copy.resolve() != pattern_file.resolve():
         shutil.copyfile(pattern_file, copy)
     keep_own_profile("firmware_profiles", machine, directory)
     keep_own_profile("materials", material, directory)
