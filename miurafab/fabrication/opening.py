@@ -76,7 +76,7 @@ def open_ring(pattern: CreasePattern, axis: int, line: int) -> CreasePattern:
     if miss > COINCIDENT * float(np.linalg.norm(np.ptp(pattern.folded_coords, axis=0))):
         raise LayoutError(
             f"{refused}laid on each other in the flat pattern, its two ends differ by up to "
-            f"{miss:.2g} mm."
+            f"{miss:.3g} mm."
         )
     edges, joint, ends = _edges(parts, axis, line)
     letters, angles = pattern.edges_assignment[edges], pattern.edges_fold_angle[edges]

@@ -117,6 +117,8 @@ def all_options(draw):
         max_patch_mm=draw(st.none() | pair),
         seam_rows=draw(st.just(()) | lines),
         seam_columns=draw(st.just(()) | lines),
+        open_row=draw(st.sampled_from([None] * 15 + [1, 2, 5])),
+        open_column=draw(st.sampled_from([None] * 20 + [2])),
         tab_height_mm=draw(st.none() | sizes(0.5, 20.0)),
         tab_inset_mm=draw(st.none() | sizes(0.0, 2.0)),
         tab_angle=draw(st.none() | sizes(0.2, 3.14)),
@@ -319,6 +321,7 @@ def check(pattern, size, material, options):
         assert_refusal_is_clear(str(refusal), pattern, usable)
         return None
     assert not oversize, "a facet larger than the bed must be named"
+    pattern = layout.pattern
     assert_tabs(pattern, layout)
     assert_strokes(pattern, material, options, layout)
     assert_sheets(machine, options, layout)
