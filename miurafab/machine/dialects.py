@@ -6,22 +6,15 @@ of these asks here by the machine's profile.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl
-from miurafab.machine.delivery import Delivery
+from miurafab.machine.delivery import Delivery, Errand
 from miurafab.machine.grbl_delivery import NOT_CONFIRMED, WAS_RESET, GrblDelivery
-from miurafab.machine.journal import Journal
-from miurafab.machine.keys import Keys
 from miurafab.machine.marlin_delivery import NOT_CONFIRMED as NOT_HALTED
 from miurafab.machine.marlin_delivery import WAS_HALTED, MarlinDelivery, MarlinWire
-from miurafab.machine.planning import Plan
 from miurafab.machine.plotter_delivery import NOT_TOLD, PEN_SENT_UP, PlotterDelivery, send_up
-from miurafab.machine.progress import Progress
 from miurafab.machine.session import Session
-from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import (
     VIRTUAL,
     Device,
@@ -64,23 +57,12 @@ def keeps_journal(machine: MachineProfile) -> bool:
     return machine.dialect != "hpgl"
 
 
-def delivery_of(
-    plan: Plan,
-    transport: FlowTransport,
-    transcript: Transcript | None,
-    journal: Journal | None,
-    on_progress: Callable[[Progress], None] | None,
-    keys: Keys,
-    check: Callable[[], None],
-) -> Delivery:
-    """How ``plan`` is delivered; ``check`` raises what should interrupt it."""
-    machine = plan.machine
-    if machine.dialect == "marlin":
-        return MarlinDelivery(plan, transport, transcript, journal, on_progress, keys, check)
-    if machine.dialect == "hpgl":
-        return PlotterDelivery(plan, transport, transcript, on_progress, keys, check)
-    session = Session(transport, Connection(machine.controller.rx_bytes), transcript, check)
-    return GrblDelivery(plan, session, transcript, journal, on_progress, keys)
+def delivery_of(errand: Errand) -> Delivery:
+    """How the errand's plan is delivered to its machine."""
+    return _DELIVERIES.get(errand.plan.machine.dialect, GrblDelivery)(errand)
+
+
+_DELIVERIES: dict[str, type[Delivery]] = {"marlin": MarlinDelivery, "hpgl": PlotterDelivery}
 
 
 def make_safe(machine: MachineProfile, transport: FlowTransport) -> str:

@@ -11,27 +11,24 @@ behind up to seconds of burning.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from miurafab.errors import ControllerError, MiurafabError
 from miurafab.gcode.job import prepare_lines
 from miurafab.gcode.moves import BEAM_M3
-from miurafab.grbl.events import Error, Event, Ok, Options, StatusReport
+from miurafab.grbl.connection import Connection
+from miurafab.grbl.events import Error, Ok, Options, StatusReport
 from miurafab.grbl.settings import Settings
 from miurafab.grbl.streamer import LineRefused, Streamer
-from miurafab.machine.delivery import Delivery
-from miurafab.machine.journal import Journal
-from miurafab.machine.keys import ABORT, Keys, NoKeys, keys_of
-from miurafab.machine.planning import Plan
+from miurafab.machine.delivery import Delivery, Errand
+from miurafab.machine.keys import NoKeys
 from miurafab.machine.preflight import (
     check_settings,
     check_status,
     check_travel,
     raise_findings,
 )
-from miurafab.machine.progress import JobAborted, Progress, StreamResult
+from miurafab.machine.progress import JobAborted
 from miurafab.machine.session import ANSWER_S, Session
-from miurafab.machine.transcript import Transcript
 
 WAS_RESET = "the controller was reset and reports the beam off"
 NOT_CONFIRMED = (
@@ -47,55 +44,36 @@ _KEY_S = 0.01  # between two looks at the keyboard, if there is one
 class GrblDelivery(Delivery):
     """One job on its way over one session."""
 
-    def __init__(
-        self,
-        plan: Plan,
-        session: Session,
-        transcript: Transcript | None,
-        journal: Journal | None,
-        on_progress: Callable[[Progress], None] | None,
-        keys: Keys,
-    ) -> None:
-        super().__init__(plan, transcript, journal)
-        self._keys = keys
-        self._patience = math.inf if isinstance(keys, NoKeys) else _KEY_S
-        self._orders: list[bytes] = []
-        self._session = session
-        self._on_progress = on_progress
-        self._begin = 0.0
+    def __init__(self, errand: Errand) -> None:
+        super().__init__(errand)
+        plan, controller = errand.plan, errand.plan.machine.controller
+        self._patience = math.inf if isinstance(errand.keys, NoKeys) else _KEY_S
+        self._session = Session(
+            errand.transport, Connection(controller.rx_bytes), errand.transcript, errand.check
+        )
         self._streamer = Streamer(
-            session.connection,
+            self._session.connection,
             plan.job.name,
-            prepare_lines(plan.job.name, plan.job.iter_lines(), plan.machine.controller.line_chars),
-            send_response=plan.machine.controller.streaming == "send-response",
+            prepare_lines(plan.job.name, plan.job.iter_lines(), controller.line_chars),
+            send_response=controller.streaming == "send-response",
             collect_refusals=plan.check_mode,
         )
+        self.refusals = self._streamer.refusals
+
+    @property
+    def acknowledged(self) -> int:
+        """See :class:`Delivery`."""
+        return self._streamer.acknowledged
+
+    @property
+    def line(self) -> int:
+        """See :class:`Delivery`."""
+        return self._streamer.last.number if self._streamer.last else 0
 
     # The way through
 
-    def run(self) -> StreamResult:
+    def meet(self) -> tuple[str, ...]:
         """See :class:`Delivery`."""
-        remarks = self.plan.remarks + self._meet()
-        session, streamer = self._session, self._streamer
-        self.at_risk = True
-        if self.plan.check_mode:
-            session.command("$C")
-        self._begin = session.now()
-        self._stream()
-        seconds = session.now() - self._begin
-        if self.plan.check_mode:
-            session.stop()
-        elif self.plan.machine.tool.kind == "laser" and session.wait_status().beam_on:
-            session.stop()
-            remarks += ("The job ended with the laser armed, so the controller was reset.",)
-        self.at_risk = False
-        if self.journal is not None:
-            self.journal.ended("done", f"{streamer.acknowledged} lines acknowledged, then idle")
-        remarks += self.close_records()
-        return StreamResult(streamer.acknowledged, seconds, tuple(streamer.refusals), remarks)
-
-    def _meet(self) -> tuple[str, ...]:
-        """Greet the controller and make all checks that need it; the sentences forced."""
         plan, session = self.plan, self._session
         session.greet()
         if plan.home:
@@ -113,9 +91,14 @@ class GrblDelivery(Delivery):
         findings = list(check_settings(plan.machine, settings))
         if plan.program is not None:
             findings.extend(check_travel(plan.program, settings, session.work_offset))
-        return remarks + raise_findings(findings, plan.force)
+        remarks += raise_findings(findings, plan.force)
+        if plan.check_mode:
+            self.at_risk = True
+            session.command("$C")
+        return remarks
 
-    def _stream(self) -> None:
+    def stream(self) -> None:
+        """See :class:`Delivery`."""
         session, streamer = self._session, self._streamer
         poll_at = answered = session.now()
         asked_last = False  # whether a status was asked for after the last acknowledgement
@@ -137,38 +120,40 @@ class GrblDelivery(Delivery):
                 if isinstance(event, Ok | Error):
                     answered = session.now()
                 elif isinstance(event, StatusReport):
-                    self._report(event)
+                    self.tell(
+                        event.state,
+                        session.position,
+                        session.connection.in_flight_bytes,
+                        session.feed_override,
+                    )
                     if asked_last and event.state in ("Idle", "Check"):
                         return
                     if event.state in ("Hold", "Door"):
                         answered = session.now()
                     self._watch_for_loss(event, answered)
-            self._after(events)
-            self._obey()
+            if not events and session.now() - session.heard > ANSWER_S:
+                raise ControllerError(
+                    f"The controller has said nothing for {ANSWER_S:g} s, not even to status "
+                    f"queries, {streamer.where}."
+                )
+            self.attend()
 
-    def _obey(self) -> None:
-        """Do what was asked for at the keyboard."""
-        known = keys_of(self.plan.machine.dialect)
-        self._orders += [known[key] for key in self._keys.pressed() if key in known]
-        if ABORT in self._orders:
-            raise JobAborted(f"{self.plan.job.name} was stopped at the keyboard.")
+    def obey(self) -> None:
+        """Send ``orders``, unless the controller is deaf just now."""
         if not self._session.connection.writing_eeprom:
-            for order in self._orders:
+            for order in self.orders:
                 self._session.write(self._session.connection.send_realtime(order))
-            self._orders.clear()
+            self.orders.clear()
 
-    def _after(self, events: list[Event]) -> None:
-        session, streamer = self._session, self._streamer
-        if not events and session.now() - session.heard > ANSWER_S:
-            raise ControllerError(
-                f"The controller has said nothing for {ANSWER_S:g} s, not even to status queries, "
-                f"{streamer.where}."
-            )
-        if self.journal is not None and streamer.last is not None and events:
-            seconds = session.now() - self._begin
-            self.journal.taken(streamer.acknowledged, streamer.last.number, seconds)
-        for record in self.records:
-            record.check()
+    def part(self) -> tuple[str, ...]:
+        """See :class:`Delivery`."""
+        session = self._session
+        if self.plan.check_mode:
+            session.stop()
+        elif self.plan.machine.tool.kind == "laser" and session.wait_status().beam_on:
+            session.stop()
+            return ("The job ended with the laser armed, so the controller was reset.",)
+        return ()
 
     def _watch_for_loss(self, report: StatusReport, answered: float) -> None:
         """A controller that idles while it owes an answer never got the line whole."""
@@ -181,28 +166,7 @@ class GrblDelivery(Delivery):
                 "the cable and the baud rate."
             )
 
-    def _report(self, status: StatusReport) -> None:
-        if self._on_progress is not None:
-            session, streamer = self._session, self._streamer
-            self._on_progress(
-                Progress(
-                    streamer.acknowledged,
-                    self.plan.lines,
-                    session.now() - self._begin,
-                    status.state,
-                    session.position,
-                    session.connection.in_flight_bytes,
-                    streamer.last.number if streamer.last else 0,
-                    session.feed_override,
-                )
-            )
-
     # The other ways out
-
-    @property
-    def acknowledged(self) -> int:
-        """See :class:`Delivery`."""
-        return self._streamer.acknowledged
 
     def stop(self, error: MiurafabError | None) -> str:
         """See :class:`Delivery`."""

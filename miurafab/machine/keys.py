@@ -27,8 +27,8 @@ KEYS = {
 
 
 def keys_of(dialect: str) -> dict[str, bytes]:
-    """The keys that a firmware knows: GRBL 0.9 has no overrides, and takes their bytes for code."""
-    if dialect == "grbl-0.9":
+    """The keys that mean something to a machine: few have overrides as realtime bytes."""
+    if dialect in ("grbl-0.9", "marlin", "hpgl"):
         return {key: order for key, order in KEYS.items() if order in (HOLD, RESUME, ABORT)}
     return KEYS
 

@@ -18,11 +18,8 @@ from collections.abc import Callable, Iterator
 
 from miurafab.errors import ControllerError, MiurafabError, PortError
 from miurafab.gcode.job import SendLine, prepare_lines
-from miurafab.machine.delivery import Delivery
-from miurafab.machine.journal import Journal
-from miurafab.machine.keys import ABORT, HOLD, KEYS, RESUME, Keys
-from miurafab.machine.planning import Plan, longest_line
-from miurafab.machine.progress import JobAborted, Progress, StreamResult
+from miurafab.machine.delivery import Delivery, Errand
+from miurafab.machine.planning import longest_line
 from miurafab.machine.session import ANSWER_S, BANNER_S, HOMING_S
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
@@ -33,7 +30,6 @@ WAS_HALTED = "the controller was halted (M112) with the laser off; reset it befo
 NOT_CONFIRMED = (
     "the controller did not confirm that it halted, so switch the laser off at the machine"
 )
-_TELL_S = 0.2  # between two words to the user
 _LOOK_S = 0.05  # between two looks at the keys
 _SILENCES = 3  # the line is sent again after each but the last
 _KILL_S = 0.8  # from M112 to its answer
@@ -45,61 +41,43 @@ _NO_PARSER = (
 
 
 class MarlinDelivery(Delivery):
-    """See the module. ``check`` raises what should interrupt the conversation."""
+    """See the module."""
 
-    def __init__(
-        self,
-        plan: Plan,
-        transport: Transport,
-        transcript: Transcript | None,
-        journal: Journal | None,
-        on_progress: Callable[[Progress], None] | None,
-        keys: Keys,
-        check: Callable[[], None],
-    ) -> None:
-        super().__init__(plan, transcript, journal)
-        self._wire = MarlinWire(transport, transcript, check)
-        self._on_progress = on_progress
-        self._keys = keys
+    def __init__(self, errand: Errand) -> None:
+        super().__init__(errand)
+        self._wire = MarlinWire(errand.transport, errand.transcript, errand.check)
         self._taken = 0
         self._last = 0
-        self._held = False
-        self._tell_at = 0.0
 
     @property
     def acknowledged(self) -> int:
         """See :class:`~miurafab.machine.delivery.Delivery`."""
         return self._taken
 
-    def run(self) -> StreamResult:
+    @property
+    def line(self) -> int:
         """See :class:`~miurafab.machine.delivery.Delivery`."""
-        plan, wire = self.plan, self._wire
-        remarks = plan.remarks + self._meet()
-        self.at_risk = True
-        begin = self._tell_at = wire.now()
+        return self._last
+
+    def stream(self) -> None:
+        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        wire = self._wire
         for line in self._lines():
-            while self._held:
-                self._between(begin)
+            while self.held:
+                self.attend_and_tell()
                 wire.receive(_LOOK_S)
-            wire.send(line, lambda: self._between(begin), self._where)
+            wire.send(line, self.attend_and_tell, self._where)
             self._taken, self._last = self._taken + 1, line.number
-            if self.journal is not None:
-                self.journal.taken(self._taken, line.number, wire.now() - begin)
-            self._between(begin)
+            self.attend_and_tell()
         for code in (b"M400", b"M5"):
-            wire.send(SendLine(0, code), lambda: self._between(begin), self._where)
-        seconds = wire.now() - begin
-        self.at_risk = False
-        if self.journal is not None:
-            self.journal.ended("done", f"{self._taken} lines acknowledged, then at rest")
-        remarks += self.close_records()
-        return StreamResult(self._taken, seconds, (), remarks)
+            wire.send(SendLine(0, code), self.attend_and_tell, self._where)
 
     def _lines(self) -> Iterator[SendLine]:
         job = self.plan.job
         return prepare_lines(job.name, job.iter_lines(), longest_line(self.plan.machine))
 
-    def _meet(self) -> tuple[str, ...]:
+    def meet(self) -> tuple[str, ...]:
+        """See :class:`~miurafab.machine.delivery.Delivery`."""
         plan, wire = self.plan, self._wire
         wire.greet()
         said = wire.send(SendLine(0, b"M115"))
@@ -111,24 +89,6 @@ class MarlinDelivery(Delivery):
             wire.send(SendLine(0, b"G92X%.3fY%.3f" % plan.at))
         parser = any("EMERGENCY_PARSER:1" in reply.text for reply in said)
         return () if parser or plan.machine.tool.kind != "laser" else (_NO_PARSER,)
-
-    def _between(self, begin: float) -> None:
-        """What is looked after while an answer is awaited: keys, files, the user."""
-        for key in self._keys.pressed():
-            order = KEYS.get(key)
-            if order == ABORT:
-                raise JobAborted(f"{self.plan.job.name} was stopped at the keyboard.")
-            if order in (HOLD, RESUME):
-                self._held = order == HOLD
-        for record in self.records:
-            record.check()
-        now = self._wire.now()
-        if self._on_progress is not None and now >= self._tell_at:
-            self._tell_at = now + _TELL_S
-            state = "Hold" if self._held else "Run"
-            self._on_progress(
-                Progress(self._taken, self.plan.lines, now - begin, state, None, 0, self._last, 100)
-            )
 
     @property
     def _where(self) -> str:

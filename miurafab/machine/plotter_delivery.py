@@ -8,14 +8,8 @@ unless it knows ``ESC.K`` (:mod:`miurafab.plotter.stream`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from miurafab.errors import MiurafabError, PortError
-from miurafab.machine.delivery import Delivery
-from miurafab.machine.keys import ABORT, HOLD, KEYS, RESUME, Keys
-from miurafab.machine.planning import Plan
-from miurafab.machine.progress import JobAborted, Progress, StreamResult
-from miurafab.machine.transcript import Transcript
+from miurafab.machine.delivery import Delivery, Errand
 from miurafab.machine.transport import FlowTransport
 from miurafab.plotter.stream import PlotterStream
 
@@ -29,88 +23,67 @@ _PIECE = 64
 _MOST_WAITING = 128
 """Bytes that the driver may hold: so few that an end comes soon behind them."""
 _LOOK_S = 0.02
-_TELL_S = 0.2
 _STOP_S = 3.0  # how long an XOFF may hold up the last bytes
 
 
 class PlotterDelivery(Delivery):
-    """See the module. ``check`` raises what should interrupt it."""
+    """See the module."""
 
-    def __init__(
-        self,
-        plan: Plan,
-        transport: FlowTransport,
-        transcript: Transcript | None,
-        on_progress: Callable[[Progress], None] | None,
-        keys: Keys,
-        check: Callable[[], None],
-    ) -> None:
-        super().__init__(plan, transcript, None)
-        self._transport = transport
-        self._transcript = transcript
-        self._on_progress = on_progress
-        self._keys = keys
-        self._check = check
-        self._stream = PlotterStream(plan.job)
-        self._held = False
-        self._begin = transport.now()
-        self._tell_at = self._begin
+    def __init__(self, errand: Errand) -> None:
+        super().__init__(errand)
+        self._transport = errand.transport
+        self._transcript = errand.transcript
+        self._check = errand.check
+        self._stream = PlotterStream(errand.plan.job)
 
     @property
     def acknowledged(self) -> int:
         """The lines handed over, since nothing is acknowledged."""
         return self._stream.line
 
-    def run(self) -> StreamResult:
+    @property
+    def line(self) -> int:
+        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        return self._stream.line
+
+    @property
+    def state(self) -> str:
+        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        return "Hold" if self.held or self._stream.waits else "Run"
+
+    def stream(self) -> None:
         """See :class:`~miurafab.machine.delivery.Delivery`."""
         stream, transport = self._stream, self._transport
-        self._begin = self._tell_at = transport.now()
-        self.at_risk = True
         while not stream.finished:
             self._check()
             gone = 0
-            if not self._held:
+            if not self.held:
                 gone = self._hand_over(stream.next_bytes(_PIECE))
                 stream.took(gone)
             self._listen(0.0 if gone else _LOOK_S)
-            self._look()
-        while transport.waiting and self._check() is None:
+            self.attend_and_tell()
+        while transport.waiting:
+            self._check()
             self._listen(_LOOK_S)
-            self._look()
-        self.at_risk = False
-        remarks = (*self.plan.remarks, _GONE_ON, *self.close_records())
-        return StreamResult(self.plan.lines, transport.now() - self._begin, (), remarks)
+            self.attend_and_tell()
+
+    def part(self) -> tuple[str, ...]:
+        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        return (_GONE_ON,)
 
     def _hand_over(self, data: bytes) -> int:
         if not data or self._transport.waiting >= _MOST_WAITING:
             return 0
         count = self._transport.offer(data)
         if count and self._transcript is not None:
-            self._transcript.sent(self._transport.now() - self._begin, data[:count])
+            self._transcript.sent(self._seconds, data[:count])
         return count
 
     def _listen(self, timeout: float) -> None:
         data = self._transport.read(timeout)
         if data and self._transcript is not None:
-            self._transcript.came(self._transport.now() - self._begin, data)
+            self._transcript.came(self._seconds, data)
         self._stream.hear(data)
-
-    def _look(self) -> None:
-        for key in self._keys.pressed():
-            order = KEYS.get(key)
-            if order == ABORT:
-                raise JobAborted(f"{self.plan.job.name} was stopped at the keyboard.")
-            if order in (HOLD, RESUME):
-                self._held = order == HOLD
-        for record in self.records:
-            record.check()
-        now = self._transport.now()
-        if self._on_progress is not None and now >= self._tell_at:
-            self._tell_at = now + _TELL_S
-            state = "Hold" if self._held or self._stream.waits else "Run"
-            line = self._stream.line
-            seconds = now - self._begin
-            self._on_progress(Progress(line, self.plan.lines, seconds, state, None, 0, line, 100))
 
     def stop(self, error: MiurafabError | None) -> str:
         """See :class:`~miurafab.machine.delivery.Delivery`."""

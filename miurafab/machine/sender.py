@@ -17,6 +17,7 @@ from pathlib import Path
 
 from miurafab.errors import JobStopped, MiurafabError
 from miurafab.gcode.job import Job
+from miurafab.machine.delivery import Errand
 from miurafab.machine.dialects import delivery_of, keeps_journal, open_machine
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import Keys, NoKeys
@@ -149,7 +150,9 @@ def deliver(
             )
             at_end.callback(journal.close)
         delivery = delivery_of(
-            plan, transport, transcript, journal, on_progress, keys or NoKeys(), signals.check
+            Errand(
+                plan, transport, transcript, journal, on_progress, keys or NoKeys(), signals.check
+            )
         )
         # A signal between an exception and its handling would skip the handling, not this.
         at_end.callback(delivery.make_safe)
