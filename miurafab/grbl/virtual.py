@@ -19,7 +19,6 @@ from collections.abc import Iterable, Mapping
 
 from miurafab.errors import ProfileError
 from miurafab.grbl.settings import parse_dump
-from miurafab.grbl.virtual_beam import BeamSegment, standing_seconds
 from miurafab.grbl.virtual_cable import Cable
 from miurafab.grbl.virtual_dialect import DIALECTS
 from miurafab.grbl.virtual_faults import Fault
@@ -27,9 +26,8 @@ from miurafab.grbl.virtual_protocol import firmware
 from miurafab.grbl.virtual_settings import Settings
 from miurafab.grbl.virtual_state import Machine, Until, Wait
 from miurafab.motion import cpu
+from miurafab.motion.beam import BeamSegment
 from miurafab.motion.stepper import Processor
-
-__all__ = ["BeamSegment", "VirtualGrbl", "standing_seconds"]
 
 
 class VirtualGrbl:

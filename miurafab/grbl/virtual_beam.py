@@ -1,40 +1,14 @@
-"""What the virtual controller burnt: every stretch of time and way with the beam on."""
+"""The log of the virtual controller's beam, as its power changes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from miurafab.motion.beam import BeamSegment
 
 Point = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class BeamSegment:
-    """The beam on from ``t0`` to ``t1`` (s of virtual time), moving evenly from (``x0``, ``y0``)
-    to (``x1``, ``y1``) in machine mm (equal: standing still), at ``power``, the PWM duty in 0..1.
-    """
-
-    t0: float
-    t1: float
-    x0: float
-    y0: float
-    x1: float
-    y1: float
-    power: float
-
-    @property
-    def standing(self) -> bool:
-        """Whether the beam burnt in place."""
-        return self.x0 == self.x1 and self.y0 == self.y1
-
-
-def standing_seconds(log: Iterable[BeamSegment]) -> float:
-    """How long the beam stood still while on, all in all."""
-    return sum(segment.t1 - segment.t0 for segment in log if segment.standing)
-
-
 class BeamLog:
-    """Closes one :class:`BeamSegment` and opens the next at each change; ``pwm`` is 0..255."""
+    """Closes one segment and opens the next at each change; ``pwm`` is 0..255."""
 
     def __init__(self) -> None:
         self.segments: list[BeamSegment] = []

@@ -14,13 +14,14 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from typing import Any, Protocol
+from typing import Protocol
 
 import serial
 import serial.tools.list_ports
 
 from miurafab.errors import PortError
 from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.motion.beam import BeamSegment
 
 VIRTUAL = "virtual"
 """The port name of the controller in memory."""
@@ -182,7 +183,7 @@ class Device(Protocol):
         """Whether the cable is in."""
 
     @property
-    def beam_log(self) -> list[Any]:
+    def beam_log(self) -> list[BeamSegment]:
         """What it burnt or drew."""
 
     @property

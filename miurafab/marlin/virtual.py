@@ -20,7 +20,8 @@ from miurafab.gcode.faults import BlockFault
 from miurafab.gcode.marlin import grbl_words
 from miurafab.gcode.parser import ModalState, parse_block
 from miurafab.marlin.connection import checksum
-from miurafab.marlin.virtual_motion import Burn, Carriage
+from miurafab.marlin.virtual_motion import Carriage
+from miurafab.motion.beam import BeamSegment
 from miurafab.motion.parameters import MotionParameters
 
 QUEUE = 4
@@ -61,7 +62,7 @@ class VirtualMarlin:
         emergency_parser: bool = True,
     ) -> None:
         self.now = 0.0
-        self.beam_log: list[Burn] = []
+        self.beam_log: list[BeamSegment] = []
         self.lost_bytes = 0
         self.connected = True
         self.homed = 0

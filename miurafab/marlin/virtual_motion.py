@@ -9,32 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from miurafab.motion.beam import BeamSegment
 from miurafab.motion.parameters import MotionParameters
 from miurafab.motion.planner import Move, Planner
 
 _FIRST_MOVE_S = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class Burn:
-    """The beam on from ``t0`` to ``t1`` (s), from (``x0``, ``y0``) to (``x1``, ``y1``) in mm, at
-    ``power``, a fraction of full.
-    """
-
-    t0: float
-    t1: float
-    x0: float
-    y0: float
-    x1: float
-    y1: float
-    power: float
-
-    @property
-    def standing(self) -> bool:
-        """Whether the beam burnt in place."""
-        return self.x0 == self.x1 and self.y0 == self.y1
 
 
 class Carriage:
@@ -44,7 +24,7 @@ class Carriage:
     appended to ``log``.
     """
 
-    def __init__(self, parameters: MotionParameters, log: list[Burn]) -> None:
+    def __init__(self, parameters: MotionParameters, log: list[BeamSegment]) -> None:
         self.planner = Planner(parameters)
         self.due = math.inf
         self._parameters = parameters
@@ -115,14 +95,14 @@ class Carriage:
         if move.speed_word > 0 and now > begin:
             (x0, y0, _), (x1, y1, _) = self.place(begin), self.place(now)
             power = move.speed_word / self._parameters.s_max
-            self._log.append(Burn(begin, now, x0, y0, x1, y1, power))
+            self._log.append(BeamSegment(begin, now, x0, y0, x1, y1, power))
 
     def stand(self, now: float, power: float) -> None:
         """The beam is at ``power``, a fraction, from now on, whatever moves."""
         if self._standing is not None:
             x, y, _ = self.place(now)
             since, before = self._standing
-            self._log.append(Burn(since, now, x, y, x, y, before))
+            self._log.append(BeamSegment(since, now, x, y, x, y, before))
         self._standing = (now, power) if power > 0 else None
 
 

@@ -13,6 +13,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from miurafab.gcode.hpgl import MM_PER_UNIT
+from miurafab.motion.beam import BeamSegment
 from miurafab.plotter.stream import DROP_ALL, XOFF, XON
 
 _FULL, _ROOM = 0.8, 0.4
@@ -23,20 +24,10 @@ _TOKEN = re.compile(rb"\s*(?:([A-Za-z]{2})|([-+]?\d+(?:\.\d+)?)(?=[^\d.])|[^A-Za
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
-    """A line drawn with the pen down from ``t0`` to ``t1`` (s), in mm, with ``force`` (``FS``).
+class DrawnSegment(BeamSegment):
+    """A line drawn with the pen down, pressed on with ``force`` (``FS``)."""
 
-    ``power`` is that of a pen that is down.
-    """
-
-    t0: float
-    t1: float
-    x0: float
-    y0: float
-    x1: float
-    y1: float
     force: float
-    power: float = 1.0
 
 
 class VirtualPlotter:
@@ -44,7 +35,7 @@ class VirtualPlotter:
 
     def __init__(self, *, baud: int | None = None, rx_bytes: int = 1024) -> None:
         self.now = 0.0
-        self.beam_log: list[Drawn] = []
+        self.beam_log: list[BeamSegment] = []
         self.lost_bytes = 0
         self.connected = True
         self.knows_abort = True
@@ -189,6 +180,6 @@ class VirtualPlotter:
         seconds = math.dist(self.position, to) / (self._speed if self.pen_down else _SPEED)
         self._busy_until = self.now + seconds
         if self.pen_down and to != self.position:
-            drawn = Drawn(self.now, self._busy_until, *self.position, *to, self._force)
-            self.beam_log.append(drawn)
+            times = self.now, self._busy_until
+            self.beam_log.append(DrawnSegment(*times, *self.position, *to, 1.0, self._force))
         self.position = to

@@ -16,7 +16,8 @@ from miurafab.gcode.job import Job, prepare
 from miurafab.gcode.moves import Program
 from miurafab.gcode.program import parse_program
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import BeamSegment, VirtualGrbl
+from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.motion.beam import BeamSegment
 from miurafab.profiles import load_machine
 
 LASER = virtual_settings(load_machine("grbl-laser-400")) | {12: 0.01}

@@ -6,7 +6,8 @@ import pytest
 from virtual_player import LASER, RECORDED, play, ready
 
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import BeamSegment, VirtualGrbl, standing_seconds
+from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.motion.beam import BeamSegment, standing_seconds
 from miurafab.profiles import load_machine
 
 

@@ -12,7 +12,7 @@ from virtual_player import RECORDED, ready, stream, until_answer
 
 from miurafab.gcode.job import Job, prepare
 from miurafab.gcode.program import parse_program
-from miurafab.grbl.virtual import standing_seconds
+from miurafab.motion.beam import standing_seconds
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import MotionParameters
 

@@ -17,9 +17,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl, standing_seconds
+from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.virtual_server import PtyWire
+from miurafab.motion.beam import standing_seconds
 from miurafab.profiles import load_machine
 
 MACHINE = "grbl-laser-400"

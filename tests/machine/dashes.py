@@ -6,7 +6,7 @@ from collections import Counter
 
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program, strokes
-from miurafab.grbl.virtual import BeamSegment
+from miurafab.motion.beam import BeamSegment
 
 STROKES = 200
 

@@ -17,13 +17,14 @@ from miurafab.errors import GcodeError, InputError, JobStopped, MachineError
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program, strokes
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl, standing_seconds
+from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.journal import JournalRun, job_digest, read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import Resumption, resume
 from miurafab.machine.sender import deliver, stream_job
 from miurafab.machine.signals import StopSignals
+from miurafab.motion.beam import standing_seconds
 from miurafab.profiles import load_machine
 
 MACHINE = load_machine("grbl-laser-400")
