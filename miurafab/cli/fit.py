@@ -66,8 +66,9 @@ def fit(
     close: Annotated[
         str | None,
         typer.Option(
-            help="For surfaces of revolution: sector (of the angle given), open (all round but "
-            "one facet), or seam (all round, to be glued) [default: sector]."
+            help="For surfaces of revolution and the circular cylinder: sector (of the angle "
+            "given), open (all round but one facet), or seam (all round, to be glued) "
+            "[default: sector]."
         ),
     ] = None,
     follow: Annotated[

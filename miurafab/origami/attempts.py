@@ -136,6 +136,8 @@ class Plan:
         asked = request.flat_foldable is not None or plain.rank != (0, False)
         if request.polish == "off" or (request.polish == "auto" and not asked):
             return plain
+        if request.is_tube:
+            return plain  # polishing would open the seam
         if plain.measurements.overlaps:
             return plain  # so far from a sheet that polishing it is lost work
         closer = self._polished(request, unknowns, solution, plain)

@@ -55,10 +55,18 @@ def cylinder_on(
     ``amplitude`` is the height of the corrugation over the row spacing, ``zigzag`` the zig-zag
     over the column spacing. The zig-zag profile has its vertices evenly spaced along the curve,
     half the height above and below it; ``level`` lifts the sheet by that part of the height.
+
+    Around a closed profile, and with an odd number of ``rows``, the zig-zag comes round to where it
+    began: the sheet is a tube, its last row of vertices being its first.
     """
-    beyond = 1.0 / (rows - 1)
-    on_curve = surface.profile.evenly(rows + 2, -beyond, 1.0 + beyond)
-    tangent = np.gradient(on_curve, axis=0)
+    if surface.closed and rows % 2:
+        around = np.arange(-2, rows + 2) % (rows - 1)
+        on_curve = surface.profile.evenly(rows)[around]
+        on_curve, tangent = on_curve[1:-1], np.gradient(on_curve, axis=0)[1:-1]
+    else:
+        beyond = 1.0 / (rows - 1)
+        on_curve = surface.profile.evenly(rows + 2, -beyond, 1.0 + beyond)
+        tangent = np.gradient(on_curve, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
     spacing = float(np.linalg.norm(np.diff(on_curve, axis=0), axis=1).mean())

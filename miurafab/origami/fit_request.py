@@ -15,6 +15,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.polish import Follow
 from miurafab.origami.seed import Corrugation
 from miurafab.origami.unknowns import Unknowns
+from miurafab.surfaces.analytic import GeneralizedCylinder
 from miurafab.surfaces.surface import TargetSurface
 
 
@@ -73,6 +74,10 @@ class FitRequest:
             raise InputError(f"--follow is '{self.follow}'; it must be middle, top or bottom.")
         if self.polish not in ("auto", "on", "off"):
             raise InputError(f"--polish is '{self.polish}'; it must be auto, on or off.")
+        if self.is_tube and self.rows == 2:
+            raise InputError("A tube of 2 rows of facets has no inside; ask for 4 rows or more.")
+        if self.polish == "on" and self.is_tube:
+            raise InputError("--polish on would open the seam of a closed tube; leave it out.")
         if self.max_aspect is not None and not self.max_aspect > 1:
             raise InputError(f"--max-aspect is {self.max_aspect:g}; it must be greater than 1.")
         low, high = self.angles
@@ -87,6 +92,12 @@ class FitRequest:
         """The least and the greatest sector angle allowed, radians."""
         low = 0.0 if self.min_angle is None else self.min_angle
         return low, np.pi if self.max_angle is None else self.max_angle
+
+    @property
+    def is_tube(self) -> bool:
+        """Whether the sheet is built as a closed tube, whose first and last row are one."""
+        tube = isinstance(self.surface, GeneralizedCylinder) and self.surface.closed
+        return tube and self.rows % 2 == 0
 
     @property
     def exactly_flat_foldable(self) -> bool:

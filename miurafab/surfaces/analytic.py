@@ -21,6 +21,13 @@ class GeneralizedCylinder(ParametricSurface):
 
     profile: ProfileCurve = field(kw_only=True)
 
+    @property
+    def closed(self) -> bool:
+        """Whether the two ends of the profile meet, so that the surface is a tube."""
+        curve = self.profile.position(np.linspace(0.0, 1.0, 9))
+        gap, size = np.linalg.norm(curve[-1] - curve[0]), np.linalg.norm(np.ptp(curve, axis=0))
+        return bool(gap <= 1e-12 * size)
+
 
 def cylinder_over(profile: ProfileCurve, length: float) -> GeneralizedCylinder:
     """``profile`` in the (y, z) plane, extruded over ``length`` along x."""

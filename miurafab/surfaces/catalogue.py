@@ -115,7 +115,7 @@ _ENTRIES = (
         "a profile curve extruded; by default a circular arc",
         {
             "radius": _length(1.0, "radius of the arc"),
-            "angle": _angle(120, "angle of the arc", 355),
+            "angle": _angle(120, "angle of the arc", 360),
             "length": _length(1.5, "length of the extrusion"),
         },
         _arc_cylinder,

@@ -21,7 +21,7 @@ from miurafab.origami.fit import FitRequest
 from miurafab.origami.fold_format import read_fold, write_fold
 from miurafab.origami.polish import Follow
 from miurafab.profiles import Table, find_file, read_toml
-from miurafab.surfaces.analytic import Revolution
+from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
 from miurafab.surfaces.catalogue import make_surface, parse_target
 from miurafab.surfaces.mesh import MESH_SUFFIXES, MeshSurface, load_mesh
 from miurafab.surfaces.placement import Region
@@ -102,8 +102,12 @@ def _named(
         raise InputError(f"--close is '{close}'; it must be one of {', '.join(CLOSINGS)}.")
     if close == "sector":
         return surface, values
-    if not isinstance(surface, Revolution):
-        raise InputError(f"--close {close} needs a surface of revolution, and '{name}' is none.")
+    arc = isinstance(surface, GeneralizedCylinder) and "angle" in values and "profile" not in values
+    if not arc and not isinstance(surface, Revolution):
+        raise InputError(
+            f"--close {close} needs a surface of revolution or a circular cylinder, and this "
+            f"'{name}' is none."
+        )
     _, rows = parse_facets(given.get("facets") or DEFAULT_FACETS)
     if close == "seam" and rows % 2:
         raise InputError(

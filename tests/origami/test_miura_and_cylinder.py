@@ -9,11 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miurafab.errors import InputError
+from miurafab.fabrication.opening import open_ring
+from miurafab.fabrication.seams import ring_seams
+from miurafab.origami.audit import audit
 from miurafab.origami.constraints import OrigamiConstraints
 from miurafab.origami.cylinder import cylinder_on
+from miurafab.origami.fit import fit
 from miurafab.origami.miura import MiuraCell, regular_miura
+from miurafab.origami.tessellation import Tessellation
 from miurafab.surfaces.analytic import GeneralizedCylinder
 from miurafab.surfaces.catalogue import make_surface
+from miurafab.workflow.design import design
 
 
 @settings(max_examples=50)
@@ -50,3 +57,56 @@ def test_the_top_of_a_cylinder_lies_on_it() -> None:
     lower = sheet.points[0::2].reshape(-1, 3)
     gap = [np.linalg.norm(surface.closest_point(p) - p, axis=1).max() for p in (upper, lower)]
     assert gap[0] < 0.1 * gap[1]
+
+
+EGG = {"profile": [[0, -1], [0.9, -0.5], [0.7, 0.8], [0, 1.2], [-0.7, 0.8], [-0.9, -0.5], [0, -1]]}
+
+
+@pytest.mark.parametrize("given", [{"angle": "360deg"}, EGG], ids=["circle", "egg"])
+@pytest.mark.parametrize("level", [0.0, 0.5, -0.5])
+def test_around_a_closed_profile_the_sheet_is_a_tube(given, level) -> None:
+    """Its first and last row are one, and it is exact and flat-foldable there as everywhere."""
+    surface = make_surface("cylinder", given)[0]
+    assert isinstance(surface, GeneralizedCylinder)
+    assert surface.closed
+    sheet = cylinder_on(surface, 21, 41, 0.83, 1.4, level)
+    assert np.abs(sheet.points[0] - sheet.points[-1]).max() < 1e-12
+    further = Tessellation(np.concatenate([sheet.points[-21:-1], sheet.points[:21]]))
+    for each in (sheet, further):
+        constraints = OrigamiConstraints(each.grid, float(each.edge_lengths.mean()), True)
+        assert np.abs(constraints(each.vertices.ravel())[0]).max() < 4e-14
+
+
+def test_with_an_odd_number_of_facets_around_there_is_no_seam() -> None:
+    surface = make_surface("cylinder", {"angle": "360deg"})[0]
+    assert isinstance(surface, GeneralizedCylinder)
+    sheet = cylinder_on(surface, 21, 40, 0.83, 1.4)
+    assert np.linalg.norm(sheet.points[0] - sheet.points[-1], axis=1).min() > 0.05
+
+
+def test_a_tube_that_is_fitted_is_closed_wherever_it_is_opened() -> None:
+    asked = design("cylinder", facets="12x24", close="seam", flat_foldable="exact")
+    result = fit(asked.request)
+    assert result.status == "converged"
+    assert result.pattern is not None
+    for line in (None, 7):
+        pattern = result.pattern if line is None else open_ring(result.pattern, 0, line)
+        found = audit(pattern, asked.request.surface)
+        assert found.findings == ()
+        assert found.measurements.max_flat_foldability is not None
+        assert found.measurements.max_flat_foldability < 1e-12
+        assert len(ring_seams(pattern)) == 12
+
+
+@pytest.mark.parametrize(
+    ("target", "options", "why"),
+    [
+        ("cylinder", {"facets": "8x9"}, "needs an even number of rows of facets"),
+        ("cylinder", {"facets": "8x2"}, "A tube of 2 rows of facets has no inside"),
+        ("cylinder", {"polish": "on"}, "--polish on would open the seam of a closed tube"),
+        ("log-spiral", {}, "needs a surface of revolution or a circular cylinder"),
+    ],
+)
+def test_what_cannot_be_a_tube_is_refused(target, options, why) -> None:
+    with pytest.raises(InputError, match=why):
+        design(target, close="seam", **options)
