@@ -37,13 +37,8 @@ from miurafab.profiles import (
 )
 from miurafab.units import parse_length
 from miurafab.workflow.dry_run import dry_run
-from miurafab.workflow.job_directory import (
-    LAYOUT,
-    JobDirectory,
-    keep_own_profile,
-    make_room,
-    write_text,
-)
+from miurafab.workflow.job_directory import JobDirectory, write_text
+from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
 
 CHOICES = "calibration.json"
 GUIDE = "calibration.pdf"
@@ -71,45 +66,44 @@ def calibrate(machine: str, material: str, directory: Path) -> Calibration:
     sheet = calibration_sheet(profile, stock)
     toolpath = sheet.toolpath
     job = post_sections(sheet.sections, profile, patch_labels=sheet.labels)
-    make_room(directory)
-    timed = dry_run(SHEET, job, profile, (sheet.width_mm, sheet.height_mm))
-    write_text(directory / f"{SHEET}{profile.job_suffix}", job.text)
-    write_text(directory / f"{SHEET}.svg", sheet_svg(toolpath))
-    guide = calibration_guide(sheet, profile, stock, directory.name or str(directory))
-    (directory / GUIDE).write_bytes(guide)
-    coupon = fold_text(sheet.coupon, "Fold coupon")
-    write_text(directory / _COUPON, coupon)
-    keep_own_profile("firmware_profiles", machine, directory)
-    keep_own_profile("materials", material, directory)
-    choices = {
-        "schema": SCHEMA,
-        "machine": profile.name,
-        "material": stock.name,
-        "cells": [dataclasses.asdict(cell) for cell in sheet.cells],
-        "squares": [dataclasses.asdict(square) for square in sheet.squares],
-        "kerf_gauge": {"strips": STRIPS},
-    }
-    write_text(directory / CHOICES, json.dumps(choices, indent=1) + "\n")
-    layout = Layout(
-        machine=profile.name,
-        material=stock.name,
-        patches=(),
-        sheets=(Sheet(SHEET, sheet.width_mm, sheet.height_mm, ()),),
-        totals=Totals(
-            patches=0,
-            sheets=1,
-            seam_mm=0.0,
-            tabs=0,
-            density=0.0,
-            cut_mm=toolpath.length_of("cut"),
-            perforated_mm=toolpath.length_of("perforate"),
-            travel_mm=toolpath.travel_mm,
-            seconds=round(timed.seconds, 1),
-        ),
-        toolpaths=(toolpath,),
-    )
-    digest = hashlib.sha256(coupon.encode("utf-8")).hexdigest()
-    write_text(directory / LAYOUT, write_layout(layout, _COUPON, digest))
+    with job_files(directory) as staging:
+        keep_profiles(machine, material, directory, staging)
+        timed = dry_run(SHEET, job, profile, (sheet.width_mm, sheet.height_mm))
+        write_text(staging / f"{SHEET}{profile.job_suffix}", job.text)
+        write_text(staging / f"{SHEET}.svg", sheet_svg(toolpath))
+        guide = calibration_guide(sheet, profile, stock, directory.name or str(directory))
+        (staging / GUIDE).write_bytes(guide)
+        coupon = fold_text(sheet.coupon, "Fold coupon")
+        write_text(staging / _COUPON, coupon)
+        choices = {
+            "schema": SCHEMA,
+            "machine": profile.name,
+            "material": stock.name,
+            "cells": [dataclasses.asdict(cell) for cell in sheet.cells],
+            "squares": [dataclasses.asdict(square) for square in sheet.squares],
+            "kerf_gauge": {"strips": STRIPS},
+        }
+        write_text(staging / CHOICES, json.dumps(choices, indent=1) + "\n")
+        layout = Layout(
+            machine=profile.name,
+            material=stock.name,
+            patches=(),
+            sheets=(Sheet(SHEET, sheet.width_mm, sheet.height_mm, ()),),
+            totals=Totals(
+                patches=0,
+                sheets=1,
+                seam_mm=0.0,
+                tabs=0,
+                density=0.0,
+                cut_mm=toolpath.length_of("cut"),
+                perforated_mm=toolpath.length_of("perforate"),
+                travel_mm=toolpath.travel_mm,
+                seconds=round(timed.seconds, 1),
+            ),
+            toolpaths=(toolpath,),
+        )
+        digest = hashlib.sha256(coupon.encode("utf-8")).hexdigest()
+        write_text(staging / LAYOUT, write_layout(layout, _COUPON, digest))
     return Calibration(JobDirectory(directory, layout, profile, (job,), (timed,)), sheet)
 
 

@@ -1,7 +1,7 @@
 """The job directory: everything that one job is, on disk, in files that stand alone.
 
-``layout.json`` is written last and removed first, so that a directory with a layout is whole and
-one that was interrupted is no job. The pattern, and a machine or material of the user's own, are
+All files are put in place at once (:mod:`~miurafab.workflow.job_files`), so that a directory with a
+layout is whole. The pattern, and a machine or material of the user's own, are
 copied in: the directory can be carried to the machine's computer and cut there. A ring that was
 opened for the job is in it as it was laid out, under a name of its own.
 """
@@ -9,7 +9,6 @@ opened for the job is in it as it was laid out, under a name of its own.
 from __future__ import annotations
 
 import hashlib
-import json
 import shutil
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
@@ -29,16 +28,14 @@ from miurafab.posting import post
 from miurafab.profiles import (
     MachineProfile,
     Table,
-    find_file,
     load_machine,
     load_material,
     read_toml,
 )
-from miurafab.profiles.shipped import Kind, shipped_directory
-from miurafab.workflow.drawings import ENDINGS, PICTURE, drawings, read_formats
+from miurafab.workflow.drawings import drawings, read_formats
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
+from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
 
-LAYOUT = "layout.json"
 GUIDE = "assembly.pdf"
 OPENED = "-opened"
 """What the name of a pattern that was opened for the job ends in."""
@@ -110,36 +107,36 @@ def write_job(
     tell(0.0, "patches, tabs, perforation, nesting")
     profile, stock = load_machine(machine), load_material(material)
     given = read_fold(pattern_file)
-    layout = lay_out(given, profile, stock, options=options)
-    pattern = layout.pattern or given
-    labels = {patch.id: patch.label for patch in layout.patches}
-    make_room(directory)
-    jobs, dry_runs = [], []
-    for number, toolpath in enumerate(layout.passes):
-        tell(0.4 + 0.5 * number / len(layout.passes), f"drawing {toolpath.sheet}")
-        job = post(toolpath, profile, stock, patch_labels=labels)
-        jobs.append(job)
-        size = (toolpath.width_mm, toolpath.height_mm)
-        dry_runs.append(dry_run(toolpath.sheet, job, profile, size))
-        write_text(directory / f"{toolpath.sheet}{profile.job_suffix}", job.text)
-        write_text(directory / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
-    for name, content in drawings(layout, pattern, wanted, pattern_file.stem):
-        (directory / name).write_bytes(content)
-    seconds = round(float(sum(sheet.seconds for sheet in dry_runs)), 1)
-    layout = replace(layout, totals=replace(layout.totals, seconds=seconds))
-    tell(0.9, "drawing the assembly guide")
-    guide = assembly_guide(layout, pattern, profile, stock, pattern_file.stem)
-    (directory / GUIDE).write_bytes(guide)
-    copy = directory / pattern_file.name
-    if pattern is not given:
-        copy = directory / f"{pattern_file.stem}{OPENED}.fold"
-        write_text(copy, fold_text(pattern, pattern_file.stem))
-    elif copy.resolve() != pattern_file.resolve():
-        shutil.copyfile(pattern_file, copy)
-    keep_own_profile("firmware_profiles", machine, directory)
-    keep_own_profile("materials", material, directory)
-    digest = hashlib.sha256(copy.read_bytes()).hexdigest()
-    write_text(directory / LAYOUT, write_layout(layout, copy.name, digest))
+    with job_files(directory) as staging:
+        keep_profiles(machine, material, directory, staging)
+        layout = lay_out(given, profile, stock, options=options)
+        pattern = layout.pattern or given
+        labels = {patch.id: patch.label for patch in layout.patches}
+        jobs, dry_runs = [], []
+        for number, toolpath in enumerate(layout.passes):
+            tell(0.4 + 0.5 * number / len(layout.passes), f"drawing {toolpath.sheet}")
+            job = post(toolpath, profile, stock, patch_labels=labels)
+            jobs.append(job)
+            size = (toolpath.width_mm, toolpath.height_mm)
+            dry_runs.append(dry_run(toolpath.sheet, job, profile, size))
+            write_text(staging / f"{toolpath.sheet}{profile.job_suffix}", job.text)
+            write_text(staging / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
+        for name, content in drawings(layout, pattern, wanted, pattern_file.stem):
+            (staging / name).write_bytes(content)
+        seconds = round(float(sum(sheet.seconds for sheet in dry_runs)), 1)
+        layout = replace(layout, totals=replace(layout.totals, seconds=seconds))
+        tell(0.9, "drawing the assembly guide")
+        guide = assembly_guide(layout, pattern, profile, stock, pattern_file.stem)
+        (staging / GUIDE).write_bytes(guide)
+        name = pattern_file.name
+        if pattern is not given:
+            name = f"{pattern_file.stem}{OPENED}.fold"
+            write_text(staging / name, fold_text(pattern, pattern_file.stem))
+        elif (directory / name).resolve() != pattern_file.resolve():
+            shutil.copyfile(pattern_file, staging / name)
+        used = staging / name if (staging / name).exists() else pattern_file
+        digest = hashlib.sha256(used.read_bytes()).hexdigest()
+        write_text(staging / LAYOUT, write_layout(layout, name, digest))
     tell(1.0, "done")
     return JobDirectory(directory, layout, profile, tuple(jobs), tuple(dry_runs))
 
@@ -172,44 +169,6 @@ def read_job(directory: Path) -> JobDirectory:
         for (name, sheet), job in zip(made, jobs, strict=True)
     )
     return JobDirectory(directory, layout, machine, tuple(jobs), tuple(dry_runs))
-
-
-def keep_own_profile(kind: Kind, name: str, directory: Path) -> None:
-    """Copy a profile or material of the user's own into the job ``directory``."""
-    path = find_file(kind, name)
-    if path.resolve().parent != shipped_directory(kind).resolve():
-        copy = directory / path.name
-        if copy.resolve() != path.resolve():
-            shutil.copyfile(path, copy)
-
-
-def make_room(directory: Path) -> None:
-    """Create the directory, or clear the sheets of the job that is in it."""
-    if directory.exists() and not directory.is_dir():
-        raise InputError(f"{directory} is a file; a job needs a directory.")
-    layout = directory / LAYOUT
-    if not layout.exists():
-        strangers = sorted(directory.glob("*.nc")) if directory.exists() else []
-        if strangers:
-            raise InputError(
-                f"{directory} holds {strangers[0].name}, which no layout there accounts for; "
-                "choose another directory or remove it."
-            )
-        directory.mkdir(parents=True, exist_ok=True)
-        return
-    try:
-        made = json.loads(layout.read_text())["sheets"]
-        names = [str(sheet["name"]) for sheet in made]
-        names += [str(sheet["back"]) for sheet in made if sheet.get("back")]
-    except (ValueError, KeyError, TypeError):
-        raise InputError(
-            f"{layout} is not a layout of this version; choose another directory or remove it."
-        ) from None
-    layout.unlink()
-    for name in names:
-        for ending in (".nc", ".plt", ".svg", *ENDINGS):
-            (directory / f"{Path(name).name}{ending}").unlink(missing_ok=True)
-    (directory / PICTURE).unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
