@@ -17,7 +17,7 @@ from miurafab.errors import InputError
 from miurafab.fabrication.assembly import assembly_order
 from miurafab.fabrication.drawing.assembly_guide import assembly_guide
 from miurafab.fabrication.drawing.dxf import VERSIONS, sheet_dxf
-from miurafab.fabrication.drawing.hpgl import UNITS_PER_MM, sheet_hpgl
+from miurafab.fabrication.drawing.hpgl import POINTS_A_LINE, UNITS_PER_MM, sheet_hpgl
 from miurafab.fabrication.drawing.page import INK, tint
 from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.svg import sheet_svg
@@ -59,8 +59,11 @@ def test_pdf(layout):
 
 def test_hpgl(layout):
     for toolpath in layout.toolpaths:
-        found = read_hpgl(sheet_hpgl(toolpath))
+        text = sheet_hpgl(toolpath)
+        found = read_hpgl(text)
         assert_same(found, toolpath, 0.5 / UNITS_PER_MM + 1e-9)
+        assert np.diff(toolpath.offsets).max() > POINTS_A_LINE + 1, "an outline longer than a line"
+        assert max(map(len, text.splitlines())) < 500
 
 
 @pytest.mark.parametrize("page", PAGES_MM)

@@ -1,7 +1,8 @@
 """Sheets as HPGL, for cutting plotters: absolute moves of a pen or blade, one pen an operation.
 
 A plotter unit is 0.025 mm (HP-GL reference, "plotter units": 40 a millimetre). The file starts with
-``IN`` and ends with the tool lifted and put away (``PU;SP0``), so that it runs alone.
+``IN`` and ends with the tool lifted and put away (``PU;SP0``), so that it runs alone. A long outline
+is told in several instructions, since plotters hold only so much of one in their buffers.
 """
 
 from __future__ import annotations
@@ -16,6 +17,10 @@ from miurafab.profiles import OPERATIONS
 UNITS_PER_MM = 40
 PENS = {name: number for number, name in enumerate(OPERATIONS, start=1)}
 """The pen of each operation; a plotter with one tool holder ignores the number."""
+POINTS_A_LINE = 32
+"""No more points stand in one instruction, so that it stays under 500 characters: half of the 1 KB
+that the buffers of the smallest plotters hold (judged).
+"""
 
 
 def sheet_hpgl(toolpath: Toolpath, setup: Mapping[str, str] | None = None) -> str:
@@ -34,6 +39,11 @@ def sheet_hpgl(toolpath: Toolpath, setup: Mapping[str, str] | None = None) -> st
             name = OPERATIONS[operation]
             lines.append(f"PU;SP{PENS[name]};{(setup or {}).get(name, '')}")
         begin, end = offsets[index], offsets[index + 1]
-        lines.append(f"PU{words[begin]};PD{','.join(words[begin + 1 : end])};")
+        first, *others = (
+            ",".join(words[at : min(at + POINTS_A_LINE, end)])
+            for at in range(begin + 1, end, POINTS_A_LINE)
+        )
+        lines.append(f"PU{words[begin]};PD{first};")
+        lines += [f"PD{more};" for more in others]
     lines.append("PU;PU0,0;SP0;")
     return "\n".join(lines) + "\n"
