@@ -38,7 +38,8 @@ import serial
 from miurafab.gcode.job import Job, prepare, prepare_lines
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl
-from miurafab.machine.sender import Progress, stream_job
+from miurafab.machine.planning import plan_job
+from miurafab.machine.sender import Progress, stream_plan
 from miurafab.machine.virtual_server import PtyWire
 from miurafab.profiles import load_machine
 
@@ -79,10 +80,11 @@ OURS = """
 import sys
 from pathlib import Path
 from miurafab.gcode.job import Job
-from miurafab.machine.sender import stream_job
+from miurafab.machine.planning import plan_job
+from miurafab.machine.sender import stream_plan
 from miurafab.profiles import load_machine
 job = Job("micro.nc", Path(sys.argv[2]).read_text())
-stream_job(job, load_machine("grbl-laser-400"), sys.argv[1])
+stream_plan(plan_job(job, load_machine("grbl-laser-400")), sys.argv[1])
 """
 
 
@@ -203,7 +205,8 @@ def check_mode(lines: int, speed: float) -> tuple[float, float]:
         peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
     with controller(speed=speed) as address:
-        result = stream_job(job, load_machine(MACHINE), address, check_mode=True, on_progress=note)
+        plan = plan_job(job, load_machine(MACHINE), check_mode=True)
+        result = stream_plan(plan, address, on_progress=note)
     return size / result.seconds / (WIRE_BYTES_S * speed), (peaks[-1] - peaks[0]) / 1024
 
 

@@ -1,6 +1,29 @@
-"""``python -m miurafab`` is the command line."""
+"""The program: the command line, and the local web page that one of its commands starts.
 
-from miurafab.cli import main
+The rooms ``cli`` and ``studio`` do not know each other; here, above both, they meet. Also what
+``python -m miurafab`` runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NoReturn
+
+from miurafab import cli
+
+
+def main() -> NoReturn:
+    """Run the command line on ``sys.argv`` and exit."""
+    cli.main(_serve_studio)
+
+
+def _serve_studio(
+    thing: str | None, *, port: int, open_browser: bool, announce: Callable[[str], None]
+) -> None:
+    from miurafab.studio.server import serve  # only now: no other command waits for it
+
+    serve(thing, port=port, open_browser=open_browser, announce=announce)
+
 
 if __name__ == "__main__":
     main()

@@ -17,8 +17,9 @@ from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program, strokes
 from miurafab.machine.journal import JournalRun, job_digest
+from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import resume
-from miurafab.machine.sender import stream_job
+from miurafab.machine.sender import stream_plan
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.posting import post
@@ -145,7 +146,7 @@ def test_the_virtual_controller_takes_chains() -> None:
     machine = on_a_wire(LASER, 19_200)
     job = post(perforation(200, 0.3, 0.2), machine, perforated_at(6000))
     assert "G91" in job.text
-    assert stream_job(job, machine, "virtual").errors == ()
+    assert stream_plan(plan_job(job, machine), "virtual").errors == ()
 
 
 @pytest.mark.parametrize("taken", [40, 130, 131, 180, 300])

@@ -16,7 +16,7 @@ from miurafab.gcode.program import strokes
 from miurafab.gcode.reading import read_program
 from miurafab.machine.dialects import virtual_machine
 from miurafab.machine.planning import plan_job
-from miurafab.machine.sender import deliver, stream_job
+from miurafab.machine.sender import deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
 from miurafab.posting import post
@@ -122,7 +122,7 @@ def test_the_preview_finds_no_hazard(name, pattern) -> None:
 def test_the_virtual_controller_takes_it_whole(name, pattern) -> None:
     machine = load_machine(name)
     job = post(sheet(pattern, machine), machine, CARD)
-    result = stream_job(job, machine, "virtual")
+    result = stream_plan(plan_job(job, machine), "virtual")
     assert result.errors == ()
     assert result.lines > 100
 

@@ -25,6 +25,7 @@ from miurafab.cli import (
     preview,
     profiles,
     sheets,
+    studio,
     surfaces,
     tradeoff,
     virtual,
@@ -54,14 +55,15 @@ app.add_typer(machine.app, name="machine")
 app.command("virtual")(virtual.virtual)
 app.command("profiles")(profiles.profiles)
 app.add_typer(profiles.materials, name="materials")
+app.command("studio")(studio.studio)
 app.command("calibrate")(calibrate.calibrate)
 app.command("doctor")(doctor.doctor)
 
 
-def main() -> NoReturn:
-    """Run the command line on ``sys.argv`` and exit."""
+def main(serve_studio: studio.ServeStudio) -> NoReturn:
+    """Run the command line on ``sys.argv`` and exit; ``serve_studio`` serves the web page."""
     try:
-        app()
+        app(obj=serve_studio)
     except MiurafabError as error:
         _fail(str(error), type(error).__name__, error.exit_code)
     except OSError as error:

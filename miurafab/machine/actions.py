@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 from miurafab.errors import ControllerError, GcodeError, InputError, JobStopped, ProfileError
 from miurafab.gcode.job import prepare_lines
@@ -18,7 +19,7 @@ from miurafab.grbl.events import Options, StatusReport, Version
 from miurafab.grbl.settings import Settings, parse_dump
 from miurafab.machine.session import HOMING_S, Session
 from miurafab.machine.signals import StopSignals
-from miurafab.machine.transport import BAUD, open_port
+from miurafab.machine.transport import open_port
 
 _POLL_S = 0.1
 
@@ -43,23 +44,25 @@ class MachineInfo:
     beam_off: bool
 
 
+class LineOptions(TypedDict, total=False):
+    """``baud``, and the ``settings`` of the controller in memory if the port is ``virtual``."""
+
+    baud: int
+    settings: Mapping[int, float] | None
+
+
 @contextmanager
 def conversation(
-    port: str,
-    *,
-    baud: int = BAUD,
-    settings: Mapping[int, float] | None = None,
-    moves: bool = False,
+    port: str, *, moves: bool = False, **line: Unpack[LineOptions]
 ) -> Iterator[Session]:
     """A session with the controller at ``port``, greeted; closed at the end.
 
-    ``settings`` are those of the controller in memory if ``port`` is ``virtual``. With ``moves``
-    the controller is reset if the block ends by an exception. Raises
+    With ``moves`` the controller is reset if the block ends by an exception. Raises
     :class:`~miurafab.errors.JobStopped` for Ctrl-C, SIGTERM and SIGHUP, and what
     :meth:`~miurafab.machine.session.Session.greet` raises.
     """
     with StopSignals() as signals:
-        transport = open_port(port, baud, settings)
+        transport = open_port(port, **line)
         signals.at_once = transport.blocks
         session = Session(transport, Connection(), check=signals.check)
         at_risk = False
@@ -77,11 +80,9 @@ def conversation(
             session.close()
 
 
-def machine_info(
-    port: str, *, baud: int = BAUD, settings: Mapping[int, float] | None = None
-) -> MachineInfo:
+def machine_info(port: str, **line: Unpack[LineOptions]) -> MachineInfo:
     """What the controller at ``port`` is and how it stands; moves and changes nothing."""
-    with conversation(port, baud=baud, settings=settings) as session:
+    with conversation(port, **line) as session:
         banner = session.banner
         status = session.wait_status()
         said = session.command("$I")
@@ -102,11 +103,9 @@ def machine_info(
         )
 
 
-def read_settings(
-    port: str, *, baud: int = BAUD, settings: Mapping[int, float] | None = None
-) -> Settings:
+def read_settings(port: str, **line: Unpack[LineOptions]) -> Settings:
     """What the controller answers to ``$$``."""
-    with conversation(port, baud=baud, settings=settings) as session:
+    with conversation(port, **line) as session:
         return Settings.from_events(session.command("$$"))
 
 
@@ -119,19 +118,13 @@ def read_dump(path: Path) -> Settings:
     return parse_dump(text, path.name)
 
 
-def write_settings(
-    port: str,
-    wanted: Settings,
-    *,
-    baud: int = BAUD,
-    settings: Mapping[int, float] | None = None,
-) -> dict[int, str]:
+def write_settings(port: str, wanted: Settings, **line: Unpack[LineOptions]) -> dict[int, str]:
     """Write those of ``wanted`` that differ, one at a time; what was changed, as read back.
 
     Homing (``$22``) goes first: soft limits are refused without it. Raises
     :class:`~miurafab.errors.ControllerError` for a setting that is refused or does not stick.
     """
-    with conversation(port, baud=baud, settings=settings) as session:
+    with conversation(port, **line) as session:
         before = Settings.from_events(session.command("$$"))
         differing = [n for n, text in wanted.texts.items() if before.texts.get(n) != text]
         for number in sorted(differing, key=lambda n: (n != 22, n)):
@@ -143,20 +136,16 @@ def write_settings(
     return {n: after.texts[n] for n in differing if n in after.texts}
 
 
-def unlock(
-    port: str, *, baud: int = BAUD, settings: Mapping[int, float] | None = None
-) -> StatusReport:
+def unlock(port: str, **line: Unpack[LineOptions]) -> StatusReport:
     """Open the lock that an alarm left (``$X``); the machine must be where it thinks it is."""
-    with conversation(port, baud=baud, settings=settings) as session:
+    with conversation(port, **line) as session:
         session.command("$X")
         return session.wait_status()
 
 
-def home(
-    port: str, *, baud: int = BAUD, settings: Mapping[int, float] | None = None
-) -> StatusReport:
+def home(port: str, **line: Unpack[LineOptions]) -> StatusReport:
     """Run the homing cycle (``$H``) and wait for its end."""
-    with conversation(port, baud=baud, settings=settings, moves=True) as session:
+    with conversation(port, moves=True, **line) as session:
         session.home()
         return session.wait_status()
 
@@ -168,8 +157,7 @@ def jog(
     y: float | None = None,
     feed_mm_min: float = 1000.0,
     absolute: bool = False,
-    baud: int = BAUD,
-    settings: Mapping[int, float] | None = None,
+    **line: Unpack[LineOptions],
 ) -> StatusReport:
     """Move by ``x`` and ``y`` mm (``absolute``: to them, in work coordinates), beam off; waits.
 
@@ -181,7 +169,7 @@ def jog(
     if not words:
         raise InputError("A jog needs a distance along X, along Y, or both.")
     mode = "G90" if absolute else "G91"
-    with conversation(port, baud=baud, settings=settings, moves=True) as session:
+    with conversation(port, moves=True, **line) as session:
         session.command(f"$J=G21{mode}{words}F{feed_mm_min:g}")
         while True:
             status = session.wait_status()
@@ -196,9 +184,7 @@ def talk(
     port: str,
     lines: Iterable[str],
     tell: Callable[[str], None],
-    *,
-    baud: int = BAUD,
-    settings: Mapping[int, float] | None = None,
+    **line: Unpack[LineOptions],
 ) -> None:
     """Send ``lines`` one at a time as they come, and ``tell`` what the controller answers.
 
@@ -206,7 +192,7 @@ def talk(
     refused line is told and does not end the conversation. At the end dark moves are waited for;
     then, and on every way out, the controller is reset unless it stands idle with the beam off.
     """
-    with conversation(port, baud=baud, settings=settings, moves=True) as session:
+    with conversation(port, moves=True, **line) as session:
         heard = bytearray()
 
         def hear(data: bytes) -> None:
@@ -218,8 +204,8 @@ def talk(
                     tell(line.decode("ascii", "backslashreplace").strip())
 
         session.on_data = hear
-        for line in lines:
-            text = line.strip()
+        for each in lines:
+            text = each.strip()
             try:
                 if text in _REALTIME:
                     session.write(session.connection.send_realtime(_REALTIME[text]))

@@ -26,14 +26,13 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import IO
+from typing import IO, Unpack
 
 from miurafab.errors import JobStopped, MachineError, MiurafabError
 from miurafab.machine.dialects import make_safe, open_machine
 from miurafab.machine.keys import Keys, NoKeys
 from miurafab.machine.planning import Plan
-from miurafab.machine.sender import Progress, StreamResult, stream_plan
+from miurafab.machine.sender import Files, Progress, StreamResult, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.watchdog import BEAT, BEAT_S, STOPS, ParentWatch
 
@@ -47,9 +46,8 @@ class _Order:
 
     plan: Plan
     port: str
-    journal_path: Path | None
-    transcript_path: Path | None
     virtual_speed: float | None
+    files: Files
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,21 +66,20 @@ def stream_apart(
     plan: Plan,
     port: str,
     *,
-    journal_path: Path | None = None,
-    transcript_path: Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
     keys: Keys | None = None,
     virtual_speed: float | None = None,
     signals: StopSignals | None = None,
+    **files: Unpack[Files],
 ) -> StreamResult:
     """Send a planned job from a process of its own.
 
-    The options are those of :func:`~miurafab.machine.sender.stream_job`; ``signals`` are those of
+    The options are those of :func:`~miurafab.machine.sender.stream_plan`; ``signals`` are those of
     a main thread that waits for this one, without it this thread's own. Raises what
-    ``stream_job`` raises, and :class:`~miurafab.errors.MachineError` if the process dies, after
+    ``stream_plan`` raises, and :class:`~miurafab.errors.MachineError` if the process dies, after
     the controller was reset.
     """
-    order = _Order(plan, port, journal_path, transcript_path, virtual_speed)
+    order = _Order(plan, port, virtual_speed, files)
     with contextlib.ExitStack() as at_end:
         if signals is None:
             signals = at_end.enter_context(StopSignals())
@@ -235,12 +232,11 @@ def main() -> None:
             outcome: StreamResult | MiurafabError = stream_plan(
                 order.plan,
                 order.port,
-                journal_path=order.journal_path,
-                transcript_path=order.transcript_path,
-                on_progress=tell,
-                keys=parent,
                 virtual_speed=order.virtual_speed,
                 signals=signals,
+                on_progress=tell,
+                keys=parent,
+                **order.files,
             )
         except MiurafabError as error:
             outcome = error

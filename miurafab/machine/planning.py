@@ -60,9 +60,14 @@ def plan_job(
 ) -> Plan:
     """Check ``job`` by itself; raises :class:`~miurafab.errors.InputError` for what is wrong.
 
-    ``program`` is ``job`` as :func:`~miurafab.gcode.reading.read_program` read it for ``machine``,
-    if somebody has done so; it is read here otherwise. The other options are those of
-    :func:`~miurafab.machine.sender.stream_job`.
+    ``force`` names checks to override (:data:`~miurafab.machine.preflight.CHECKS`). With
+    ``check_mode`` the controller will only read the job (``$C``): nothing moves, and refused lines
+    are gathered in the result. With ``home`` the machine is homed first, in the same conversation:
+    most boards forget where they are when the port is opened. ``at`` states where the head stands
+    (X, Y in mm, in the job's coordinates), for a machine without homing switches. With
+    ``resumption`` the rest of ``job`` is sent; it needs one of the two. ``most_power`` is the most
+    that the material takes, as a fraction of full power. ``program`` is ``job`` as
+    :func:`~miurafab.gcode.reading.read_program` read it for ``machine``, if somebody has done so.
     """
     if resumption is not None:
         if check_mode:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
+from numpy.typing import NDArray
 
 from miurafab.errors import ControllerError, GcodeError, InputError, MiurafabError
 from miurafab.gcode.job import SendLine
@@ -101,36 +102,43 @@ def check_program(
 
     ``most_power`` is the most that the material takes, as a fraction of full power.
     """
-    yield from _bounds(program, machine)
-    if machine.tool.kind == "laser":
-        yield from _loose(program)
-        yield from _dwells(program)
-        if most_power < 1.0:
-            yield from _material(program, most_power * machine.tool.s_max)
-    too_much = program.power > machine.tool.s_max
-    if too_much.any():
-        index = int(np.argmax(too_much))
-        yield Finding(
-            "power",
-            GcodeError(
-                f"{program.name}, line {program.line[index]} asks for S{program.power[index]:g}, "
-                f"more than the {machine.tool.s_max} that is full power on {machine.name}"
-            ),
-        )
-
-
-def _bounds(program: Program, machine: MachineProfile) -> Iterator[Finding]:
     size = np.array([machine.bed.width_mm, machine.bed.height_mm])
     ends = program.end[:, :2]
-    outside = ((ends < -_TOLERANCE) | (ends > size + _TOLERANCE)).any(axis=1)
-    if outside.any():
-        index = int(np.argmax(outside))
+    for index in _first_outside(ends, np.zeros(2), size):
         x, y = ends[index]
         yield Finding(
             "bounds",
             GcodeError(
                 f"{program.name}, line {program.line[index]} moves to X{x:g} Y{y:g}, off the bed "
                 f"of {machine.name} ({size[0]:g} x {size[1]:g} mm)"
+            ),
+        )
+    full = machine.tool.s_max
+    if machine.tool.kind == "laser":
+        yield from _loose(program)
+        yield from _dwells(program)
+        if most_power < 1.0:
+            most = f"S{most_power * full:.0f} that the material takes (its max_power)"
+            yield from _power("material", program, most_power * full + 0.5, most)
+    yield from _power("power", program, full, f"{full} that is full power on {machine.name}")
+
+
+def _first_outside(
+    ends: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> list[int]:
+    """The index of the first of ``ends`` (n, 2) that lies outside the box, if any."""
+    outside = ((ends < low - _TOLERANCE) | (ends > high + _TOLERANCE)).any(axis=1)
+    return [int(index) for index in np.flatnonzero(outside)[:1]]
+
+
+def _power(name: str, program: Program, most: float, words: str) -> Iterator[Finding]:
+    """The check ``name``: no move has more power than ``most``, which ``words`` tell."""
+    for index in np.flatnonzero(program.power > most)[:1]:
+        yield Finding(
+            name,
+            GcodeError(
+                f"{program.name}, line {program.line[index]} asks for S{program.power[index]:g}, "
+                f"more than the {words}"
             ),
         )
 
@@ -186,19 +194,6 @@ def _dwells(program: Program) -> Iterator[Finding]:
             return
 
 
-def _material(program: Program, most: float) -> Iterator[Finding]:
-    too_much = program.power > most + 0.5
-    if too_much.any():
-        index = int(np.argmax(too_much))
-        yield Finding(
-            "material",
-            GcodeError(
-                f"{program.name}, line {program.line[index]} asks for S{program.power[index]:g}, "
-                f"more than the S{most:.0f} that the material takes (its max_power)"
-            ),
-        )
-
-
 def check_status(status: StatusReport) -> Iterator[Finding]:
     """The checks ``idle`` and ``beam``."""
     if status.state != "Idle":
@@ -249,9 +244,7 @@ def check_travel(
     offset = np.array((work_offset or (0.0, 0.0))[:2])
     travel = np.array([values.get(130, np.inf), values.get(131, np.inf)])
     ends = program.end[:, :2] + offset
-    outside = ((ends < -travel - _TOLERANCE) | (ends > _TOLERANCE)).any(axis=1)
-    if outside.any():
-        index = int(np.argmax(outside))
+    for index in _first_outside(ends, -travel, np.zeros(2)):
         x, y = ends[index]
         yield Finding(
             "travel",

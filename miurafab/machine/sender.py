@@ -14,107 +14,62 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 from miurafab.errors import JobStopped, MiurafabError
-from miurafab.gcode.job import Job
 from miurafab.machine.delivery import Errand
 from miurafab.machine.dialects import delivery_of, keeps_journal, open_machine
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import Keys, NoKeys
-from miurafab.machine.planning import Plan, plan_job
+from miurafab.machine.planning import Plan
 from miurafab.machine.progress import Progress, StreamResult
-from miurafab.machine.resume import Resumption
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import FlowTransport
-from miurafab.profiles import MachineProfile
 
-__all__ = ["Progress", "StreamResult", "deliver", "stream_job", "stream_plan"]
+__all__ = ["Files", "Progress", "StreamOptions", "StreamResult", "deliver", "stream_plan"]
 
 
-def stream_job(
-    job: Job,
-    machine: MachineProfile,
-    port: str,
-    *,
-    journal_path: Path | None = None,
-    transcript_path: Path | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
-    force: frozenset[str] = frozenset(),
-    allow_m3: bool = False,
-    check_mode: bool = False,
-    home: bool = False,
-    at: tuple[float, float] | None = None,
-    resumption: Resumption | None = None,
-    most_power: float = 1.0,
-    keys: Keys | None = None,
-    virtual_speed: float | None = None,
-) -> StreamResult:
-    """Send ``job`` to ``machine`` at ``port`` and wait until it is done.
+class Files(TypedDict, total=False):
+    """What is written down of a job while it is sent."""
 
-    ``port`` is a device, a pyserial URL, or ``virtual`` for a controller in memory set up as the
-    profile says, as fast as the computer allows or at ``virtual_speed`` times real time.
-    ``on_progress`` is called about five times a second. ``force`` names checks to override
-    (:data:`~miurafab.machine.preflight.CHECKS`). With ``check_mode`` the controller only reads
-    the job (``$C``): nothing moves, and refused lines are gathered in the result. With ``home``
-    the machine is homed first, in the same conversation: most boards forget where they are when
-    the port is opened. ``at`` states where the head stands (X, Y in mm, in the job's
-    coordinates), for a machine without homing switches. With ``resumption`` the rest of ``job``
-    is sent; it needs one of the two. ``most_power`` is the most that the material takes, as a
-    fraction of full power; ``keys`` may hold, resume, abort and override while the job runs.
+    journal_path: Path | None
+    transcript_path: Path | None
 
-    Raises :class:`~miurafab.errors.InputError` for a job or option at fault,
-    :class:`~miurafab.errors.PortError` and :class:`~miurafab.errors.ControllerError` for what the
-    machine did, :class:`~miurafab.errors.JobStopped` after Ctrl-C, SIGTERM or SIGHUP. Whichever
-    it is, the controller was reset if a line of the job had been sent.
+
+class StreamOptions(Files, total=False):
+    """... and who is told: ``on_progress`` about five times a second; ``keys`` may hold, resume,
+    abort and override while the job runs.
     """
-    plan = plan_job(
-        job,
-        machine,
-        force=force,
-        allow_m3=allow_m3,
-        check_mode=check_mode,
-        home=home,
-        at=at,
-        resumption=resumption,
-        most_power=most_power,
-    )
-    return stream_plan(
-        plan,
-        port,
-        journal_path=journal_path,
-        transcript_path=transcript_path,
-        on_progress=on_progress,
-        keys=keys,
-        virtual_speed=virtual_speed,
-    )
+
+    on_progress: Callable[[Progress], None] | None
+    keys: Keys | None
 
 
 def stream_plan(
     plan: Plan,
     port: str,
     *,
-    journal_path: Path | None = None,
-    transcript_path: Path | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
-    keys: Keys | None = None,
     virtual_speed: float | None = None,
     signals: StopSignals | None = None,
+    **options: Unpack[StreamOptions],
 ) -> StreamResult:
-    """Send a planned job; see :func:`stream_job`. ``signals`` are those already caught, if any."""
+    """Send a planned job to its machine at ``port`` and wait until it is done.
+
+    ``port`` is a device, a pyserial URL, or ``virtual`` for a machine in memory set up as the
+    profile says, as fast as the computer allows or at ``virtual_speed`` times real time.
+    ``signals`` are those already caught, if any.
+
+    Raises :class:`~miurafab.errors.InputError` for a file that cannot be written,
+    :class:`~miurafab.errors.PortError` and :class:`~miurafab.errors.ControllerError` for what the
+    machine did, :class:`~miurafab.errors.JobStopped` after Ctrl-C, SIGTERM or SIGHUP. Whichever
+    it is, the machine was made safe if a line of the job had been sent.
+    """
     with StopSignals() if signals is None else nullcontext(signals) as signals:
         try:
             transport = open_machine(plan.machine, port, virtual_speed)
             signals.at_once = transport.blocks
-            return deliver(
-                plan,
-                transport,
-                signals,
-                journal_path=journal_path,
-                transcript_path=transcript_path,
-                on_progress=on_progress,
-                keys=keys,
-            )
+            return deliver(plan, transport, signals, **options)
         except KeyboardInterrupt:
             raise JobStopped(f"{plan.job.name} was stopped by {signals.reason}.") from None
 
@@ -129,7 +84,7 @@ def deliver(
     on_progress: Callable[[Progress], None] | None = None,
     keys: Keys | None = None,
 ) -> StreamResult:
-    """Send a planned job over an open wire and close it; see :func:`stream_job`."""
+    """Send a planned job over an open wire and close it; see :func:`stream_plan`."""
     job, machine = plan.job, plan.machine
     with ExitStack() as at_end:
         at_end.callback(transport.close)

@@ -276,19 +276,16 @@ class VirtualTransport:
 
 
 def open_port(
-    port: str,
-    baud: int,
-    settings: Mapping[int, float] | None = None,
-    speed: float | None = None,
+    port: str, baud: int = BAUD, settings: Mapping[int, float] | None = None
 ) -> Transport:
     """The wire to ``port``: a device, a pyserial URL, or ``virtual``.
 
     The controller in memory has ``settings`` over the stock ones and runs as fast as the
-    computer allows, or at ``speed`` times real time; the others ignore both. Raises
+    computer allows; the others ignore them. Raises
     :class:`~miurafab.errors.PortError` saying why a port cannot be opened.
     """
     if port == VIRTUAL:
-        return VirtualTransport(VirtualGrbl(settings, baud=baud), speed, forgets=True)
+        return VirtualTransport(VirtualGrbl(settings, baud=baud), forgets=True)
     return SerialTransport(port, baud)
 
 

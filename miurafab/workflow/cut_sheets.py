@@ -58,7 +58,7 @@ class SheetProgress:
 
 @dataclass(frozen=True)
 class CutOptions:
-    """How sheets are sent; see :func:`~miurafab.machine.sender.stream_job`.
+    """How sheets are sent; see :func:`~miurafab.machine.planning.plan_job`.
 
     ``resume`` goes on with what was interrupted; ``frame`` traces the box around each sheet
     before it, with the ``pointer`` power (a fraction of full power, 0: dark), and waits.
@@ -98,7 +98,7 @@ def cut(
     opened, with what will be burnt twice of a sheet that goes on. The journal and the transcript go
     beside the job. A sheet for a real port is sent by a process of its own
     (:func:`~miurafab.machine.job_process.stream_apart`). Raises what
-    :func:`~miurafab.machine.sender.stream_job` raises.
+    :func:`~miurafab.machine.sender.stream_plan` raises.
     """
     done = []
     at = options.at

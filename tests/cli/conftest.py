@@ -5,7 +5,7 @@ import sys
 import pytest
 from command_line import Done
 
-from miurafab.cli import main
+from miurafab.__main__ import main
 
 
 @pytest.fixture

@@ -130,7 +130,7 @@ def test_the_module_runs_as_a_process_and_starts_light():
     """Help must not wait for the scientific libraries."""
     code = (
         "import sys; sys.argv = ['miurafab', '--help']\n"
-        "from miurafab.cli import main\n"
+        "from miurafab.__main__ import main\n"
         "try:\n    main()\n"
         "except SystemExit:\n    assert not {'scipy', 'trimesh', 'shapely'} & set(sys.modules)\n"
     )

@@ -13,7 +13,7 @@ from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
 from miurafab.machine import planning
 from miurafab.machine.planning import plan_job
-from miurafab.machine.sender import Progress, stream_job, stream_plan
+from miurafab.machine.sender import Progress, stream_plan
 from miurafab.profiles import load_machine
 
 MACHINE = load_machine("grbl-laser-400")
@@ -69,7 +69,7 @@ def test_a_job_is_read_once_from_the_plan_to_the_end(monkeypatch: pytest.MonkeyP
         return reading.read_program(job, MACHINE)
 
     monkeypatch.setattr(planning, "read_program", read)
-    stream_job(job(20), MACHINE, "virtual")
+    stream_plan(plan_job(job(20), MACHINE), "virtual")
     assert reads == ["long.nc"]
     program = reading.read_program(job(20), MACHINE)
     stream_plan(plan_job(job(20), MACHINE, program=program), "virtual")

@@ -19,7 +19,7 @@ from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.dialects import make_safe
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
-from miurafab.machine.sender import Progress, StreamResult, deliver, stream_job
+from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
 from miurafab.machine.virtual_server import PtyWire, load_controller
@@ -325,7 +325,7 @@ def test_over_a_pseudo_terminal_the_command_cuts_it(tmp_path: Path) -> None:
     thread = threading.Thread(target=serve, args=(device, wire, stop, 20.0))
     thread.start()
     try:
-        result = stream_job(dashes(), MACHINE, wire.address)
+        result = stream_plan(plan_job(dashes(), MACHINE), wire.address)
     finally:
         stop.set()
         thread.join()

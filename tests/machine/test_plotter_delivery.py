@@ -12,7 +12,7 @@ from miurafab.errors import InputError, JobStopped, PortError
 from miurafab.gcode.job import Job
 from miurafab.machine.dialects import make_safe, virtual_machine
 from miurafab.machine.planning import plan_job
-from miurafab.machine.sender import Progress, StreamResult, deliver, stream_job
+from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
 from miurafab.machine.virtual_server import PtyWire
@@ -129,7 +129,7 @@ def test_over_a_pseudo_terminal_the_kernel_heeds_xoff() -> None:
     thread = threading.Thread(target=serve)
     thread.start()
     try:
-        stream_job(strokes(speed=10), MACHINE, wire.address)
+        stream_plan(plan_job(strokes(speed=10), MACHINE), wire.address)
         end = time.monotonic() + 10
         while len(device.beam_log) < len(WHOLE) and time.monotonic() < end:
             time.sleep(0.05)

@@ -22,7 +22,7 @@ from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.journal import JournalRun, job_digest, read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import Resumption, resume
-from miurafab.machine.sender import deliver, stream_job
+from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.motion.beam import standing_seconds
 from miurafab.profiles import load_machine
@@ -213,9 +213,9 @@ def test_what_cannot_be_resumed_is_said() -> None:
         resume(shifted, MACHINE, [record(shifted, line=200, taken=200)])
     rest = resume(job, MACHINE, [record(job, line=200, taken=200)])
     with pytest.raises(InputError, match=r"--home.*--at"):
-        stream_job(job, MACHINE, "virtual", resumption=rest)
+        plan_job(job, MACHINE, resumption=rest)
     with pytest.raises(InputError, match="check mode"):
-        stream_job(job, MACHINE, "virtual", resumption=rest, check_mode=True)
+        plan_job(job, MACHINE, resumption=rest, check_mode=True)
 
 
 @pytest.mark.parametrize("style", ["absolute", "relative"])

@@ -25,7 +25,7 @@ from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
-from miurafab.machine.sender import Progress, StreamResult, deliver, stream_job
+from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile, load_machine
 
@@ -151,7 +151,7 @@ def test_check_mode_moves_nothing_and_gathers_what_is_refused() -> None:
 
 def test_the_embedded_controller_is_reached_by_name(tmp_path: Path) -> None:
     transcript = tmp_path / "job.transcript"
-    result = stream_job(zigzag(50), MACHINE, "virtual", transcript_path=transcript)
+    result = stream_plan(plan_job(zigzag(50), MACHINE), "virtual", transcript_path=transcript)
     assert result.lines == 105
     lines = transcript.read_text().splitlines()
     assert lines[0] == "# zigzag.nc to virtual"
@@ -162,9 +162,8 @@ def test_the_embedded_controller_is_reached_by_name(tmp_path: Path) -> None:
 
 def test_the_same_job_makes_the_same_records(tmp_path: Path) -> None:
     for name in ("a", "b"):
-        stream_job(
-            zigzag(30),
-            MACHINE,
+        stream_plan(
+            plan_job(zigzag(30), MACHINE),
             "virtual",
             journal_path=tmp_path / f"{name}.journal",
             transcript_path=tmp_path / f"{name}.transcript",
@@ -387,7 +386,7 @@ def test_an_unknown_name_to_force_is_refused() -> None:
 
 def test_a_line_that_may_not_be_sent_is_refused_before_the_port_is_opened() -> None:
     with pytest.raises(GcodeError, match=r"a\.nc, line 2"):
-        stream_job(Job("a.nc", "G0X1\nG0!X2\n"), MACHINE, "/dev/does-not-exist")
+        plan_job(Job("a.nc", "G0X1\nG0!X2\n"), MACHINE)
 
 
 # Records

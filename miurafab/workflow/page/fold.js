@@ -171,7 +171,17 @@ class FoldView {
       byId("motion").value = this.fold.start;
     }
     this.show(moves ? Number(byId("motion").value) : 0);
-    const size = this.form.box.slice(3).map((mm) => mm.toFixed(mm >= 100 ? 0 : 1));
+  }
+
+  /** Tell the size of the box around what is shown. */
+  measure(points) {
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    for (let at = 0; at < points.length; at += 1) {
+      low[at % 3] = Math.min(low[at % 3], points[at]);
+      high[at % 3] = Math.max(high[at % 3], points[at]);
+    }
+    const size = high.map((most, axis) => (most - low[axis]).toFixed(most - low[axis] >= 100 ? 0 : 1));
     byId("fold-size").value = `${(this.form.flat ? size.slice(0, 2) : size).join(" × ")} mm`;
   }
 
@@ -180,6 +190,7 @@ class FoldView {
     const { gl } = this.stage;
     const count = this.form.coordinates.length / this.form.frames;
     const points = this.form.coordinates.subarray(frame * count, (frame + 1) * count);
+    this.measure(points);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.pointBuffer);
     gl.bufferData(gl.ARRAY_BUFFER, gather(points, this.triangles), gl.DYNAMIC_DRAW);
     this.creases.place(gather(points, this.edges), 3);

@@ -36,6 +36,8 @@ function table(sheets, choose) {
   box.hidden = false;
 }
 
+// within another page (the studio) the drawing stands alone
+document.documentElement.classList.toggle("within", window.parent !== window);
 const data = JSON.parse(byId("data").textContent);
 const views = {};
 figures(data);

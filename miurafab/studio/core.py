@@ -1,0 +1,158 @@
+"""The studio without sockets: a request in, a response out.
+
+=============== ====== ==========================================================================
+address         method answers
+=============== ====== ==========================================================================
+(empty)         GET    the page; its styles and scripts by their names
+catalogue       GET    surfaces, machines and materials that can be chosen, limits, defaults
+state           GET    what lies on the bench, and how far the task is
+files/N/NAME    GET    something that was computed; with ``?save`` to be saved
+design.toml     GET    the design file of the pattern
+upload          POST   keeps a file (its name in ``X-File-Name``, percent-encoded)
+fit, open       POST   begins to make or read a pattern
+sheets          POST   begins to lay it out
+cancel          POST   ends what is being done
+=============== ====== ==========================================================================
+
+All addresses lie behind the key (:mod:`~miurafab.studio.guard`). A refusal is a sentence:
+``{"error": ...}``.
+"""
+
+from __future__ import annotations
+
+import math
+from importlib import resources
+from typing import Any
+from urllib.parse import unquote
+
+import miurafab
+from miurafab.errors import MiurafabError
+from miurafab.fabrication.options import TAB_SIDES
+from miurafab.profiles import load_machine, load_material, shipped_names
+from miurafab.studio.bench import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
+from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
+from miurafab.studio.messages import Request, Response, answer, made_file, own_file, refusal
+from miurafab.studio.orders import read_fit, read_layout, read_source
+from miurafab.surfaces.analytic import Revolution
+from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
+from miurafab.surfaces.mesh import MESH_SUFFIXES
+from miurafab.workflow.design import DEFAULT_FACETS, DEFAULT_SIZE_MM
+
+PAGE = "studio.html"
+PARTS = ("icon.svg", "studio.css", "tools.js", "choices.js", "results.js", "studio.js")
+"""The files of the page, beside the page itself."""
+
+
+class Studio:
+    """Answers requests. ``first`` is what the page starts with: a choice of target, if any."""
+
+    def __init__(self, bench: Bench, guard: Guard, first: dict[str, Any] | None = None) -> None:
+        self.bench = bench
+        self.guard = guard
+        self._first = first
+        self._page = resources.files(__package__).joinpath("page")
+        self._catalogue = _catalogue()
+
+    def handle(self, request: Request) -> Response:
+        """The answer to ``request``; what is not let in or is wrong is refused in a sentence."""
+        refused = self.guard.refuse(request.method, request.path, request.headers)
+        if refused is not None:
+            return refused
+        route = self.guard.route(request.path)
+        assert route is not None
+        self.bench.take_in()
+        try:
+            if request.method == "POST":
+                return self._post(route, request)
+            return self._get(route, request.path.partition("?")[2])
+        except MiurafabError as fault:
+            return refusal(400, str(fault))
+
+    def _get(self, route: str, query: str) -> Response:
+        if route in ("", *PARTS):
+            name = route or PAGE
+            return own_file(name, self._page.joinpath(name).read_bytes())
+        if route == "catalogue":
+            return answer({**self._catalogue, "first": self._first})
+        if route == "state":
+            return answer(self.bench.state())
+        if route == "design.toml":
+            text = self.bench.design_text()
+            if text is not None and self.bench.pattern is not None:
+                name = f"{self.bench.pattern['name']}{DESIGN_SUFFIX}"
+                saved = {"Content-Disposition": f'attachment; filename="{name}"'}
+                return Response(200, "text/plain; charset=utf-8", text.encode("ascii"), saved)
+        kind, _, rest = route.partition("/")
+        number, _, name = rest.partition("/")
+        path = self.bench.files.get((number, unquote(name))) if kind == "files" else None
+        if path is None:
+            return refusal(404, "There is nothing at this address (any more).")
+        return made_file(path, download=query == "save")
+
+    def _post(self, route: str, request: Request) -> Response:
+        bench = self.bench
+        if route == UPLOAD:
+            name = unquote(request.headers.get("x-file-name", ""))
+            source = bench.add_upload(name, request.body)
+            return answer({"source": source.id, "kind": source.kind, **bench.state()})
+        if route == "fit":
+            bench.fit(read_fit(request.body))
+        elif route == "open":
+            bench.open(read_source(request.body))
+        elif route == "sheets":
+            bench.lay_out(read_layout(request.body))
+        elif route == "cancel":
+            bench.cancel()
+        else:
+            return refusal(404, "There is nothing to be done at this address.")
+        return answer(bench.state())
+
+
+def _catalogue() -> dict[str, Any]:
+    """All that can be chosen on the page."""
+    return {
+        "version": miurafab.__version__,
+        "surfaces": [_surface(entry) for entry in CATALOGUE.values()],
+        "machines": [
+            {"name": name, "title": load_machine(name).title}
+            for name in shipped_names("firmware_profiles")
+        ],
+        "materials": [
+            {"name": name, "title": load_material(name).title}
+            for name in shipped_names("materials")
+        ],
+        "tab_sides": TAB_SIDES,
+        "file_suffixes": (*MESH_SUFFIXES, PATTERN_SUFFIX),
+        "file_limit": FILE_LIMIT,
+        "defaults": {
+            "facets": DEFAULT_FACETS,
+            "size": f"{DEFAULT_SIZE_MM:g}mm",
+            "machine": miurafab.DEFAULT_MACHINE,
+            "material": miurafab.DEFAULT_MATERIAL,
+        },
+    }
+
+
+def _surface(entry: NamedSurface) -> dict[str, Any]:
+    surface, _ = make_surface(entry.name, {})
+    parameters = []
+    for key, parameter in entry.parameters.items():
+        low, high, default = parameter.low, parameter.high, parameter.default
+        if parameter.is_angle:
+            low, high, default = (math.degrees(value) for value in (low, high, default))
+        parameters.append(
+            {
+                "key": key,
+                "meaning": parameter.meaning,
+                "unit": "deg" if parameter.is_angle else "",
+                "default": f"{default:g}",
+                "low": low,
+                "high": high,
+            }
+        )
+    return {
+        "name": entry.name,
+        "summary": entry.summary,
+        "parameters": parameters,
+        "turned": isinstance(surface, Revolution),
+    }

@@ -1,0 +1,82 @@
+"""Who may ask: decided from the first line and the headers alone, before a body is read.
+
+The server listens on this computer only, but other pages in the browser and other people on the
+computer can reach it, too. Against them:
+
+- the ``Host`` must be this server's, or another site has pointed its own name here (DNS rebinding);
+- every address begins with a key of 192 random bits that only the printed address tells;
+- what changes anything (POST) must come from this page by its ``Origin``, and repeat the key in a
+  header, which no form and no other site can send unasked;
+- a body must say its length, and the length has a limit.
+"""
+
+from __future__ import annotations
+
+import hmac
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from miurafab.studio.messages import Response, refusal
+
+ADDRESS = "127.0.0.1"
+"""The only address that is listened on."""
+
+TOKEN_HEADER = "x-studio-key"
+FILE_LIMIT = 64 * 2**20
+"""How many bytes a file may have that is given to the page: a scan of a million triangles."""
+
+ORDER_LIMIT = 2**16
+"""How many bytes any other body may have."""
+
+UPLOAD = "upload"
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Lets requests in to the server at ``port`` whose addresses begin with ``key``."""
+
+    port: int
+    key: str
+
+    @property
+    def address(self) -> str:
+        """What to open in a browser."""
+        return f"http://{ADDRESS}:{self.port}/{self.key}/"
+
+    @property
+    def _hosts(self) -> tuple[str, ...]:
+        return tuple(f"{name}:{self.port}" for name in (ADDRESS, "localhost"))
+
+    def route(self, path: str) -> str | None:
+        """``path`` behind the key, without its query; None if the key is not the right one."""
+        first, slash, rest = path.partition("?")[0].removeprefix("/").partition("/")
+        return rest if slash and _same(first, self.key) else None
+
+    def refuse(self, method: str, path: str, headers: Mapping[str, str]) -> Response | None:
+        """Why the request is not let in, or None if it is. ``headers`` have small names."""
+        if headers.get("host", "").lower() not in self._hosts:
+            return refusal(421, f"This server answers to {self._hosts[0]} only.")
+        if method not in ("GET", "HEAD", "POST"):
+            return refusal(405, f"There is nothing to be had by {method[:16]!r} here.")
+        route = self.route(path)
+        if route is None:
+            return refusal(404, "Open the address that 'miurafab studio' printed, with its key.")
+        return self._refuse_post(route, headers) if method == "POST" else None
+
+    def _refuse_post(self, route: str, headers: Mapping[str, str]) -> Response | None:
+        if headers.get("origin", "").lower() not in {f"http://{host}" for host in self._hosts}:
+            return refusal(403, "The request does not come from the studio's own page.")
+        if not _same(headers.get(TOKEN_HEADER, ""), self.key):
+            return refusal(403, "The request does not carry the studio's key; reload the page.")
+        length = headers.get("content-length", "")
+        if "transfer-encoding" in headers or not (length.isascii() and length.isdigit()):
+            return refusal(411, "The request does not say how long it is.")
+        limit = FILE_LIMIT if route == UPLOAD else ORDER_LIMIT
+        if len(length) > 18 or int(length) > limit:
+            return refusal(413, f"That is larger than the {limit // 2**10:,} KiB that are taken.")
+        return None
+
+
+def _same(given: str, wanted: str) -> bool:
+    """Equality that takes the same time wherever the difference is."""
+    return hmac.compare_digest(given.encode("utf-8", "surrogateescape"), wanted.encode("ascii"))

@@ -1,0 +1,27 @@
+"""File names that come from elsewhere, made harmless: no path, no blank, no option, no device."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+_LONGEST = 60
+_DEVICES = re.compile(r"(con|prn|aux|nul|(com|lpt)[0-9])(\..*)?", re.IGNORECASE)
+
+
+def safe_stem(name: str) -> str:
+    """The part of ``name`` before its ending, in letters, digits, dots, dashes and underscores.
+
+    It is never empty, begins with a letter or digit, and is no device of Windows.
+    """
+    base = re.split(r"[/\\]", name)[-1]
+    plain = unicodedata.normalize("NFKD", base).encode("ascii", "ignore").decode("ascii")
+    stem = plain.rpartition(".")[0] or plain
+    words = re.sub(r"[^A-Za-z0-9._-]+", "-", stem)[:_LONGEST].strip("-._")
+    return f"file-{words}".strip("-") if not words or _DEVICES.fullmatch(words) else words
+
+
+def suffix_of(name: str) -> str:
+    """The ending of ``name`` with its dot, in small letters; empty if it has none."""
+    _, dot, ending = re.split(r"[/\\]", name)[-1].rpartition(".")
+    return f".{ending.lower()}" if dot else ""

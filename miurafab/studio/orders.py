@@ -1,0 +1,159 @@
+"""What the page asks for, read strictly: known keys, short texts, names from our own lists.
+
+Nothing that comes from the browser is ever taken for a path. A surface, a machine or a material is
+one of those that are listed, its parameters are numbers, and a file is the number of one that was
+given to the studio before. Options are those of ``miurafab fit`` and ``miurafab sheets`` that name
+no file, in their written form.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from miurafab.errors import InputError, TargetError
+from miurafab.profiles import shipped_names
+from miurafab.surfaces.catalogue import CATALOGUE, make_surface
+from miurafab.workflow.design import design
+from miurafab.workflow.job_directory import layout_options
+
+FIT_OPTIONS = (
+    "facets",
+    "size",
+    "min_edge",
+    "max_deviation",
+    "amplitude",
+    "zigzag",
+    "flat_foldable",
+    "close",
+)
+LAYOUT_TEXTS = ("gap", "margin", "max_patch", "offcuts", "tab_height", "tab_side", "bridge")
+LAYOUT_NUMBERS = ("quantity", "bridges")
+LAYOUT_FLAGS = ("full_facet", "two_sided", "spread_heat")
+
+_LONGEST = 200
+
+
+@dataclass(frozen=True)
+class FitOrder:
+    """A fit to a named ``surface`` with its ``parameters``, or to the file of ``source``."""
+
+    surface: str | None
+    parameters: Mapping[str, str]
+    source: str | None
+    options: Mapping[str, str]
+
+    @property
+    def target(self) -> str:
+        """The named surface as the command line writes it."""
+        assert self.surface is not None
+        values = ",".join(f"{key}={value}" for key, value in self.parameters.items())
+        return f"{self.surface}:{values}" if values else self.surface
+
+
+@dataclass(frozen=True)
+class LayoutOrder:
+    """A layout for a ``machine`` and a ``material``, both shipped, with options as in a design."""
+
+    machine: str
+    material: str
+    options: Mapping[str, str | int | bool] = field(default_factory=dict)
+
+
+def read_fit(body: bytes) -> FitOrder:
+    """The fit that is asked for in ``body``, JSON; a named surface is made here already.
+
+    Raises :class:`~miurafab.errors.InputError` or ``TargetError``.
+    """
+    order = _read(body, ("target", "options"))
+    target = _table(order.get("target"), "The target")
+    options = _texts(_table(order.get("options", {}), "The options"), FIT_OPTIONS)
+    if "source" in target:
+        return FitOrder(None, {}, _text("source", target["source"]), options)
+    return _named(_text("surface", target.get("surface")), target.get("parameters", {}), options)
+
+
+def _named(surface: str, parameters: Any, options: Mapping[str, str]) -> FitOrder:
+    if surface not in CATALOGUE:
+        raise TargetError(f"'{surface}' is not a known surface.")
+    given = _texts(_table(parameters, "The parameters"), tuple(CATALOGUE[surface].parameters))
+    make_surface(surface, given)
+    order = FitOrder(surface, given, None, options)
+    design(order.target, **options)
+    return order
+
+
+def read_source(body: bytes) -> str:
+    """The source that is to be opened. Raises :class:`~miurafab.errors.InputError`."""
+    return _text("source", _read(body, ("source",)).get("source"))
+
+
+def read_layout(body: bytes) -> LayoutOrder:
+    """The layout that is asked for in ``body``, JSON; its options are read here already.
+
+    Raises :class:`~miurafab.errors.InputError`.
+    """
+    order = _read(body, ("machine", "material", "options"))
+    machine = _listed("machine", order.get("machine"), shipped_names("firmware_profiles"))
+    material = _listed("material", order.get("material"), shipped_names("materials"))
+    given = _table(order.get("options", {}), "The options")
+    options: dict[str, str | int | bool] = {}
+    for key, value in given.items():
+        if key in LAYOUT_FLAGS and isinstance(value, bool):
+            if value:
+                options[key] = True
+        elif key in LAYOUT_NUMBERS:
+            text = _text(key, value)
+            if text and not (text.isascii() and text.isdigit()):
+                raise InputError(f"The layout options: '{key}' is '{text}', not a whole number.")
+            if text:
+                options[key] = int(text)
+        elif key in LAYOUT_TEXTS:
+            text = _text(key, value)
+            if text:
+                options[key] = text
+        else:
+            raise InputError(f"The layout options: '{key[:40]}' cannot be set here.")
+    layout_options(options)
+    return LayoutOrder(machine, material, options)
+
+
+def _read(body: bytes, keys: tuple[str, ...]) -> dict[str, Any]:
+    try:
+        order = json.loads(body)
+    except (ValueError, RecursionError):
+        raise InputError("The page sent something that is not JSON; reload it.") from None
+    table = _table(order, "The order")
+    for key in table:
+        if key not in keys:
+            raise InputError(f"The page asked for '{key[:40]}', which is not known; reload it.")
+    return table
+
+
+def _table(value: Any, what: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(f"{what} must be a table of names and values.")
+    return value
+
+
+def _texts(values: Mapping[str, Any], keys: tuple[str, ...]) -> dict[str, str]:
+    """The texts of ``values``, in the order of ``keys``, without those that are empty."""
+    for key in values:
+        if key not in keys:
+            raise InputError(f"'{key[:40]}' cannot be set here; there are {', '.join(keys)}.")
+    texts = {key: _text(key, values[key]) for key in keys if key in values}
+    return {key: text for key, text in texts.items() if text}
+
+
+def _text(key: str, value: Any) -> str:
+    if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable():
+        raise InputError(f"'{key[:40]}' must be a text of one line.")
+    return value.strip()
+
+
+def _listed(key: str, value: Any, names: list[str]) -> str:
+    if value not in names:
+        raise InputError(f"Choose a {key} of the list: {', '.join(names)}.")
+    return str(value)

@@ -1,0 +1,124 @@
+// The forms: filled from the catalogue, read back as orders. Values stay as they were written, with
+// their units; only an angle without one is given degrees, which is what its field says.
+
+import { byId, element } from "./tools.js";
+
+let catalogue;
+
+export function fillForms(given) {
+  catalogue = given;
+  const { defaults } = given;
+  byId("version").textContent = given.version;
+  byId("facets").value = defaults.facets;
+  byId("size").value = defaults.size;
+  options(byId("machine"), given.machines, defaults.machine);
+  options(byId("material"), given.materials, defaults.material);
+  byId("tab_side").append(...given.tab_sides.map((side, at) => (
+    element("option", { value: at ? side : "", textContent: side })
+  )));
+  byId("file").accept = given.file_suffixes.join(",");
+  byId("file-help").textContent = `${given.file_suffixes.join(" ")}, up to ${given.file_limit >> 20} MB; or drop it here`;
+  byId("target").addEventListener("change", () => showTarget());
+  showSources([]);
+  const { first } = given;
+  if (first?.surface) showTarget(`surface:${first.surface}`, first.parameters);
+  else showTarget();
+}
+
+function options(select, entries, chosen) {
+  select.append(...entries.map(({ name, title }) => (
+    element("option", { value: name, textContent: title, selected: name === chosen })
+  )));
+}
+
+/** The list of targets: the built-in ones, and files that can be fitted or opened. */
+export function showSources(sources, chosen) {
+  const select = byId("target");
+  const before = chosen ? `source:${chosen}` : select.value;
+  const group = (label, entries) => (entries.length ? [element("optgroup", { label }, ...entries)] : []);
+  select.replaceChildren(
+    ...group("Your files", sources.map(({ id, name, kind }) => (
+      element("option", { value: `source:${id}`, textContent: kind === "pattern" ? `${name} (pattern)` : name })
+    ))),
+    ...group("Built in", catalogue.surfaces.map(({ name }) => (
+      element("option", { value: `surface:${name}`, textContent: name })
+    ))),
+  );
+  sourcesNow = sources;
+  select.value = before || "surface:hypar";
+  if (select.selectedIndex < 0) select.value = "surface:hypar";
+  if (select.value !== before) showTarget();
+  else if (chosen) showTarget();
+}
+
+let sourcesNow = [];
+
+function chosenTarget() {
+  const [kind, name] = byId("target").value.split(":");
+  return kind === "surface"
+    ? { surface: catalogue.surfaces.find((each) => each.name === name) }
+    : { source: sourcesNow.find((each) => each.id === name) };
+}
+
+function showTarget(value, parameters = {}) {
+  if (value) byId("target").value = value;
+  const { surface, source } = chosenTarget();
+  const pattern = source?.kind === "pattern";
+  byId("summary").textContent = surface ? `${capital(surface.summary)}.` : {
+    mesh: "Your mesh. It keeps the size of its file unless you give one.",
+    design: "Your design file. What you give below wins over what it says.",
+    pattern: "A finished pattern: it is checked and shown as it stands.",
+  }[source.kind];
+  byId("parameters").replaceChildren(...(surface?.parameters ?? []).map((each) => {
+    const id = `parameter-${each.key}`;
+    const text = parameters[each.key] ?? `${each.default}${each.unit}`;
+    return element(
+      "div", { className: "row" },
+      element("label", { htmlFor: id }, capital(each.key), element("small", { textContent: each.meaning })),
+      element("input", { id, name: each.key, value: text, autocomplete: "off", spellcheck: false }),
+    );
+  }));
+  byId("close-row").hidden = Boolean(surface && !surface.turned) || source?.kind === "mesh";
+  byId("sheet-options").hidden = pattern;
+  byId("fit").textContent = pattern ? "Open" : "Fit";
+  const { facets, size } = catalogue.defaults;
+  byId("facets").placeholder = source?.kind === "design" ? "as it says" : facets;
+  byId("size").placeholder = { design: "as it says", mesh: "as in its file" }[source?.kind] ?? size;
+  // the size that was offered belongs to built-in surfaces; files have their own
+  if (source && byId("size").value === size) byId("size").value = "";
+  if (source?.kind === "design" && byId("facets").value === facets) byId("facets").value = "";
+  if (surface && !byId("size").value) byId("size").value = size;
+  if (surface && !byId("facets").value) byId("facets").value = facets;
+}
+
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** The route and the order that the first form stands for. */
+export function fitOrder() {
+  const { surface, source } = chosenTarget();
+  if (source?.kind === "pattern") return ["open", { source: source.id }];
+  const target = source ? { source: source.id } : { surface: surface.name, parameters: {} };
+  for (const { key, unit, default: usual } of surface?.parameters ?? []) {
+    const text = byId(`parameter-${key}`).value.trim();
+    const value = unit && /^[-+.\deE]+$/.test(text) ? text + unit : text;
+    if (value && value !== `${usual}${unit}`) target.parameters[key] = value;
+  }
+  return ["fit", { target, options: values("sheet-options") }];
+}
+
+/** The order that the second form stands for. */
+export function layoutOrder() {
+  return {
+    machine: byId("machine").value, material: byId("material").value, options: values("layout-options"),
+  };
+}
+
+function values(fieldset) {
+  const found = {};
+  for (const field of byId(fieldset).querySelectorAll("input[name], select[name]")) {
+    const away = field.closest("[hidden]") !== null;
+    const value = field.type === "checkbox" ? field.checked : field.value.trim();
+    if (value && !away) found[field.name] = value;
+  }
+  return found;
+}

@@ -1,0 +1,79 @@
+// What came of it: the pattern in words, in space and flat; the sheets, their totals and warnings.
+
+import { byId, element, hasWebGl } from "./tools.js";
+
+const terms = (lines) => lines.map(({ name, value, remark, mark }) => (
+  element(
+    "div", {}, element("dt", { textContent: name }),
+    element("dd", { className: mark }, value, ...(remark ? [element("small", { textContent: remark })] : [])),
+  )
+));
+
+const items = (texts) => texts.map((text) => element("li", { textContent: text }));
+
+const download = (text, address) => (
+  element("a", { className: "button", href: address, download: "", textContent: text })
+);
+
+/** Only what has changed is loaded again: a drawing that is being looked at stays as it is. */
+function load(view, attribute, address) {
+  if (view.getAttribute(attribute) !== address) view.setAttribute(attribute, address);
+}
+
+export function showPattern(pattern) {
+  byId("shape-empty").hidden = pattern !== null;
+  byId("pattern").hidden = pattern === null;
+  if (pattern === null) return;
+  const { files } = pattern;
+  byId("verdict").classList.toggle("bad", pattern.status !== "converged");
+  byId("headline").textContent = pattern.headline;
+  byId("advice").textContent = pattern.advice;
+  const waiting = pattern.folding ? ["The folding is still being computed."] : [];
+  byId("remarks").replaceChildren(...items([...pattern.remarks, ...waiting, ...(pattern.still ? [pattern.still] : [])]));
+  byId("pattern-downloads").replaceChildren(
+    ...(files.fold ? [download("Pattern .fold", `${files.fold}?save`)] : []),
+    ...(files.picture ? [download("Drawing .svg", `${files.picture}?save`)] : []),
+    ...(pattern.has_design ? [download("Design .toml", "design.toml")] : []),
+  );
+  byId("pattern-views").hidden = !files.fold;
+  if (files.fold) {
+    byId("space").hidden = !hasWebGl;
+    byId("no-space").hidden = hasWebGl;
+    if (hasWebGl) load(byId("space"), "src", files.page);
+    load(byId("flat"), "src", files.picture);
+    byId("flat-link").href = files.picture;
+  }
+  byId("figures").replaceChildren(...terms(pattern.lines));
+  byId("pattern-command").textContent = pattern.command;
+}
+
+export function showJob(job, pattern) {
+  const ready = Boolean(pattern?.files.fold);
+  byId("layout-of").textContent = ready ? `For the pattern ${pattern.name}.` : "";
+  byId("lay-out").disabled = !ready;
+  byId("layout-empty").hidden = job !== null;
+  byId("layout-hint").textContent = ready
+    ? "Choose a machine and a material, and lay the pattern out." : "Fit or open a pattern first.";
+  byId("job").hidden = job === null;
+  if (job === null) return;
+  const { files } = job;
+  byId("totals").replaceChildren(...terms(job.lines));
+  byId("job-downloads").replaceChildren(
+    download("Job .zip", `${files.zip}?save`),
+    download("Assembly guide .pdf", `${files.guide}?save`),
+    download("Pattern .fold", `${pattern.files.fold}?save`),
+  );
+  byId("warnings").hidden = job.warnings.length === 0;
+  byId("warnings").lastElementChild.replaceChildren(...items(job.warnings));
+  byId("dry-run").hidden = !hasWebGl;
+  byId("pictures").hidden = hasWebGl;
+  if (hasWebGl) load(byId("dry-run"), "src", files.page);
+  else if (byId("pictures").childElementCount !== job.pictures.length || byId("pictures").dataset.job !== job.id) {
+    byId("pictures").dataset.job = job.id;
+    byId("pictures").replaceChildren(...job.pictures.map((src, at) => (
+      element("img", { src, loading: "lazy", alt: `Sheet ${at + 1}` })
+    )));
+  }
+  byId("cut-command").textContent = job.cut;
+  byId("job-command").textContent = job.command;
+}

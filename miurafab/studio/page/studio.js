@@ -1,0 +1,158 @@
+// The page: asks for work, follows it, and shows what came of it.
+
+import { fillForms, fitOrder, layoutOrder, showSources } from "./choices.js";
+import { showJob, showPattern } from "./results.js";
+import { ask, byId, copy } from "./tools.js";
+
+const TABS = ["shape", "layout"];
+const DOING = { fit: "Fitting", open: "Opening", sheets: "Laying out" };
+let following = 0;
+let told = "";
+
+function show(state) {
+  const { task, pattern, job, sources } = state;
+  showPattern(pattern);
+  showJob(job, pattern);
+  const running = Boolean(task?.running);
+  byId("task").hidden = !running;
+  if (running) {
+    byId("task-note").textContent = task.note ? `${DOING[task.kind]}: ${task.note}` : `${DOING[task.kind]}…`;
+    // nothing is known of how long it takes before the first step is done
+    if (task.fraction > 0) byId("task-bar").value = task.fraction;
+    else byId("task-bar").removeAttribute("value");
+  }
+  const renewed = running && task.id !== pattern?.id;
+  byId("pattern").classList.toggle("old", renewed && task.kind !== "sheets");
+  byId("job").classList.toggle("old", renewed);
+  byId("fit").disabled = running;
+  byId("lay-out").disabled ||= running;
+  const names = JSON.stringify(sources);
+  if (names !== told) showSources(sources);
+  told = names;
+  if (!running && task?.error) fault(task.error);
+}
+
+function fault(sentence) {
+  byId("fault").textContent = sentence;
+  byId("fault").hidden = !sentence;
+}
+
+/** Ask for the state until nothing is being done any more. */
+async function follow() {
+  following += 1;
+  const mine = following;
+  try {
+    let state = await ask("state");
+    while (mine === following) {
+      show(state);
+      if (!state.task?.running) break;
+      await new Promise((resolve) => { setTimeout(resolve, 200); });
+      state = await ask("state");
+    }
+  } catch (error) {
+    byId("task").hidden = true;
+    fault(error.message);
+  }
+}
+
+async function order(route, body) {
+  fault("");
+  try {
+    await ask(route, body);
+    await follow();
+  } catch (error) {
+    fault(error.message);
+  }
+}
+
+async function open(file) {
+  fault("");
+  try {
+    const name = encodeURIComponent(file.name);
+    const { source, kind, sources } = await ask("upload", file, { "X-File-Name": name });
+    told = JSON.stringify(sources);
+    showSources(sources, source);
+    if (kind === "pattern") await order("open", { source });
+  } catch (error) {
+    fault(error.message);
+  }
+}
+
+function turnTo(tab) {
+  fault("");
+  for (const each of TABS) {
+    const chosen = each === tab;
+    byId(each).hidden = !chosen;
+    byId(`${each}-tab`).setAttribute("aria-selected", chosen);
+    byId(`${each}-tab`).tabIndex = chosen ? 0 : -1;
+  }
+}
+
+function listen() {
+  for (const [at, tab] of TABS.entries()) {
+    const button = byId(`${tab}-tab`);
+    button.addEventListener("click", () => turnTo(tab));
+    button.addEventListener("keydown", (event) => {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      const next = TABS[(at + step + TABS.length) % TABS.length];
+      turnTo(next);
+      byId(`${next}-tab`).focus();
+    });
+  }
+  byId("fit-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    order(...fitOrder());
+  });
+  byId("layout-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    order("sheets", layoutOrder());
+  });
+  document.addEventListener("input", () => fault(""));
+  byId("cancel").addEventListener("click", () => order("cancel", {}));
+  byId("go-on").addEventListener("click", () => {
+    turnTo("layout");
+    byId("layout-tab").focus();
+  });
+  byId("file").addEventListener("change", ({ target }) => {
+    if (target.files.length) open(target.files[0]);
+    target.value = "";
+  });
+  for (const button of document.querySelectorAll("[data-copy]")) {
+    button.addEventListener("click", () => copy(button));
+  }
+  const files = (event) => event.dataTransfer?.types.includes("Files");
+  document.addEventListener("dragover", (event) => {
+    if (!files(event)) return;
+    event.preventDefault();
+    document.body.classList.add("dropping");
+  });
+  document.addEventListener("dragleave", (event) => {
+    if (!event.relatedTarget) document.body.classList.remove("dropping");
+  });
+  document.addEventListener("drop", (event) => {
+    document.body.classList.remove("dropping");
+    if (!files(event)) return;
+    event.preventDefault();
+    turnTo("shape");
+    open(event.dataTransfer.files[0]);
+  });
+  document.addEventListener("visibilitychange", () => { if (!document.hidden) follow(); });
+}
+
+async function begin() {
+  listen();
+  try {
+    const catalogue = await ask("catalogue");
+    fillForms(catalogue);
+    const { sources } = await ask("state");
+    told = JSON.stringify(sources);
+    showSources(sources, catalogue.first?.source);
+    await follow();
+  } catch (error) {
+    fault(error.message);
+  }
+  document.documentElement.dataset.ready = "yes";
+}
+
+begin();

@@ -1,0 +1,183 @@
+"""The server: sockets on one side, :class:`~miurafab.studio.core.Studio` on the other.
+
+It listens on 127.0.0.1 and nowhere else. One request at a time reaches the studio, which never
+takes long: what takes time is done by another process. Everything that is computed or given lies
+in a temporary folder that goes when the server ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import shutil
+import socket
+import sys
+import tempfile
+import threading
+import webbrowser
+from collections.abc import Callable
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+from miurafab.errors import InputError, PatternError, PortError, TargetError
+from miurafab.machine.signals import StopSignals
+from miurafab.profiles import find_file
+from miurafab.studio.bench import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
+from miurafab.studio.core import Studio
+from miurafab.studio.guard import ADDRESS, Guard
+from miurafab.studio.messages import Request, Response, refusal
+from miurafab.studio.worker import Process
+from miurafab.surfaces.catalogue import make_surface, parse_target
+from miurafab.surfaces.mesh import MESH_SUFFIXES
+
+_IDLE_S = 60.0
+"""How long a connection that says nothing is kept."""
+
+
+def serve(
+    thing: str | None = None,
+    *,
+    port: int = 0,
+    open_browser: bool = True,
+    announce: Callable[[str], None] = print,
+) -> None:
+    """Serve the page until Ctrl-C, SIGTERM or SIGHUP.
+
+    ``thing`` is what it starts with: a pattern (.fold), which is opened, or a TARGET, which is
+    chosen. ``port`` 0 is any that is free. ``announce`` is called with the address when it can be
+    opened. Raises :class:`~miurafab.errors.InputError` for a thing that cannot be read,
+    :class:`~miurafab.errors.PortError` for a port that cannot be had.
+    """
+    if not 0 <= port <= 65535:
+        raise InputError(f"--port is {port}; it must lie between 0 (any that is free) and 65535.")
+    with contextlib.ExitStack() as at_end:
+        signals = at_end.enter_context(StopSignals())
+        at_end.enter_context(contextlib.suppress(KeyboardInterrupt))
+        folder = Path(tempfile.mkdtemp(prefix="miurafab-studio-"))
+        at_end.callback(shutil.rmtree, folder, ignore_errors=True)
+        bench = Bench(folder, Process)
+        first = None if thing is None else _put_on(bench, thing)
+        at_end.callback(bench.cancel)
+        at_end.callback(signals.hold)
+        server = _Server(port, signals.check)
+        at_end.callback(server.server_close)
+        guard = Guard(server.server_port, secrets.token_urlsafe(24))
+        server.studio = Studio(bench, guard, first)
+        if thing is not None and first is not None and first.get("open"):
+            bench.open(first["source"])
+        announce(guard.address)
+        if open_browser:
+            threading.Thread(target=webbrowser.open, args=(guard.address,), daemon=True).start()
+        server.serve_forever(poll_interval=0.1)
+
+
+def _put_on(bench: Bench, thing: str) -> dict[str, Any]:
+    """Put what was named on the command line on the bench; how the page is to begin."""
+    path = Path(thing)
+    suffix = path.suffix.lower()
+    if suffix == DESIGN_SUFFIX:
+        found = find_file("patterns", thing, error=TargetError)
+        return {"source": bench.add_own(found, "design").id}
+    if suffix in (*MESH_SUFFIXES, PATTERN_SUFFIX):
+        if not path.is_file():
+            error = PatternError if suffix == PATTERN_SUFFIX else TargetError
+            raise error(f"{path} does not exist.")
+        kind = "pattern" if suffix == PATTERN_SUFFIX else "mesh"
+        return {"source": bench.add_own(path, kind).id, "open": kind == "pattern"}
+    name, parameters = parse_target(thing)
+    make_surface(name, parameters)
+    return {"surface": name, "parameters": parameters}
+
+
+class _Server(ThreadingHTTPServer):
+    """Listens on this computer only; a name is never looked up."""
+
+    daemon_threads = True
+    allow_reuse_address = os.name == "posix"  # elsewhere it would share the port with others
+    studio: Studio
+
+    def __init__(self, port: int, check: Callable[[], None]) -> None:
+        self.lock = threading.Lock()
+        self._check = check
+        try:
+            super().__init__((ADDRESS, port), _Handler)
+        except OSError as fault:
+            raise PortError(
+                f"The port {port} cannot be had: {fault.strerror or fault}; choose another with "
+                "--port, or leave it out."
+            ) from None
+
+    def server_bind(self) -> None:
+        # HTTPServer would look up the name of this computer, which can take seconds
+        socket.socket.bind(self.socket, self.server_address)
+        self.server_address = self.socket.getsockname()
+        self.server_name, self.server_port = ADDRESS, self.server_address[1]
+
+    def service_actions(self) -> None:
+        """Several times a second: a signal whose exception was lost is raised again."""
+        self._check()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that goes away is no fault; anything else is told in one line."""
+        fault = sys.exc_info()[1]
+        if not isinstance(fault, ConnectionError | TimeoutError):
+            sys.stderr.write(f"miurafab: a request failed ({type(fault).__name__}: {fault}).\n")
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Reads one request after the other, has it answered, and writes the answer."""
+
+    protocol_version = "HTTP/1.1"
+    timeout = _IDLE_S
+    server: _Server
+
+    def do_GET(self) -> None:
+        self._answer()
+
+    do_HEAD = do_POST = do_PUT = do_DELETE = do_OPTIONS = do_PATCH = do_GET
+
+    def version_string(self) -> str:
+        return "miurafab-studio"
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing is written down of who asks for what."""
+
+    def _answer(self) -> None:
+        headers = {name.lower(): value for name, value in self.headers.items()}
+        studio = self.server.studio
+        refused = studio.guard.refuse(self.command, self.path, headers)
+        if refused is not None:
+            self.close_connection = True  # its body, if any, is not read
+            self._send(refused)
+            return
+        body = b""
+        if self.command == "POST":
+            wanted = int(headers["content-length"])
+            body = self.rfile.read(wanted)
+            if len(body) != wanted:
+                self.close_connection = True
+                return
+        with self.server.lock:
+            response = studio.handle(Request(self.command, self.path, headers, body))
+        self._send(response)
+
+    def _send(self, response: Response) -> None:
+        body = response.body
+        if isinstance(body, Path):
+            try:
+                body = body.read_bytes()
+            except OSError:  # another result has just taken its place
+                response = refusal(404, "There is nothing at this address any more.")
+                body = response.body
+        assert isinstance(body, bytes)
+        self.send_response(response.status)
+        for name, value in response.all_headers.items():
+            self.send_header(name, value)
+        self.send_header("Content-Length", str(len(body)))
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(body)

@@ -1,0 +1,203 @@
+"""The work itself, by the package's own verbs: fit or open a pattern, fold it, lay it out.
+
+Each order has a folder of its own, and everything is written there, in files of the names that the
+command line would give them. What is there to be shown is told part by part, so that a pattern can
+be looked at while its folding is still computed.
+"""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import miurafab
+from miurafab.errors import MiurafabError, PatternError
+from miurafab.fabrication.drawing.svg import pattern_svg
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.fold_format import read_fold
+from miurafab.studio.recipe import job_name
+from miurafab.workflow.job_directory import GUIDE, write_text
+from miurafab.workflow.picture_svg import svg_text
+from miurafab.workflow.preview import Preview
+
+Tell = Callable[[dict[str, Any]], None]
+
+PAGE, MOTION, PICTURE = "still.html", "folding.html", "pattern.svg"
+_FITTING = 0.6
+"""The part of the bar that the fit takes; the folding has the rest."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is to be done (``fit``, ``open`` or ``sheets``) in ``folder``, for the pattern ``name``.
+
+    ``target`` is for a fit; ``file`` is the pattern that is opened or laid out, and ``ours`` says
+    that it is the user's own on this computer and was not sent by the browser.
+    """
+
+    do: str
+    folder: Path
+    name: str
+    target: str = ""
+    file: Path = Path()
+    ours: bool = False
+    machine: str = ""
+    material: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For the way to another process."""
+        return asdict(self) | {"folder": str(self.folder), "file": str(self.file)}
+
+
+def order_from(values: Mapping[str, Any]) -> Order:
+    """The order that :meth:`Order.as_dict` wrote."""
+    return Order(**{**values, "folder": Path(values["folder"]), "file": Path(values["file"])})
+
+
+def carry_out(order: Order, tell: Tell) -> None:
+    """Do what ``order`` says; ``tell`` is given progress and parts of the answer.
+
+    Raises whatever the verbs raise, :class:`~miurafab.errors.MiurafabError` for what is wrong.
+    """
+    {"fit": _fit, "open": _open, "sheets": _sheets}[order.do](order, tell)
+
+
+def _fit(order: Order, tell: Tell) -> None:
+    wanted = miurafab.design(order.target, **order.options)
+    result = miurafab.fit(wanted.request, _progress(tell, 0.0, _FITTING))
+    part = {"part": "pattern", "report": result.report(), "remarks": list(wanted.remarks)}
+    if result.pattern is None:
+        tell(part | {"files": {}})
+        return
+    pattern = _with_mesh_in(order.folder, result.pattern)
+    file = order.folder / f"{order.name}.fold"
+    miurafab.save_pattern(pattern, file, wanted.title)
+    _show(order, pattern, part | {"files": {"fold": file.name}}, tell)
+
+
+def _open(order: Order, tell: Tell) -> None:
+    tell({"progress": 0.0, "note": "checking the pattern"})
+    pattern, surface, missing = _read(order)
+    report = miurafab.check(pattern, surface).report()
+    copy = order.folder / f"{order.name}.fold"
+    shutil.copyfile(order.file, copy)
+    remarks = [] if missing is None else [f"Distances are left out: {missing}."]
+    part = {"part": "pattern", "report": report, "remarks": remarks}
+    _show(order, pattern, part | {"files": {"fold": copy.name}}, tell)
+
+
+def _read(order: Order) -> tuple[CreasePattern, Any, str | None]:
+    """The pattern with its target. A file from the browser must not name a mesh by its path."""
+    pattern = read_fold(order.file)
+    mesh = pattern.target.get("mesh")
+    if mesh is None or order.ours:
+        return miurafab.load_pattern(order.file)
+    return pattern, None, "its target is a mesh, which is not in the file"
+
+
+def _with_mesh_in(folder: Path, pattern: CreasePattern) -> CreasePattern:
+    """``pattern`` with the mesh of its target beside it, so that it is named without a path."""
+    if "mesh" not in pattern.target:
+        return pattern
+    mesh = Path(pattern.target["mesh"])
+    copy = folder / mesh.name
+    shutil.copyfile(mesh, copy)
+    return replace(pattern, target={**pattern.target, "mesh": str(copy.resolve())})
+
+
+def _show(order: Order, pattern: CreasePattern, part: dict[str, Any], tell: Tell) -> None:
+    """The pattern as a drawing and in space, at first still, and then as it folds."""
+    folder = order.folder
+    write_text(folder / PICTURE, pattern_svg(pattern))
+    miurafab.write_page(folder / PAGE, title=order.name, pattern=pattern)
+    tell(part | {"files": {**part["files"], "picture": PICTURE, "page": PAGE}})
+    tell({"progress": _FITTING, "note": "folding"})
+    try:
+        folding = miurafab.fold(pattern, on_progress=_progress(tell, _FITTING, 1.0))
+    except PatternError as fault:
+        tell({"part": "motion", "missing": str(fault)})
+        return
+    miurafab.write_motion(folding, folder / MOTION, order.name)
+    told = folding.report()
+    remarks = []
+    if not told["rigid"]:
+        remarks.append("It does not fold rigidly: its facets bend a little on the way.")
+    if told["self_contacts"]:
+        frames = f"{len(told['self_contacts'])} of {told['frames']} positions"
+        remarks.append(f"On the way facets pass through each other in {frames}.")
+    tell({"part": "motion", "files": {"page": MOTION}, "remarks": remarks})
+
+
+def _sheets(order: Order, tell: Tell) -> None:
+    directory = order.folder / job_name(order.name)
+    options = miurafab.layout_options(order.options)
+    job = miurafab.write_job(
+        order.file,
+        directory,
+        order.machine,
+        order.material,
+        _progress(tell, 0.0, 0.9),
+        options=options,
+    )
+    tell({"progress": 0.9, "note": "drawing the sheets"})
+    shown = Preview(order.name, job.machine, job.dry_runs, None, ())
+    page = f"{order.name}-preview.html"
+    miurafab.write_page(order.folder / page, title=order.name, preview=shown)
+    pictures = []
+    for sheet in job.dry_runs:
+        pictures.append(f"{sheet.name}-picture.svg")
+        write_text(order.folder / pictures[-1], svg_text(sheet, job.machine))
+    packed = f"{directory.name}.zip"
+    _pack(directory, order.folder / packed)
+    shutil.copyfile(directory / GUIDE, order.folder / GUIDE)
+    layout = job.layout
+    tell(
+        {
+            "part": "job",
+            "totals": asdict(layout.totals),
+            "sheets": [
+                {
+                    "name": sheet.name,
+                    "seconds": sheet.seconds,
+                    "warnings": list(sheet.warnings),
+                }
+                for sheet in job.dry_runs
+            ],
+            "untabbed": len(layout.untabbed),
+            "unlettered": layout.unlettered,
+            "remarks": list(layout.remarks),
+            "files": {"zip": packed, "guide": GUIDE, "page": page},
+            "pictures": pictures,
+        }
+    )
+
+
+def _pack(directory: Path, archive: Path) -> None:
+    """``directory`` as a ZIP archive; the same files give the same bytes."""
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as packed:
+        for path in sorted(directory.iterdir()):
+            entry = zipfile.ZipInfo(f"{directory.name}/{path.name}")
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            packed.writestr(entry, path.read_bytes())
+
+
+def _progress(tell: Tell, low: float, high: float) -> Callable[[float, str], None]:
+    """Progress of a step as a part of the whole."""
+    return lambda fraction, note: tell(
+        {"progress": low + (high - low) * min(max(fraction, 0.0), 1.0), "note": note}
+    )
+
+
+def failure(fault: MiurafabError | OSError | MemoryError) -> str:
+    """What went wrong, in one sentence."""
+    if isinstance(fault, MemoryError):
+        return "This computer has not enough memory for that; ask for fewer --facets."
+    if isinstance(fault, OSError):
+        return f"A file could not be read or written: {fault.strerror or fault}."
+    return str(fault)

@@ -1,0 +1,137 @@
+"""The process in which the work is done, from both ends, so that it can be ended at any time.
+
+An order goes in as one line of JSON, and a line of JSON comes out for whatever happens: progress,
+parts of the answer, and ``done`` or ``error`` at last. The process ends at once when its standard
+input is closed, as it is when the studio is gone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import IO, Any, Protocol
+
+from miurafab.errors import MiurafabError
+from miurafab.studio.messages import json_text
+from miurafab.studio.work import Order, carry_out, failure, order_from
+
+News = dict[str, Any]
+
+_COMMAND = (
+    "import sys; sys.path.insert(0, sys.argv[1]); from miurafab.studio.worker import main; main()"
+)
+
+
+class Running(Protocol):
+    """An order that is being carried out."""
+
+    def news(self) -> list[News]:
+        """What has happened since this was last asked."""
+
+    def stop(self) -> None:
+        """End it now; it may have ended already."""
+
+
+class Process:
+    """An order that is carried out by a process of its own."""
+
+    def __init__(self, order: Order) -> None:
+        root = str(Path(__file__).resolve().parents[2])
+        self._news: queue.SimpleQueue[News] = queue.SimpleQueue()
+        self._last = ""
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _COMMAND, root],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+        )
+        out, err = self._process.stdout, self._process.stderr
+        assert out is not None
+        assert err is not None
+        self._complaints = threading.Thread(target=self._keep_last, args=(err,), daemon=True)
+        self._answers = threading.Thread(target=self._listen, args=(out,), daemon=True)
+        self._complaints.start()
+        self._answers.start()
+        assert self._process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):  # one that has died says so by its end
+            self._process.stdin.write(json_text(order.as_dict()) + "\n")
+            self._process.stdin.flush()
+
+    def news(self) -> list[News]:
+        """What has happened since this was last asked."""
+        found = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                found.append(self._news.get_nowait())
+        return found
+
+    def stop(self) -> None:
+        """Kill the process, and wait until nothing of it is left."""
+        self._process.kill()
+        self._answers.join()
+        self._complaints.join()
+        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
+            assert pipe is not None
+            with contextlib.suppress(BrokenPipeError):
+                pipe.close()
+
+    def _listen(self, lines: IO[str]) -> None:
+        ended = False
+        for line in lines:
+            try:
+                said = json.loads(line)
+            except json.JSONDecodeError:
+                break  # cut off when it was killed
+            ended = "done" in said or "error" in said
+            self._news.put(said)
+        status = self._process.wait()
+        if not ended:
+            self._complaints.join()
+            self._news.put({"error": _unexpected(status, self._last)})
+
+    def _keep_last(self, lines: IO[str]) -> None:
+        for line in lines:
+            self._last = line.strip() or self._last
+
+
+def _unexpected(status: int, last: str) -> str:
+    if status == -9:
+        return "The system ended the computation, as it does when memory runs out."
+    return f"The computation ended unexpectedly ({last.rstrip('.') or f'status {status}'})."
+
+
+def main() -> None:
+    """Carry out the order on standard input."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the studio, which ends us
+    # What libraries print themselves must not get among the answers.
+    answers = os.fdopen(os.dup(1), "w", encoding="ascii")
+    os.dup2(2, 1)
+
+    def tell(news: News) -> None:
+        answers.write(json_text(news) + "\n")
+        answers.flush()
+
+    order = order_from(json.loads(sys.stdin.readline()))
+    threading.Thread(target=_end_with_studio, daemon=True).start()
+    try:
+        carry_out(order, tell)
+    except (MiurafabError, OSError, MemoryError) as fault:
+        tell({"error": failure(fault)})
+    else:
+        tell({"done": True})
+
+
+def _end_with_studio() -> None:
+    while os.read(0, 4096):
+        pass
+    os._exit(1)
