@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from miurafab.cli import main
+from miurafab.__main__ import main
 from miurafab.errors import ControllerError, InputError, JobStopped, PortError, ProfileError
 from miurafab.gcode.job import Job
 from miurafab.grbl.virtual_faults import parse_faults
