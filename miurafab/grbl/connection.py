@@ -32,14 +32,11 @@ from miurafab.grbl.events import (
 )
 from miurafab.grbl.replies import parse_reply
 from miurafab.grbl.states import KEEPS_ACCOUNT, TRANSITIONS, Input, State
+from miurafab.wire.lines import LineReader
 
 SOFT_RESET = b"\x18"
 STATUS_QUERY = b"?"
 FEED_HOLD = b"!"
-
-MAX_REPLY = 1024
-"""Bytes without a line end after which the stream is taken for noise; GRBL's longest report has
-about 160."""
 
 _WRITES_EEPROM = re.compile(
     rb"^\$(?:\d+|N\d|RST|I)=|G0*10(?![\d.])|G0*28\.10*(?!\d)|G0*30\.10*(?!\d)", re.IGNORECASE
@@ -79,7 +76,7 @@ class Connection:
         self.state = State.OPENING
         self.in_flight: deque[SendLine] = deque()
         self.in_flight_bytes = 0
-        self._incoming = bytearray()
+        self._lines = LineReader()
         self._events: deque[Event] = deque()
 
     # What we send
@@ -134,16 +131,8 @@ class Connection:
         if not data:
             self._take(Closed())
             return
-        self._incoming += data
-        *lines, rest = self._incoming.split(b"\n")
-        if len(rest) > MAX_REPLY:
-            lines.append(rest)
-            rest = bytearray()
-        self._incoming = rest
-        for line in lines:
-            text = line.strip(b"\r\0").decode("ascii", "backslashreplace")
-            if text:
-                self._take(parse_reply(text))
+        for text in self._lines.take(data):
+            self._take(parse_reply(text))
 
     def events(self) -> Iterator[Event]:
         """The events that have become complete since the last call, in order."""

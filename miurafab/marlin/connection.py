@@ -16,6 +16,7 @@ from collections.abc import Iterator
 
 from miurafab.gcode.job import SendLine
 from miurafab.marlin.replies import Fault, Ok, Reply, Resend, Started, parse_reply
+from miurafab.wire.lines import LineReader
 
 EMERGENCY = b"\nM112\n"
 """Halt: motors and laser off until a reset. The newline ends what may have been begun."""
@@ -24,7 +25,6 @@ FRAME = len("N99999999*255")
 """Characters that the count and the checksum add to a line at most."""
 MOST_TRIES = 5
 """How often a line is sent before the wire is given up."""
-_MOST_REPLY = 1024  # bytes without a line end after which the stream is taken for noise
 
 
 class Connection:
@@ -37,7 +37,7 @@ class Connection:
         self._tries = 0
         self._again = False
         self._taken = False
-        self._incoming = bytearray()
+        self._lines = LineReader(b"\r\0 ")
         self._replies: deque[Reply] = deque()
 
     @property
@@ -77,16 +77,8 @@ class Connection:
 
     def receive_data(self, data: bytes) -> None:
         """Take bytes as they came, in any chunks; the replies are then had from :meth:`replies`."""
-        self._incoming += data
-        *lines, rest = self._incoming.split(b"\n")
-        if len(rest) > _MOST_REPLY:
-            lines.append(rest)
-            rest = bytearray()
-        self._incoming = rest
-        for line in lines:
-            text = line.strip(b"\r\0 ").decode("ascii", "backslashreplace")
-            if text:
-                self._take(parse_reply(text))
+        for text in self._lines.take(data):
+            self._take(parse_reply(text))
 
     def replies(self) -> Iterator[Reply]:
         """The replies that have become complete since the last call, in order."""
