@@ -1,6 +1,6 @@
 """How few patches a pattern takes, and how short their seams are, before and after the search.
 
-    python benchmarks/patching.py [fan:100000 miura:40000 fan:10000:free ...] [--picture FILE.png]
+    python benchmarks/patching.py [fan:100000 miura:40000 ...] [--best] [--picture FILE.png]
 
 A case is a pattern of benchmarks/layout.py and its number of facets; ``free`` hides the grid, as if
 the pattern came from a file that does not tell it. *Before* is the split along grid lines, or the
@@ -8,10 +8,10 @@ grown one where there is no grid; *after* is what the search for covers and the 
 bound is the area of the pattern over that of a bed of 590 x 390 mm, rounded up. No patch can do
 without tabs of 7 mm on its seams, so no split of a large pattern comes nearer than about 1.03.
 
-``best`` of a Miura-ori is the fewest patches of all splits by straight cuts right through (each
-part cut again, along or across), found exactly: no split along its grid lines does with less unless
-it has a pinwheel. Times are of the processor. The exit code is 1 if a case takes more patches than
-it did when this was written.
+With ``--best`` the fewest patches of all splits by straight cuts right through (each part cut
+again, along or across) are found exactly, in some minutes: no split along grid lines does with less
+unless it has a pinwheel. Times are of the processor. The exit code is 1 if a case takes more
+patches than it did when this was written.
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ import numpy as np
 from layout import PATTERNS
 
 from miurafab.fabrication import patches
+from miurafab.fabrication.boxes import best_turn
+from miurafab.fabrication.seams import inner_seams
+from miurafab.fabrication.tabs import tab_regions
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import load_material
 
@@ -95,7 +98,6 @@ def measure(case: str) -> tuple[dict[str, Any], CreasePattern, np.ndarray]:
         "after_m": seam_m(pattern, patch),
         "seconds": seconds,
         "search": seen["search"],
-        "best": straight_cuts(pattern) if case.startswith("miura") else None,
     }
     return row, pattern, patch
 
@@ -108,34 +110,75 @@ def seam_m(pattern: CreasePattern, patch: np.ndarray) -> float:
 
 
 def straight_cuts(pattern: CreasePattern) -> int:
-    """The fewest patches of a regular Miura-ori if every cut goes right through a part.
+    """The fewest patches of a fan or a Miura-ori if every cut goes right through a part.
 
-    A patch of c x r facets measures c times the first side, and the zig-zag and the tab beyond it,
-    by r times the row height and the tab; at the far border there is no tab, which is granted to
-    all patches by taking one row and one column from the whole.
+    Both are the same everywhere along their rows, so a part is known by its first row, its number
+    of rows h and of columns n, and by whether it ends at the right border, where no tabs stand:
+
+        fewest(part) = 1 if it fits, else the least sum over its cuts in two, along or across.
     """
-    points = pattern.vertices_coords
-    columns = int(np.flatnonzero(np.diff(points[:, 0]) < 0)[0])
-    rows = len(points) // (columns + 1) - 1
-    side, lean = points[1, 0] - points[0, 0], points[columns + 1, 0] - points[0, 0]
-    height = points[columns + 1, 1]
-    tab = 7.0 / math.sin(math.atan2(height, lean)) - 0.31
-    most = [
-        (int((w - lean - tab) / side), int((h - 7.0) / height)) for w, h in (BED_MM, BED_MM[::-1])
-    ]
-    fewest = np.full((columns, rows), np.iinfo(np.int64).max // 4)
-    for c in range(1, columns):
-        for r in range(1, rows):
-            if any(c <= wide and r <= high for wide, high in most):
-                fewest[c, r] = 1
-                continue
-            if c > 1:
-                across = fewest[1 : c // 2 + 1, r] + fewest[c - 1 : c - c // 2 - 1 : -1, r]
-                fewest[c, r] = across.min()
-            if r > 1:
-                along = fewest[c, 1 : r // 2 + 1] + fewest[c, r - 1 : r - r // 2 - 1 : -1]
-                fewest[c, r] = min(fewest[c, r], along.min())
-    return int(fewest[columns - 1, rows - 1])
+    columns, rows = (lines - 1 for lines in pattern.grid)
+    inner, border = _largest(pattern, rows, columns)
+    fewest = np.full((2, rows + 1, rows + 1, columns + 1), 255, dtype=np.uint8)
+    n = np.arange(columns + 1)
+    for h in range(1, rows + 1):
+        starts = rows - h + 1
+        for at_border, largest in enumerate((inner, border)):
+            here = fewest[at_border, h, :starts]
+            here[(n > 0) & (n <= largest[h, :starts, None])] = 1
+            for k in range(1, h):
+                low, high = fewest[at_border, k, :starts], fewest[at_border, h - k, k : starts + k]
+                np.minimum(here, _sum(low, high), out=here)
+            left = fewest[0, h, :starts]
+            for c in range(2, columns + 1):
+                pairs = _sum(left[:, 1:c], here[:, c - 1 : 0 : -1])
+                np.minimum(here[:, c], pairs.min(axis=1), out=here[:, c])
+    return int(fewest[1, rows, 0, columns])
+
+
+def _sum(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Their sum, 255 being as good as infinite."""
+    return np.minimum(one, 127) + np.minimum(other, 127)
+
+
+def _largest(pattern: CreasePattern, rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    """(R + 1, R) the most columns of a patch of h rows from each row on that fits the bed, with
+    tabs on its right and its upper side; and the same without tabs on the right.
+    """
+    edges = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+    face = pattern.edges_faces[edges]
+    seams = inner_seams(pattern, edges, face.argmax(axis=1))
+    tabs = tab_regions(pattern, seams, load_material("card-250"), full_facet=False)
+    filled = np.where(tabs.present[..., None], tabs.points, tabs.points[:, :1])
+    to_right = tabs.mate_face == tabs.own_face + 1
+    right, upper = np.full((2, rows * columns), -1)
+    right[tabs.own_face[to_right]] = np.flatnonzero(to_right)
+    upper[tabs.own_face[~to_right]] = np.flatnonzero(~to_right)
+    right, upper = right.reshape(rows, columns), upper.reshape(rows, columns)
+    points = pattern.vertices_coords.reshape(rows + 1, columns + 1, 2)
+
+    def fits(r: int, h: int, n: int, *, at_border: bool) -> bool:
+        ends = [points[r, : n + 1], points[r + h, : n + 1]]
+        ends += [points[r : r + h + 1, 0], points[r : r + h + 1, n]]
+        standing = [upper[r + h - 1, :n]] if r + h < rows else []
+        standing += [] if at_border else [right[r : r + h, n - 1]]
+        ends += [filled[tab].reshape(-1, 2) for tab in standing]
+        return best_turn(np.concatenate(ends), *BED_MM) is not None
+
+    found = np.zeros((2, rows + 1, rows), dtype=np.int64)
+    for at_border in (False, True):
+        for h in range(1, rows + 1):
+            for r in range(rows - h + 1):
+                # What is most changes little from one row to the next.
+                n = int(found[int(at_border), h, r - 1]) if r else columns // 2
+                while n < columns - 1 and fits(r, h, n + 1, at_border=at_border):
+                    n += 1
+                while n > 0 and not fits(r, h, n, at_border=at_border):
+                    n -= 1
+                found[int(at_border), h, r] = n
+            if not found[int(at_border), h].any():
+                break
+    return found[0], found[1]
 
 
 def draw(pattern: CreasePattern, patch: np.ndarray, file: Path) -> None:
@@ -167,15 +210,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cases", nargs="*", default=list(KNOWN), metavar="PATTERN:FACETS[:free]")
     parser.add_argument("--picture", type=Path, help="draw the last case")
+    parser.add_argument("--best", action="store_true", help="find the fewest by straight cuts")
     options = parser.parse_args()
     print("case               bound  before   seams m  after   seams m  ratio  best   s (search)")
     worse = []
     for case in options.cases:
         row, pattern, patch = measure(case)
-        best = "" if row["best"] is None else row["best"]
+        best = str(straight_cuts(pattern)) if options.best and pattern.grid else ""
         print(
             f"{case:18s}{row['bound']:6d}{row['before']:8d}{row['before_m']:10.2f}"
-            f"{row['after']:7d}{row['after_m']:10.2f}{row['after'] / row['bound']:7.3f}{best!s:>6s}"
+            f"{row['after']:7d}{row['after_m']:10.2f}{row['after'] / row['bound']:7.3f}{best:>6s}"
             f"{row['seconds']:6.1f} ({row['search']:.1f})",
             flush=True,
         )

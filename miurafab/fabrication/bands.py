@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab.fabrication.boxes import fits
+from miurafab.fabrication.boxes import Space
 
 Rectangle = tuple[int, int, int, int]
 """Rows from, rows to, columns from, columns to; the ends excluded."""
@@ -89,13 +89,13 @@ class GridShape:
         )
 
 
-def split_grid(shape: GridShape, width: float, height: float) -> list[Rectangle]:
-    """Rectangles that cover the grid, each fitting ``width`` x ``height`` mm with its tabs.
+def split_grid(shape: GridShape, space: Space) -> list[Rectangle]:
+    """Rectangles that cover the grid, each fitting ``space`` with its tabs.
 
     They come in an order in which of two neighbours the lower or left one is first. Every facet
     with its tabs must be known to fit alone.
     """
-    rows, columns = _Bands(shape, width, height), _Bands(shape.exchanged(), width, height)
+    rows, columns = _Bands(shape, space), _Bands(shape.exchanged(), space)
     by_row = rows.prefixes + columns.suffix_total()
     by_column = columns.prefixes + rows.suffix_total()
     at_row, at_column = int(np.argmin(by_row)), int(np.argmin(by_column))
@@ -118,8 +118,8 @@ class _Bands:
     columns, at [c, first row]; infinite where a column of the band does not fit.
     """
 
-    def __init__(self, shape: GridShape, width: float, height: float) -> None:
-        self.shape, self.size = shape, (width, height)
+    def __init__(self, shape: GridShape, space: Space) -> None:
+        self.shape, self.space = shape, space
         self.columns, self.rows = shape.right_mm.shape
         self.cost: list[NDArray[np.float64]] = []
         body, right, cut_mm = shape.body.copy(), shape.right.copy(), shape.right_mm
@@ -154,7 +154,7 @@ class _Bands:
         for c in range(self.columns):
             column = np.maximum(body[c], top[c])
             grown = np.maximum(run, column)
-            longer = fits(np.maximum(grown, right[c]), *self.size)
+            longer = self.space.holds(np.maximum(grown, right[c]))
             if c == 0:
                 longer[:] = False
             step = np.where(longer, 0.0, _PATCH + (cut_mm[c - 1] if c else 0.0))
@@ -162,7 +162,7 @@ class _Bands:
             if len(opened):
                 grown[opened] = column[opened]
                 if h > 1:
-                    fit = fits(np.maximum(column[opened], right[c, opened]), *self.size)
+                    fit = self.space.holds(np.maximum(column[opened], right[c, opened]))
                     step[opened[~fit]] = np.inf
             run = grown
             cost[c + 1] = cost[c] + step

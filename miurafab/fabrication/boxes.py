@@ -15,6 +15,7 @@ u(θ) = (cos θ, sin θ) and v(θ) = (-sin θ, cos θ) are at most w and h. Two 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,54 @@ from numpy.typing import NDArray
 
 TOLERANCE = 1e-9
 """How far, in mm, an extent may exceed the rectangle by rounding."""
+
+_ROUNDING = 0.005
+"""Room in mm for the rounding of support values in single precision."""
+
+
+_ANGLES = 48
+"""Angles in a right angle at which boxes are tried: steps of 1.9 degrees."""
+
+
+@dataclass(frozen=True)
+class Space:
+    """The rectangle, ``width`` x ``height`` mm, that shapes have to fit, turned at will or by the
+    given quarter ``turns`` alone: 0 as they are, 1 by a right angle.
+    """
+
+    width: float
+    height: float
+    turns: tuple[int, ...] | None = None
+
+    @property
+    def directions(self) -> NDArray[np.float64]:
+        """(D, 2) along which support values are taken for :meth:`holds`."""
+        return fan(_ANGLES if self.turns is None else 1)
+
+    def smaller(self, by: float) -> Space:
+        """The space less ``by`` mm each way."""
+        return Space(self.width - by, self.height - by, self.turns)
+
+    def holds(self, values: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """(...,) whether shapes with support ``values`` (..., D) fit."""
+        if self.turns is None:
+            return fits(values, self.width, self.height)
+        size = np.array([self.width, self.height]) - _ROUNDING
+        extents = values[..., :2] + values[..., 2:]
+        ways = [(extents <= (size if turn == 0 else size[::-1])).all(-1) for turn in self.turns]
+        found: NDArray[np.bool_] = np.logical_or.reduce(ways)
+        return found
+
+    def turn(self, points: NDArray[np.float64]) -> float | None:
+        """The angle θ in radians whose turn by -θ fits ``points`` (n, 2): with the smallest box, or
+        0 where the turns are given; None if none does.
+        """
+        if self.turns is None:
+            return best_turn(points, self.width, self.height)
+        size = np.array([self.width, self.height]) + TOLERANCE
+        extents = np.ptp(points, axis=0)
+        ways = [(extents <= (size if turn == 0 else size[::-1])).all() for turn in self.turns]
+        return 0.0 if any(ways) else None
 
 
 def fan(turns: int) -> NDArray[np.float64]:
@@ -66,7 +115,7 @@ def fits(values: NDArray[np.float32], width: float, height: float) -> NDArray[np
     quarter = values.shape[-1] // 4
     along = values[..., :quarter] + values[..., 2 * quarter : 3 * quarter]
     across = values[..., quarter : 2 * quarter] + values[..., 3 * quarter :]
-    long, short = max(width, height) - 0.005, min(width, height) - 0.005
+    long, short = max(width, height) - _ROUNDING, min(width, height) - _ROUNDING
     found: NDArray[np.bool_] = (
         (np.maximum(along, across) <= long) & (np.minimum(along, across) <= short)
     ).any(axis=-1)

@@ -1,9 +1,7 @@
 """Patches: pieces in a frame of their own, and as many of each as there are copies of the model.
 
 A piece is turned to the smallest box that fits its sheet and moved until that box begins at the
-origin. Where it has to lie along the fibres of a sheet it keeps the directions of the pattern; then
-it may fit the sheet at any angle but the right one, and the pattern is divided once more, into
-pieces as much smaller as the worst of them is too large, until all fit.
+origin. Where it has to lie along the fibres of a sheet it keeps the directions of the pattern.
 """
 
 from __future__ import annotations
@@ -15,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.boxes import best_turn
-from miurafab.fabrication.nesting import SheetKind, turned
+from miurafab.fabrication.boxes import Space
+from miurafab.fabrication.nesting import turned
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.pieces import Piece, Pieces, make_pieces
 from miurafab.fabrication.stock import LaidStock
@@ -26,12 +24,6 @@ from miurafab.profiles import Material
 
 DIGITS = 6
 """Decimals of mm that a layout keeps, so that what is written is what was computed."""
-
-_ATTEMPTS = 24
-"""How often a pattern is divided into smaller pieces before it is given up."""
-
-_STEP = 0.6, 0.92
-"""The least and the greatest factor by which pieces are made smaller at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,40 +68,18 @@ def frame_patches(
     """The patches of a pattern, each no larger than the main sheet of ``stock``.
 
     Raises :class:`~miurafab.errors.LayoutError` as
-    :func:`~miurafab.fabrication.pieces.make_pieces`, and where no division yields patches that lie
-    along the fibres.
+    :func:`~miurafab.fabrication.pieces.make_pieces`.
     """
     kind = stock.kinds.kinds[stock.main]
-    limit = (max(kind.width, kind.height), min(kind.width, kind.height))
-    if options.max_patch_mm is not None:
-        limit = min(limit[0], options.max_patch_mm[0]), min(limit[1], options.max_patch_mm[1])
-    for _ in range(_ATTEMPTS):
-        smaller = replace(options, max_patch_mm=limit)
-        pieces = make_pieces(pattern, kind.width, kind.height, material, smaller)
-        numbers = _numbers(pieces)
-        size = None if stock.upright else (kind.width, kind.height)
-        patches = tuple(
-            _patch(pattern, number, piece, pieces, numbers, size)
-            for number, piece in enumerate(pieces.pieces)
-        )
-        part = min(_room(patch.outline_mm, kind) for patch in patches) if stock.upright else 1.0
-        if part >= 1.0:
-            return Framed(pieces, numbers, patches)
-        factor = min(max(part, _STEP[0]), _STEP[1])
-        limit = limit[0] * factor, limit[1] * factor
-    raise LayoutError(
-        "The pattern cannot be divided into patches that lie along the fibres of a sheet of "
-        f"{kind.width:.1f} mm x {kind.height:.1f} mm; write grain = 'none', or lay the pattern's "
-        "other axis along them."
+    turns = tuple(sorted({turn // 90 % 2 for turn in kind.rotations})) if stock.upright else None
+    pieces = make_pieces(pattern, kind.width, kind.height, material, options, turns=turns)
+    numbers = _numbers(pieces)
+    space = Space(kind.width, kind.height, turns)
+    patches = (
+        _patch(pattern, number, piece, pieces, numbers, space)
+        for number, piece in enumerate(pieces.pieces)
     )
-
-
-def _room(outline: NDArray[np.float64], kind: SheetKind) -> float:
-    """By how much an outline would have to be scaled to fit a sheet, 1 or more if it does."""
-    sizes = [np.ptp(turned(outline, turn), axis=0) for turn in kind.rotations]
-    if any(kind.fits(outline, turn) for turn in kind.rotations):
-        return 1.0
-    return max(float((np.array([kind.width, kind.height]) / size).min()) for size in sizes)
+    return Framed(pieces, numbers, tuple(patches))
 
 
 def copied(patches: tuple[Patch, ...], quantity: int) -> tuple[Patch, ...]:
@@ -146,10 +116,10 @@ def _patch(
     piece: Piece,
     pieces: Pieces,
     numbers: NDArray[np.int64],
-    size: tuple[float, float] | None,
+    space: Space,
 ) -> Patch:
     line = piece.cut_lines[0]
-    angle = 0.0 if size is None else best_turn(line, *size)
+    angle = space.turn(line)
     if angle is None:
         raise LayoutError(f"Patch {number} with its tabs does not fit the bed at any angle.")
     rotation = round(-math.degrees(angle), 9) if angle else 0.0

@@ -16,7 +16,7 @@ import heapq
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab.fabrication.boxes import fits
+from miurafab.fabrication.boxes import Space
 from miurafab.origami.crease_pattern import CreasePattern
 
 
@@ -27,7 +27,7 @@ class _Growth:
         self,
         pattern: CreasePattern,
         reach: NDArray[np.float32],
-        size: tuple[float, float],
+        space: Space,
         free: NDArray[np.bool_],
         most: int,
     ) -> None:
@@ -41,10 +41,10 @@ class _Growth:
         self.across = [
             row[: len(face)] for row, face in zip(across.tolist(), self.corners, strict=True)
         ]
-        self.reach, self.size, self.most = reach, size, most
+        self.reach, self.space, self.most = reach, space, most
         self.patch: list[int] = np.where(free, -1, -2).tolist()
         self.stamp = [-1] * len(pattern.vertices_coords)
-        self.rank = _ranks(pattern, size)
+        self.rank = _ranks(pattern, space)
 
     def keeps_disk(self, face: int, patch: int) -> bool:
         """Whether ``patch`` stays a disk when it takes ``face``."""
@@ -65,7 +65,7 @@ class _Growth:
                 if not self.keeps_disk(face, patch):
                     continue
                 grown = np.maximum(values, self.reach[face])
-                if not fits(grown, *self.size):
+                if not self.space.holds(grown):
                     tried[face] = len(self.corners[face])
                     continue
                 values = grown
@@ -86,22 +86,21 @@ class _Growth:
 def grow_patches(
     pattern: CreasePattern,
     reach: NDArray[np.float32],
-    width: float,
-    height: float,
+    space: Space,
     faces: NDArray[np.int64] | None = None,
     most: int | None = None,
 ) -> NDArray[np.int64]:
     """(F,) patch ids from 0 of ``faces`` (all by default), -1 for the others.
 
     ``reach`` (F, D) are the support values of each facet with all tabs that may stand on it, and
-    every facet must fit ``width`` x ``height`` mm alone. ``most`` limits the facets of a patch.
+    every facet must fit ``space`` alone. ``most`` limits the facets of a patch.
     """
     total = len(pattern.faces_vertices)
     free = np.ones(total, dtype=bool)
     if faces is not None:
         free = np.zeros(total, dtype=bool)
         free[faces] = True
-    growth = _Growth(pattern, reach, (width, height), free, most or total)
+    growth = _Growth(pattern, reach, space, free, most or total)
     order = np.lexsort((np.arange(total), growth.rank.sum(axis=1)))
     patch = 0
     for seed in order.tolist():
@@ -109,10 +108,10 @@ def grow_patches(
             growth.grow(seed, patch)
             patch += 1
     found = np.maximum(np.array(growth.patch), -1)
-    return found if most else _merged(pattern, reach, (width, height), found)
+    return found if most else _merged(pattern, reach, space, found)
 
 
-def _ranks(pattern: CreasePattern, size: tuple[float, float]) -> NDArray[np.float64]:
+def _ranks(pattern: CreasePattern, space: Space) -> NDArray[np.float64]:
     """(F, 2) facet centres in the pattern's principal axes, in units of the bed's sides."""
     real = pattern.faces_vertices >= 0
     corners = np.where(real[..., None], pattern.vertices_coords[pattern.faces_vertices], 0.0)
@@ -121,14 +120,15 @@ def _ranks(pattern: CreasePattern, size: tuple[float, float]) -> NDArray[np.floa
     _, axes = np.linalg.eigh(centred.T @ centred)
     # The sign of an eigenvector is arbitrary; the larger component is made positive.
     axes = axes * np.sign(axes[np.abs(axes).argmax(axis=0), [0, 1]])
-    ranks: NDArray[np.float64] = (centred @ axes[:, ::-1]) / (max(size), min(size))
+    sides = max(space.width, space.height), min(space.width, space.height)
+    ranks: NDArray[np.float64] = (centred @ axes[:, ::-1]) / sides
     return ranks
 
 
 def _merged(
     pattern: CreasePattern,
     reach: NDArray[np.float32],
-    size: tuple[float, float],
+    space: Space,
     face_patch: NDArray[np.int64],
 ) -> NDArray[np.int64]:
     """Neighbouring patches joined, smallest first, while the union is a disk that fits."""
@@ -152,7 +152,7 @@ def _merged(
         for q in sorted(beside[p], key=lambda other: (len(members[other]), other)):
             both = np.maximum(values[p], values[q])
             union = np.concatenate([members[p], members[q]])
-            if fits(both, *size) and is_disk(pattern, union):
+            if space.holds(both) and is_disk(pattern, union):
                 members[p], values[p] = np.sort(union), both
                 members[q] = members[q][:0]
                 for other in beside[q]:

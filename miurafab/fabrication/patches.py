@@ -3,8 +3,9 @@
 A pattern that fits is one patch. Otherwise a grid of facets is cut into bands and runs
 (:mod:`~miurafab.fabrication.bands`), and any other mesh is grown into regions
 (:mod:`~miurafab.fabrication.growing`). Either is then made better without regard to grid lines
-(:mod:`~miurafab.fabrication.improving`). A flat pattern may overlap itself; a patch may not, and
-one that does is grown again in halves until none does.
+(:mod:`~miurafab.fabrication.improving`), unless patches have to keep the pattern's directions. A
+flat pattern may overlap itself; a patch may not, and one that does is grown again in halves until
+none does.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.bands import GridShape, Rectangle, split_grid
-from miurafab.fabrication.boxes import best_turn, box_of, fan, fits, support
+from miurafab.fabrication.boxes import Space, box_of, support
 from miurafab.fabrication.growing import grow_patches, is_disk
 from miurafab.fabrication.improving import improved
 from miurafab.fabrication.options import LayoutOptions
@@ -26,9 +27,6 @@ from miurafab.fabrication.seams import inner_seams
 from miurafab.fabrication.tabs import TabRegions, choose_tabs, ring_tabs, tab_regions
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
-
-_TURNS = 48
-"""Angles in a right angle at which boxes are tried at first: steps of 1.9 degrees."""
 
 _MANY = 30_000
 """In grids of more facets only every other angle is tried."""
@@ -50,8 +48,11 @@ def split(
     height: float,
     material: Material,
     options: LayoutOptions | None = None,
+    *,
+    turns: tuple[int, ...] | None = None,
 ) -> NDArray[np.int64]:
-    """(F,) the patch of each facet, from 0, so that each fits ``width`` x ``height`` mm.
+    """(F,) the patch of each facet, from 0, so that each fits ``width`` x ``height`` mm, turned at
+    will or by quarter ``turns`` alone (:class:`~miurafab.fabrication.boxes.Space`).
 
     Tabs are counted in, and stand on the patch that ``options`` say, usually the one with the
     lower number. Raises :class:`~miurafab.errors.LayoutError` naming the facet if one is not a
@@ -59,13 +60,14 @@ def split(
     the pattern does not have.
     """
     options = options or LayoutOptions()
+    space = Space(width, height, turns)
     check_facets(pattern)
     cells = _cells(pattern)
     blocks = _blocks(cells, options)
     faces = len(pattern.faces_vertices)
-    if len(blocks) == 1 and _fits_whole(pattern, width, height, material, options):
+    if len(blocks) == 1 and _fits_whole(pattern, space, material, options):
         return np.zeros(faces, dtype=np.int64)
-    directions = fan(_TURNS)
+    directions = space.directions
     corners = pattern.faces_vertices
     body = support(pattern.vertices_coords[corners], corners >= 0, directions)
     ring = ring_tabs(pattern, material, options)
@@ -89,10 +91,10 @@ def split(
     tabs = tab_regions(pattern, seams, material, full_facet=options.full_facet)
     tab_values = support(tabs.points, tabs.present, directions)
     reach = _with_tabs(body, tabs, tab_values)
-    _check_alone(pattern, ~fits(reach, width, height), tabs, width, height)
+    _check_alone(pattern, ~space.holds(reach), tabs, space)
 
     depth = _tab_room(pattern, tabs)
-    small = (width - depth, height - depth) if both else (width, height)
+    small = space.smaller(depth) if both else space
     part = np.zeros(faces, dtype=np.int64)
     if cells is not None:
         blocks.sort()
@@ -100,10 +102,10 @@ def split(
             part[cells[r0:r1, c0:c1]] = number
     found = np.empty(faces, dtype=np.int64)
     count = 0
-    if cells is None or (both and not fits(reach, *small).all()):
+    if cells is None or (both and not small.holds(reach).all()):
         for number in range(len(blocks)):
             facets = np.flatnonzero(part == number)
-            found[facets] = grow_patches(pattern, reach, width, height, facets)[facets] + count
+            found[facets] = grow_patches(pattern, reach, space, facets)[facets] + count
             count = int(found[facets].max()) + 1
     else:
         if both:
@@ -115,23 +117,24 @@ def split(
         for r0, r1, c0, c1 in blocks:
             block = cells[r0:r1, c0:c1]
             here = shape.part(r0, r1, c0, c1)
-            if faces > _MANY:
+            if faces > _MANY and turns is None:
                 here = here.with_every(2)
-            for a0, a1, b0, b1 in split_grid(here, *small):
+            for a0, a1, b0, b1 in split_grid(here, small):
                 found[block[a0:a1, b0:b1]] = count
                 count += 1
-    found = improved(
-        pattern,
-        found,
-        part,
-        (width, height),
-        ring,
-        depth,
-        material,
-        options,
-        straight=cells is not None,
-    )
-    found = _without_overlaps(pattern, found, reach, width, height)
+    if turns is None:
+        found = improved(
+            pattern,
+            found,
+            part,
+            (width, height),
+            ring,
+            depth,
+            material,
+            options,
+            straight=cells is not None,
+        )
+    found = _without_overlaps(pattern, found, reach, space)
     return found.max() - found if turned else found
 
 
@@ -241,17 +244,13 @@ def check_facets(pattern: CreasePattern) -> None:
 
 
 def _fits_whole(
-    pattern: CreasePattern,
-    width: float,
-    height: float,
-    material: Material,
-    options: LayoutOptions,
+    pattern: CreasePattern, space: Space, material: Material, options: LayoutOptions
 ) -> bool:
     faces = np.arange(len(pattern.faces_vertices))
     used = np.unique(pattern.faces_vertices[pattern.faces_vertices >= 0])
     tabs, _, _ = choose_tabs(pattern, np.zeros_like(faces), material, options)
     points = np.concatenate([pattern.vertices_coords[used], tabs.points[tabs.present]])
-    if best_turn(points, width, height) is None:
+    if space.turn(points) is None:
         return False
     return is_disk(pattern, faces) and not len(_overlapping(pattern, np.zeros_like(faces)))
 
@@ -316,8 +315,7 @@ def _check_alone(
     pattern: CreasePattern,
     doubtful: NDArray[np.bool_],
     tabs: TabRegions,
-    width: float,
-    height: float,
+    space: Space,
 ) -> None:
     """Raise a LayoutError for the first ``doubtful`` (F,) facet that does not fit at any angle."""
     for face in np.flatnonzero(doubtful).tolist():
@@ -325,16 +323,18 @@ def _check_alone(
         facet = pattern.vertices_coords[corners[corners >= 0]]
         standing = np.flatnonzero(tabs.own_face == face)
         points = np.concatenate([facet, *(tabs.polygon(i) for i in standing)])
-        if best_turn(points, width, height) is not None:
+        if space.turn(points) is not None:
             continue
-        long, short = box_of(points)
-        with_tabs = "" if best_turn(facet, width, height) is None else " with its tabs"
-        if not with_tabs:
-            long, short = box_of(facet)
+        with_tabs = "" if space.turn(facet) is None else " with its tabs"
+        shape = points if with_tabs else facet
+        long, short = box_of(shape) if space.turns is None else np.ptp(shape, axis=0).tolist()
+        along, choice = "", ""
+        if space.turns is not None:
+            along, choice = " along the pattern's axes", ", write grain = 'none'"
         raise LayoutError(
-            f"Facet {face} measures {long:.1f} mm x {short:.1f} mm{with_tabs} and does not fit the "
-            f"usable bed of {width:.1f} mm x {height:.1f} mm; make the pattern smaller, use more "
-            "facets, or take a larger bed."
+            f"Facet {face} measures {long:.1f} mm x {short:.1f} mm{along}{with_tabs} and does not "
+            f"fit the usable bed of {space.width:.1f} mm x {space.height:.1f} mm; make the pattern "
+            f"smaller, use more facets{choice}, or take a larger bed."
         )
 
 
@@ -353,8 +353,7 @@ def _without_overlaps(
     pattern: CreasePattern,
     face_patch: NDArray[np.int64],
     reach: NDArray[np.float32],
-    width: float,
-    height: float,
+    space: Space,
 ) -> NDArray[np.int64]:
     """The split with every patch that overlaps itself grown again in halves, ids from 0."""
     while True:
@@ -366,6 +365,6 @@ def _without_overlaps(
         for patch in bad:
             faces = np.flatnonzero(face_patch == patch * len(face_patch))
             half = (len(faces) + 1) // 2
-            parts = grow_patches(pattern, reach, width, height, faces, half)
+            parts = grow_patches(pattern, reach, space, faces, half)
             face_patch[faces] += parts[faces]
         face_patch = np.unique(face_patch, return_inverse=True)[1].astype(np.int64)

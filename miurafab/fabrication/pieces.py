@@ -16,7 +16,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from miurafab.fabrication.boxes import best_turn
+from miurafab.fabrication.boxes import Space
 from miurafab.fabrication.kerf import allowance, cut_lines
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.patches import Boundary, boundaries, split
@@ -58,8 +58,11 @@ def make_pieces(
     height: float,
     material: Material,
     options: LayoutOptions | None = None,
+    *,
+    turns: tuple[int, ...] | None = None,
 ) -> Pieces:
-    """The pattern split into pieces that each fit ``width`` x ``height`` mm, cut lines included.
+    """The pattern split into pieces that each fit ``width`` x ``height`` mm, cut lines included,
+    turned at will or by quarter ``turns`` alone.
 
     Raises :class:`~miurafab.errors.LayoutError` as :func:`~miurafab.fabrication.patches.split`.
     """
@@ -68,15 +71,15 @@ def make_pieces(
         long, short = options.max_patch_mm
         along, across = (long, short) if width >= height else (short, long)
         width, height = min(width, along), min(height, across)
-    room = 2 * allowance(material.kerf_mm)
-    face_patch = split(pattern, width - room, height - room, material, options)
+    space = Space(width, height, turns).smaller(2 * allowance(material.kerf_mm))
+    face_patch = split(pattern, space.width, space.height, material, options, turns=turns)
     around = boundaries(pattern, face_patch)
     tight = np.zeros(len(around), dtype=bool)
     while True:
         tabs, unusual, untabbed = choose_tabs(pattern, face_patch, material, options, tight)
         outlines, standing = _outlines(pattern, face_patch, around, tabs)
         outgrown = [
-            bool(unusual[own].any()) and best_turn(outline, width - room, height - room) is None
+            bool(unusual[own].any()) and space.turn(outline) is None
             for outline, own in zip(outlines, standing, strict=True)
         ]
         if not any(outgrown):

@@ -63,6 +63,39 @@ def test_pieces_fit_with_tabs_and_kerf(name):
         assert best_turn(piece.cut_lines[0], 190.0, 140.0) is not None
 
 
+@pytest.mark.parametrize("turns", [(0,), (1,), (0, 1)])
+@pytest.mark.parametrize("name", CASES)
+def test_pieces_that_keep_the_directions_of_the_pattern_fit_as_they_are(name, turns):
+    pieces = make_pieces(CASES[name], 190.0, 140.0, card(kerf=0.4), turns=turns)
+    assert_patches_are_sound(CASES[name], pieces.face_patch, 340.0, 340.0)
+    sizes = np.array([(190.0, 140.0), (140.0, 190.0)])[list(turns)] + 1e-6
+    for piece in pieces.pieces:
+        assert (np.ptp(piece.cut_lines[0], axis=0) <= sizes).all(axis=1).any()
+
+
+def test_squares_that_keep_their_directions_are_split_into_as_few_patches_as_possible():
+    i, j = np.indices((25, 41))
+    squares = flat_patterns.grid(np.stack([j * 10.0, i * 10.0], axis=-1))
+    # Of 40 x 24 squares a bed takes 9 x 5 with tabs of 7 mm on two sides, and one more at the end.
+    assert split(squares, 101.0, 61.0, card(), turns=(0,)).max() + 1 == 5 * 5
+    assert split(squares, 101.0, 61.0, card(), turns=(1,)).max() + 1 == 8 * 3
+    assert split(squares, 61.0, 101.0, card(), turns=(0,)).max() + 1 == 8 * 3
+    assert split(squares, 61.0, 101.0, card(), turns=(1,)).max() + 1 == 5 * 5
+
+
+def test_a_facet_too_large_in_the_directions_of_the_pattern_is_named():
+    turn = np.array([[1.0, 1.0], [-1.0, 1.0]]) / np.sqrt(2.0)
+    i, j = np.indices((5, 5))
+    tilted = flat_patterns.grid(np.stack([j * 50.0, i * 50.0], axis=-1) @ turn)
+    assert split(tilted, 62.0, 62.0, card()).max() + 1 == 16
+    message = (
+        r"Facet 0 measures 70\.7 mm x 70\.7 mm along the pattern's axes and does not fit the "
+        r"usable bed of 62\.0 mm x 62\.0 mm; .*, write grain = 'none', or take"
+    )
+    with pytest.raises(LayoutError, match=message):
+        split(tilted, 62.0, 62.0, card(), turns=(0,))
+
+
 def test_a_pattern_that_fits_is_one_patch_whatever_its_angle():
     turn = np.array([[np.cos(1.1), np.sin(1.1)], [-np.sin(1.1), np.cos(1.1)]])
     pattern = miura(8, 10)
