@@ -97,7 +97,7 @@ class Bench:
         if not content:
             raise InputError(f"'{name[-60:]}' is empty.")
         held = [source for source in self.sources.values() if not source.ours]
-        for old in held[: len(held) - _KEPT + 1]:
+        for old in held[: max(0, len(held) - _KEPT + 1)]:
             del self.sources[old.id]
             shutil.rmtree(old.path.parent)
         number = self._number()

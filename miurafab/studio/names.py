@@ -15,9 +15,9 @@ def safe_stem(name: str) -> str:
     It is never empty, begins with a letter or digit, and is no device of Windows.
     """
     base = re.split(r"[/\\]", name)[-1]
-    plain = unicodedata.normalize("NFKD", base).encode("ascii", "ignore").decode("ascii")
-    stem = plain.rpartition(".")[0] or plain
-    words = re.sub(r"[^A-Za-z0-9._-]+", "-", stem)[:_LONGEST].strip("-._")
+    stem = unicodedata.normalize("NFKD", base.rpartition(".")[0] or base)
+    plain = stem.encode("ascii", "ignore").decode("ascii")
+    words = re.sub(r"[^A-Za-z0-9._-]+", "-", plain)[:_LONGEST].strip("-._")
     return f"file-{words}".strip("-") if not words or _DEVICES.fullmatch(words) else words
 
 
