@@ -102,6 +102,9 @@ def read_options(table: Table, folder: Path = Path()) -> LayoutOptions:
     bridges = table.whole("bridges", usual.bridges, low=0, high=12)
     if bridges == 1:
         raise table.fault("bridges", "is 1, on which a piece would swing; use 0, or 2 and more")
+    if table.has("bridge") and not bridges:
+        raise table.fault("bridge", "is the length of holding bridges, but none are wanted; give "
+                          "the number of 'bridges' as well")  # fmt: skip
     return LayoutOptions(
         gap_mm=table.length("gap", usual.gap_mm, low=0, high=100),
         offcuts_mm=_sizes(table, "offcuts"),

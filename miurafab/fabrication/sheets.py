@@ -23,6 +23,7 @@ from miurafab.fabrication.opening import opened
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.ordering import Strokes, corner_of, order_strokes
 from miurafab.fabrication.pieces import Pieces
+from miurafab.fabrication.remarks import remarks_on
 from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.stock import LaidStock, lay_stock
 from miurafab.fabrication.strokes import Blank, Motion, sheet_strokes
@@ -174,7 +175,7 @@ def lay_out(
     material = _with_own_tabs(material, options)
     stock = lay_stock(options, machine.bed, material.grain)
     framed = frame_patches(pattern, stock, material, options)
-    pieces, numbers = framed.pieces, framed.numbers
+    pieces = framed.pieces
     patches = copied(framed.patches, wanted.quantity)
     nesting = nest(
         Problem(
@@ -209,7 +210,7 @@ def lay_out(
     sheets = tuple(_with_passes(*made) for made in zip(sheets, toolpaths, backs, strict=True))
     behind = tuple(back for back in backs if back is not None)
     usable = sum(stock.kinds.kinds[kind].area for kind in _kinds(nesting))
-    remarks = _remarks(pieces, numbers, lettering.unmarked, drawn.unrelieved, material)
+    remarks = remarks_on(pattern, framed, lettering, drawn, material, options)
     return Layout(
         machine=machine.name,
         material=material.name,
@@ -272,29 +273,6 @@ def _with_own_tabs(material: Material, options: LayoutOptions) -> Material:
     if options.tab_angle is not None:
         rule = replace(rule, max_angle=options.tab_angle)
     return replace(material, tabs=rule)
-
-
-def _remarks(
-    pieces: Pieces,
-    numbers: NDArray[np.int64],
-    unmarked: int,
-    unrelieved: int,
-    material: Material,
-) -> tuple[str, ...]:
-    found = []
-    weak = numbers[pieces.tabs.areas < material.tabs.min_area_mm2]
-    if len(weak):
-        shown = ", ".join(str(number) for number in np.sort(weak)[:8].tolist())
-        more = f" and {len(weak) - 8} more" if len(weak) > 8 else ""
-        found.append(
-            f"{len(weak)} of {len(numbers)} tabs have less than {material.tabs.min_area_mm2:g} mm2 "
-            f"of glue: number {shown}{more}."
-        )
-    if unmarked:
-        found.append(f"{unmarked} tabs have no room for the letter of their fold.")
-    if unrelieved:
-        found.append(f"At {unrelieved} vertices a crease is too short for a relief hole.")
-    return tuple(found)
 
 
 def _kinds(nesting: Nesting) -> list[int]:

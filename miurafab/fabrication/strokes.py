@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
+from miurafab.fabrication.bridges import bridged
 from miurafab.fabrication.labels import Text
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.ordering import HOLE, OUTLINE, Strokes
@@ -58,12 +59,14 @@ class Blank:
 class Drawn:
     """The strokes of each sheet in no order yet, and of each back (None where it is blank).
 
-    ``unrelieved`` is how many vertices have no room for their relief hole.
+    ``unrelieved`` is how many vertices have no room for their relief hole, and ``unbridged`` how
+    many outlines none for all their holding bridges.
     """
 
     fronts: list[Strokes]
     backs: list[Strokes | None]
     unrelieved: int
+    unbridged: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,11 +99,12 @@ def sheet_strokes(
     if options.two_sided:
         _check_two_sided(material, sheets)
     creases, holes = _creases(pattern, pieces, material)
+    outlines, unbridged = _outlines(pieces, options, material.kerf_mm)
     drawn_once = [
         *(_made(creases[kind], kind, material) for kind in CREASE_KINDS),
         _relief(pattern, holes, material),
         _slits(pattern, pieces),
-        _outlines(pieces, options, material.kerf_mm),
+        outlines,
     ]
     copies = range(0, len(motion.sheet), len(pieces.pieces))
     parts = [
@@ -152,7 +156,7 @@ def sheet_strokes(
         fronts.append(taken(2 * number, blank, blank.name))
         drawn = _turned_over(taken(2 * number + 1, blank, f"{blank.name}-back"))
         backs.append(_with_pins(drawn, blank, material) if len(drawn.toolpath) else None)
-    return Drawn(fronts, backs, holes.left_out)
+    return Drawn(fronts, backs, holes.left_out, unbridged)
 
 
 def _check_two_sided(material: Material, sheets: Sequence[Blank]) -> None:
@@ -328,21 +332,23 @@ def _slits(pattern: CreasePattern, pieces: Pieces) -> _Part:
     )
 
 
-def _outlines(pieces: Pieces, options: LayoutOptions, kerf: float) -> _Part:
+def _outlines(pieces: Pieces, options: LayoutOptions, kerf: float) -> tuple[_Part, int]:
+    """All cut lines, and how many outlines have fewer bridges than wanted."""
     lines, patch, rank, group = [], [], [], []
-    rings = 0
+    rings = unbridged = 0
     for number, piece in enumerate(pieces.pieces):
         for place, ring in enumerate(piece.cut_lines):
             closed = np.concatenate([ring, ring[:1]])
             # A gap left between two cuts is longer in the path by half a kerf at each end.
             wanted = 0 if place else options.bridges
             made = bridged(closed, wanted, options.bridge_mm + kerf)
+            unbridged += wanted > 0 and len(made) < wanted
             lines += made
             patch += [number] * len(made)
             rank += [_WASTE if place else OUTLINE] * len(made)
             group += [rings] * len(made)
             rings += 1
-    return _Part(
+    part = _Part(
         operation=OPERATIONS.index("cut"),
         points=np.concatenate(lines),
         count=np.array([len(line) for line in lines]),
@@ -351,40 +357,7 @@ def _outlines(pieces: Pieces, options: LayoutOptions, kerf: float) -> _Part:
         group=np.array(group),
         rank=np.array(rank),
     )
-
-
-def bridged(ring: NDArray[np.float64], count: int, gap: float) -> list[NDArray[np.float64]]:
-    """The closed ``ring`` (n, 2) in ``count`` pieces with gaps of ``gap`` mm between them.
-
-    Each gap lies in the middle of a side, so that no corner hangs on it; sides shorter than three
-    gaps bear none. So there may be fewer gaps than asked for, and no fewer than two unless the
-    ring stays whole.
-    """
-    side = np.linalg.norm(np.diff(ring, axis=0), axis=1)
-    able = np.flatnonzero(side >= 3 * gap)
-    if min(count, len(able)) < 2:
-        return [ring]
-    middle = np.cumsum(side) - side / 2
-    chosen: list[int] = []
-    for k in range(count):
-        # The middles of sides nearest to evenly spaced points of the ring, from its longest side.
-        target = (middle[able[np.argmax(side[able])]] + k * side.sum() / count) % side.sum()
-        off = np.abs(middle[able] - target)
-        chosen.append(int(able[np.argmin(np.minimum(off, side.sum() - off))]))
-    at = np.unique(chosen)
-    if len(at) < 2:
-        return [ring]
-    way = (ring[at + 1] - ring[at]) / side[at, None] * (gap / 2)
-    centre = (ring[at + 1] + ring[at]) / 2
-    before, after = centre - way, centre + way
-    corners = ring[:-1]
-    found = []
-    for k, start in enumerate(at.tolist()):
-        stop = int(at[(k + 1) % len(at)])
-        between = np.arange(start + 1, stop + 1 + (len(corners) if stop <= start else 0))
-        ends = (after[k], corners[between % len(corners)], before[(k + 1) % len(at)])
-        found.append(np.vstack(ends))
-    return found
+    return part, unbridged
 
 
 def _inner_edges(

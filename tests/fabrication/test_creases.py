@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 
 import flat_patterns
 import numpy as np
@@ -13,9 +14,10 @@ from flat_patterns import bed, card, miura, zigzag
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.boxes import best_turn
+from miurafab.fabrication.bridges import bridged
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import lay_out
-from miurafab.fabrication.strokes import PIN_MM, bridged, pin_centres
+from miurafab.fabrication.strokes import PIN_MM, pin_centres
 from miurafab.profiles import OPERATIONS
 from miurafab.profiles.material import CREASE_KINDS, MODES, Crease
 
@@ -208,6 +210,33 @@ def test_a_ring_without_long_sides_stays_whole():
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     (same,) = bridged(ring, 3, 0.5)
     assert same is ring
+
+
+def test_as_many_bridges_as_sides_can_bear_one_each_on_its_own():
+    # Three long sides lie close together; the fourth quarter and the half have only short ones.
+    short = [(30 + 0.1 * math.cos(a), 0.1 * math.sin(a)) for a in np.linspace(2, 4, 40)]
+    corners = np.array([(0, 0), (12, 0), (12, 12), (0, 12), *short], dtype=float)
+    ring = np.vstack([corners, corners[:1]])
+    able = int((np.linalg.norm(np.diff(ring, axis=0), axis=1) >= 3.0).sum())
+    for count in range(2, 9):
+        parts = bridged(ring, count, 1.0)
+        assert len(parts) == min(count, able)
+        left = sum(shapely.LineString(part).length for part in parts)
+        assert shapely.LineString(ring).length - left == pytest.approx(len(parts) * 1.0)
+
+
+def test_bridges_that_find_no_room_are_told():
+    layout = lay_out(miura(4, 4), MACHINE, card(), options=LayoutOptions(bridges=3, bridge_mm=20.0))
+    (remark,) = layout.remarks
+    assert remark.startswith("1 outline has no room for 3 holding bridges of 20 mm")
+
+
+def test_creases_of_no_kind_are_told():
+    pattern = miura(4, 4)
+    letters = pattern.edges_assignment.copy()
+    letters[np.flatnonzero(letters == "M")[:2]] = "U"
+    layout = lay_out(dataclasses.replace(pattern, edges_assignment=letters), MACHINE, card())
+    assert layout.remarks == ("2 creases are neither mountain nor valley in the pattern.",)
 
 
 def test_the_fold_of_a_tab_is_that_of_its_crease():

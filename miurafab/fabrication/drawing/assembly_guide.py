@@ -29,7 +29,6 @@ from miurafab.fabrication.drawing.page import (
     WIDTH,
     Page,
     caption,
-    count,
     foot,
     heading,
     legend,
@@ -40,6 +39,7 @@ from miurafab.fabrication.drawing.page import (
 from miurafab.fabrication.drawing.sheet_pages import SheetPages
 from miurafab.fabrication.drawing.views import Views
 from miurafab.fabrication.sheets import Layout
+from miurafab.fabrication.wording import count
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, Material
 

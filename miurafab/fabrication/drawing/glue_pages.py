@@ -20,7 +20,6 @@ from miurafab.fabrication.drawing.page import (
     ROOM,
     Box,
     Page,
-    count,
     heading,
     line_above,
     tabs_called,
@@ -29,6 +28,7 @@ from miurafab.fabrication.drawing.page import (
 )
 from miurafab.fabrication.drawing.views import Views
 from miurafab.fabrication.sheets import Layout
+from miurafab.fabrication.wording import count
 
 _STEP = (ROOM - 12) / 3
 """The width of one step of glueing."""
@@ -145,7 +145,10 @@ class GluePages:
         if step.onto and not step.tabs:
             words = "No tabs: use tape on the seam"
         lines = wrapped(words, width - 8.5, 8)
-        text(canvas, x + 8.5, top - 11, lines[0] + (" ..." if len(lines) > 1 else ""), 8)
+        text(canvas, x + 8.5, top - 11, lines[0], 8)
+        if len(lines) > 1:
+            text(canvas, x + 8.5, top - 14.2, lines[1] + (" ..." if len(lines) > 2 else ""), 8)
+            top -= 3.2
         tall = min(height - 20, width * self.views.aspect)
         self.views.map(
             canvas,

@@ -1,8 +1,8 @@
 """Sheets as HPGL, for cutting plotters: absolute moves of a pen or blade, one pen an operation.
 
 A plotter unit is 0.025 mm (HP-GL reference, "plotter units": 40 a millimetre). The file starts with
-``IN`` and ends with the tool lifted and put away (``PU;SP0``), so that it runs alone. A long outline
-is told in several instructions, since plotters hold only so much of one in their buffers.
+``IN`` and ends with the tool lifted and put away (``PU;SP0``), so that it runs alone. A long
+outline is told in several instructions, since plotters hold only so much of one in their buffers.
 """
 
 from __future__ import annotations

@@ -27,8 +27,9 @@ from miurafab.fabrication.drawing.page import (
 
 _FOLDING = (
     "Crease every line both ways, one row after another.",
-    "Fold all rows together, a little at a time: the sheet moves as one. Red lines are mountains "
-    "and fold away from you, blue ones valleys and fold towards you, seen from the printed side.",
+    "Fold all rows together, a little at a time: the sheet moves as one. Lines that are red in the "
+    "pictures of the sheets are mountains and fold away from you, blue ones are valleys and fold "
+    "towards you, seen from the side with the names.",
 )
 _GLUEING = (
     "On each tab stands its number and the way its own fold goes: M for mountain, V for valley.",

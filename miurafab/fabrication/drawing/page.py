@@ -15,6 +15,7 @@ from reportlab.pdfbase.pdfmetrics import stringWidth
 from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.drawing.colours import patch_colour
+from miurafab.fabrication.wording import runs
 
 Floats = NDArray[np.float64]
 Page = Callable[[Canvas], None]
@@ -180,22 +181,6 @@ def line_above(canvas: Canvas, x: float, y: float, width: float) -> None:
     canvas.setStrokeColor(RULE)
     canvas.setLineWidth(0.2 * mm)
     canvas.line(x * mm, y * mm, (x + width) * mm, y * mm)
-
-
-def count(number: int, one: str, many: str) -> str:
-    """``1 sheet``, ``2 sheets``."""
-    return f"{number:,} {one if number == 1 else many}"
-
-
-def runs(numbers: tuple[int, ...]) -> str:
-    """``1-4, 7``: runs of consecutive numbers drawn together."""
-    found: list[list[int]] = []
-    for number in sorted(numbers):
-        if found and number == found[-1][-1] + 1:
-            found[-1].append(number)
-        else:
-            found.append([number])
-    return ", ".join(f"{r[0]}-{r[-1]}" if len(r) > 1 else str(r[0]) for r in found)
 
 
 def tabs_called(numbers: tuple[int, ...]) -> str:

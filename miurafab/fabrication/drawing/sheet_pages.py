@@ -24,7 +24,6 @@ from miurafab.fabrication.drawing.page import (
     Box,
     Page,
     chip,
-    count,
     heading,
     legend,
     line_above,
@@ -39,6 +38,7 @@ from miurafab.fabrication.drawing.pdf import draw_for_people
 from miurafab.fabrication.drawing.views import OUTLINED, Views, named
 from miurafab.fabrication.sheets import Layout, Placement, Sheet
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.fabrication.wording import count
 
 _CARD = 33.0
 """The least height of what is said of one patch below its sheet; more is used where there is."""

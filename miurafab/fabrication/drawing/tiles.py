@@ -29,13 +29,13 @@ from miurafab.fabrication.drawing.page import (
     RULE,
     VALLEY,
     Floats,
-    count,
     legend,
     paragraph,
     text,
 )
 from miurafab.fabrication.drawing.pdf import draw_for_people, new_canvas
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.fabrication.wording import count
 
 PAGES_MM = {
     "a4": (210.0, 297.0),
