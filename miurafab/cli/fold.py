@@ -73,14 +73,33 @@ def _show(console: Console, answer: dict[str, Any]) -> None:
     facts = {key: value for key, value in answer.items() if key not in hidden and value is not None}
     facts["self_contacts"] = f"in {len(contacts)} frames" if contacts else "none"
     console.facts(facts)
-    for contact in contacts:
-        first = contact["facets"][0]
-        console.line(
-            f"frame {contact['frame']}, s = {contact['state']:.4g}: {len(contact['facets'])} pairs "
-            f"of facets pass through each other, the first being {first[0]} and {first[1]}"
-        )
+    for run in _runs(contacts):
+        console.line(_of_run(run))
     if thick is not None:
         _show_thickness(console, thick)
+
+
+def _runs(contacts: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
+    """The contacts in runs of frames that follow each other."""
+    runs: list[list[dict[str, Any]]] = []
+    for contact in contacts:
+        if runs and contact["frame"] == runs[-1][-1]["frame"] + 1:
+            runs[-1].append(contact)
+        else:
+            runs.append([contact])
+    return runs
+
+
+def _of_run(run: list[dict[str, Any]]) -> str:
+    first, last = run[0], run[-1]
+    frames, states = f"frame {first['frame']}", f"s = {first['state']:.4g}"
+    if len(run) > 1:
+        frames = f"frames {first['frame']} to {last['frame']}"
+        states += f" to {last['state']:.4g}"
+    most = max(len(contact["facets"]) for contact in run)
+    one, other = first["facets"][0]
+    pairs = "1 pair of facets passes" if most == 1 else f"up to {most} pairs of facets pass"
+    return f"{frames}, {states}: {pairs} through each other, the first being {one} and {other}"
 
 
 def _show_thickness(console: Console, thick: dict[str, Any]) -> None:

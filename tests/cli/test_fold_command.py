@@ -48,6 +48,20 @@ def test_a_sheet_that_bends_says_so(run, stiff, tmp_path):
     assert quiet.stderr == ""
 
 
+def test_frames_in_which_paper_meets_paper_are_told_in_runs(run, tmp_path):
+    tube = tmp_path / "tube.fold"
+    made = run("fit", "cylinder", "--close", "seam", "--facets", "6x12", "-o", tube)
+    assert made.returncode == 0
+    contacts = json.loads(run("fold", tube, "--steps", "12", "--json").stdout)["self_contacts"]
+    frames = [contact["frame"] for contact in contacts]
+    assert frames == list(range(frames[0], frames[0] + len(frames)))
+    assert min(contact["state"] for contact in contacts) > 1.0  # the tube closes at 1
+    shown = run("fold", tube, "--steps", "12").stdout
+    lines = [line for line in shown.splitlines() if line.startswith("frame")]
+    assert [line.split(",")[0] for line in lines] == [f"frames {frames[0]} to {frames[-1]}"]
+    assert f"the first being {' and '.join(map(str, contacts[0]['facets'][0]))}" in lines[0]
+
+
 def test_thickness_decides_the_exit_code(run, rigid):
     thin = run("fold", rigid, "--steps", "4", "--thickness", "1mm", "--json")
     assert thin.returncode == 0
