@@ -35,6 +35,12 @@ def test_the_wheel_holds_what_the_checkout_holds(installed):
         assert shipped
         assert {p.name: p.read_bytes() for p in carried.iterdir()} == shipped
     assert (installed / "miurafab" / "py.typed").exists()
+    for page in ("workflow/page", "studio/page"):
+        parts = {
+            p.name: p.read_bytes() for p in (ROOT / "miurafab" / page).iterdir() if p.is_file()
+        }
+        found = {name: (installed / "miurafab" / page / name).read_bytes() for name in parts}
+        assert found == parts
 
 
 @pytest.mark.parametrize("place", ["wheel", "checkout"])

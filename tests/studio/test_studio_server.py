@@ -121,11 +121,11 @@ def test_the_page_writes_what_the_commands_that_it_shows_write(start, tmp_path):
     program = start()
     page = Page(program.address)
     assert b"<h1>miurafab" in page.get("")
-    options = {"facets": "8x8", "size": "500mm", "min_edge": "4mm"}
+    options = {"facets": "6x6", "size": "420mm", "min_edge": "4mm"}
     page.post("fit", {"target": MINIATURE, "options": options})
     pattern = page.finished()["pattern"]
     assert pattern["status"] == "converged"
-    chosen = {"bridges": "2", "full_facet": True, "gap": "3mm", "max_patch": "300mmx250mm"}
+    chosen = {"bridges": "2", "full_facet": True, "gap": "3mm", "max_patch": "380mmx300mm"}
     page.post("sheets", {"machine": "grbl-laser-400", "material": "paper-100", "options": chosen})
     job = page.finished()["job"]
     fold = page.get(pattern["files"]["fold"])

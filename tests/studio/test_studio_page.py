@@ -1,0 +1,168 @@
+"""The page in a browser: by keyboard and by file, from a surface to sheets, at any width."""
+
+import base64
+import threading
+import time
+
+import pytest
+from browser import CHROMIUM, Browser
+from studios import saddle_obj
+
+from miurafab.studio.bench import Bench
+from miurafab.studio.core import Studio
+from miurafab.studio.guard import Guard
+from miurafab.studio.server import _Server
+from miurafab.studio.worker import Process
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
+
+
+class Seen(Browser):
+    """The studio's page, with short ways to look at it."""
+
+    def until(self, expression, seconds=90):
+        """Wait until a JavaScript expression is true."""
+        end = time.monotonic() + seconds
+        while not self.run(expression):
+            assert time.monotonic() < end, expression
+            time.sleep(0.05)
+
+    def text(self, name):
+        return self.run(f"document.getElementById('{name}').innerText")
+
+    def type(self, name, text):
+        """Put ``text`` into a field as somebody would who writes it."""
+        self.run(f"document.getElementById('{name}').select()")
+        self.call("Input.insertText", text=text)
+
+    def press(self, key):
+        codes = {"Enter": 13, "Tab": 9, "ArrowRight": 39, "ArrowLeft": 37, "Space": 32}
+        named = {"key": key, "code": key, "windowsVirtualKeyCode": codes[key]}
+        text = {"text": "\r"} if key == "Enter" else {}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **named, **text)
+        self.call("Input.dispatchKeyEvent", type="keyUp", **named)
+
+    def idle(self):
+        self.until("document.getElementById('task').hidden")
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    server = _Server(0, lambda: None)
+    guard = Guard(server.server_port, "k" * 32)
+    bench = Bench(tmp_path_factory.mktemp("bench"), Process)
+    server.studio = Studio(bench, guard)
+    serving = threading.Thread(target=server.serve_forever, args=(0.05,))
+    serving.start()
+    yield guard.address
+    server.shutdown()
+    serving.join()
+    server.server_close()
+    bench.cancel()
+
+
+@pytest.fixture
+def page(tmp_path, address):
+    with Seen(tmp_path / "profile") as seen:
+        seen.open(address)
+        seen.until("document.documentElement.dataset.ready === 'yes'")
+        yield seen
+        assert all(asked.startswith((address, "data:", "blob:")) for asked in seen.requests)
+
+
+def test_from_a_surface_to_sheets_by_keyboard(page):
+    assert page.run("document.getElementById('pattern').hidden")
+    page.run("document.getElementById('target').focus()")
+    page.run(
+        "{ const target = document.getElementById('target'); target.value = 'surface:vase';"
+        "target.dispatchEvent(new Event('change')); }"
+    )
+    assert page.run("document.getElementById('parameter-angle').value") == "120deg"
+    page.type("parameter-angle", "100")
+    page.type("facets", "8x")
+    page.press("Enter")
+    page.until("!document.getElementById('fault').hidden")
+    assert "--facets is '8x'" in page.text("fault")
+    page.type("facets", "12x12")
+    assert page.run("document.getElementById('fault').hidden")
+    page.press("Enter")
+    page.until("!document.getElementById('pattern').hidden")
+    page.idle()
+    assert "from one flat piece" in page.text("headline")
+    command = "miurafab fit vase:angle=100deg --facets 12x12 --size 200mm -o vase.fold"
+    assert page.text("pattern-command") == command
+    assert "Flat facets" in page.text("figures")
+    folding = page.run("document.getElementById('space').getAttribute('src')")
+    assert folding.endswith("folding.html"), page.text("remarks")
+    page.until("document.getElementById('flat').naturalWidth > 0")
+
+    page.run("document.getElementById('shape-tab').focus()")
+    page.press("ArrowRight")
+    assert page.run("document.activeElement.id") == "layout-tab"
+    assert page.run("document.getElementById('shape').hidden")
+    page.type("gap", "4mm")
+    page.press("Enter")
+    page.until("!document.getElementById('job').hidden")
+    page.idle()
+    assert "Machine time" in page.text("totals")
+    assert page.text("cut-command") == "miurafab cut vase-job --port /dev/ttyUSB0"
+    assert page.text("job-command").endswith("--gap 4mm")
+    links = "[...document.querySelectorAll('#job-downloads a')].map((a) => a.href)"
+    for link in page.run(links):
+        assert page.run(f"fetch({link!r}).then((answer) => answer.status)") == 200
+    shown = page.run("document.getElementById('dry-run').getAttribute('src')")
+    assert shown.endswith("preview.html")
+
+    for width, height in ((1400, 900), (390, 844)):
+        page.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=width, height=height, deviceScaleFactor=1, mobile=width < 600,
+        )  # fmt: skip
+        for tab in ("shape", "layout"):
+            page.run(f"document.getElementById('{tab}-tab').click()")
+            assert page.run("document.documentElement.scrollWidth") <= width
+
+
+def test_what_is_shown_within_draws_and_can_ask_for_nothing(page, address):
+    """The embedded page has no origin: it folds, and the server does not talk to it."""
+    page.run("document.getElementById('shape-tab').click()")
+    page.run("document.getElementById('fit').click()")
+    page.until("!document.getElementById('pattern').hidden")
+    page.idle()
+    source = page.run("document.getElementById('space').src")
+    page.open(source)
+    assert page.run("document.documentElement.dataset.ready") == "fold"
+    assert page.run("origin") == "null"
+    assert page.run(f"fetch({address + 'state'!r}).then(() => 'in', () => 'out')") == "out"
+    page.open(address)
+    page.until("document.documentElement.dataset.ready === 'yes'")
+    page.until("!document.getElementById('pattern').hidden")  # a page that is loaded again goes on
+
+
+def test_a_file_is_chosen_and_a_fit_is_cancelled(page):
+    content = base64.b64encode(saddle_obj()).decode()
+    page.run(
+        "{ const held = new DataTransfer(); const bytes = atob('" + content + "');"
+        "held.items.add(new File([bytes], 'my saddle.obj'));"
+        "const field = document.getElementById('file'); field.files = held.files;"
+        "field.dispatchEvent(new Event('change')); }"
+    )
+    page.until("document.getElementById('target').value.startsWith('source:')")
+    assert page.run("document.getElementById('target').selectedOptions[0].text") == "my-saddle.obj"
+    assert page.run("document.getElementById('size').value") == ""
+    page.type("facets", "200x200")
+    page.press("Enter")
+    page.until("!document.getElementById('task').hidden")
+    assert page.run("document.getElementById('fit').disabled")
+    page.run("document.getElementById('cancel').click()")
+    page.idle()
+    assert not page.run("document.getElementById('fit').disabled")
+    assert page.run("document.getElementById('fault').hidden")
+
+
+def test_a_studio_that_has_ended_is_told(page):
+    still = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}
+    page.call("Network.emulateNetworkConditions", offline=True, **still)
+    page.run("document.getElementById('fit').click()")
+    page.until("!document.getElementById('fault').hidden")
+    assert "does not answer" in page.text("fault")
