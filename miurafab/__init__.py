@@ -41,7 +41,13 @@ if TYPE_CHECKING:
         write_angles,
         write_motion,
     )
-    from miurafab.workflow.job_directory import layout_options, read_job, sheets, write_job
+    from miurafab.workflow.job_directory import (
+        design_profiles,
+        layout_options,
+        read_job,
+        sheets,
+        write_job,
+    )
     from miurafab.workflow.page import write_page
     from miurafab.workflow.picture import write_pictures
     from miurafab.workflow.preview import ASSUMED_MACHINE as DEFAULT_MACHINE
@@ -61,6 +67,7 @@ _HOMES = {
     "convert": ("miurafab.workflow.convert", "convert"),
     "cut": ("miurafab.workflow.cut_sheets", "cut"),
     "design": ("miurafab.workflow.design", "design"),
+    "design_profiles": ("miurafab.workflow.job_directory", "design_profiles"),
     "energy": ("miurafab.workflow.energy", "energy"),
     "examine": ("miurafab.workflow.doctor", "examine"),
     "fit": ("miurafab.origami.fit", "fit"),
@@ -101,6 +108,7 @@ __all__ = [
     "convert",
     "cut",
     "design",
+    "design_profiles",
     "energy",
     "examine",
     "fit",

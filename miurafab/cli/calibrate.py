@@ -29,7 +29,9 @@ def calibrate(
     console = Console(as_json, quiet)
     with console.progress("drawing the sheet") as progress:
         made = miurafab.calibrate(
-            machine or miurafab.DEFAULT_MACHINE, material or miurafab.DEFAULT_MATERIAL, out
+            miurafab.DEFAULT_MACHINE if machine is None else machine,
+            miurafab.DEFAULT_MATERIAL if material is None else material,
+            out,
         )
         progress(1.0, "done")
     layout, sheet = made.job.layout, made.sheet

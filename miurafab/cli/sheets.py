@@ -10,6 +10,8 @@ import typer
 import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
 
+GUIDE = "assembly.pdf"
+
 MachineOption = Annotated[
     str | None, typer.Option("--machine", help="A machine profile: a shipped name or a TOML file.")
 ]
@@ -34,7 +36,10 @@ def sheets(
     ] = None,
     design: Annotated[
         Path | None,
-        typer.Option(help="A design file whose [layout] holds options; those given here win."),
+        typer.Option(
+            help="A design file whose [layout] holds options, machine and material; those given "
+            "here win."
+        ),
     ] = None,
     gap: Annotated[str | None, typer.Option(help="Kept between patches [default: 2mm].")] = None,
     offcuts: Annotated[
@@ -155,23 +160,33 @@ def sheets(
     options = miurafab.layout_options(
         {key: value for key, value in given.items() if value is not None}, design
     )
+    named = (None, None) if design is None else miurafab.design_profiles(design)
+    # An empty name, as of a variable that is not set, is a mistake and not the usual machine.
+    machine = named[0] if machine is None else machine
+    material = named[1] if material is None else material
     with console.progress("laying out") as progress:
         job = miurafab.write_job(
             file,
             out,
-            machine or miurafab.DEFAULT_MACHINE,
-            material or miurafab.DEFAULT_MATERIAL,
+            miurafab.DEFAULT_MACHINE if machine is None else machine,
+            miurafab.DEFAULT_MATERIAL if material is None else material,
             progress,
             formats=formats or (),
             options=options,
         )
     totals = job.layout.totals
+    seconds = {each.name: each.seconds for each in job.dry_runs}
     answer: dict[str, Any] = {
         "job": str(out),
         "machine": job.layout.machine,
         "material": job.layout.material,
         "sheets": [
-            {"name": sheet.name, "stock": sheet.stock, "patches": len(sheet.placements)}
+            {
+                "name": sheet.name,
+                "stock": sheet.stock,
+                "patches": len(sheet.placements),
+                "seconds": round(sum(seconds[name] for name in sheet.passes), 1),
+            }
             for sheet in job.layout.sheets
         ],
         "totals": {
@@ -190,16 +205,38 @@ def sheets(
         "remarks": list(job.layout.remarks),
     }
 
-    def show() -> None:
-        console.facts({"job": str(out), "machine": job.layout.machine})
-        console.facts(answer["totals"])
-        for sheet in job.layout.sheets:
-            if sheet.stock:
-                console.line(f"{sheet.name} is cut from '{sheet.stock}'.")
-        if job.layout.untabbed:
-            console.line(f"No tab could stand on {len(job.layout.untabbed)} seam edges.")
-        for remark in job.layout.remarks:
-            console.line(remark)
-        console.line(f"Look at it first: miurafab preview {out}")
+    console.answer(answer, lambda: _show(console, answer))
 
-    console.answer(answer, show)
+
+def _show(console: Console, answer: dict[str, Any]) -> None:
+    from miurafab.workflow.dry_run import clock_text, length_text
+
+    totals, sheets = answer["totals"], answer["sheets"]
+    facts = {key: answer[key] for key in ("job", "machine", "material")}
+    facts["patches"] = totals["patches"]
+    if totals["tabs"]:
+        facts["tabs"] = f"{totals['tabs']:,} on {length_text(totals['seam_mm'])} of seams"
+    facts["sheets"] = f"{totals['sheets']:,}, {totals['density']:.0%} of their room used"
+    for key in ("cut", "perforated", "travel"):
+        facts[key] = length_text(totals[f"{key}_mm"])
+    facts["machine time"] = clock_text(totals["seconds"])
+    console.facts(facts)
+    rows = [(sheet["name"], sheet["patches"], clock_text(sheet["seconds"])) for sheet in sheets]
+    if any(sheet["stock"] for sheet in sheets):
+        cut_from = [(sheet["stock"] or "a whole sheet",) for sheet in sheets]
+        console.rows(
+            ("sheet", "patches", "machine time", "cut from"),
+            [row + end for row, end in zip(rows, cut_from, strict=True)],
+        )
+    elif len(sheets) > 1:
+        console.rows(("sheet", "patches", "machine time"), rows)
+    if answer["untabbed"]:
+        edges = len(answer["untabbed"])
+        console.line(f"No tab could stand on {edges} seam edge{'s' if edges > 1 else ''}.")
+    if answer["unlettered"]:
+        texts = answer["unlettered"]
+        names = "names and numbers" if texts > 1 else "name or number"
+        console.line(f"{texts} {names} found no room on the sheets; go by {GUIDE}.")
+    for remark in answer["remarks"]:
+        console.line(remark)
+    console.line(f"Look at it first: miurafab preview {answer['job']}")

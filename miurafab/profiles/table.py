@@ -8,6 +8,7 @@ exists, never a silently ignored line.
 from __future__ import annotations
 
 import difflib
+import math
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,6 +18,7 @@ from miurafab.errors import InputError, ProfileError, UnitError
 from miurafab.units import parse_angle, parse_feed, parse_length, parse_pressure
 
 _REQUIRED: Any = object()
+_DEGREES = " deg"
 
 
 def read_toml(path: Path, error: type[InputError] = ProfileError) -> dict[str, Any]:
@@ -117,7 +119,7 @@ class Table:
 
     def angle(self, key: str, default: float = _REQUIRED, *, low: float, high: float) -> float:
         """An angle in radians (``"10deg"``, ``0.17``) within ``low`` and ``high``."""
-        return self._quantity(key, default, parse_angle, low, high, " rad")
+        return self._quantity(key, default, parse_angle, low, high, _DEGREES)
 
     def feed(self, key: str, default: float = _REQUIRED, *, low: float, high: float) -> float:
         """A feed in mm/min (``"1200mm/min"``) within ``low`` and ``high``."""
@@ -144,8 +146,11 @@ class Table:
         except UnitError as fault:
             raise self.fault(key, f"cannot be read: {str(fault).rstrip('.')}") from None
         if not low <= quantity <= high:
+            shown = [quantity, low, high]
+            if unit == _DEGREES:
+                shown = [math.degrees(each) for each in shown]
             raise self.fault(
-                key, f"is {quantity:g}{unit}; it must lie between {low:g} and {high:g}"
+                key, f"is {shown[0]:g}{unit}; it must lie between {shown[1]:g} and {shown[2]:g}"
             )
         return quantity
 

@@ -73,8 +73,7 @@ def layout_options(given: Mapping[str, Any], design_file: Path | None = None) ->
     """
     values: dict[str, Any] = {}
     if design_file is not None:
-        written = Table(read_toml(design_file, InputError), design_file.name, InputError)
-        values = written.table("layout", {}).rest()
+        values = _layout_table(design_file).rest()
         for key in ("machine", "material"):
             values.pop(key, None)
         if isinstance(values.get("stock"), str):
@@ -83,6 +82,24 @@ def layout_options(given: Mapping[str, Any], design_file: Path | None = None) ->
     options = read_options(table)
     table.finish()
     return options
+
+
+def design_profiles(design_file: Path) -> tuple[str | None, str | None]:
+    """The machine and the material that the ``[layout]`` of ``design_file`` names, None for one
+    that it does not.
+
+    Raises :class:`~miurafab.errors.InputError` naming the file and the key.
+    """
+    table = _layout_table(design_file)
+    machine = table.text("machine") if table.has("machine") else None
+    return machine, table.text("material") if table.has("material") else None
+
+
+def _layout_table(design_file: Path) -> Table:
+    written = Table(read_toml(design_file, InputError), design_file.name, InputError)
+    if not written.has("layout"):
+        raise InputError(f"{design_file} has no [layout], so there is nothing to take from it.")
+    return written.table("layout")
 
 
 def write_job(

@@ -94,11 +94,33 @@ def test_check_mode_moves_nothing(run, job):
         (("sheets", "gone.fold", "-o", "other"), "gone.fold", 2),
         (("sheets", "s.fold", "-o", "s.fold"), "needs a directory", 2),
         (("sheets", "s.fold", "-o", "other", "--material", "gone"), "'gone'", 2),
+        (("sheets", "s.fold", "-o", "other", "--machine", ""), "'' is not a known machine", 2),
+        (("sheets", "s.fold", "-o", "other", "--design", "s.toml"), "s.toml", 2),
         (("preview", "gone"), "gone", 2),
     ],
 )
 def test_bad_input_is_one_sentence(run, job, arguments, named, code):
     assert named in sentence(run(*arguments, "--quiet"), code)
+
+
+def test_a_design_gives_its_machine_material_and_options(run, job, tmp_path):
+    (tmp_path / "d.toml").write_text(
+        '[layout]\nmachine = "grbl-pen-a4"\nmaterial = "paper-100"\nseam_rows = "2"\n'
+    )
+    usual = ("sheets", "s.fold", "-o", "designed", "--design", "d.toml", "--json")
+    answer = json.loads(run(*usual).stdout)
+    assert (answer["machine"], answer["material"]) == ("grbl-pen-a4", "paper-100")
+    assert answer["totals"]["patches"] == 2
+    seconds = sum(sheet["seconds"] for sheet in answer["sheets"])
+    assert seconds == pytest.approx(answer["totals"]["seconds"], abs=0.2)
+    answer = json.loads(run(*usual, "--machine", "grbl-knife-a3").stdout)
+    assert (answer["machine"], answer["material"]) == ("grbl-knife-a3", "paper-100")
+    (tmp_path / "other.toml").write_text('title = "x"\n')
+    done = run("sheets", "s.fold", "-o", "other", "--design", "other.toml", "--quiet")
+    assert "other.toml has no [layout]" in sentence(done, 2)
+    shown = run("sheets", "s.fold", "-o", "designed", "--design", "d.toml").stdout
+    for words in ("paper-100", "mm of seams", "of their room used", "machine time"):
+        assert words in shown
 
 
 def test_an_empty_directory_is_no_job(run, job, tmp_path):

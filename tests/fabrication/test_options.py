@@ -94,6 +94,7 @@ def test_every_option_is_read():
         ({"engine": "magic"}, "one of raster, auto, packingsolver, spyrrow, rectpack"),
         ({"nesting_time": 0}, "'nesting_time' is 0; it must lie between 1 and"),
         ({"bridges": 1}, "'bridges' is 1, on which a piece would swing"),
+        ({"tab_angle": 75}, "'tab_angle' is 4297.18 deg; it must lie between 5.72958 and 180"),
         ({"bridge": "1mm"}, "'bridge' is the length of holding bridges, but none are wanted"),
     ],
 )
