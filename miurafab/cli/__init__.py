@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -32,6 +32,7 @@ from miurafab.cli import (
 )
 from miurafab.cli.console import json_text
 from miurafab.errors import MiurafabError
+from miurafab.version import __version__
 
 app = typer.Typer(
     name="miurafab",
@@ -58,6 +59,24 @@ app.add_typer(profiles.materials, name="materials")
 app.command("studio")(studio.studio)
 app.command("calibrate")(calibrate.calibrate)
 app.command("doctor")(doctor.doctor)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"miurafab {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _program(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+        ),
+    ] = False,
+) -> None:
+    pass
 
 
 def main(serve_studio: studio.ServeStudio) -> NoReturn:

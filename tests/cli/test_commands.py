@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from importlib.metadata import version
 
 import pytest
 from command_line import sentence
@@ -28,6 +29,11 @@ def test_an_unknown_option_is_exit_2(run, command):
     assert done.returncode == 2
     assert "no-such-option" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_the_version_is_that_of_the_package(run):
+    done = run("--version")
+    assert (done.returncode, done.stdout) == (0, f"miurafab {version('miurafab')}\n")
 
 
 @pytest.mark.parametrize("command", ["surfaces", "profiles", "materials"])
