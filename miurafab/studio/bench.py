@@ -257,12 +257,18 @@ class Bench:
             "id": task.id,
             "name": recipe.job_name(name),
             "lines": layout_lines(part["totals"]),
-            "warnings": layout_warnings(part),
+            "warnings": [*self._doubts(), *layout_warnings(part)],
             "files": self._put_down(task.id, part["files"]),
             "pictures": list(self._put_down(task.id, pictures).values()),
-            "command": f"{self._asked.command} && {sheets}",
+            "command": recipe.both(self._asked.command, sheets, sound=not self._doubts()),
             "cut": recipe.cut_command(name),
         }
+
+    def _doubts(self) -> list[str]:
+        """What was wrong with the pattern before it was laid out."""
+        if self.pattern is None or self.pattern["status"] == "converged":
+            return []
+        return [f"{self.pattern['headline']} {self.pattern['advice']}".strip()]
 
     def _begin(self, do: str, name: str, **what: Any) -> None:
         number = self._number()

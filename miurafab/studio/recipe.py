@@ -35,6 +35,11 @@ def sheets_command(
     return shlex.join(words)
 
 
+def both(first: str, second: str, *, sound: bool) -> str:
+    """One line for two commands; the second runs even if the first answers no and not ``sound``."""
+    return f"{first} {'&&' if sound else ';'} {second}"
+
+
 def cut_command(name: str) -> str:
     """What cuts the job once it is unpacked; the port is to be replaced."""
     return shlex.join(["miurafab", "cut", job_name(name), "--port", PORT])

@@ -31,6 +31,7 @@ from miurafab.studio.messages import Request, Response, refusal
 from miurafab.studio.worker import Process
 from miurafab.surfaces.catalogue import make_surface, parse_target
 from miurafab.surfaces.mesh import MESH_SUFFIXES
+from miurafab.workflow.design import design
 
 _IDLE_S = 60.0
 """How long a connection that says nothing is kept."""
@@ -78,8 +79,10 @@ def _put_on(bench: Bench, thing: str) -> dict[str, Any]:
     path = Path(thing)
     suffix = path.suffix.lower()
     if suffix == DESIGN_SUFFIX:
+        wanted = design(thing)
         found = find_file("patterns", thing, error=TargetError)
-        return {"source": bench.add_own(found, "design").id}
+        source = bench.add_own(found, "design")
+        return {"source": source.id, "machine": wanted.machine, "material": wanted.material}
     if suffix in (*MESH_SUFFIXES, PATTERN_SUFFIX):
         if not path.is_file():
             error = PatternError if suffix == PATTERN_SUFFIX else TargetError

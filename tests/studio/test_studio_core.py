@@ -206,6 +206,10 @@ def test_a_fit_that_misses_a_limit_says_so(done):
     assert pattern["status"] == "infeasible"
     assert pattern["headline"] == "The sheet folds, but not within what was asked."
     assert "900 mm asked for" in pattern["advice"]
+    done.post("sheets", {"machine": "grbl-laser-400", "material": "card-250"})
+    job = done.state()["job"]
+    assert job["warnings"][0] == f"{pattern['headline']} {pattern['advice']}"
+    assert " -o plane.fold ; miurafab sheets" in job["command"]  # fit answers no
 
 
 def test_where_no_sheet_was_found_there_is_nothing_to_lay_out(asked):

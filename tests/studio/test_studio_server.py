@@ -284,3 +284,19 @@ def test_a_port_that_is_taken_is_a_sentence():
         port = taken.getsockname()[1]
         with pytest.raises(PortError, match=f"The port {port} cannot be had: .*--port"):
             serve(port=port, open_browser=False, announce=pytest.fail)
+
+
+def test_a_design_named_on_the_command_line_is_fitted(start, tmp_path):
+    (tmp_path / "my.toml").write_text(
+        'facets = "6x4"\nsize = "90mm"\n[target]\nsurface = "plane"\n'
+        '[layout]\nmachine = "grbl-co2-k40"\nmaterial = "paper-100"\n'
+    )
+    page = Page(start("my.toml").address)
+    first = json.loads(page.get("catalogue"))["first"]
+    assert (first["machine"], first["material"]) == ("grbl-co2-k40", "paper-100")
+    page.post("fit", {"target": {"source": first["source"]}, "options": {"size": "120mm"}})
+    pattern = page.finished()["pattern"]
+    assert pattern["command"] == "miurafab fit my.toml --size 120mm -o my.fold"
+    run(tmp_path, pattern["command"])
+    assert page.get(pattern["files"]["fold"]) == (tmp_path / "my.fold").read_bytes()
+    assert page.ask("GET", "design.toml")[0] == 404  # there is one already

@@ -4,15 +4,16 @@
 import { byId, element } from "./tools.js";
 
 let catalogue;
+let sourcesNow = [];
 
 export function fillForms(given) {
   catalogue = given;
-  const { defaults } = given;
+  const { defaults, first } = given;
   byId("version").textContent = given.version;
   byId("facets").value = defaults.facets;
   byId("size").value = defaults.size;
-  options(byId("machine"), given.machines, defaults.machine);
-  options(byId("material"), given.materials, defaults.material);
+  options(byId("machine"), given.machines, first?.machine ?? defaults.machine);
+  options(byId("material"), given.materials, first?.material ?? defaults.material);
   byId("tab_side").append(...given.tab_sides.map((side, at) => (
     element("option", { value: at ? side : "", textContent: side })
   )));
@@ -20,7 +21,6 @@ export function fillForms(given) {
   byId("file-help").textContent = `${given.file_suffixes.join(" ")}, up to ${given.file_limit >> 20} MB; or drop it here`;
   byId("target").addEventListener("change", () => showTarget());
   showSources([]);
-  const { first } = given;
   if (first?.surface) showTarget(`surface:${first.surface}`, first.parameters);
   else showTarget();
 }
@@ -47,11 +47,8 @@ export function showSources(sources, chosen) {
   sourcesNow = sources;
   select.value = before || "surface:hypar";
   if (select.selectedIndex < 0) select.value = "surface:hypar";
-  if (select.value !== before) showTarget();
-  else if (chosen) showTarget();
+  if (select.value !== before || chosen) showTarget();
 }
-
-let sourcesNow = [];
 
 function chosenTarget() {
   const [kind, name] = byId("target").value.split(":");
@@ -92,6 +89,12 @@ function showTarget(value, parameters = {}) {
 }
 
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** Why a file cannot be taken, if it cannot; the server would hang up on a larger one. */
+export function tooLarge(file) {
+  const limit = catalogue.file_limit;
+  return file.size > limit ? `${file.name} is larger than the ${limit >> 20} MB that are taken.` : "";
+}
 
 /** The route and the order that the first form stands for. */
 export function fitOrder() {

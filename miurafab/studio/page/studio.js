@@ -1,6 +1,6 @@
 // The page: asks for work, follows it, and shows what came of it.
 
-import { fillForms, fitOrder, layoutOrder, showSources } from "./choices.js";
+import { fillForms, fitOrder, layoutOrder, showSources, tooLarge } from "./choices.js";
 import { showJob, showPattern } from "./results.js";
 import { ask, byId, copy } from "./tools.js";
 
@@ -66,7 +66,8 @@ async function order(route, body) {
 }
 
 async function open(file) {
-  fault("");
+  fault(tooLarge(file));
+  if (tooLarge(file)) return;
   try {
     const name = encodeURIComponent(file.name);
     const { source, kind, sources } = await ask("upload", file, { "X-File-Name": name });
