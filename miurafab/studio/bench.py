@@ -7,6 +7,7 @@ were put down here, never by a path that somebody sends.
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -82,6 +83,7 @@ class Bench:
         self.pattern: dict[str, Any] | None = None
         self.job: dict[str, Any] | None = None
         self._folder = folder
+        self._own = re.compile(re.escape(str(folder)) + r"[/\\][0-9]+[/\\]")
         self._start = start
         self._numbers = 0
         self._asked: Asked | None = None
@@ -173,7 +175,7 @@ class Bench:
             elif "part" in said:
                 self._take_part(task, said)
             else:
-                task.error = said.get("error", "")
+                task.error = self._plain(said.get("error", ""))
                 task.running.stop()
                 task.running = None
                 self._settle()
@@ -233,9 +235,9 @@ class Bench:
             "name": task.order.name,
             "status": report["status"],
             "headline": headline(report["status"], opened=opened),
-            "advice": report["advice"],
+            "advice": self._plain(report["advice"]),
             "lines": pattern_lines(report),
-            "remarks": list(part["remarks"]),
+            "remarks": [self._plain(remark) for remark in part["remarks"]],
             "files": self._put_down(task.id, part["files"]),
             "folding": bool(part["files"]),
             "still": "",
@@ -269,6 +271,10 @@ class Bench:
         if self.pattern is None or self.pattern["status"] == "converged":
             return []
         return [f"{self.pattern['headline']} {self.pattern['advice']}".strip()]
+
+    def _plain(self, sentence: str) -> str:
+        """``sentence`` with files of the studio's own folder called by their names alone."""
+        return self._own.sub("", sentence)
 
     def _begin(self, do: str, name: str, **what: Any) -> None:
         number = self._number()

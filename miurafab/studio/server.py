@@ -56,7 +56,7 @@ def serve(
     with contextlib.ExitStack() as at_end:
         signals = at_end.enter_context(StopSignals())
         at_end.enter_context(contextlib.suppress(KeyboardInterrupt))
-        folder = Path(tempfile.mkdtemp(prefix="miurafab-studio-"))
+        folder = Path(tempfile.mkdtemp(prefix="miurafab-studio-")).resolve()
         at_end.callback(shutil.rmtree, folder, ignore_errors=True)
         bench = Bench(folder, Process)
         first = None if thing is None else _put_on(bench, thing)

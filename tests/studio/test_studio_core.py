@@ -310,6 +310,7 @@ def test_a_broken_file_is_a_sentence(done, name, content):
     state = done.state()
     assert state["pattern"] is None
     assert state["task"]["error"].endswith(".")
+    assert state["task"]["error"].startswith(name)
 
 
 def test_the_oldest_file_goes(asked):
