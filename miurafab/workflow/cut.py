@@ -8,17 +8,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from miurafab.fabrication.options import LayoutOptions
 from miurafab.gcode.job import Job
-from miurafab.origami.audit import audit
-from miurafab.origami.fit import fit
 from miurafab.profiles import MachineProfile, load_machine, load_material
-from miurafab.workflow.design import design, load_pattern, save_pattern
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
-from miurafab.workflow.job_directory import JobDirectory, read_job, write_job
 from miurafab.workflow.preview import ASSUMED_MACHINE, assumed_machine, named_machine
+
+# What fits and lays out is imported where it is needed: loading it
+# takes longer than all that cuts.
+if TYPE_CHECKING:
+    from miurafab.fabrication.options import LayoutOptions
+    from miurafab.workflow.job_directory import JobDirectory
 
 GCODE_SUFFIXES = (".nc", ".gcode", ".ngc", ".tap", ".plt")
 DEFAULT_MATERIAL = "card-250"
@@ -71,6 +72,8 @@ def prepare(
     path = Path(thing)
     tell = on_progress or (lambda fraction, note: None)
     if path.is_dir():
+        from miurafab.workflow.job_directory import read_job
+
         job = read_job(path)
         profile = job.machine if machine is None else load_machine(machine)
         dry_runs = job.dry_runs
@@ -84,6 +87,10 @@ def prepare(
         return Prepared(
             path.name, profile, (gcode,), (_dry_run(gcode, profile),), None, path.parent
         )
+    from miurafab.origami.audit import audit
+    from miurafab.origami.fit import fit
+    from miurafab.workflow.design import design, load_pattern, save_pattern
+
     if path.suffix.lower() == ".fold":
         pattern, surface, _ = load_pattern(path)
         tell(0.1, "checking the pattern")
@@ -137,6 +144,8 @@ def _from_pattern(
         return Prepared(
             name, load_machine(chosen), (), (), report=report, refusal=str(report["advice"])
         )
+    from miurafab.workflow.job_directory import write_job
+
     directory = write_job(
         fold,
         out or JOBS / name,

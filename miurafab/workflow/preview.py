@@ -14,7 +14,6 @@ from miurafab.errors import InputError
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import parse_dump
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fold_format import read_fold
 from miurafab.profiles import MachineProfile, load_machine
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 
@@ -215,6 +214,8 @@ def _pattern(path: Path, layout: _Layout, remarks: list[str]) -> CreasePattern |
         file = folder / layout.pattern_file
         if file.is_file():
             if hashlib.sha256(file.read_bytes()).hexdigest() == layout.pattern_sha256:
+                from miurafab.origami.fold_format import read_fold  # slow to load, seldom needed
+
                 return read_fold(file)
             remarks.append(f"{file} has changed since the sheets were made, so it is not shown.")
             return None
