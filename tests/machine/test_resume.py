@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -87,10 +88,11 @@ def interrupted_and_resumed(
     return burnt(job, [device.beam_log for device in devices]), rests
 
 
-def stroke_ends(job: Job) -> list[float]:
+@cache
+def stroke_ends(style: str) -> list[float]:
     """When each stroke ends in an undisturbed run, on the controller's clock."""
     wire = FakeWire(new_device())
-    run(job, wire, None)
+    run(dashes(style), wire, None)
     ends = {(round(s.y1), int((s.x1 - 4.98) // 3)): s.t1 for s in wire.device.beam_log}
     return list(ends.values())
 
@@ -111,7 +113,7 @@ def check(job: Job, kinds: list[tuple[str, float]], tmp_path: Path) -> None:
 @pytest.mark.parametrize("first", [0, 1, 2, 50, 121, 198, 199])
 def test_a_fault_after_a_stroke(style: str, first: int, tmp_path: Path) -> None:
     job = dashes(style)
-    ends = stroke_ends(job)
+    ends = stroke_ends(style)
     assert len(ends) == STROKES
     check(job, [(KINDS[first % 6], ends[first] + 0.001)], tmp_path)
 
@@ -137,14 +139,14 @@ def test_a_fault_at_very_many_moments(style: str, at: float, kind: str) -> None:
 @pytest.mark.parametrize("style", ["absolute", "relative"])
 def test_a_fault_after_every_stroke(style: str, tmp_path: Path) -> None:
     job = dashes(style)
-    for index, end in enumerate(stroke_ends(job)):
+    for index, end in enumerate(stroke_ends(style)):
         for kind in KINDS if index % 10 == 0 else (KINDS[index % 6],):
             check(job, [(kind, end + 0.001)], tmp_path)
 
 
 def test_a_resumed_job_is_interrupted_again(tmp_path: Path) -> None:
     job = dashes("absolute")
-    ends = stroke_ends(job)
+    ends = stroke_ends("absolute")
     kinds = [
         ("disconnect", ends[60]),
         ("power", ends[3]),

@@ -74,13 +74,15 @@ class FakeWire:
             if due or left <= 0:
                 return due
             waits = [left]
-            upcoming = self.device.next_event_in()
-            if upcoming is not None:
-                waits.append(upcoming)
-            for queue in (self._to_device, self._to_host):
+            for queue in (self._to_device, self._to_host, self.lies):
                 if queue:
                     waits.append(queue[0][0] - self.device.now)
-            self.device.advance(max(min(waits), 1e-6))
+            if self._latency:  # the host gets every byte on its own
+                upcoming = self.device.next_event_in()
+                waits += [] if upcoming is None else [upcoming]
+                self.device.advance(max(min(waits), 1e-6))
+            else:
+                self.device.advance_to_line(max(min(waits), 1e-6))
 
     def close(self) -> None:
         self.closed = True
