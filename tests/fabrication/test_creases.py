@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import shapely
 from flat_patterns import bed, card, miura, zigzag
+from rings import revolved, tube
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.boxes import best_turn
@@ -160,6 +161,34 @@ def test_two_sided_working_scores_the_valleys_from_the_back():
         # The holes lie in the margin, clear of every patch.
         for middle in on_front:
             assert np.linalg.norm(face.points - middle, axis=1).min() > PIN_MM / 2
+
+
+@pytest.mark.parametrize(
+    ("ring", "fold"), [(tube, "mountain"), (lambda: revolved("8x16", "120mm"), "valley")]
+)
+def test_valleys_of_a_ring_seam_are_scored_from_the_back(ring, fold):
+    """Its edges are borders of the sheet, so only the seam knows which way they fold."""
+    pattern = ring()
+    material = stock("perforate", "score", "score")
+    layout = lay_out(pattern, MACHINE, material, options=LayoutOptions(two_sided=True))
+    placed = {p.patch: (k, p) for k, sheet in enumerate(layout.sheets) for p in sheet.placements}
+    seen = []
+    for patch in layout.patches:
+        number, placement = placed[patch.id]
+        for tab in patch.tabs:
+            closes = tab.edge != tab.mate_edge
+            assert not closes or pattern.edges_assignment[tab.edge] == "B"
+            back = tab.fold == "valley"
+            path = layout.backs[number] if back else layout.toolpaths[number]
+            (score,) = np.flatnonzero((path.operation == SCORE) & (path.edge == tab.edge))
+            stroke = path.stroke(score)
+            if back:
+                stroke = stroke * [-1.0, 1.0] + [path.width_mm, 0.0]
+            base = shapely.LineString(placement.from_patch(tab.polygon_mm[:2]))
+            assert shapely.LineString(stroke).hausdorff_distance(base) < material.tabs.height_mm / 4
+            assert shapely.distance(shapely.points(stroke), base).max() < 1e-5
+            seen.append((closes, tab.fold))
+    assert {each for closes, each in seen if closes} == {fold}
 
 
 @pytest.mark.parametrize("size", [(300.0, 200.0), (400.0, 400.0)])

@@ -20,12 +20,14 @@ from miurafab.fabrication.drawing.dxf import VERSIONS, sheet_dxf
 from miurafab.fabrication.drawing.hpgl import POINTS_A_LINE, UNITS_PER_MM, sheet_hpgl
 from miurafab.fabrication.drawing.page import INK, tint
 from miurafab.fabrication.drawing.pdf import sheets_pdf
+from miurafab.fabrication.drawing.sheet_pages import _clear_place
 from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, tiled_pdf
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out
 from miurafab.profiles import load_machine, load_material
+from miurafab.profiles.material import Crease
 
 MACHINE, MATERIAL = load_machine("grbl-laser-400"), load_material("card-250")
 
@@ -214,6 +216,41 @@ def test_the_guide_says_what_could_not_be_had():
     assert "2 seam edges bear no tab: use tape there." in text
     assert "5 names and numbers found no room" in text
     assert "Mind the gap." in text
+
+
+def test_the_guide_tells_how_both_sides_are_made():
+    pattern = regular(9, 9)
+    creases = {"mountain": Crease(), "valley": Crease("score"), "tab": Crease()}
+    material = dataclasses.replace(MATERIAL, creases=creases)
+    layout = lay_out(pattern, MACHINE, material, options=LayoutOptions(two_sided=True))
+    pages = pages_of(assembly_guide(layout, pattern, MACHINE, material, "Both"))
+    assert "valley: scored" in pages[0]
+    near, far = MACHINE.bed.margin_mm / 2, MACHINE.bed.width_mm - MACHINE.bed.margin_mm / 2
+    words = pages[1].replace("\n", " ")
+    assert f"holes lie at X{near:.1f} Y{near:.1f}, X{near:.1f} Y" in words
+    assert f"and X{far:.1f} Y{near:.1f}; then run sheet-01." in words
+    scored = sum(back.length_of("score") for back in layout.backs) / 1000
+    assert scored > 0
+    assert f"{scored:.2f} m scored" in words
+
+
+def test_power_is_told_for_lasers_alone():
+    pattern = regular(9, 9)
+    pen = load_machine("grbl-pen-a4")
+    for machine, powered in ((MACHINE, True), (pen, False)):
+        layout = lay_out(pattern, machine, MATERIAL)
+        text = pages_of(assembly_guide(layout, pattern, machine, MATERIAL, "One"))[0]
+        feed = f"{MATERIAL.operations['cut'].feed_mm_min:g} mm/min"
+        assert (f"%, {feed}" in text) == powered
+        assert feed in text
+
+
+def test_the_name_of_a_patch_does_not_hide_what_is_engraved():
+    strokes = np.array([[0.0, 0.0], [2.0, 1.0]])
+    places = np.array([[0.0, 0.0], [-30.0, 0.0], [0.0, 8.0], [0.0, 12.0]])
+    assert _clear_place(places, strokes, "P1", 16.0).tolist() == [0.0, 8.0]
+    assert _clear_place(places[:1], strokes, "P1", 16.0).tolist() == [0.0, 0.0]
+    assert _clear_place(places, np.empty((0, 2)), "P1", 16.0).tolist() == [0.0, 0.0]
 
 
 def test_copies_have_one_guide():

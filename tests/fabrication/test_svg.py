@@ -106,4 +106,6 @@ def test_the_picture_of_a_layout_names_its_patches():
     layout = lay_out(pattern, bed(200.0, 150.0), card())
     root = ElementTree.fromstring(pattern_svg(pattern, layout))
     names = [text.text for text in root.iter(SVG + "text")]
-    assert names == [patch.label for patch in layout.patches]
+    # Each with a rim of its own below: many programs do not know paint-order.
+    assert names == [patch.label for patch in layout.patches for _ in range(2)]
+    assert [text.get("stroke") for text in root.iter(SVG + "text")][:2] == ["#ffffff", None]

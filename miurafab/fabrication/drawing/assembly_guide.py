@@ -92,7 +92,7 @@ class _Overview:
             scale = self.views.folded_view(canvas, (MARGIN, top - 104, ROOM, 98))
             scale_bar(canvas, scale, MARGIN, top - 108)
             top -= 118
-        caption(canvas, "Flat, seen from the printed side", MARGIN, top)
+        caption(canvas, "Flat, seen from the side with the names", MARGIN, top)
         beside = 106.0
         tall = min(top - BOTTOM - 22, beside * self.views.aspect)
         scale = self.views.flat_view(canvas, (MARGIN, top - 8 - tall, beside, tall))
@@ -111,7 +111,6 @@ class _Overview:
     def facts(self) -> list[tuple[str, list[str]]]:
         """What the overview says beside the pictures."""
         pattern, material, totals = self.views.pattern, self.material, self.views.layout.totals
-        rule = material.perforation
 
         def size(points: NDArray[np.float64]) -> str:
             return " x ".join(f"{side:.0f}" for side in np.ptp(points, axis=0)) + " mm"
@@ -125,21 +124,8 @@ class _Overview:
                 "Material",
                 [f"{material.title} ({material.name}), {material.thickness_mm:g} mm thick"],
             ),
-            (
-                "Perforation",
-                [
-                    f"{rule.cut_mm:g} mm cut, {rule.gap_mm:g} mm left",
-                    f"kerf {material.kerf_mm:g} mm",
-                ],
-            ),
-            (
-                "Settings",
-                [
-                    f"{name}: {op.power:.0%}, {op.feed_mm_min:g} mm/min"
-                    + (f", {op.passes} passes" if op.passes > 1 else "")
-                    for name, op in material.operations.items()
-                ],
-            ),
+            ("Creases", [*_ways(material), f"kerf {material.kerf_mm:g} mm"]),
+            ("Settings", [_setting(self.machine, material, name) for name in material.operations]),
         ]
         if totals.tabs:
             words = f"{count(totals.tabs, 'tab', 'tabs')} on {totals.seam_mm / 1000:.2f} m of seams"
@@ -151,3 +137,29 @@ class _Overview:
             )
             found.append(("Time on the machine", [f"about {hours}"]))
         return found
+
+
+def _ways(material: Material) -> list[str]:
+    """How the creases are made, kinds that are alike in one line."""
+    kinds: dict[str, list[str]] = {}
+    for kind, crease in material.creases.items():
+        rule = material.perforation_of(kind)
+        way = {
+            "perforate": f"{rule.cut_mm:g} mm cut, {rule.gap_mm:g} mm left",
+            "score": "scored",
+            "cut": f"cut but for {rule.bridge_mm:g} mm at both ends",
+            "none": "not made",
+        }[crease.mode]
+        kinds.setdefault(way, []).append("tab fold" if kind == "tab" else kind)
+    found = [way if len(kinds) == 1 else f"{', '.join(own)}: {way}" for way, own in kinds.items()]
+    if material.relief_hole_mm:
+        found.append(f"holes of {material.relief_hole_mm:g} mm where they meet")
+    return found
+
+
+def _setting(machine: MachineProfile, material: Material, name: str) -> str:
+    """Power, where the tool is a laser, and feed of one operation."""
+    operation = material.operations[name]
+    power = f"{operation.power:.0%}, " if machine.tool.kind == "laser" else ""
+    passes = f", {operation.passes} passes" if operation.passes > 1 else ""
+    return f"{name}: {power}{operation.feed_mm_min:g} mm/min{passes}"

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from reportlab.lib.units import mm
+from reportlab.pdfbase.pdfmetrics import stringWidth
 from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.drawing.page import (
@@ -27,6 +29,7 @@ from miurafab.fabrication.drawing.page import (
     heading,
     legend,
     line_above,
+    paragraph,
     polygon,
     scale_bar,
     tabs_called,
@@ -39,12 +42,15 @@ from miurafab.fabrication.drawing.views import OUTLINED, Views, named
 from miurafab.fabrication.sheets import Layout, Placement, Sheet
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.fabrication.wording import count
+from miurafab.profiles import OPERATIONS
 
 _CARD = 33.0
 """The least height of what is said of one patch below its sheet; more is used where there is."""
 _PICTURED = 12
 """Of more patches on a sheet only the words are shown: the sheet itself is the picture."""
 _COLUMNS = 3
+_MADE = {"cut": "cut", "perforate": "perforated", "score": "scored"}
+"""The operations whose lengths are told, and what they do."""
 
 _Words = tuple[float, float, str, list[str]]
 """Where the words on a patch begin, its name, and the lines below."""
@@ -62,6 +68,24 @@ class SheetPages:
     @property
     def layout(self) -> Layout:
         return self.views.layout
+
+    @cached_property
+    def behind(self) -> Toolpath | None:
+        """What is made from the back of the sheet, as it lies seen from the front."""
+        for back in self.layout.backs:
+            if back.sheet == self.sheet.back:
+                mirrored = back.points * [-1.0, 1.0] + [self.sheet.width_mm, 0.0]
+                return replace(back, points=mirrored)
+        return None
+
+    def holes(self) -> str:
+        """Where the registration holes lie when the front is made."""
+        path = self.behind
+        assert path is not None
+        cut = path.operation == OPERATIONS.index("cut")
+        middles = [path.stroke(int(k))[:-1].mean(axis=0) for k in np.flatnonzero(cut)]
+        places = [f"X{x:.1f} Y{y:.1f}" for x, y in sorted(each.tolist() for each in middles)]
+        return f"{', '.join(places[:-1])} and {places[-1]}"
 
     def label(self, patch: int) -> str:
         return self.layout.patches[patch].label
@@ -81,7 +105,7 @@ class SheetPages:
         top = HEIGHT - MARGIN - 19
         under = top - sheet.height_mm * scale - 16
         if sheet.back is not None:
-            under -= 6
+            under -= 10
         placed = [each.patch for each in sheet.placements]
         if len(placed) > _PICTURED:
             yield from self.listed(placed, subtitle, scale, under)
@@ -164,6 +188,8 @@ class SheetPages:
         for ring in sheet.defects_mm:
             polygon(canvas, np.array(ring))
         draw_for_people(canvas, toolpath, self.views.letters, scale)
+        if self.behind is not None:
+            draw_for_people(canvas, self.behind, self.views.letters, scale)
         canvas.setStrokeColor(RULE)
         canvas.setLineWidth(0.3 / scale * mm)
         canvas.rect(0, 0, sheet.width_mm * mm, sheet.height_mm * mm)
@@ -177,18 +203,22 @@ class SheetPages:
             ("cut", INK, 0.45),
         ]
         legend(canvas, entries, MARGIN + ROOM, low - 6)
+        passes = [toolpath] if self.behind is None else [toolpath, self.behind]
+        lengths = {
+            word: sum(each.length_of(operation) for each in passes) / 1000
+            for operation, word in _MADE.items()
+        }
         figures = (
             f"{sheet.width_mm:g} x {sheet.height_mm:g} mm, drawn at 1:{1 / scale:.3g}; "
-            f"{toolpath.length_of('cut') / 1000:.2f} m cut, "
-            f"{toolpath.length_of('perforate') / 1000:.2f} m perforated"
+            + ", ".join(f"{length:.2f} m {word}" for word, length in lengths.items() if length > 0)
         )
         text(canvas, MARGIN + ROOM, low - 11.5, figures, 8, colour=QUIET, align="right")
-        if sheet.back is not None:
+        if self.behind is not None:
             words = (
-                f"First run {sheet.back}, turn the sheet over left to right onto its three holes, "
-                f"then run {sheet.name}."
+                f"First run {sheet.back}. Turn the sheet over, left to right, so that its three "
+                f"holes lie at {self.holes()}; then run {sheet.name}."
             )
-            text(canvas, MARGIN, low - 17.5, words, 9, bold=True)
+            paragraph(canvas, MARGIN, low - 17.5, words, ROOM, 9, bold=True)
 
     def draw_names(
         self, canvas: Canvas, placed: Placement, corner: tuple[float, float], scale: float
@@ -206,7 +236,11 @@ class SheetPages:
         points = on_page(pattern.vertices_coords[corners[corners >= 0]])
         middle, span = points.mean(axis=0), float(np.ptp(points, axis=0).min())
         size = min(max(span / 2.2, 4.0), 16.0)
-        named(canvas, patch.label, float(middle[0]), float(middle[1]), size)
+        path = self.toolpath
+        engraved = (path.operation == OPERATIONS.index("engrave")) & (path.patch == patch.id)
+        strokes = path.points[np.repeat(engraved, np.diff(path.offsets))] * scale + corner
+        at = _clear_place(np.vstack([middle, points]), strokes, patch.label, size)
+        named(canvas, patch.label, float(at[0]), float(at[1]), size)
         if span < 26:
             return
         for mate, edges in self.seams_of(patch.id).items():
@@ -296,3 +330,18 @@ class SheetPages:
             for mate, numbers in sorted(others.items())
         ]
         return found or ["Stands alone: nothing is glued to it."]
+
+
+def _clear_place(
+    places: NDArray[np.float64], strokes: NDArray[np.float64], label: str, size: float
+) -> NDArray[np.float64]:
+    """The first of ``places`` (n, 2), or else the one nearest to it, where a ``label`` in type of
+    ``size`` hides none of the points ``strokes`` (m, 2); the first if there is no such place.
+    """
+    wide = stringWidth(label, "Helvetica-Bold", size) / mm / 2 + 1.5
+    room = np.array([wide, 0.14 * size + 1.5])
+    near = np.argsort(np.linalg.norm(places - places[0], axis=1), kind="stable").tolist()
+    hidden = ((np.abs(strokes - places[k]) < room).all(axis=1).any() for k in near)
+    best = next((k for k, hides in zip(near, hidden, strict=True) if not hides), 0)
+    place: NDArray[np.float64] = places[best]
+    return place

@@ -130,16 +130,17 @@ def _add_names(
 ) -> None:
     size = np.ptp(points, axis=0).max() / 30
     group = drawing.g(
-        font_family="sans-serif", font_size=_short(size), font_weight="bold",
-        text_anchor="middle", fill="#222222", stroke="#ffffff", stroke_width=_short(0.16 * size),
-        stroke_linejoin="round",
+        font_family="sans-serif", font_size=_short(size), font_weight="bold", text_anchor="middle",
     )  # fmt: skip
-    # The rim goes under the letters, so that creases do not spoil them.
-    group.attribs["paint-order"] = "stroke"
+    # A rim under the letters, so that creases do not spoil them; many programs do not know
+    # paint-order, so it is a text of its own.
+    rim = {"stroke": "#ffffff", "stroke_width": _short(0.16 * size), "stroke_linejoin": "round"}
     for patch in layout.model.patches:
         corners = pattern.faces_vertices[patch.faces]
         x, y = points[corners[corners >= 0]].mean(axis=0)
-        group.add(drawing.text(patch.label, insert=(_short(x), _short(y + 0.35 * size))))
+        name, at = patch.label.partition("-")[0], (_short(x), _short(y + 0.35 * size))
+        group.add(drawing.text(name, insert=at, fill="#ffffff", **rim))
+        group.add(drawing.text(name, insert=at, fill="#222222"))
     drawing.add(group)
 
 
