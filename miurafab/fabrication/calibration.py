@@ -46,7 +46,9 @@ STRIPS = 20
 _PITCH = (16.0, 14.0)
 _FLAP = (11.0, 9.0)
 _SQUARE = 8.0
-_LEFT, _HEAD, _FOOT = 24.0, 9.0, 20.0
+_HEAD, _FOOT = 9.0, 20.0
+_RATIO = 2.4
+"""The height of what is written on the left of a row, in mm."""
 _WINDOW = (80.0, 14.0)
 _SPACE = 8.0
 _COUPON = MiuraCell(across=12.0, along=12.0, alpha=math.radians(68), theta=math.radians(40))
@@ -114,7 +116,8 @@ def calibration_sheet(machine: MachineProfile, material: Material) -> Calibratio
     burns = _settings(material, "perforate", fastest)
     cuts = _settings(material, "cut", fastest)
     coupon = unfold(regular_miura(_COUPON, *_COUPON_GRID))
-    trial = _trial_size(len(rules), max(len(burns), len(cuts)))
+    left = 5.0 + _RATIO * max(text_width(_ratio(rule)) for rule in rules)
+    trial = _trial_size(left, len(rules), max(len(burns), len(cuts)))
     gauge = (_WINDOW[0] + 14.0, _WINDOW[1] + 8.0)
     fold = (np.ptp(coupon.vertices_coords[:, 0]), np.ptp(coupon.vertices_coords[:, 1]))
     corners, size = _arranged([trial, gauge, (float(fold[0]), float(fold[1]))], machine)
@@ -128,7 +131,7 @@ def calibration_sheet(machine: MachineProfile, material: Material) -> Calibratio
     tried = [_Pen() for _ in cuts]
     at = corners[0]
     for column, operation in enumerate(burns):
-        x = at[0] + _LEFT + _PITCH[0] * column
+        x = at[0] + left + _PITCH[0] * column
         top = at[1] + trial[1]
         _write(engraved, _percent(operation), (x + _FLAP[0] / 2, top - 1.2), 2.2)
         _write(engraved, _feed(operation), (x + _FLAP[0] / 2, top - 5.0), 2.2)
@@ -145,10 +148,10 @@ def calibration_sheet(machine: MachineProfile, material: Material) -> Calibratio
             _write(engraved, cell.label, corner + np.array(_FLAP) / 2, 3.0)
     for row, rule in enumerate(rules):
         y = at[1] + trial[1] - _HEAD - _PITCH[1] * row - _FLAP[1] / 2
-        text = f"{rule.cut_mm:g}/{rule.gap_mm:g}"
-        _write(engraved, text, (at[0] + 2.0 + 2.4 * text_width(text) / 2, y), 2.4)
+        text = _ratio(rule)
+        _write(engraved, text, (at[0] + 2.0 + _RATIO * text_width(text) / 2, y), _RATIO)
     for column, operation in enumerate(cuts):
-        x = at[0] + _LEFT + _PITCH[0] * column + _FLAP[0] / 2
+        x = at[0] + left + _PITCH[0] * column + _FLAP[0] / 2
         square = Square(f"X{column + 1}", operation)
         patch = len(cells) + len(squares)
         squares.append(square)
@@ -252,8 +255,8 @@ def _settings(material: Material, name: str, fastest: float) -> list[Operation]:
     return sorted(found, key=lambda each: (each.power / each.feed_mm_min, each.power))
 
 
-def _trial_size(rows: int, columns: int) -> tuple[float, float]:
-    wide = _LEFT + _PITCH[0] * (columns - 1) + _FLAP[0]
+def _trial_size(left: float, rows: int, columns: int) -> tuple[float, float]:
+    wide = left + _PITCH[0] * (columns - 1) + _FLAP[0]
     return wide, _HEAD + _PITCH[1] * rows + _FOOT
 
 
@@ -281,6 +284,10 @@ def _arranged(
         f"x {above[1]:.0f} mm, and the usable bed of {machine.name} is {room[0]:g} mm x "
         f"{room[1]:g} mm; choose another machine, or a smaller margin in its profile."
     )
+
+
+def _ratio(rule: Perforation) -> str:
+    return f"{rule.cut_mm:g}/{rule.gap_mm:g}"
 
 
 def _percent(operation: Operation) -> str:

@@ -125,6 +125,19 @@ def test_nothing_but_the_sheet_itself_touches_a_caption():
     assert near.shape[1] == 0
 
 
+def test_captions_keep_clear_of_cuts_whatever_their_length():
+    rule = dataclasses.replace(card().perforation, cut_mm=12.35, gap_mm=10.15)
+    sheet = calibration_sheet(bed(600.0, 400.0), dataclasses.replace(card(), perforation=rule))
+    path = sheet.toolpath
+    kinds = [OPERATIONS[operation] for operation in path.operation]
+    lines = [shapely.LineString(path.stroke(k)) for k in range(len(path))]
+    cuts = shapely.union_all(
+        [line for line, kind in zip(lines, kinds, strict=True) if kind in ("cut", "perforate")]
+    )
+    captions = [line for line, kind in zip(lines, kinds, strict=True) if kind == "engrave"]
+    assert shapely.distance(np.array(captions), cuts).min() > 0.9
+
+
 def test_a_bed_too_small_and_a_knife_are_refused():
     with pytest.raises(LayoutError, match=r"needs 2\d\d mm x \d+ mm or .* is 90 mm x 90 mm"):
         calibration_sheet(bed(100, 100), card())
