@@ -22,7 +22,7 @@ from miurafab.fabrication.drawing.page import INK, tint
 from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.sheet_pages import _clear_place
 from miurafab.fabrication.drawing.svg import sheet_svg
-from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, tiled_pdf
+from miurafab.fabrication.drawing.tiles import EDGE_MM, PAGES_MM, Tiling, tiled_pdf
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out
@@ -94,7 +94,7 @@ def test_tiles_joined_by_their_crosses_are_the_sheet(layout, page):
         else:
             raise AssertionError("a page shares no cross with the others")
     origin = next(move for words, move, _ in laid if re.search(r"^A1$", words, re.MULTILINE))
-    wanted = segments(toolpath)[:, 1:]
+    wanted = segments(toolpath)[:, 1:] - np.tile(toolpath.points.min(axis=0) - EDGE_MM, 2)
     drawn = np.concatenate([p + np.tile(move - origin, 2) for _, move, p in laid])
     drawn -= np.tile(Tiling().margin_mm, 4)
     for ends in (wanted, wanted[:, [2, 3, 0, 1]]):
@@ -137,12 +137,22 @@ def read_tile(page, reader):
     return crosses, lines
 
 
+def test_tiles_begin_where_the_drawing_does():
+    """What fits one page is on one page, wherever it lies on its sheet."""
+    path = lay_out(regular(9, 9), MACHINE, MATERIAL).toolpaths[0]
+    moved = dataclasses.replace(path, points=path.points + np.array([150.0, 250.0]))
+    letters = regular(9, 9).edges_assignment
+    for each in (path, moved):
+        reader = pypdf.PdfReader(io.BytesIO(tiled_pdf((each,), letters, "one", Tiling())))
+        assert len(reader.pages) == 2
+
+
 def test_blank_tiles_are_not_printed():
     pattern = regular(9, 9)
     layout = lay_out(pattern, MACHINE, MATERIAL)
     tiled = tiled_pdf(layout.toolpaths, edge_letters(layout, pattern), "one", Tiling())
     pages = pages_of(tiled)
-    assert "on 1 page," in pages[0]
+    assert "on 1 page, 1 column by 1 row" in pages[0]
     assert len(pages) == 2
 
 

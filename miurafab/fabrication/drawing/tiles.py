@@ -1,7 +1,8 @@
 """Sheets over the pages of an ordinary printer, true to scale, to be joined by hand.
 
 First comes a page that shows the sheet and its tiles, then one page for each tile on which
-something is drawn, named like a field of a chess board: A1 is at the lower left. Neighbouring pages
+something is drawn, named like a field of a chess board: A1 is at the lower left. The tiles begin
+where the drawing does, not the sheet, since each page costs an edge to glue. Neighbouring pages
 share a strip. In it lie numbered crosses, each at one place of the sheet and so on both pages: laid
 cross upon cross the pages match. Mountains, valleys and cuts are told apart by colour.
 """
@@ -47,6 +48,9 @@ PAGES_MM = {
 
 CHECK_MM = 50.0
 """The length of the bar by which the scale of a print is checked."""
+
+EDGE_MM = 2.0
+"""Between the drawing and the frame of the outermost pages."""
 
 _HOW = (
     "Print at 100 %, without fitting to the page, and check the bar of 50 mm at the foot of each. "
@@ -106,15 +110,23 @@ class _Tiles:
         self.margin, self.overlap = tiling.margin_mm, tiling.overlap_mm
         self.shown = tuple(side - 2 * self.margin for side in page)
         self.step = tuple(side - self.overlap for side in self.shown)
-        self.sheet = (toolpath.width_mm, toolpath.height_mm)
+        self.origin = toolpath.points.min(axis=0) - EDGE_MM
+        self.size = np.ptp(toolpath.points, axis=0) + 2 * EDGE_MM
         self.columns, self.rows = (
             max(1, math.ceil((length - self.overlap) / step))
-            for length, step in zip(self.sheet, self.step, strict=True)
+            for length, step in zip(self.size.tolist(), self.step, strict=True)
         )
+
+    @property
+    def grid(self) -> str:
+        """How many columns and rows there are, in words."""
+        columns = count(self.columns, "column", "columns")
+        return f"{columns} by {count(self.rows, 'row', 'rows')}"
 
     def corner(self, row: int, column: int) -> tuple[float, float]:
         """Where on the sheet a tile begins."""
-        return column * self.step[0], row * self.step[1]
+        x, y = self.origin.tolist()
+        return x + column * self.step[0], y + row * self.step[1]
 
     def strokes_in(self, row: int, column: int) -> NDArray[np.int64]:
         """The strokes that touch a tile."""
@@ -144,10 +156,11 @@ class _Tiles:
             ((self.columns, self.rows), (self.rows, self.columns))
         ):
             for boundary in range(1, tiles):
-                at = boundary * self.step[axis] + self.overlap / 2
+                at = self.origin[axis] + boundary * self.step[axis] + self.overlap / 2
                 for other in range(others):
-                    begin = other * self.step[1 - axis]
-                    end = min(begin + self.shown[1 - axis], self.sheet[1 - axis])
+                    first = self.origin[1 - axis]
+                    begin = first + other * self.step[1 - axis]
+                    end = min(begin + self.shown[1 - axis], first + self.size[1 - axis])
                     for part in (0.3, 0.7):
                         along = begin + part * (end - begin)
                         number += 1
@@ -161,8 +174,8 @@ class _Tiles:
         text(canvas, margin, top - 5, f"{title}: {self.toolpath.sheet}", 18, bold=True)
         printed = self.printed
         words = (
-            f"{self.sheet[0]:g} x {self.sheet[1]:g} mm on {count(len(printed), 'page', 'pages')}, "
-            f"{self.columns} columns by {self.rows} rows"
+            f"{self.size[0]:.0f} x {self.size[1]:.0f} mm on "
+            f"{count(len(printed), 'page', 'pages')}, {self.grid}"
         )
         text(canvas, margin, top - 11, words, 9.5, colour=QUIET)
         y = paragraph(canvas, margin, top - 20, _HOW, room, 9.5)
@@ -173,7 +186,8 @@ class _Tiles:
         scale = min(room / whole[0], (y - margin - 16) / whole[1])
         low = y - 4 - whole[1] * scale
         canvas.saveState()
-        canvas.translate(margin * mm, low * mm)
+        place = np.array([margin, low]) - self.origin * scale
+        canvas.translate(*(place * mm).tolist())
         canvas.scale(scale, scale)
         canvas.setFillColor(PALE)
         for row in range(self.rows):
@@ -190,7 +204,7 @@ class _Tiles:
         canvas.restoreState()
         for row, column in printed:
             a, b = self.corner(row, column)
-            at = (margin + (a + self.shown[0] / 2) * scale, low + (b + self.shown[1] / 2) * scale)
+            at = place + np.array([a + self.shown[0] / 2, b + self.shown[1] / 2]) * scale
             canvas.setFillColor(INK, alpha=0.75)
             canvas.circle(at[0] * mm, at[1] * mm, 4.5 * mm, stroke=0, fill=1)
             canvas.setFillAlpha(1)
@@ -220,7 +234,7 @@ class _Tiles:
         canvas.rect(margin * mm, margin * mm, shown[0] * mm, shown[1] * mm)
         foot = margin - 5.5
         text(canvas, margin, foot, _field(row, column), 11, bold=True)
-        words = f"{title}, {self.toolpath.sheet}; {self.columns} columns by {self.rows} rows"
+        words = f"{title}, {self.toolpath.sheet}; {self.grid}"
         text(canvas, margin + 10, foot, words, 7.5, colour=QUIET)
         _check_bar(canvas, self.page[0] - margin, foot)
         canvas.showPage()
