@@ -47,7 +47,7 @@ def preview(
 
     def show() -> None:
         console.rows(
-            ("sheet", "lines", "time", "beam on", "cut", "travel", "bounds mm"),
+            ("sheet", "lines", "time", "beam on", "drawn", "travel", "bounds mm"),
             [_row(sheet) for sheet in seen.sheets],
             title=f"{seen.name} on {seen.machine.title}",
         )

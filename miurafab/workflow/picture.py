@@ -156,7 +156,7 @@ def _title(draw: ImageDraw.ImageDraw, sheet: SheetPreview, machine: MachineProfi
     draw.text((_LEFT, 22), sheet.program.name, fill=_INK, font=_font(34))
     subtitle = (
         f"{machine.title}   |   {clock_text(sheet.seconds)} estimated, beam on "
-        f"{clock_text(sheet.beam_on_seconds)}   |   {length_text(sheet.cut_mm)} burnt, "
+        f"{clock_text(sheet.beam_on_seconds)}   |   {length_text(sheet.cut_mm)} drawn, "
         f"{length_text(sheet.travel_mm)} travel"
     )
     draw.text((_LEFT, 70), subtitle, fill=_QUIET, font=_font(18))

@@ -113,7 +113,7 @@ def _data(
         facts["Sheets"] = f"{len(preview.sheets)}"
         facts["Machine time"] = clock_text(preview.seconds)
         facts["Beam on"] = clock_text(sum(sheet.beam_on_seconds for sheet in preview.sheets))
-        facts["Cut"] = length_text(sum(sheet.cut_mm for sheet in preview.sheets))
+        facts["Drawn"] = length_text(sum(sheet.cut_mm for sheet in preview.sheets))
         facts["Travel"] = length_text(sum(sheet.travel_mm for sheet in preview.sheets))
     if pattern is not None:
         facts["Facets"] = f"{len(pattern.faces_vertices):,}"

@@ -15,7 +15,7 @@ function figures({ facts, machine, remarks, sheets, made_by: maker }) {
 
 function table(sheets, choose) {
   if (!sheets.length) return;
-  const heads = ["Sheet", "Lines", "Time", "Beam on", "Cut", "Travel", "Bounds (mm)", "Warnings"];
+  const heads = ["Sheet", "Lines", "Time", "Beam on", "Drawn", "Travel", "Bounds (mm)", "Warnings"];
   const box = byId("table");
   box.querySelector("thead").append(
     element("tr", {}, ...heads.map((text) => element("th", { scope: "col", textContent: text }))),
