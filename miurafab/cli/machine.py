@@ -171,7 +171,13 @@ def jog(
 @app.command()
 def frame(
     thing: Annotated[str, typer.Argument(help="A job directory or a G-code file.")],
-    port: PortOption,
+    port: Annotated[
+        list[str],
+        typer.Option(
+            help="A serial device, a pyserial URL (socket://...), 'virtual'; given more than once, "
+            "the machines trace it in turn."
+        ),
+    ],
     sheet: Annotated[int, typer.Option(help="The sheet of a job directory, from 1.")] = 1,
     pointer: Annotated[
         float, typer.Option(help="Power in percent, 5 at most; 0 keeps the beam off.")
@@ -193,12 +199,17 @@ def frame(
     options = cut_sheets.CutOptions(
         home=home, at=None if at is None else parse_point(at), pointer=pointer / 100
     )
-    cut_sheets.frame(prepared, sheet, port=port, options=options)
-    Console(as_json, quiet).answer(
+    console = Console(as_json, quiet)
+    for each in port:
+        if len(port) > 1:
+            console.remark(f"Tracing the frame at {each}.")
+        cut_sheets.frame(prepared, sheet, port=each, options=options)
+    console.answer(
         {
             "sheet": prepared.dry_runs[sheet - 1].name,
             "bounds_mm": prepared.dry_runs[sheet - 1].bounds_mm,
             "pointer_percent": pointer,
+            "ports": port,
         }
     )
 

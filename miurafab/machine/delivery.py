@@ -45,9 +45,12 @@ class Errand:
 class Delivery(ABC):
     """An errand under way; ``at_risk`` while the machine may move or burn by what was sent.
 
-    ``held`` says whether the user wants nothing to be sent, ``orders`` are those of the keyboard
-    that were not carried out yet, ``refusals`` the refused lines of a job in check mode.
+    ``taken`` is the word for a line that the machine has. ``held`` says whether the user wants
+    nothing to be sent, ``orders`` are those of the keyboard that were not carried out yet,
+    ``refusals`` the refused lines of a job in check mode.
     """
+
+    taken = "acknowledged"
 
     def __init__(self, errand: Errand) -> None:
         self.at_risk = False
@@ -114,7 +117,7 @@ class Delivery(ABC):
         remarks += self.part()
         self.at_risk = False
         if self.journal is not None:
-            self.journal.ended("done", f"{self.acknowledged} lines acknowledged, then idle")
+            self.journal.ended("done", f"{self.acknowledged} lines {self.taken}")
         remarks += self._close_records()
         return StreamResult(self.acknowledged, seconds, tuple(self.refusals), remarks)
 
@@ -190,7 +193,7 @@ class Delivery(ABC):
             self.at_risk = False
             sentence = (
                 f"{sentence.rstrip('.')}; {self.acknowledged} of {self.plan.lines} lines were "
-                f"acknowledged, and {outcome}."
+                f"{self.taken}, and {outcome}."
             )
         elif isinstance(error, JobStopped):
             sentence = f"{sentence.rstrip('.')} before a line of it was sent."

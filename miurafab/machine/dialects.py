@@ -52,11 +52,6 @@ def virtual_machine(machine: MachineProfile) -> Device:
     return VirtualGrbl(virtual_settings(machine), baud=controller.baud, dialect=machine.dialect)
 
 
-def keeps_journal(machine: MachineProfile) -> bool:
-    """Whether the machine tells what it has taken."""
-    return machine.dialect != "hpgl"
-
-
 def delivery_of(errand: Errand) -> Delivery:
     """How the errand's plan is delivered to its machine."""
     return _DELIVERIES.get(errand.plan.machine.dialect, GrblDelivery)(errand)

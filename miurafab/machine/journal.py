@@ -4,8 +4,9 @@ The journal is a file of JSON objects, one a line; each run of a job appends its
 header: ``schema``, ``job``, ``sha256`` of the whole program's text, ``machine``, ``port``,
 ``lines``, and ``from_line``, where the run began (1 unless it resumed another). Then, when the
 controller has said so, ``{"blocks": n}``: it plans n moves ahead. Then, four times a second of
-the wire's clock at most, ``{"taken": n, "line": k, "seconds": t}``: n lines were acknowledged, the
-last of them line k of the file. At the end ``{"ended": how, "why": sentence}``, how being
+the wire's clock at most, ``{"taken": n, "line": k, "seconds": t}``: n lines were acknowledged (or
+handed over, to a cutter that answers nothing), the last of them line k of the file. At the end
+``{"ended": how, "why": sentence}``, how being
 ``done``, ``stopped`` or ``failed``.
 
 What it says was taken, was taken; a little more may have been when a run ends without a last

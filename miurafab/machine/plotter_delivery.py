@@ -1,9 +1,9 @@
 """A file on its way to a cutter that speaks HPGL and answers nothing.
 
 The cutter is greeted with nothing and asked nothing; it is given instructions as fast as its flow
-control lets the wire take them, and at the end the pen is up. No journal is kept: what was handed
-over is not what was cut. On every other way out the pen is sent up, behind what the cutter holds
-unless it knows ``ESC.K`` (:mod:`miurafab.plotter.stream`).
+control lets the wire take them, and at the end the pen is up. The journal tells what was handed
+over, which is not what was cut. On every other way out the pen is sent up, behind what the cutter
+holds unless it knows ``ESC.K`` (:mod:`miurafab.plotter.stream`).
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ _STOP_S = 3.0  # how long an XOFF may hold up the last bytes
 class PlotterDelivery(Delivery):
     """See the module."""
 
+    taken = "handed over"
+
     def __init__(self, errand: Errand) -> None:
         super().__init__(errand)
         self._transport = errand.transport
@@ -38,8 +40,8 @@ class PlotterDelivery(Delivery):
 
     @property
     def acknowledged(self) -> int:
-        """The lines handed over, since nothing is acknowledged."""
-        return self._stream.line
+        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        return self._stream.lines
 
     @property
     def line(self) -> int:

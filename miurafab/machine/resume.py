@@ -28,6 +28,7 @@ from miurafab.gcode.execution import Jog, OffsetsChanged, Probe, Store, execute
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.parser import ModalState, parse_block
 from miurafab.gcode.program import Program, parse_program, strokes
+from miurafab.gcode.reading import read_program
 from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST, NO_MOTION
 from miurafab.machine.journal import JournalRun, job_digest
 from miurafab.profiles import MachineProfile
@@ -108,16 +109,25 @@ def _require_resumable(job: Job, machine: MachineProfile, run: JournalRun) -> No
         )
     if run.ended == "done":
         raise InputError(f"{job.name} was cut to its end; nothing is left to resume.")
-    if machine.dialect == "marlin":
+    why = {
+        "marlin": "loses its place when it is halted",
+        "hpgl": "does not tell what it has cut",
+    }.get(machine.dialect)
+    if why is None and (machine.tool.kind != "laser" or machine.dialect == "grbl-0.9"):
+        why = "has no laser mode"
+    if why is not None:
         raise InputError(
-            f"{machine.name} loses its place when it is halted, so {job.name} cannot be taken up "
-            "in its middle; cut it from the beginning on fresh material."
+            f"{machine.name} {why}, so {job.name} cannot be taken up in its middle "
+            f"({_how_far(job, machine, run)}); cut it from the beginning on fresh material."
         )
-    if machine.tool.kind != "laser" or machine.dialect == "grbl-0.9":
-        raise InputError(
-            f"{machine.name} has no laser mode, so {job.name} cannot be taken up in its middle; "
-            "cut it from the beginning."
-        )
+
+
+def _how_far(job: Job, machine: MachineProfile, run: JournalRun) -> str:
+    """What the machine had been given when ``run`` ended, for the user."""
+    program = read_program(job, machine)
+    all_strokes = strokes(program)
+    given = int(np.count_nonzero(program.line[all_strokes.last_move] <= run.line))
+    return f"it was given {given} of its {len(all_strokes)} strokes, up to line {run.line}"
 
 
 def moves_back(machine: MachineProfile, run: JournalRun) -> int:

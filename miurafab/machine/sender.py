@@ -18,7 +18,7 @@ from typing import TypedDict, Unpack
 
 from miurafab.errors import JobStopped, MiurafabError
 from miurafab.machine.delivery import Errand
-from miurafab.machine.dialects import delivery_of, keeps_journal, open_machine
+from miurafab.machine.dialects import delivery_of, open_machine
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import Keys, NoKeys
 from miurafab.machine.planning import Plan
@@ -92,7 +92,7 @@ def deliver(
         if transcript_path is not None:
             transcript = Transcript(transcript_path, f"{job.name} to {transport.name}")
             at_end.callback(transcript.close)
-        if journal_path is not None and not plan.check_mode and keeps_journal(machine):
+        if journal_path is not None and not plan.check_mode:
             rest = plan.resumption
             journal = Journal(
                 journal_path,

@@ -28,10 +28,13 @@ DROP_ALL = b"\x1b.K"
 
 @dataclass(frozen=True, slots=True)
 class Instruction:
-    """One instruction: its 1-based ``line`` in the file, and ``data`` as it goes down the wire."""
+    """One instruction: its 1-based ``line`` in the file, ``data`` as it goes down the wire, and
+    whether it ``ends`` the line.
+    """
 
     line: int
     data: bytes
+    ends: bool
 
 
 def prepared(job: Job) -> Iterator[Instruction]:
@@ -40,20 +43,21 @@ def prepared(job: Job) -> Iterator[Instruction]:
     Raises :class:`~miurafab.errors.GcodeError` for what is none.
     """
     for number, line in enumerate(job.iter_lines(), 1):
-        for name, parameters in instructions(job.name, number, line):
-            yield Instruction(number, f"{name}{parameters};".encode("ascii"))
+        found = [f"{name}{rest};" for name, rest in instructions(job.name, number, line)]
+        for index, text in enumerate(found, 1):
+            yield Instruction(number, text.encode("ascii"), index == len(found))
 
 
 class PlotterStream:
-    """What of ``job`` may be handed to the wire; ``line`` is the last one handed over whole."""
+    """What of ``job`` may be handed to the wire; ``lines`` went whole, the last being ``line``."""
 
     def __init__(self, job: Job) -> None:
         self.line = 0
-        self.count = 0
+        self.lines = 0
         self.waits = False
         self._instructions = prepared(job)
         self._begun = b""  # what is left of the instruction on the wire
-        self._begun_line = 0
+        self._instruction: Instruction | None = None
         self._ended = False
 
     @property
@@ -68,15 +72,16 @@ class PlotterStream:
             if following is None:
                 self._ended, self._begun = True, PEN_UP
             else:
-                self._begun, self._begun_line = following.data, following.line
+                self._begun, self._instruction = following.data, following
         return b"" if self.waits else self._begun[:most]
 
     def took(self, count: int) -> None:
         """The wire took ``count`` of the bytes given last."""
         self._begun = self._begun[count:]
-        if count and not self._begun and not self._ended:
-            self.count += 1
-            self.line = self._begun_line
+        done = self._instruction
+        if count and not self._begun and not self._ended and done is not None and done.ends:
+            self.lines += 1
+            self.line = done.line
 
     def hear(self, data: bytes) -> None:
         """What the cutter said: wait, or go on."""

@@ -63,8 +63,8 @@ def share_sheets(
         )
     if options.frame:
         raise InputError(
-            "A frame is looked at before its sheet is cut, so trace it at one machine at a time: "
-            "give one --port, or use 'miurafab machine frame'."
+            "A frame is looked at before its sheet is cut, and machines that share sheets do not "
+            "wait: first trace it at each with 'miurafab machine frame' and the same --port."
         )
     twice = {port for port in ports if ports.count(port) > 1 and port != "virtual"}
     if twice:

@@ -223,7 +223,7 @@ def test_machines_share_the_sheets_and_one_failing_hurts_no_other(run, three_she
 def test_machines_go_on_with_what_each_had(run, three_sheets):
     arguments = ("cut", "job", "--port", "virtual", "--port", "virtual")
     assert "interrupted" in sentence(run(*arguments, "--resume", "--at", "0,0", "--quiet"), 2)
-    assert "one machine at a time" in sentence(run(*arguments, "--frame", "--quiet"), 2)
+    assert "first trace it at each" in sentence(run(*arguments, "--frame", "--quiet"), 2)
     whole = run(*arguments, "--sheet", "1", "--sheet", "2", "--json")
     assert whole.returncode == 0, whole.stderr
     journal = three_sheets / "sheet-01.journal"
@@ -276,5 +276,34 @@ def test_a_frame_is_traced(run, job):
     done = run("machine", "frame", "job", "--port", "virtual", "--pointer", "2", "--json")
     assert done.returncode == 0, done.stderr
     assert len(json.loads(done.stdout)["bounds_mm"]) == 4
+    assert json.loads(done.stdout)["ports"] == ["virtual"]
     refused = run("machine", "frame", "job", "--port", "virtual", "--pointer", "9", "--quiet")
     assert "could burn" in sentence(refused, 2)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
+def test_a_frame_is_traced_at_each_machine_in_turn(job):
+    from machine.benches import Bench
+
+    first, second = Bench(speed=10), Bench(speed=10)
+    ports = [word for bench in (first, second) for word in ("--port", bench.wire.address)]
+    command = [sys.executable, "-m", "miurafab", "machine", "frame", str(job), *ports, "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        first.run(lambda: b"G0X0.000Y0.000\n" in first.bytes_came, 40)
+        assert second.bytes_came == b""
+        while process.poll() is None:
+            for bench in (first, second):
+                once = iter((False, True))
+                bench.run(lambda o=once: next(o))
+        answer = json.loads(process.stdout.read())
+    assert process.returncode == 0
+    assert answer["ports"] == [first.wire.address, second.wire.address]
+    traced = [
+        [line for line in b.commands.split(b"\n") if line.startswith(b"G1")]
+        for b in (first, second)
+    ]
+    assert len(traced[0]) == 4
+    assert traced[0] == traced[1]
+    for bench in (first, second):
+        assert bench.device.beam_log == []
+        bench.wire.close()

@@ -11,7 +11,9 @@ import pytest
 from miurafab.errors import InputError, JobStopped, PortError
 from miurafab.gcode.job import Job
 from miurafab.machine.dialects import make_safe, virtual_machine
+from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
+from miurafab.machine.resume import resume
 from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
@@ -65,7 +67,10 @@ def test_every_stroke_is_cut_though_the_cutter_is_slower_than_the_wire(tmp_path:
     assert not device.pen_down
     assert device.pen == 0
     assert "wait until it has cut what it holds" in result.remarks[-1]
-    assert not journal.exists()
+    run = read_journal(journal)[-1]
+    assert (run.ended, run.why) == ("done", f"{result.lines} lines handed over")
+    assert run.taken == run.lines == result.lines == ROWS + 3
+    assert run.line == ROWS + 3
 
 
 @pytest.mark.parametrize("knows", [True, False])
@@ -83,6 +88,34 @@ def test_ctrl_c_lifts_the_tool_behind_what_the_cutter_holds(knows: bool) -> None
     assert not device.pen_down
     assert drawn(device) == WHOLE[: len(device.beam_log)]
     assert 0 < len(device.beam_log) < len(WHOLE)
+
+
+@pytest.mark.parametrize("how", ["ended", "killed"])
+def test_the_journal_tells_how_far_a_broken_job_got(how: str, tmp_path: Path) -> None:
+    device, journal = new_device(), tmp_path / "rows.journal"
+    device.knows_abort = False
+
+    def stop(now: Progress) -> None:
+        if now.seconds_elapsed > 2.0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(JobStopped, match=r"; \d+ of 123 lines were handed over, and") as caught:
+        send(strokes(), device, journal_path=journal, on_progress=stop)
+    if how == "killed":  # without a last word
+        text = journal.read_text()
+        journal.write_text(text[: text.index('{"ended"')])
+    device.advance(300.0)
+    (run,) = read_journal(journal)
+    assert run.ended == (None if how == "killed" else "stopped")
+    assert how == "killed" or run.why == str(caught.value)
+    given = 2 * (run.line - 2)  # two strokes a line, after two lines of head
+    assert 0 < given < len(WHOLE)
+    # What was begun is cut to its end; of a line that was not given whole, at most one stroke more.
+    late = 2 * 12 if how == "killed" else 0  # what went in the quarter of a second since
+    assert given <= len(device.beam_log) <= given + 1 + late
+    said = rf"does not tell what it has cut.*given {run.line - 2} of its {ROWS} strokes, up to line"
+    with pytest.raises(InputError, match=said):
+        resume(strokes(), MACHINE, [run])
 
 
 def test_a_cutter_that_cannot_be_told_is_told_of() -> None:
