@@ -10,7 +10,7 @@ import typer
 
 from miurafab.cli.console import Console, JsonOption, QuietOption, json_text
 from miurafab.errors import InputError
-from miurafab.grbl.virtual_faults import KINDS, parse_faults
+from miurafab.wire.faults import KINDS, parse_faults
 
 
 def virtual(
@@ -44,7 +44,7 @@ def virtual(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Run a virtual GRBL controller for any sender, until Ctrl-C.
+    """Run a virtual controller for any sender, until Ctrl-C.
 
     The first line printed is what a sender opens: a path, or a socket:// address. Faults such as
     --fault drop@1200 (a byte is lost), --fault reset@3s or --fault disconnect=2s@1200 show what

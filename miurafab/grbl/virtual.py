@@ -8,7 +8,7 @@ writes lose bytes, and a job takes the time that it takes.
 
 Whatever is done to it, however it is cut into calls, the same bytes at the same times give the
 same output. It is GRBL 1.1h unless it is given another dialect
-(:mod:`miurafab.grbl.virtual_dialect`). ``faults`` (:mod:`miurafab.grbl.virtual_faults`) befall it
+(:mod:`miurafab.grbl.virtual_dialect`). ``faults`` (:mod:`miurafab.wire.faults`) befall it
 and its cable on their own.
 """
 
@@ -19,15 +19,15 @@ from collections.abc import Iterable, Mapping
 
 from miurafab.errors import ProfileError
 from miurafab.grbl.settings import parse_dump
-from miurafab.grbl.virtual_cable import Cable
 from miurafab.grbl.virtual_dialect import DIALECTS
-from miurafab.grbl.virtual_faults import Fault
 from miurafab.grbl.virtual_protocol import firmware
 from miurafab.grbl.virtual_settings import Settings
 from miurafab.grbl.virtual_state import Machine, Until, Wait
 from miurafab.motion import cpu
 from miurafab.motion.beam import BeamSegment
 from miurafab.motion.stepper import Processor
+from miurafab.wire.cable import Cable
+from miurafab.wire.faults import Fault
 
 
 class VirtualGrbl:
@@ -40,6 +40,8 @@ class VirtualGrbl:
     :data:`~miurafab.grbl.virtual_dialect.DIALECTS`. ``faults`` strike once each. At power-up the
     banner is in the output.
     """
+
+    resets_on_open = True
 
     def __init__(
         self,
@@ -60,7 +62,7 @@ class VirtualGrbl:
         self._frozen = False
         self._thaws_at: int | None = None
         faults = tuple(faults)
-        self._cable = Cable(faults, self._suffer) if faults else None
+        self._cable = Cable(faults, self._suffer, cpu.CLOCK) if faults else None
         self._power_on()
 
     def _power_on(self) -> None:

@@ -190,8 +190,15 @@ class Device(Protocol):
     def lost_bytes(self) -> int:
         """Bytes that it had no room for."""
 
+    @property
+    def resets_on_open(self) -> bool:
+        """Whether the opening of its port resets it, as it does most controller boards."""
+
     def power_cycle(self) -> None:
         """Switch off and on."""
+
+    def freeze(self, seconds: float) -> None:
+        """Its program hangs for ``seconds`` (``math.inf``: for good); prepared motion runs out."""
 
     def next_event_in(self) -> float | None:
         """Seconds until something changes by itself; None if nothing will."""

@@ -29,15 +29,16 @@ from miurafab.errors import InputError, PortError, ProfileError
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.grbl.virtual_dialect import DIALECTS
-from miurafab.grbl.virtual_faults import Fault
 from miurafab.machine.actions import read_dump
 from miurafab.machine.dialects import virtual_machine
+from miurafab.machine.faulty import FaultyDevice
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import BAUD, Device
-from miurafab.plotter.virtual import VirtualPlotter
 from miurafab.profiles import load_machine
+from miurafab.wire.faults import Fault
 
 STOCK = "stock"
+_GRBL_FAULTS = ("alarm", "stall")
 _BOOT_S = 0.1  # from the opening to the banner: senders flush what came while they set up the port
 _TICK_S = 0.01  # the longest sleep: how late a client's coming or a signal is seen
 _CHUNK = 4096
@@ -186,8 +187,8 @@ def load_controller(source: str, faults: Iterable[Fault] = ()) -> Device:
     """The machine meant by ``stock``, a machine profile's name or file, or a ``$$`` dump's file.
 
     A profile's answers as its dialect does, the others are GRBL 1.1h. Raises
-    :class:`~miurafab.errors.ProfileError` if ``source`` is none of them, or for ``faults`` of a
-    machine that speaks no GRBL.
+    :class:`~miurafab.errors.ProfileError` if ``source`` is none of them, or for a fault that only
+    a machine that speaks GRBL can have.
     """
     path = Path(source)
     if source == STOCK:
@@ -196,12 +197,14 @@ def load_controller(source: str, faults: Iterable[Fault] = ()) -> Device:
         return VirtualGrbl(read_dump(path).values, baud=BAUD, faults=faults)
     machine = load_machine(source)
     if machine.dialect not in DIALECTS:
-        if list(faults):
-            raise ProfileError(
-                f"{machine.name} speaks {machine.dialect}, and faults are made for machines that "
-                f"speak {', '.join(DIALECTS)}; leave --fault out."
-            )
-        return virtual_machine(machine)
+        device, faults = virtual_machine(machine), tuple(faults)
+        for fault in faults:
+            if fault.kind in _GRBL_FAULTS:
+                raise ProfileError(
+                    f"{machine.name} speaks {machine.dialect}, and only machines that speak "
+                    f"{', '.join(DIALECTS)} have the fault '{fault.kind}'; leave it out."
+                )
+        return FaultyDevice(device, faults) if faults else device
     return VirtualGrbl(
         virtual_settings(machine),
         baud=machine.controller.baud,
@@ -241,8 +244,7 @@ def serve_virtual(
     if not 0 < speed < math.inf:
         raise InputError(f"A speed of {speed:g} does not run; give a positive number.")
     device = load_controller(settings, faults)
-    # A cutter is not reset by the line that resets a controller board.
-    reset_on_open = reset_on_open and not isinstance(device, VirtualPlotter)
+    reset_on_open = reset_on_open and device.resets_on_open
     with contextlib.ExitStack() as at_end:
         log = _BeamLog(device, beam_log)
         at_end.callback(log.close)

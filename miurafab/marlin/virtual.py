@@ -54,6 +54,8 @@ class VirtualMarlin:
     At power-up ``start`` is in the output.
     """
 
+    resets_on_open = True
+
     def __init__(
         self,
         parameters: MotionParameters,
@@ -91,11 +93,17 @@ class VirtualMarlin:
         self._command: Command | None = None
         self._condition: Callable[[], bool] = _now
         self._busy_at = self._wake_at = math.inf
+        self._thaws_at = -math.inf
+        self._stop_at_thaw: bool | None = None  # whether it is for good
         self._busy_period = _BUSY_S
         self._count = 0
         self._inline = False
         self._power = 0.0
         self._say("start")
+
+    def freeze(self, seconds: float = math.inf) -> None:
+        """The main program hangs: nothing is answered, planned motion runs out."""
+        self._thaws_at = self.now + seconds
 
     # Time
 
@@ -117,9 +125,16 @@ class VirtualMarlin:
             self._coming[0][0] if self._coming else math.inf,
             next((at for at, _ in self._going if at > self.now), math.inf),
             self._carriage.due,
-            self._busy_at,
-            self._wake_at,
+            self._main_due(),
         )
+
+    def _main_due(self) -> float:
+        """When the main program does something by itself; while it hangs, when that is over."""
+        return self._thaws_at if self._frozen else min(self._busy_at, self._wake_at)
+
+    @property
+    def _frozen(self) -> bool:
+        return self.now < self._thaws_at
 
     def _run(self, target: float, *, stop_at_line: bool) -> None:
         while True:
@@ -128,7 +143,7 @@ class VirtualMarlin:
                 target = min(target, max(line, self.now))
             arrival = self._coming[0][0] if self._coming else math.inf
             motion = self._carriage.due
-            event = min(arrival, motion, self._busy_at, self._wake_at)
+            event = min(arrival, motion, self._main_due())
             if event > target:
                 break
             self.now = max(self.now, event)
@@ -136,6 +151,11 @@ class VirtualMarlin:
                 self._arrive(self._coming.popleft()[1])
             if motion <= self.now:
                 self._carriage.go_on(self.now)
+            if self._frozen:
+                continue
+            if self._stop_at_thaw is not None:
+                self._emergency(self._stop_at_thaw)
+                self._stop_at_thaw = None
             if self._busy_at <= self.now:
                 self._say("echo:busy: processing")
                 self._busy_at = self.now + self._busy_period
@@ -161,7 +181,7 @@ class VirtualMarlin:
         return bytes(out)
 
     def _say(self, text: str) -> None:
-        for byte in text.encode("ascii") + b"\n":
+        for byte in text.encode("ascii", "replace") + b"\n":
             self._out_free = max(self._out_free, self.now) + self._byte
             self._going.append((self._out_free, byte))
 
@@ -181,7 +201,9 @@ class VirtualMarlin:
             return
         line, self._early = bytes(self._early), bytearray()
         match = re.match(rb"\s*(?:N\d+\s*)?(M112|M410)(?!\d)", line)
-        if match is not None:
+        if match is not None and self._frozen:  # only the main program acts on it
+            self._stop_at_thaw = self._stop_at_thaw or match[1] == b"M112"
+        elif match is not None:
             self._emergency(match[1] == b"M112")
 
     def _emergency(self, kill: bool) -> None:

@@ -33,6 +33,8 @@ class DrawnSegment(BeamSegment):
 class VirtualPlotter:
     """The device side of the wire; ``rx_bytes`` is its buffer, ``baud`` None takes no time."""
 
+    resets_on_open = False
+
     def __init__(self, *, baud: int | None = None, rx_bytes: int = 1024) -> None:
         self.now = 0.0
         self.beam_log: list[BeamSegment] = []
@@ -56,10 +58,14 @@ class VirtualPlotter:
         self._buffer = bytearray()
         self._out = bytearray()
         self._force, self._speed = 1.0, _SPEED
-        self._busy_until = 0.0
+        self._busy_until = self._thaws_at = 0.0
         self._starved = True
         self._name = b""
         self._x: float | None = None
+
+    def freeze(self, seconds: float = math.inf) -> None:
+        """Its program hangs: what it draws just now is drawn to its end."""
+        self._thaws_at = self.now + seconds
 
     @property
     def waiting(self) -> int:
@@ -84,7 +90,7 @@ class VirtualPlotter:
         able = self._way or not self._starved
         return (
             self._coming[0][0] if self._coming else math.inf,
-            max(self._busy_until, self.now) if able else math.inf,
+            max(self._busy_until, self._thaws_at, self.now) if able else math.inf,
         )
 
     def _run(self, target: float, *, stop: bool) -> None:

@@ -11,7 +11,7 @@ from virtual_player import BANNER
 
 from miurafab.errors import InputError
 from miurafab.grbl.virtual import VirtualGrbl
-from miurafab.grbl.virtual_faults import KINDS, Fault, parse_fault, parse_faults
+from miurafab.wire.faults import KINDS, Fault, parse_fault, parse_faults
 
 LASER = {30: 1000, 31: 0, 32: 1}
 

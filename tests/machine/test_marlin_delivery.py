@@ -15,8 +15,8 @@ import pytest
 from miurafab.__main__ import main
 from miurafab.errors import ControllerError, InputError, JobStopped, PortError, ProfileError
 from miurafab.gcode.job import Job
-from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.dialects import make_safe
+from miurafab.machine.faulty import FaultyDevice
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
@@ -27,6 +27,7 @@ from miurafab.marlin.virtual import VirtualMarlin
 from miurafab.motion.parameters import MotionParameters
 from miurafab.plotter.virtual import VirtualPlotter
 from miurafab.profiles import load_machine
+from miurafab.wire.faults import parse_faults
 from miurafab.workflow.dry_run import dry_run
 
 MACHINE = load_machine("marlin-laser-220")
@@ -299,11 +300,13 @@ def test_whoever_finds_the_machine_at_work_halts_it() -> None:
     assert_dark(device)
 
 
-def test_it_is_served_as_a_practice_machine_without_faults() -> None:
+def test_it_is_served_as_a_practice_machine() -> None:
     assert isinstance(load_controller(MACHINE.name), VirtualMarlin)
     assert isinstance(load_controller("hpgl-cutter-a3"), VirtualPlotter)
-    with pytest.raises(ProfileError, match="speaks marlin, and faults are made for machines"):
-        load_controller(MACHINE.name, parse_faults(["reset@1s"]))
+    assert isinstance(load_controller(MACHINE.name, parse_faults(["reset@1s"])), FaultyDevice)
+    for fault in ("alarm@1s", "stall@1s"):
+        with pytest.raises(ProfileError, match=r"speaks marlin, and only .* have the fault '"):
+            load_controller(MACHINE.name, parse_faults([fault]))
 
 
 def serve(device: VirtualMarlin, wire: PtyWire, stop: threading.Event, speed: float) -> None:

@@ -22,12 +22,12 @@ from miurafab.gcode.job import Job, prepare
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.streamer import LineRefused
 from miurafab.grbl.virtual import VirtualGrbl
-from miurafab.grbl.virtual_faults import parse_faults
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile, load_machine
+from miurafab.wire.faults import parse_faults
 
 MACHINE = load_machine("grbl-laser-400")
 

@@ -1,6 +1,6 @@
 """A fake wire between the sender and the virtual controller: it chops and delays.
 
-What fails on order is the virtual controller's (:mod:`miurafab.grbl.virtual_faults`). Time is the
+What fails on order is the virtual controller's (:mod:`miurafab.wire.faults`). Time is the
 controller's: no test sleeps. What the host wrote is kept with the time, and so can
 be held against what the controller's beam log says.
 """

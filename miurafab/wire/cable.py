@@ -1,9 +1,9 @@
-"""The cable between a sender and the virtual controller, on which bytes can come to harm.
+"""The cable between a sender and a machine in memory, on which bytes can come to harm.
 
 Each way is a :class:`Way`: bytes go in at one end and come out at the other, at once unless they
 are lost, changed, held up or joined by noise. :class:`Cable` has both, keeps the count and the
-clock by which faults are dated, and says when the next one is due. What befalls the controller
-itself it hands back, since only the controller can do that.
+clock by which faults are dated, and says when the next one is due. What befalls the machine
+itself it hands back, since only the machine can do that.
 """
 
 from __future__ import annotations
@@ -13,14 +13,13 @@ import random
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from miurafab.grbl.virtual_faults import Fault
-from miurafab.motion import cpu
+from miurafab.wire.faults import Fault
 
 _NEWLINE = 10
 
 
 class Way:
-    """One direction; times are in processor cycles."""
+    """One direction; times are in ticks."""
 
     def __init__(self, seed: int) -> None:
         self.drop = 0.0
@@ -74,14 +73,18 @@ class Way:
 class Cable:
     """Both ways, and the ``faults`` that are still to come.
 
-    ``on_fault`` is called with each fault that befalls the controller and the time.
+    ``second`` is how many ticks one has. ``on_fault`` is called with each fault that befalls the
+    machine and the time.
     """
 
-    def __init__(self, faults: Iterable[Fault], on_fault: Callable[[Fault, int], None]) -> None:
+    def __init__(
+        self, faults: Iterable[Fault], on_fault: Callable[[Fault, int], None], second: int
+    ) -> None:
         faults = tuple(faults)
         self.inward, self.outward = Way(1), Way(2)
         self.connected = True
         self._on_fault = on_fault
+        self._second = second
         self._at_byte = deque(
             sorted((f for f in faults if f.at_byte is not None), key=lambda f: f.at_byte or 0)
         )
@@ -109,7 +112,7 @@ class Cable:
                 self._strike(self._at_byte.popleft(), now)
 
     def reply(self, dated: Iterable[tuple[int, int]]) -> None:
-        """The controller has sent bytes, each at its time."""
+        """The machine has sent bytes, each at its time."""
         if self.connected:
             for at, byte in dated:
                 self.outward.carry(at, bytes((byte,)))
@@ -125,7 +128,7 @@ class Cable:
         return min((at for at in due if at is not None), default=None)
 
     def happen(self, now: int) -> bytes:
-        """Let the faults that are due strike and end; the bytes that reach the controller."""
+        """Let the faults that are due strike and end; the bytes that reach the machine."""
         if self._back_at is not None and self._back_at <= now:
             self._back_at = None
             self.connected = True
@@ -141,7 +144,7 @@ class Cable:
     def _next_timed(self) -> int | None:
         if self._first is None or not self._at_time:
             return None
-        return self._first + round((self._at_time[0].at_s or 0.0) * cpu.CLOCK)
+        return self._first + round((self._at_time[0].at_s or 0.0) * self._second)
 
     def _strike(self, fault: Fault, now: int) -> None:
         kind, value = fault.kind, fault.value
@@ -154,14 +157,14 @@ class Cable:
             case "noise":
                 way.noise(now, value)
             case "delay":
-                way.held_until = now + round(value * cpu.CLOCK)
+                way.held_until = now + round(value * self._second)
             case "slow":
-                self.inward.late = self.outward.late = round(value * cpu.CLOCK)
+                self.inward.late = self.outward.late = round(value * self._second)
             case "disconnect":
                 self.connected = False
                 self.inward.clear()
                 self.outward.clear()
                 if value < math.inf:
-                    self._back_at = now + round(value * cpu.CLOCK)
+                    self._back_at = now + round(value * self._second)
             case _:
                 self._on_fault(fault, now)
