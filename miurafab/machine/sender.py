@@ -1,7 +1,7 @@
 """A job sent to a machine, from the opening of the port to the last move, safe on every way out.
 
-The way through: the job is checked by itself; the port is opened and the controller greeted, asked
-and checked; the journal and the transcript are proved to be writable; the lines are delivered
+The way through: the port is opened; the journal and the transcript are proved to be writable; the
+machine is greeted, asked and checked, and the lines are delivered
 (:mod:`~miurafab.machine.delivery`).
 
 Every other way out - a refused line, an alarm, a reset, silence, a full disk, Ctrl-C, SIGTERM, an
@@ -38,7 +38,7 @@ class Files(TypedDict, total=False):
 
 
 class StreamOptions(Files, total=False):
-    """... and who is told: ``on_progress`` about five times a second; ``keys`` may hold, resume,
+    """... and who is told: ``on_progress``, about five times a second. ``keys`` may hold, resume,
     abort and override while the job runs.
     """
 
