@@ -31,7 +31,7 @@ def closest_on_triangle(points: Floats, triangles: Floats) -> Floats:
     det = d11 * d22 - d12 * d12
     with np.errstate(invalid="ignore", divide="ignore"):
         s, t = (d22 * p1 - d12 * p2) / det, (d11 * p2 - d12 * p1) / det
-    inside = (det > 0) & (s >= 0) & (t >= 0) & (s + t <= 1)
+        inside = (det > 0) & (s >= 0) & (t >= 0) & (s + t <= 1)
     best = a + np.where(inside, s, 0.0)[:, None] * ab + np.where(inside, t, 0.0)[:, None] * ac
     least = np.where(inside, _dot(best - points, best - points), np.inf)
     for start, end in ((a, b), (b, c), (c, a)):

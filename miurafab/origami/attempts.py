@@ -51,6 +51,10 @@ SCALINGS = 4
 """How often a sheet is polished again because its scale has changed."""
 BOUND_MARGIN = 2e-3
 """Limits are tightened by this part while polishing, since the scale of the sheet still changes."""
+KEPT_EDGE = 0.4
+"""Where no shortest edge is asked for, polishing leaves each edge this part of what was the shortest
+before.
+"""
 LEVELS: Mapping[Follow, float] = {"middle": 0.0, "top": -0.5, "bottom": 0.5}
 """How far the sheet is lifted off the middle for the target to be followed, in parts of its height.
 """
@@ -182,9 +186,11 @@ class Plan:
         hence the repetition.
         """
         constraints = unknowns.constraints(request.exactly_flat_foldable)
-        found = plain
+        found, first, least = plain, solution, request.min_edge_mm
         for _ in range(SCALINGS):
-            limits = request.bounds(unknowns, found.pattern.scale, BOUND_MARGIN)
+            limits = replace(request, min_edge_mm=least).bounds(
+                unknowns, found.pattern.scale, BOUND_MARGIN
+            )
             bounds = unknowns.on_unknowns(limits) if limits.any else None
             iterations = found.attempt.iterations
             if bounds is not None:
@@ -212,7 +218,10 @@ class Plan:
                 polished=True,
                 active_bounds=limits.count(solution.active) if bounds is not None else {},
             )
-            if bounds is None or not found.faults:
+            shortest = KEPT_EDGE * plain.measurements.min_edge_mm
+            if least is None and found.measurements.min_edge_mm < shortest:
+                found, solution, least = plain, first, shortest
+            elif bounds is None or not found.faults:
                 break
         return found
 

@@ -89,6 +89,17 @@ def test_polishing_brings_the_sheet_closer_and_keeps_it_exact() -> None:
     )
 
 
+def test_polishing_leaves_no_edge_far_shorter_than_the_shortest_before() -> None:
+    sector, _ = make_surface("vase", {"angle": "100deg"})
+    plain, polished = (
+        fit(request("vase", 8, 6, surface=sector, polish=polish)).measurements
+        for polish in ("off", "on")
+    )
+    assert plain is not None
+    assert polished is not None
+    assert polished.min_edge_mm >= 0.4 * plain.min_edge_mm
+
+
 class TestLimits:
     def test_an_edge_limit_is_met_and_reported_as_active(self) -> None:
         free = fit(request("hypar", 10, 10))
