@@ -52,7 +52,7 @@ SCALINGS = 4
 BOUND_MARGIN = 2e-3
 """Limits are tightened by this part while polishing, since the scale of the sheet still changes."""
 KEPT_EDGE = 0.4
-"""Without a shortest edge asked for, polishing leaves each edge this part of the shortest before."""
+"""Without a shortest edge asked for, polishing leaves every edge this part of what was shortest."""
 LEVELS: Mapping[Follow, float] = {"middle": 0.0, "top": -0.5, "bottom": 0.5}
 """How far the sheet is lifted off the middle for the target to be followed, in parts of its height.
 """
