@@ -17,6 +17,7 @@ from miurafab.fabrication.nesting import (
     SheetKind,
     Slot,
     Stock,
+    cells,
     layout_faults,
     nest,
     place,
@@ -232,10 +233,33 @@ def test_the_work_grows_with_the_outlines_and_not_with_their_pairs(monkeypatch):
 
 def test_copies_of_an_outline_share_their_masks(monkeypatch):
     made = []
-    mark = raster._scan
-    monkeypatch.setattr(raster, "_scan", lambda *given: made.append(1) or mark(*given))
+    mark = cells._scan
+    monkeypatch.setattr(cells, "_scan", lambda *given: made.append(1) or mark(*given))
     raster_engine(problem([rectangle(30.0, 20.0)] * 50, SheetKind(200.0, 100.0, (0, 90))), list)
-    assert len(made) == 2
+    # At two rotations: the cells of the coarse raster, those of the fine one, and its rims.
+    assert len(made) == 6
+
+
+def test_the_rule_of_most_company_lays_a_part_where_it_touches_most():
+    """A notch that a square fits is taken, though another free corner is nearer to the origin."""
+    notch = np.array([(0, 0), (100, 0), (100, 60), (60, 60), (60, 40), (40, 40), (40, 60), (0, 60)])
+    asked = problem(
+        [notch.astype(float), rectangle(18.0, 19.0)], SheetKind(130.0, 100.0, (0,)), gap=0.5
+    )
+    search = raster._Search(asked, clock=lambda: 0.0)
+    company = search.first_fit([0, 1], None, [0], True)
+    middle = np.array([company[1].x_mm, company[1].y_mm]) + 9.5
+    inside = middle - [company[0].x_mm, company[0].y_mm]
+    np.testing.assert_allclose(inside, [50.0, 50.0], atol=1.0)
+    (beside,) = search.first_fit([0, 1], (1.0, 0.01), [0], True)[1:]
+    assert beside.y_mm > 50.0
+
+
+@pytest.mark.large
+def test_two_hundred_small_patches_take_no_more_sheets_than_their_area_needs():
+    outlines = zigzag_pieces(200, 5.02)
+    found = nest(problem(outlines, SheetKind(600.0, 400.0, ANY), seconds=120.0))
+    assert sheets_of(found.slots) == found.bound == 6
 
 
 def test_the_time_limit_ends_the_search_with_a_sound_layout():

@@ -6,11 +6,14 @@ cells that a part would share with what lies on a sheet, for all positions at on
 correlation of two masks and one product of Fourier transforms; positions where it is 0 are free.
 Defects take their cells from the beginning.
 
-Parts come by size, on the first sheet with a free position, at the one that a rule prefers.
-Several orders and rules are tried, and the layout that takes the least stock wins; the first that
-no layout could beat ends the search. A sheet without room for the area of a part is not searched,
-and the first part on an empty sheet goes to its corner; so parts that fill a sheet each cost next
-to nothing. Masks and transforms are made when they are asked for.
+Parts come by size, on the first sheet with a free position, at the one that a rule prefers: the
+one nearest to a side or a corner, or the one with most company, that is, with the largest share of
+the rim around the part taken already or off the sheet. That share is another correlation; it packs
+closer, the more so on finer cells, and takes longer. Several orders and rules are tried, and the
+layout that takes the least stock wins; the first that no layout could beat ends the search. A sheet
+without room for the area of a part is not searched, and by the first rules the first part on an
+empty sheet goes to its corner; so parts that fill a sheet each cost next to nothing. Masks and
+transforms are made when they are asked for, and kept for one part at a time.
 
 Nothing is random. The clock is read for the time limit alone: if that never strikes, the same
 input gives the same layout. When it strikes in the first pass, what is left goes on the last
@@ -21,121 +24,39 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import scipy.fft
-import shapely
 from numpy.typing import NDArray
-from shapely.geometry.base import BaseGeometry
 
 from miurafab.errors import LayoutError
+from miurafab.fabrication.nesting.cells import Part, Raster
 from miurafab.fabrication.nesting.problem import (
     Problem,
     Report,
-    SheetKind,
     Slot,
     Stock,
-    buffered,
     cost,
-    turned,
 )
 
 _CELLS = 384
 """Cells along the longer side of a sheet, about; finer packs closer and takes longer."""
 
+_FINE = 600
+"""The same for the rule of most company."""
+
+_RIM = 12
+"""How many cells wide the rim around a part is (tried: 1 to 16)."""
+
 _LAST = 2
 """How many sheets are looked at for a part once the time is over."""
 
 Clock = Callable[[], float]
-
-
-@dataclass(frozen=True, eq=False)
-class _Mask:
-    """An outline at one rotation: its cells and their transform."""
-
-    cells: NDArray[np.bool_]
-    transform: NDArray[np.complex64]
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """An outline: its area grown by half the gap, and at each rotation its corners, moved so that
-    their box begins at the origin, and by how much.
-    """
-
-    outline: NDArray[np.float64]
-    area: float
-    turns: dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
-
-    def turned(self, rotation: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        if rotation not in self.turns:
-            points = turned(self.outline, rotation)
-            low = points.min(axis=0)
-            self.turns[rotation] = (points - low, -low)
-        return self.turns[rotation]
-
-
-class _Raster:
-    """The cells of one size of sheet, grown by half the gap on all sides, and all masks on it."""
-
-    def __init__(self, kind: SheetKind, gap: float, parts: Sequence[_Part]) -> None:
-        self.gap, self.parts = gap, parts
-        size = np.array([kind.width + gap, kind.height + gap])
-        self.cells = [
-            int(scipy.fft.next_fast_len(max(math.ceil(_CELLS * side / size.max()), 16), real=True))
-            for side in size
-        ]
-        self.cell = size / self.cells
-        self._masks: dict[tuple[int, int], _Mask] = {}
-
-    def reach(self, number: int, rotation: int) -> NDArray[np.int64]:
-        """(2,) how many cells the part takes along both axes."""
-        high = self.parts[number].turned(rotation)[0].max(axis=0)
-        count: NDArray[np.int64] = np.ceil((high + self.gap) / self.cell - 1e-7).astype(np.int64)
-        return count.clip(1, np.array(self.cells))
-
-    def mask(self, number: int, rotation: int) -> _Mask:
-        """The cells that the part may touch."""
-        if (number, rotation) not in self._masks:
-            points, half = self.parts[number].turned(rotation)[0], self.gap / 2
-            # A cell that the grown outline touches has its centre within half a diagonal of it.
-            reach = half + np.hypot(*self.cell) / 2
-            shape = buffered(shapely.Polygon(points), reach)
-            cells = self._marked(shape, self.reach(number, rotation))
-            transform = np.conj(scipy.fft.rfft2(cells.astype(np.float32), self.cells))
-            self._masks[number, rotation] = _Mask(cells, transform)
-        return self._masks[number, rotation]
-
-    def flawed(self, kind: SheetKind) -> NDArray[np.bool_]:
-        """The cells that touch a defect."""
-        reach = np.hypot(*self.cell) / 2
-        lost = buffered(kind.flaws, reach)
-        return self._marked(lost, np.array(self.cells))
-
-    def _marked(self, shape: BaseGeometry, count: NDArray[np.int64]) -> NDArray[np.bool_]:
-        rings = shapely.get_rings(shapely.get_parts(shape))
-        half = self.gap / 2
-        return _scan([(shapely.get_coordinates(ring) + half) / self.cell for ring in rings], count)
-
-
-def _scan(rings: list[NDArray[np.float64]], count: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which cells' centres lie inside ``rings`` given in units of cells, by even-odd crossings."""
-    flips = np.zeros((count[0] + 1, count[1]), dtype=np.int64)
-    for ring in rings:
-        a, b = ring[:-1], ring[1:]
-        low, high = np.minimum(a[:, 1], b[:, 1]), np.maximum(a[:, 1], b[:, 1])
-        first = np.ceil(low - 0.5).clip(0, count[1]).astype(np.int64)
-        last = np.ceil(high - 0.5).clip(0, count[1]).astype(np.int64)
-        side = np.repeat(np.arange(len(a)), last - first)
-        row = np.arange(len(side)) - np.repeat(np.cumsum(last - first) - last, last - first)
-        part = (row + 0.5 - a[side, 1]) / (b[side, 1] - a[side, 1])
-        x = a[side, 0] + part * (b[side, 0] - a[side, 0])
-        np.add.at(flips, (np.ceil(x - 0.5).clip(0, count[0]).astype(np.int64), row), 1)
-    inside: NDArray[np.bool_] = np.cumsum(flips, axis=0)[:-1] % 2 == 1
-    return inside
+Rule = tuple[float, float] | None
+"""The weights of x and y by which the far corner of a part is least; None for most company."""
 
 
 class _Sheet:
@@ -143,7 +64,7 @@ class _Sheet:
     until then ``free``, an area that no less is free, tells whether that is worth while.
     """
 
-    def __init__(self, kind: int, stock: Stock, raster: _Raster) -> None:
+    def __init__(self, kind: int, stock: Stock, raster: Raster) -> None:
         self.kind, self.raster = kind, raster
         self.allowed, gap = stock.kinds[kind], stock.gap
         whole = (self.allowed.width + gap) * (self.allowed.height + gap)
@@ -154,19 +75,18 @@ class _Sheet:
         self._taken: NDArray[np.float32] | None = None
         self._transform: NDArray[np.complex64] | None = None
 
-    def take(self, number: int, part: int, weights: tuple[float, float]) -> bool:
-        """Lay outline ``number``, which is as ``part``, at the free position whose far corner is
-        least by ``weights``, if there is a position.
+    def take(self, number: int, part: int, rule: Rule) -> bool:
+        """Lay outline ``number``, which is as ``part``, at the free position that ``rule`` prefers,
+        if there is a position.
         """
         shape = self.raster.parts[part]
         if self.free < shape.area * (1 - 1e-6) or part in self._refused:
             return False
         rotations = [r for r in self.allowed.rotations if self.allowed.fits(shape.outline, r)]
-        empty = not self.placed and not self.allowed.defects
-        found = [
-            (self._corner if empty else self._best)(part, rotation, weights)
-            for rotation in rotations
-        ]
+        if rule is None or self.placed or self.allowed.defects:
+            found = [self._best(part, rotation, rule) for rotation in rotations]
+        else:
+            found = [self._corner(part, rotation, rule) for rotation in rotations]
         open_places = [(*at, r) for at, r in zip(found, rotations, strict=True) if at is not None]
         if not open_places:
             self._refused.add(part)
@@ -181,35 +101,41 @@ class _Sheet:
 
     def _corner(
         self, part: int, rotation: int, weights: tuple[float, float]
-    ) -> tuple[float, int, int]:
+    ) -> tuple[float, int, int] | None:
         return float(self.raster.reach(part, rotation) * self.raster.cell @ weights), 0, 0
 
-    def _best(
-        self, part: int, rotation: int, weights: tuple[float, float]
-    ) -> tuple[float, int, int] | None:
-        cell, cells = self.raster.cell, self.raster.cells
-        mask = self.raster.mask(part, rotation)
-        shared = scipy.fft.irfft2(self._marked() * mask.transform, cells)
+    def _best(self, part: int, rotation: int, rule: Rule) -> tuple[float, int, int] | None:
+        raster = self.raster
+        mask = raster.mask(part, rotation)
+        marked = self._marked()
         wide, high = mask.cells.shape
-        columns, rows = cells[0] - wide + 1, cells[1] - high + 1
-        free = np.flatnonzero(shared[:columns, :rows] < 0.5)
+        columns, rows = raster.cells[0] - wide + 1, raster.cells[1] - high + 1
+        near = raster.rim
+        shared = scipy.fft.irfft2(marked * mask.transform, raster.whole)
+        free = np.flatnonzero(shared[near : near + columns, near : near + rows] < 0.5)
         if not len(free):
             return None
         i, j = np.divmod(free, rows)
-        far = (i + wide) * (weights[0] * cell[0]) + (j + high) * (weights[1] * cell[1])
-        at = int(np.argmin(far))
-        return float(far[at]), int(i[at]), int(j[at])
+        if rule is None:
+            assert mask.rim is not None
+            around = scipy.fft.irfft2(marked * mask.rim, raster.whole)[:columns, :rows]
+            # Rounded, so that the noise of the transforms decides nothing.
+            order = -np.round(around.ravel()[free], 3)
+        else:
+            far = (i + wide) * raster.cell[0], (j + high) * raster.cell[1]
+            order = far[0] * rule[0] + far[1] * rule[1]
+        at = int(np.argmin(order))
+        return float(order[at]), int(i[at]), int(j[at])
 
     def _marked(self) -> NDArray[np.complex64]:
         """The transform of the cells that are taken."""
         if self._taken is None:
-            self._taken = np.zeros(self.raster.cells, dtype=np.float32)
-            if self.allowed.defects:
-                self._taken += self.raster.flawed(self.allowed)
+            self._taken = self.raster.blank(self.allowed)
         if self._transform is None or self._waiting:
             for part, rotation, i, j in self._waiting:
-                cells = self.raster.mask(part, rotation).cells
-                self._taken[i : i + cells.shape[0], j : j + cells.shape[1]] += cells
+                cells = self.raster.marked(part, rotation)
+                x, y = i + self.raster.rim, j + self.raster.rim
+                self._taken[x : x + cells.shape[0], y : y + cells.shape[1]] += cells
             self._waiting.clear()
             self._transform = scipy.fft.rfft2(self._taken)
         return self._transform
@@ -220,7 +146,7 @@ class _Rack:
     kind one that is blank, as long as there are any.
     """
 
-    def __init__(self, stock: Stock, rasters: list[_Raster], kinds: list[int]) -> None:
+    def __init__(self, stock: Stock, rasters: list[Raster], kinds: list[int]) -> None:
         self.stock, self.rasters, self.kinds = stock, rasters, kinds
         self.begun: list[_Sheet] = []
         self._open: list[_Sheet] = []
@@ -228,16 +154,14 @@ class _Rack:
         for kind in kinds:
             self._supply(kind)
 
-    def take(
-        self, number: int, part: int, weights: tuple[float, float], rest: float, late: bool
-    ) -> bool:
+    def take(self, number: int, part: int, rule: Rule, rest: float, late: bool) -> bool:
         """Lay outline ``number`` on the first sheet with room for it, if there is one. No outline
         after it is smaller than ``rest`` mm²; if it is ``late`` only the last sheets are tried.
         """
         near = self._open[-_LAST:] if late else self._open
         blank = [self._blank[kind] for kind in self.kinds if kind in self._blank]
         for sheet in (*near, *blank):
-            if sheet.take(number, part, weights):
+            if sheet.take(number, part, rule):
                 break
         else:
             return False
@@ -270,20 +194,30 @@ class _Search:
         first: dict[bytes, int] = {}
         self.alike = [first.setdefault(o.tobytes(), len(first)) for o in problem.outlines]
         parts = {
-            part: _Part(outline, float(area))
+            part: Part(outline, float(area))
             for part, outline, area in zip(self.alike, problem.outlines, self.areas, strict=True)
         }
-        kinds, gap = self.stock.kinds, self.stock.gap
-        by_size = {
-            size: _Raster(kind, gap, list(parts.values()))
-            for size, kind in (((kind.width, kind.height), kind) for kind in kinds)
-        }
-        self.rasters = [by_size[kind.width, kind.height] for kind in kinds]
+        self.parts = list(parts.values())
+        self._rasters: dict[bool, list[Raster]] = {}
+
+    def rasters(self, fine: bool) -> list[Raster]:
+        """The raster of each kind of sheet, kinds of one size having the same."""
+        if fine not in self._rasters:
+            kinds = self.stock.kinds
+            by_size: dict[tuple[float, float], Raster] = {}
+            for kind in kinds:
+                size = (kind.width, kind.height)
+                if size not in by_size:
+                    how = (_FINE, _RIM) if fine else (_CELLS, 0)
+                    by_size[size] = Raster(kind, self.stock.gap, self.parts, *how)
+            self._rasters[fine] = [by_size[kind.width, kind.height] for kind in kinds]
+        return self._rasters[fine]
 
     def orders(self) -> list[list[int]]:
-        """The outlines by area, and by their longer side, the largest first."""
+        """The outlines by area, by their longer side, and by both, the largest first."""
         sides = np.array([np.ptp(outline, axis=0).max() for outline in self.problem.outlines])
-        return [np.argsort(-key, kind="stable").tolist() for key in (self.areas, sides)]
+        keys = (self.areas, sides, self.areas * sides)
+        return [np.argsort(-key, kind="stable").tolist() for key in keys]
 
     def endless(self) -> list[list[int]]:
         """Orders in which to begin sheets of which there are as many as it takes."""
@@ -293,12 +227,13 @@ class _Search:
         return [given] if small_first == given else [given, small_first]
 
     def first_fit(
-        self, order: list[int], weights: tuple[float, float], endless: list[int], first: bool
+        self, order: list[int], rule: Rule, endless: list[int], first: bool
     ) -> list[Slot] | None:
         """The slots of one pass; None if the time was over, unless this is the ``first``."""
         given = [k for k in self.stock.in_turn if self.stock.kinds[k].quantity is not None]
         racks = [
-            _Rack(self.stock, self.rasters, kinds) for kinds in (*([k] for k in given), endless)
+            _Rack(self.stock, self.rasters(rule is None), kinds)
+            for kinds in (*([k] for k in given), endless)
         ]
         least = np.append(np.minimum.accumulate(self.areas[order][::-1])[::-1], np.inf)
         for position, number in enumerate(order):
@@ -306,7 +241,7 @@ class _Search:
             if late and not first:
                 return None
             part, rest = self.alike[number], float(least[position + 1])
-            if not any(rack.take(number, part, weights, rest, late) for rack in racks):
+            if not any(rack.take(number, part, rule, rest, late) for rack in racks):
                 raise LayoutError(self._no_room(number))
         found = [Slot(0, 0, 0.0, 0.0, 0)] * len(order)
         for index, sheet in enumerate(sheet for rack in racks for sheet in rack.begun):
@@ -320,7 +255,7 @@ class _Search:
         kinds = self.stock.kinds
         if any(
             _Sheet(k, self.stock, raster).take(number, self.alike[number], (1.0, 1.0))
-            for k, raster in enumerate(self.rasters)
+            for k, raster in enumerate(self.rasters(False))
         ):
             count = sum(kind.quantity or 0 for kind in kinds)
             return (
@@ -331,6 +266,15 @@ class _Search:
             f"Patch {name} fits no sheet of the stock beside the defects; add a sheet, or make the "
             "patches smaller with --max-patch."
         )
+
+    def passes(self) -> Iterator[tuple[Rule, list[int], list[int]]]:
+        """Rule, order and endless sheets of each pass: the quickest, the closest, the others."""
+        *usual, both = self.orders()
+        quick = list(product([(0.01, 1.0), (1.0, 0.01), (1.0, 1.0)], usual, self.endless()))
+        yield quick[0]
+        for order, endless in product((*usual, both), self.endless()):
+            yield None, order, endless
+        yield from quick[1:]
 
     def unbeatable(self, slots: Sequence[Slot]) -> bool:
         """Whether no layout could take less stock. If sheets of several kinds come in any number,
@@ -357,9 +301,8 @@ def raster_engine(problem: Problem, report: Report, clock: Clock = time.monotoni
     """
     search = _Search(problem, clock)
     best = (math.inf, math.inf, math.inf)
-    passes = product([(0.01, 1.0), (1.0, 0.01), (1.0, 1.0)], search.orders(), search.endless())
-    for number, (weights, order, endless) in enumerate(passes):
-        slots = search.first_fit(order, weights, endless, number == 0)
+    for number, (rule, order, endless) in enumerate(search.passes()):
+        slots = search.first_fit(order, rule, endless, number == 0)
         if slots is None:
             return False
         last = max(slot.sheet for slot in slots)
