@@ -11,7 +11,8 @@ travel legs are added:
    cycles of even length split into two matchings, of which the shorter is taken; what remains of
    odd cycles is assigned again; and pairs of legs are exchanged as long as that shortens them.
 2. Components that are still apart are joined by exchanging two legs ab, cd for ac, bd, the
-   exchange that costs least first.
+   exchange that costs least first. If nothing is tied to the starting point by then, it is let in
+   where that costs least, at a leg or at the nearest node.
 3. The tour passes each node by the cheapest of its pairings
    (:mod:`~miurafab.fabrication.trails`).
 
@@ -71,7 +72,14 @@ def find_route(
     placed = np.concatenate([positions, [start], [[np.nan, np.nan]]])
     odd = np.flatnonzero(np.bincount(np.concatenate([tails, heads])) % 2)
     legs, bound = match(odd, placed)
-    legs = _joined(tails, heads, legs, placed)
+    legs = _with_bare_components(tails, heads, legs, placed)
+    begins = (np.sort(legs, axis=1) == [nodes, nodes + 1]).all(axis=1)
+    if begins.any():
+        # Nothing is tied to the starting point yet, so it goes in last and where that costs least.
+        legs = _joined(a, b, legs[~begins], placed)
+        legs = _begun(np.unique([a, b]), legs, nodes, placed)
+    else:
+        legs = _joined(tails, heads, legs, placed)
     drawn = placed[np.stack([np.append(tails, legs[:, 0]), np.append(heads, legs[:, 1])], axis=1)]
     if ends is not None:
         drawn[:count] = ends
@@ -198,11 +206,7 @@ def _joined(
     positions: NDArray[np.float64],
 ) -> NDArray[np.int64]:
     """The legs changed so that creases and legs are one component."""
-    used, label = _components(a, b, legs, len(positions))
-    for bare in np.setdiff1d(label[used], label[legs[:, 0]]).tolist():
-        members = np.flatnonzero(label == bare)
-        legs = _with_bare(members, legs[label[legs[:, 0]] != bare], positions)
-    used, label = _components(a, b, legs, len(positions))
+    _, label = _components(a, b, legs, len(positions))
     if label.max() == 0:
         return legs
     legs = legs.copy()
@@ -221,6 +225,25 @@ def _joined(
     return legs
 
 
+def _begun(
+    used: NDArray[np.int64],
+    legs: NDArray[np.int64],
+    start: int,
+    positions: NDArray[np.float64],
+) -> NDArray[np.int64]:
+    """The legs of a closed tour through the nodes ``used`` with node ``start``, and after it the
+    node that is anywhere, let in: in place of the leg that saves most, or at the nearest node.
+    """
+    away = _apart(positions[used], positions[start])
+    node = int(used[np.argmin(away)])
+    cost = _apart(positions[legs], positions[start]) - _lengths(legs, positions)[:, None]
+    if not len(legs) or away.min() <= cost.min():
+        return np.concatenate([legs, [[start, node], [node, start + 1]]])
+    k, end = divmod(int(np.argmin(cost)), 2)
+    entry, last = legs[k, end], legs[k, 1 - end]
+    return np.concatenate([np.delete(legs, k, axis=0), [[start, entry], [last, start + 1]]])
+
+
 def _components(
     a: NDArray[np.int64], b: NDArray[np.int64], legs: NDArray[np.int64], nodes: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -232,6 +255,20 @@ def _components(
     label = np.full(nodes, -1, dtype=np.int64)
     label[used] = np.unique(raw[used], return_inverse=True)[1]
     return used, label
+
+
+def _with_bare_components(
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    legs: NDArray[np.int64],
+    positions: NDArray[np.float64],
+) -> NDArray[np.int64]:
+    """The legs with all components that have none joined to one that has."""
+    used, label = _components(a, b, legs, len(positions))
+    for bare in np.setdiff1d(label[used], label[legs[:, 0]]).tolist():
+        members = np.flatnonzero(label == bare)
+        legs = _with_bare(members, legs[label[legs[:, 0]] != bare], positions)
+    return legs
 
 
 def _with_bare(
