@@ -25,7 +25,7 @@ class NestingOptions:
     ``quantity`` is how many of the whole model are made. ``stock`` is a file that tells the sheets
     (:mod:`~miurafab.fabrication.stock`), None for as many as it takes, as large as the bed;
     ``margin_mm`` stands in for the machine's. ``grain`` is which way fibres run in sheets that do
-    not tell, None for the material's, and ``along_grain`` the axis of the pattern that is laid
+    not tell, None for the material's, and ``along_grain`` the axis (x if None) of the pattern laid
     along them. ``rotations`` are the degrees by which a patch may be turned on its sheet.
 
     ``engine`` is one of :data:`~miurafab.fabrication.nesting.run.ENGINES`; it has ``seconds`` of
@@ -36,7 +36,7 @@ class NestingOptions:
     stock: Path | None = None
     margin_mm: float | None = None
     grain: str | None = None
-    along_grain: str = "x"
+    along_grain: str | None = None
     rotations: tuple[int, ...] = (0, 90, 180, 270)
     engine: str = RASTER
     seconds: float = 30.0
@@ -136,7 +136,7 @@ def _nesting(table: Table, folder: Path) -> NestingOptions:
         stock=folder / table.text("stock") if table.has("stock") else None,
         margin_mm=margin,
         grain=table.choice("grain", GRAINS) if table.has("grain") else None,
-        along_grain=table.choice("along_grain", ("x", "y"), usual.along_grain),
+        along_grain=table.choice("along_grain", ("x", "y")) if table.has("along_grain") else None,
         rotations=_rotations(table, usual.rotations),
         engine=table.choice("engine", ENGINES, usual.engine),
         seconds=table.number("nesting_time", usual.seconds, low=1, high=86_400),

@@ -91,7 +91,7 @@ def split(
     tabs = tab_regions(pattern, seams, material, full_facet=options.full_facet)
     tab_values = support(tabs.points, tabs.present, directions)
     reach = _with_tabs(body, tabs, tab_values)
-    _check_alone(pattern, ~space.holds(reach), tabs, space)
+    _check_alone(pattern, ~space.holds(reach), tabs, space, options)
 
     depth = _tab_room(pattern, tabs)
     small = space.smaller(depth) if both else space
@@ -316,6 +316,7 @@ def _check_alone(
     doubtful: NDArray[np.bool_],
     tabs: TabRegions,
     space: Space,
+    options: LayoutOptions,
 ) -> None:
     """Raise a LayoutError for the first ``doubtful`` (F,) facet that does not fit at any angle."""
     for face in np.flatnonzero(doubtful).tolist():
@@ -329,12 +330,16 @@ def _check_alone(
         shape = points if with_tabs else facet
         long, short = box_of(shape) if space.turns is None else np.ptp(shape, axis=0).tolist()
         along, choice = "", ""
+        room = f"the usable bed of {space.width:.1f} mm x {space.height:.1f} mm"
+        remedy = "take a larger bed"
+        if options.max_patch_mm is not None:
+            room = "a patch of {:g} mm x {:g} mm".format(*options.max_patch_mm)
+            remedy = "allow larger patches"
         if space.turns is not None:
             along, choice = " along the pattern's axes", ", write grain = 'none'"
         raise LayoutError(
             f"Facet {face} measures {long:.1f} mm x {short:.1f} mm{along}{with_tabs} and does not "
-            f"fit the usable bed of {space.width:.1f} mm x {space.height:.1f} mm; make the pattern "
-            f"smaller, use more facets{choice}, or take a larger bed."
+            f"fit {room}; make the pattern smaller, use more facets{choice}, or {remedy}."
         )
 
 

@@ -173,6 +173,8 @@ def lay_out(
     check_engine(wanted.engine)
     pattern = opened(pattern, options)
     material = _with_own_tabs(material, options)
+    if machine.tool.kind != "laser":
+        material = replace(material, kerf_mm=0.0)  # only a beam takes material away
     stock = lay_stock(options, machine.bed, material.grain)
     framed = frame_patches(pattern, stock, material, options)
     pieces = framed.pieces

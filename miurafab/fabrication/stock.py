@@ -130,6 +130,11 @@ def lay_stock(options: LayoutOptions, bed: Bed, grain: str) -> LaidStock:
     else:
         sheets += read_stock(wanted.stock)
     fibres = [sheet.grain or wanted.grain or grain for sheet in sheets]
+    if wanted.along_grain is not None and all(way == "none" for way in fibres):
+        raise LayoutError(
+            f"The pattern's {wanted.along_grain} axis is to lie along the grain, but neither the "
+            "sheets nor the material have any; say which way the fibres run by --grain x or y."
+        )
     kinds = []
     for sheet, way in zip(sheets, fibres, strict=True):
         if sheet.width_mm > bed.width_mm or sheet.height_mm > bed.height_mm:
@@ -147,7 +152,7 @@ def lay_stock(options: LayoutOptions, bed: Bed, grain: str) -> LaidStock:
         defects = tuple(
             tuple((x - margin, y - margin) for x, y in ring) for ring in sheet.defects_mm
         )
-        turns = _turns(wanted.rotations, way, wanted.along_grain)
+        turns = _turns(wanted.rotations, way, wanted.along_grain or "x")
         kinds.append(SheetKind(width, height, turns, sheet.quantity, defects))
 
     def rank(k: int) -> tuple[bool, float]:

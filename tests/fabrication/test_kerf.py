@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
-from flat_patterns import card, zigzag
+from flat_patterns import bed, card, zigzag
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miurafab.fabrication.kerf import allowance, cut_lines
 from miurafab.fabrication.pieces import make_pieces
+from miurafab.fabrication.sheets import lay_out
 
 
 def test_a_rectangle_grows_by_half_a_kerf_on_each_side():
@@ -51,3 +54,16 @@ def test_waste_enclosed_by_a_narrow_mouth_is_cut_out_too():
     outer, waste = cut_lines([outline], 0.4)[0]
     assert shapely.Polygon(outer).contains(shapely.Polygon(waste))
     assert shapely.Polygon(waste).area == pytest.approx(9.6 * 9.6)
+
+
+@pytest.mark.parametrize("kind", ["pen", "knife"])
+def test_pens_and_knives_take_nothing_away(kind):
+    laser = bed(300.0, 300.0)
+    other = replace(laser, tool=replace(laser.tool, kind=kind))
+    pattern = zigzag(4, 4)
+    made, plain, burnt = (
+        lay_out(pattern, machine, card(kerf=kerf)).toolpaths[0]
+        for machine, kerf in ((other, 0.3), (laser, 0.0), (laser, 0.3))
+    )
+    np.testing.assert_array_equal(made.points, plain.points)
+    assert not np.array_equal(made.points, burnt.points)

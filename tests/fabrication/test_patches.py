@@ -73,6 +73,12 @@ def test_pieces_that_keep_the_directions_of_the_pattern_fit_as_they_are(name, tu
         assert (np.ptp(piece.cut_lines[0], axis=0) <= sizes).all(axis=1).any()
 
 
+def test_a_facet_larger_than_a_patch_may_be_is_named():
+    options = LayoutOptions(max_patch_mm=(12.0, 8.0))
+    with pytest.raises(LayoutError, match=r"Facet 0 .* fit a patch of 12 mm x 8 mm; .* larger"):
+        make_pieces(miura(8, 10), 190.0, 140.0, card(), options)
+
+
 def test_squares_that_keep_their_directions_are_split_into_as_few_patches_as_possible():
     i, j = np.indices((25, 41))
     squares = flat_patterns.grid(np.stack([j * 10.0, i * 10.0], axis=-1))

@@ -109,6 +109,11 @@ def test_sheets_lose_their_margins_and_turn_with_their_grain(tmp_path):
     assert [kind.rotations for kind in laid.kinds.kinds] == [(0, 180), (0, 90, 180, 270)]
 
 
+def test_an_axis_to_lie_along_no_fibres_is_refused():
+    with pytest.raises(LayoutError, match="The pattern's y axis is to lie along the grain, but"):
+        lay_stock(options(along_grain="y"), bed(260.0, 200.0).bed, "none")
+
+
 @pytest.mark.parametrize(
     ("chosen", "complaint"),
     [
@@ -211,6 +216,7 @@ def test_the_layout_file_tells_stock_copies_and_what_nested_it(tmp_path):
     st.floats(0.0, 12.0),
 )
 def test_any_bed_grain_and_quantity_gets_a_valid_layout_or_a_refusal(w, h, grain, axis, n, margin):
+    axis = None if grain == "none" else axis
     wanted = options(grain=grain, along_grain=axis, quantity=n, margin_mm=margin)
     layout = lay_out(miura(9, 7), bed(w, h), card(), options=wanted)
     for sheet in layout.sheets:
