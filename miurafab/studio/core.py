@@ -33,10 +33,9 @@ from miurafab.studio.bench import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
 from miurafab.studio.messages import Request, Response, answer, made_file, own_file, refusal
 from miurafab.studio.orders import read_fit, read_layout, read_source
-from miurafab.surfaces.analytic import Revolution
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
 from miurafab.surfaces.mesh import MESH_SUFFIXES
-from miurafab.workflow.design import DEFAULT_FACETS, DEFAULT_SIZE_MM
+from miurafab.workflow.design import DEFAULT_FACETS, DEFAULT_SIZE_MM, can_close
 
 PAGE = "studio.html"
 PARTS = ("icon.svg", "studio.css", "tools.js", "choices.js", "results.js", "studio.js")
@@ -134,7 +133,7 @@ def _catalogue() -> dict[str, Any]:
 
 
 def _surface(entry: NamedSurface) -> dict[str, Any]:
-    surface, _ = make_surface(entry.name, {})
+    surface, values = make_surface(entry.name, {})
     parameters = []
     for key, parameter in entry.parameters.items():
         low, high, default = parameter.low, parameter.high, parameter.default
@@ -154,5 +153,5 @@ def _surface(entry: NamedSurface) -> dict[str, Any]:
         "name": entry.name,
         "summary": entry.summary,
         "parameters": parameters,
-        "turned": isinstance(surface, Revolution),
+        "turned": can_close(surface, values),
     }

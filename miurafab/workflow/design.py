@@ -90,6 +90,13 @@ def design(target: str, **options: str | None) -> Design:
 CLOSINGS = ("sector", "open", "seam")
 
 
+def can_close(surface: TargetSurface, parameters: Mapping[str, Any]) -> bool:
+    """Whether a named surface goes around an axis, so that its sheet can be closed."""
+    arc = isinstance(surface, GeneralizedCylinder)
+    arc = arc and "angle" in parameters and "profile" not in parameters
+    return arc or isinstance(surface, Revolution)
+
+
 def _named(
     name: str, parameters: Mapping[str, Any], given: Mapping[str, str | None]
 ) -> tuple[TargetSurface, dict[str, Any]]:
@@ -102,8 +109,7 @@ def _named(
         raise InputError(f"--close is '{close}'; it must be one of {', '.join(CLOSINGS)}.")
     if close == "sector":
         return surface, values
-    arc = isinstance(surface, GeneralizedCylinder) and "angle" in values and "profile" not in values
-    if not arc and not isinstance(surface, Revolution):
+    if not can_close(surface, values):
         raise InputError(
             f"--close {close} needs a surface of revolution or a circular cylinder, and this "
             f"'{name}' is none."

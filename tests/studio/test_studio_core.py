@@ -93,6 +93,7 @@ def test_the_catalogue_is_what_the_commands_list(tmp_path):
     angle = next(p for p in named["vase"]["parameters"] if p["key"] == "angle")
     assert (angle["default"], angle["unit"], angle["high"]) == ("120", "deg", 360.0)
     assert named["vase"]["turned"]
+    assert named["cylinder"]["turned"]
     assert not named["hypar"]["turned"]
     assert "grbl-laser-400" in {machine["name"] for machine in found["machines"]}
     assert found["defaults"]["material"] in {material["name"] for material in found["materials"]}
