@@ -30,9 +30,9 @@ from miurafab.cli import (
     tradeoff,
     virtual,
 )
-from miurafab.cli.console import json_text
 from miurafab.errors import MiurafabError
 from miurafab.version import __version__
+from miurafab.workflow.json_text import json_text
 
 app = typer.Typer(
     name="miurafab",

@@ -6,8 +6,6 @@ other. Progress and remarks go to standard error, so that standard output is the
 
 from __future__ import annotations
 
-import json
-import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,25 +17,12 @@ import rich.progress
 import rich.table
 import typer
 
+from miurafab.workflow.json_text import json_text
+
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="Print no progress and no remarks.")]
-
-
-def json_text(answer: Mapping[str, Any]) -> str:
-    """One JSON object; numbers that JSON cannot hold become null."""
-    return json.dumps(_finite(answer), indent=2, allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value
 
 
 class Console:

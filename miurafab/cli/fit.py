@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption, json_text
+from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.workflow.json_text import json_text
 
 TargetArgument = Annotated[
     str,

@@ -11,7 +11,8 @@ from typing import Annotated, Protocol
 
 import typer
 
-from miurafab.cli.console import Console, JsonOption, QuietOption, json_text
+from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.workflow.json_text import json_text
 
 
 class ServeStudio(Protocol):

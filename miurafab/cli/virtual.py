@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
-from miurafab.cli.console import Console, JsonOption, QuietOption, json_text
+from miurafab.cli.console import Console, JsonOption, QuietOption
 from miurafab.errors import InputError
 from miurafab.wire.faults import KINDS, parse_faults
+from miurafab.workflow.json_text import json_text
 
 
 def virtual(

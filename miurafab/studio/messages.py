@@ -9,12 +9,13 @@ cannot ask this server for anything.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
+
+from miurafab.workflow.json_text import json_text
 
 _ALWAYS = {
     "Cache-Control": "no-store",
@@ -80,7 +81,8 @@ class Response:
 
 def answer(value: Any, status: int = 200) -> Response:
     """``value`` as JSON."""
-    return Response(status, "application/json; charset=utf-8", json_text(value).encode("ascii"))
+    text = json_text(value, one_line=True)
+    return Response(status, "application/json; charset=utf-8", text.encode("ascii"))
 
 
 def refusal(status: int, sentence: str) -> Response:
@@ -99,18 +101,3 @@ def made_file(path: Path, *, download: bool) -> Response:
     if download:
         headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(path.name)}"
     return Response(200, TYPES[path.suffix], path, headers)
-
-
-def json_text(value: Any) -> str:
-    """``value`` as one line of JSON; numbers that JSON cannot hold become null."""
-    return json.dumps(_finite(value), separators=(",", ":"), allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return value

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import IO, Any, Protocol
 
 from miurafab.errors import MiurafabError
-from miurafab.studio.messages import json_text
 from miurafab.studio.work import Order, carry_out, failure, order_from
+from miurafab.workflow.json_text import json_text
 
 News = dict[str, Any]
 
@@ -64,7 +64,7 @@ class Process:
         self._answers.start()
         assert self._process.stdin is not None
         with contextlib.suppress(BrokenPipeError):  # one that has died says so by its end
-            self._process.stdin.write(json_text(order.as_dict()) + "\n")
+            self._process.stdin.write(json_text(order.as_dict(), one_line=True) + "\n")
             self._process.stdin.flush()
 
     def news(self) -> list[News]:
@@ -118,7 +118,7 @@ def main() -> None:
     os.dup2(2, 1)
 
     def tell(news: News) -> None:
-        answers.write(json_text(news) + "\n")
+        answers.write(json_text(news, one_line=True) + "\n")
         answers.flush()
 
     order = order_from(json.loads(sys.stdin.readline()))
