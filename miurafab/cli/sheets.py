@@ -10,8 +10,6 @@ import typer
 import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
 
-GUIDE = "assembly.pdf"
-
 MachineOption = Annotated[
     str | None, typer.Option("--machine", help="A machine profile: a shipped name or a TOML file.")
 ]
@@ -210,6 +208,7 @@ def sheets(
 
 def _show(console: Console, answer: dict[str, Any]) -> None:
     from miurafab.workflow.dry_run import clock_text, length_text
+    from miurafab.workflow.job_directory import GUIDE
 
     totals, sheets = answer["totals"], answer["sheets"]
     facts = {key: answer[key] for key in ("job", "machine", "material")}
