@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from miurafab.origami.energy import energy_curve
-from miurafab.origami.energy_solver import Driven
-from miurafab.origami.fit import FitRequest, fit
+from miurafab.origami.energy.equilibrium import Driven
+from miurafab.origami.energy.path import energy_curve
+from miurafab.origami.fitting.fit import FitRequest, fit
 from miurafab.surfaces.catalogue import make_surface
 
 SIZES = (5, 10, 20, 30, 45, 60)

@@ -19,13 +19,13 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from scipy import sparse
 
-from miurafab.origami.constraints import OrigamiConstraints
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.energy import EnergyCurve, energy_curve, pulled_path
-from miurafab.origami.energy import Path as FoldingPath
-from miurafab.origami.energy_model import Paper, sheet_model
-from miurafab.origami.fit import FitRequest, FitResult, fit
-from miurafab.origami.solver import project
+from miurafab.origami.energy.bar_hinge import Paper, sheet_model
+from miurafab.origami.energy.path import EnergyCurve, energy_curve, pulled_path
+from miurafab.origami.energy.path import Path as FoldingPath
+from miurafab.origami.fitting.constraints import OrigamiConstraints
+from miurafab.origami.fitting.fit import FitRequest, FitResult, fit
+from miurafab.origami.fitting.solver import project
 from miurafab.origami.tessellation import Tessellation
 from miurafab.origami.unfold import unfold
 from miurafab.profiles import load_material

@@ -30,13 +30,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, sparse
 
-from miurafab.origami.constraints import OrigamiConstraints
-from miurafab.origami.fit import FitRequest, fit
-from miurafab.origami.fit_request import FitResult
-from miurafab.origami.last_resorts import STEP_CAP
-from miurafab.origami.seed import Corrugation, seed
-from miurafab.origami.solver import project
-from miurafab.origami.unknowns import Unknowns
+from miurafab.origami.fitting.constraints import OrigamiConstraints
+from miurafab.origami.fitting.continuation import STEP_CAP
+from miurafab.origami.fitting.fit import FitRequest, fit
+from miurafab.origami.fitting.reduction import Unknowns
+from miurafab.origami.fitting.request import FitResult
+from miurafab.origami.fitting.seed import Corrugation, seed
+from miurafab.origami.fitting.solver import project
 from miurafab.surfaces.analytic import revolution
 from miurafab.surfaces.catalogue import make_surface
 

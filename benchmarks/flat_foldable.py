@@ -13,8 +13,8 @@ import argparse
 import math
 import sys
 
-from miurafab.origami.fit import FitRequest, fit
-from miurafab.origami.kinematics import rigid_motion, states_between
+from miurafab.origami.fitting.fit import FitRequest, fit
+from miurafab.origami.folding.kinematics import rigid_motion, states_between
 from miurafab.surfaces.catalogue import make_surface
 
 TARGETS = ("hypar", "saddle", "sphere", "catenoid", "paraboloid", "cylinder", "log-spiral")

@@ -13,7 +13,7 @@ import sys
 import time
 from pathlib import Path
 
-from miurafab.origami.fit import fit
+from miurafab.origami.fitting.fit import fit
 from miurafab.workflow.design import design, save_pattern
 
 RESIDUAL = 1e-12

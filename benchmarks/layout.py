@@ -37,8 +37,8 @@ import numpy as np
 from miurafab.fabrication import sheets
 from miurafab.fabrication.drawing.dxf import sheet_dxf
 from miurafab.fabrication.drawing.svg import sheet_svg
-from miurafab.fabrication.ordering import Strokes, corner_of, order_strokes
-from miurafab.fabrication.routing import find_route
+from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
+from miurafab.fabrication.route.postman import find_route
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.fabrication.travel import only, path_bound
 from miurafab.geometry.quads import QuadGrid
@@ -181,7 +181,7 @@ def order_of_dashes() -> dict[str, Any]:
     dashes = Perforation(cut_mm=1.1, gap_mm=0.4, end_bridge_mm=0.3, min_end_mm=0.9)
     machine = load_machine("fluidnc-laser-600")
     machine = replace(machine, bed=replace(machine.bed, width_mm=700.0, height_mm=700.0))
-    taken: list[Strokes] = []
+    taken: list[StrokeSet] = []
     ordered = sheets.order_strokes
     sheets.order_strokes = lambda strokes, *rest, **more: (
         taken.append(strokes) or ordered(strokes, *rest, **more)
@@ -193,7 +193,7 @@ def order_of_dashes() -> dict[str, Any]:
     perforate = OPERATIONS.index("perforate")
     (whole,) = taken
     chosen = whole.toolpath.operation == perforate
-    strokes = Strokes(only(whole.toolpath, perforate), whole.group[chosen], whole.rank[chosen])
+    strokes = StrokeSet(only(whole.toolpath, perforate), whole.group[chosen], whole.rank[chosen])
     found: dict[str, Any] = {
         "creases": len(creases),
         "crease_travel_mm": route.legs_mm,

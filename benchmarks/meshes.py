@@ -22,7 +22,7 @@ import trimesh
 from scipy.spatial import Delaunay, cKDTree
 
 from miurafab.errors import TargetError
-from miurafab.origami.fit import FitRequest, fit
+from miurafab.origami.fitting.fit import FitRequest, fit
 from miurafab.surfaces.mesh import mesh_surface
 from miurafab.workflow.design import parse_facets
 

@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 from layout import PATTERNS
 
-from miurafab.fabrication import patches
-from miurafab.fabrication.boxes import best_turn
+from miurafab.fabrication.partition import split as patches
+from miurafab.fabrication.partition.fit_box import best_turn
 from miurafab.fabrication.seams import inner_seams
 from miurafab.fabrication.tabs import tab_regions
 from miurafab.origami.crease_pattern import CreasePattern

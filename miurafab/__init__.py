@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any
 from miurafab.version import __version__
 
 if TYPE_CHECKING:
-    from miurafab.origami.audit import audit as check
-    from miurafab.origami.fit import fit
-    from miurafab.origami.thickness import thick_panels
+    from miurafab.origami.fitting.fit import fit
+    from miurafab.origami.folding.thick_panels import thick_panels
+    from miurafab.origami.verify import audit as check
     from miurafab.posting import post
     from miurafab.profiles import load_machine, load_material
     from miurafab.workflow.calibrate import add_material, calibrate
@@ -60,7 +60,7 @@ _HOMES = {
     "DEFAULT_MATERIAL": ("miurafab.workflow.cut", "DEFAULT_MATERIAL"),
     "add_material": ("miurafab.workflow.calibrate", "add_material"),
     "calibrate": ("miurafab.workflow.calibrate", "calibrate"),
-    "check": ("miurafab.origami.audit", "audit"),
+    "check": ("miurafab.origami.verify", "audit"),
     "check_energy_file": ("miurafab.workflow.energy", "check_writable"),
     "check_motion_file": ("miurafab.workflow.fold", "check_motion_file"),
     "check_tradeoff_file": ("miurafab.workflow.tradeoff", "check_writable"),
@@ -70,7 +70,7 @@ _HOMES = {
     "design_profiles": ("miurafab.workflow.job_directory", "design_profiles"),
     "energy": ("miurafab.workflow.energy", "energy"),
     "examine": ("miurafab.workflow.doctor", "examine"),
-    "fit": ("miurafab.origami.fit", "fit"),
+    "fit": ("miurafab.origami.fitting.fit", "fit"),
     "fold": ("miurafab.workflow.fold", "fold"),
     "load_machine": ("miurafab.profiles", "load_machine"),
     "layout_options": ("miurafab.workflow.job_directory", "layout_options"),
@@ -83,7 +83,7 @@ _HOMES = {
     "read_pattern": ("miurafab.workflow.convert", "read_pattern"),
     "save_pattern": ("miurafab.workflow.design", "save_pattern"),
     "sheets": ("miurafab.workflow.job_directory", "sheets"),
-    "thick_panels": ("miurafab.origami.thickness", "thick_panels"),
+    "thick_panels": ("miurafab.origami.folding.thick_panels", "thick_panels"),
     "thickness_report": ("miurafab.workflow.fold", "thickness_report"),
     "tradeoff": ("miurafab.workflow.tradeoff", "tradeoff"),
     "write_angles": ("miurafab.workflow.fold", "write_angles"),

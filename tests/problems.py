@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fit import FitRequest, FitResult, fit
+from miurafab.origami.fitting.fit import FitRequest, FitResult, fit
 from miurafab.origami.miura import MiuraCell, regular_miura
 from miurafab.origami.unfold import unfold
 from miurafab.surfaces.catalogue import make_surface

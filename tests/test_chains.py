@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from test_posting import CARD, LASER, PERFORATE, joined, toolpath, toolpaths
 
-import miurafab.posting.job as posting
+import miurafab.posting.post as posting
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program, strokes
@@ -23,7 +23,7 @@ from miurafab.machine.sender import stream_plan
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.posting import post
-from miurafab.posting.chains import LONGEST_CHAIN, LONGEST_GAP
+from miurafab.posting.relative_moves import LONGEST_CHAIN, LONGEST_GAP
 from miurafab.profiles import OPERATIONS, MachineProfile, Material, load_machine
 from miurafab.workflow.dry_run import dry_run
 

@@ -169,7 +169,7 @@ def _share(
     options: CutOptions,
 ) -> None:
     """Cut on several machines at once, and say which sheet went where."""
-    from miurafab.workflow.several import share_sheets
+    from miurafab.workflow.multi_machine import share_sheets
 
     with console.progress("cutting") as bar:
         outcome = share_sheets(prepared, ports, sheet, options, on_progress=bar)

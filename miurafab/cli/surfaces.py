@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from miurafab.cli.console import Console, JsonOption, QuietOption
 
 if TYPE_CHECKING:
-    from miurafab.surfaces.catalogue import Parameter
+    from miurafab.surfaces.catalogue import SurfaceParameter
 
 
 def surfaces(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
@@ -48,7 +48,7 @@ def surfaces(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
     console.answer(answer, show)
 
 
-def _defaults(parameters: Mapping[str, Parameter]) -> str:
+def _defaults(parameters: Mapping[str, SurfaceParameter]) -> str:
     parts = []
     for key, parameter in parameters.items():
         value = parameter.default

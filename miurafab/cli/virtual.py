@@ -10,7 +10,7 @@ import typer
 
 from miurafab.cli.console import Console, JsonOption, QuietOption
 from miurafab.errors import InputError
-from miurafab.wire.faults import KINDS, parse_faults
+from miurafab.simulate.faults import KINDS, parse_faults
 from miurafab.workflow.json_text import json_text
 
 

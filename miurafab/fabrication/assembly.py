@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from miurafab.fabrication.patches import boundaries
+from miurafab.fabrication.partition.split import boundaries
 from miurafab.fabrication.sheets import Layout
 from miurafab.origami.crease_pattern import CreasePattern
 

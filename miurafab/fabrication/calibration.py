@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError, ProfileError
 from miurafab.fabrication.lettering import text_strokes, text_width
-from miurafab.fabrication.ordering import Strokes, order_strokes
 from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
+from miurafab.fabrication.route.order import StrokeSet, order_strokes
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.miura import MiuraCell, regular_miura
@@ -330,7 +330,7 @@ def _gauge(engraved: _Pen, cut: _Pen, corner: Points) -> None:
 def _routed(folds: Toolpath, coupon: CreasePattern) -> Toolpath:
     """The strokes of the coupon in an order with little travel."""
     nowhere = np.zeros(len(folds), dtype=np.int64)
-    return order_strokes(Strokes(folds, folds.edge, nowhere), coupon.edges_vertices)
+    return order_strokes(StrokeSet(folds, folds.edge, nowhere), coupon.edges_vertices)
 
 
 def _coupon(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.framing import Patch
+from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.sheets import Layout, NestingRecord, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
 

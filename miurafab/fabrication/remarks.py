@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from miurafab.fabrication.framing import Framed
 from miurafab.fabrication.labels import Lettering
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.partition.patch_frame import Framed
 from miurafab.fabrication.strokes import Drawn
 from miurafab.fabrication.wording import count
 from miurafab.origami.crease_pattern import CreasePattern

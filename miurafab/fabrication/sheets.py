@@ -16,17 +16,17 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from miurafab.fabrication.framing import DIGITS, Framed, Patch, copied, frame_patches
 from miurafab.fabrication.labels import Lettering, place_texts
 from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, check_engine, nest, turned
-from miurafab.fabrication.opening import opened
+from miurafab.fabrication.open_ring import opened
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.ordering import Strokes, corner_of, order_strokes
-from miurafab.fabrication.pieces import Pieces
+from miurafab.fabrication.partition.patch_frame import DIGITS, Framed, Patch, copied, frame_patches
+from miurafab.fabrication.partition.patch_outline import Pieces
 from miurafab.fabrication.remarks import remarks_on
+from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
 from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.stock import LaidStock, lay_stock
-from miurafab.fabrication.strokes import Blank, Motion, sheet_strokes
+from miurafab.fabrication.strokes import Blank, RigidTransform, sheet_strokes
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.fabrication.travel import travel_bound
 from miurafab.origami.crease_pattern import CreasePattern
@@ -204,7 +204,7 @@ def lay_out(
     ways, corner = pattern.edges_vertices, corner_of(machine, material)
     spread = options.spread_heat
 
-    def ordered(strokes: Strokes) -> Toolpath:
+    def ordered(strokes: StrokeSet) -> Toolpath:
         return order_strokes(strokes, ways, spread_heat=spread, corner_mm=corner)
 
     toolpaths = tuple(ordered(each) for each in drawn.fronts)
@@ -230,7 +230,7 @@ def lay_out(
 
 
 def _lettering(
-    pattern: CreasePattern, framed: Framed, patches: tuple[Patch, ...], motion: Motion
+    pattern: CreasePattern, framed: Framed, patches: tuple[Patch, ...], motion: RigidTransform
 ) -> Lettering:
     """The texts of all copies, each upright as its patch lies."""
     pieces, count = framed.pieces, len(framed.patches)
@@ -317,7 +317,7 @@ def _sheets(
 
 def _motion(
     patches: tuple[Patch, ...], placements: list[Placement], slots: tuple[Slot, ...]
-) -> Motion:
+) -> RigidTransform:
     """The way of each patch from the pattern to its sheet, in one step."""
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     moved = np.array(
@@ -329,7 +329,7 @@ def _motion(
     matrix = np.stack([moved[:, 1] - moved[:, 0], moved[:, 2] - moved[:, 0]], axis=2)
     origins = np.array([patch.origin_mm for patch in patches])
     shift = moved[:, 0] - np.einsum("nij,nj->ni", matrix, origins)
-    return Motion(matrix, shift, np.array([slot.sheet for slot in slots]))
+    return RigidTransform(matrix, shift, np.array([slot.sheet for slot in slots]))
 
 
 def _totals(

@@ -26,10 +26,10 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.bridges import bridged
 from miurafab.fabrication.labels import Text
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.ordering import HOLE, OUTLINE, Strokes
+from miurafab.fabrication.partition.patch_outline import Pieces
 from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
-from miurafab.fabrication.pieces import Pieces
 from miurafab.fabrication.relief import Holes, circles, relief_holes
+from miurafab.fabrication.route.order import HOLE, OUTLINE, StrokeSet
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import OPERATIONS, Material
@@ -63,14 +63,14 @@ class Drawn:
     many outlines none for all their holding bridges.
     """
 
-    fronts: list[Strokes]
-    backs: list[Strokes | None]
+    fronts: list[StrokeSet]
+    backs: list[StrokeSet | None]
     unrelieved: int
     unbridged: int
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RigidTransform:
     """Where the P patches go: q = ``matrix`` (P, 2, 2) p + ``shift`` (P, 2) for a point p of the
     pattern, and the number of the ``sheet`` (P,).
     """
@@ -84,7 +84,7 @@ def sheet_strokes(
     pattern: CreasePattern,
     pieces: Pieces,
     texts: Sequence[Text],
-    motion: Motion,
+    motion: RigidTransform,
     material: Material,
     sheets: Sequence[Blank],
     options: LayoutOptions | None = None,
@@ -134,7 +134,7 @@ def sheet_strokes(
     begin = np.searchsorted(side[by_side], np.arange(2 * len(sheets) + 1))
     first = np.cumsum(count) - count
 
-    def taken(number: int, blank: Blank, name: str) -> Strokes:
+    def taken(number: int, blank: Blank, name: str) -> StrokeSet:
         chosen = by_side[begin[number] : begin[number + 1]]
         own = count[chosen]
         offsets = np.concatenate([[0], np.cumsum(own)])
@@ -148,10 +148,10 @@ def sheet_strokes(
             patch=patch[chosen],
             edge=edge[chosen],
         )
-        return Strokes(toolpath, group[chosen], rank[chosen])
+        return StrokeSet(toolpath, group[chosen], rank[chosen])
 
-    fronts: list[Strokes] = []
-    backs: list[Strokes | None] = []
+    fronts: list[StrokeSet] = []
+    backs: list[StrokeSet | None] = []
     for number, blank in enumerate(sheets):
         fronts.append(taken(2 * number, blank, blank.name))
         drawn = _turned_over(taken(2 * number + 1, blank, f"{blank.name}-back"))
@@ -172,7 +172,7 @@ def _check_two_sided(material: Material, sheets: Sequence[Blank]) -> None:
         )
 
 
-def _turned_over(strokes: Strokes) -> Strokes:
+def _turned_over(strokes: StrokeSet) -> StrokeSet:
     """The strokes seen from the back of the sheet, turned over about its upright axis."""
     front = strokes.toolpath
     points = front.points * np.array([-1.0, 1.0]) + np.array([front.width_mm, 0.0])
@@ -187,13 +187,13 @@ def pin_centres(width: float, height: float, margin: float) -> NDArray[np.float6
     return np.array([[near, near], [width - near, near], [near, height * 0.7]])
 
 
-def _with_pins(back: Strokes, blank: Blank, material: Material) -> Strokes:
+def _with_pins(back: StrokeSet, blank: Blank, material: Material) -> StrokeSet:
     """The strokes of a back with its registration holes."""
     centres = pin_centres(blank.width, blank.height, blank.margin) * [-1.0, 1.0]
     moved = centres + np.array([blank.width, 0.0])
     points, count = circles(moved, PIN_MM - material.kerf_mm)
     path, pins = back.toolpath, len(centres)
-    return Strokes(
+    return StrokeSet(
         replace(
             path,
             points=np.concatenate([path.points, points]),

@@ -1,0 +1,1 @@
+"""G-code: words, programs, arcs, what a program does; HPGL as well."""

@@ -33,7 +33,7 @@ def parse_hpgl(job: Job) -> Program:
     it up. Raises :class:`~miurafab.errors.GcodeError` naming the line for an instruction that is
     not read, or coordinates that do not come in pairs.
     """
-    return _Reader(job.name).read(job)
+    return _HpglReader(job.name).read(job)
 
 
 def instructions(name: str, number: int, line: str) -> Iterator[tuple[str, str]]:
@@ -53,7 +53,7 @@ def instructions(name: str, number: int, line: str) -> Iterator[tuple[str, str]]
         place = match.end()
 
 
-class _Reader:
+class _HpglReader:
     def __init__(self, name: str) -> None:
         self.name = name
         self.at = (0.0, 0.0)

@@ -1,0 +1,1 @@
+"""The GRBL protocol without I/O: events, state table, connection, streamer, settings."""

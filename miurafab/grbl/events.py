@@ -152,7 +152,7 @@ class GCState(Event):
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter(Event):
+class ParameterReply(Event):
     """One line of ``$#``: ``[G54:0.000,0.000,0.000]``, ``[TLO:0.000]``, ``[PRB:...:0]``."""
 
     name: str

@@ -24,7 +24,7 @@ from miurafab.grbl.events import (
     GCState,
     Ok,
     Options,
-    Parameter,
+    ParameterReply,
     Setting,
     StartupLine,
     StartupResult,
@@ -133,9 +133,9 @@ def _bracket(match: re.Match[str]) -> Event | None:
         return GCState(tuple(body.split()))
     if tag == "PRB":
         values, _, flag = body.rpartition(":")
-        return Parameter(tag, _numbers(values), flag == "1")
+        return ParameterReply(tag, _numbers(values), flag == "1")
     if tag in _PARAMETERS:
-        return Parameter(tag, _numbers(body))
+        return ParameterReply(tag, _numbers(body))
     return None
 
 

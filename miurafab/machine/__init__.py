@@ -1,0 +1,1 @@
+"""Everything that touches a port: transport, session, delivery, journal, resume, pre-flight."""

@@ -18,7 +18,7 @@ from miurafab.errors import JobStopped, MachineError, MiurafabError
 from miurafab.grbl.streamer import Refusal
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import ABORT, HOLD, Keys, keys_of
-from miurafab.machine.planning import Plan
+from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import JobAborted, Progress, StreamResult
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import FlowTransport
@@ -33,7 +33,7 @@ class Errand:
     ``check`` is called before every read: it raises what should interrupt the conversation.
     """
 
-    plan: Plan
+    plan: JobPlan
     transport: FlowTransport
     transcript: Transcript | None
     journal: Journal | None

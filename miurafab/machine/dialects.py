@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.delivery import Delivery, Errand
 from miurafab.machine.grbl_delivery import NOT_CONFIRMED, WAS_RESET, GrblDelivery
 from miurafab.machine.marlin_delivery import NOT_CONFIRMED as NOT_HALTED
@@ -22,11 +21,12 @@ from miurafab.machine.transport import (
     SerialTransport,
     VirtualTransport,
 )
-from miurafab.marlin.virtual import VirtualMarlin
 from miurafab.motion.parameters import MotionParameters
 from miurafab.plotter.stream import DROP_ALL, PEN_UP
-from miurafab.plotter.virtual import VirtualPlotter
 from miurafab.profiles import MachineProfile
+from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.marlin.controller import VirtualMarlin
+from miurafab.simulate.plotter import VirtualPlotter
 
 
 def open_machine(machine: MachineProfile, port: str, speed: float | None = None) -> FlowTransport:

@@ -10,8 +10,8 @@ from collections.abc import Iterable
 
 from miurafab.machine.transport import Device
 from miurafab.motion.beam import BeamSegment
-from miurafab.wire.cable import Cable
-from miurafab.wire.faults import Fault
+from miurafab.simulate.cable import Cable
+from miurafab.simulate.faults import Fault
 
 _SECOND = 1_000_000  # ticks of the cable's clock
 

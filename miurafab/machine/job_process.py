@@ -31,7 +31,7 @@ from typing import IO, Unpack
 from miurafab.errors import JobStopped, MachineError, MiurafabError
 from miurafab.machine.dialects import make_safe, open_machine
 from miurafab.machine.keys import Keys, NoKeys
-from miurafab.machine.planning import Plan
+from miurafab.machine.planning import JobPlan
 from miurafab.machine.sender import Files, Progress, StreamResult, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.watchdog import BEAT, BEAT_S, STOPS, ParentWatch
@@ -44,7 +44,7 @@ _STOP_S = 15.0  # for the process to stop the machine, ask it, and end; stopping
 class _Order:
     """What the sending process is told at its start."""
 
-    plan: Plan
+    plan: JobPlan
     port: str
     virtual_speed: float | None
     files: Files
@@ -63,7 +63,7 @@ _Message = _Begun | Progress | StreamResult | MiurafabError | None
 
 
 def stream_apart(
-    plan: Plan,
+    plan: JobPlan,
     port: str,
     *,
     on_progress: Callable[[Progress], None] | None = None,

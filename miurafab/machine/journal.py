@@ -23,7 +23,7 @@ from typing import Any
 
 from miurafab.errors import InputError
 from miurafab.gcode.job import Job
-from miurafab.machine.durable import DurableFile
+from miurafab.machine.append_log import DurableFile
 
 SCHEMA = "miurafab-journal/1"
 _PERIOD = 0.25  # s between two records

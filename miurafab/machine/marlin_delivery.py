@@ -23,8 +23,8 @@ from miurafab.machine.planning import longest_line
 from miurafab.machine.session import ANSWER_S, BANNER_S, HOMING_S
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
-from miurafab.marlin.connection import EMERGENCY, Connection
-from miurafab.marlin.replies import Fault, Killed, Ok, Reply, Started
+from miurafab.marlin.connection import EMERGENCY, MarlinConnection
+from miurafab.marlin.replies import Killed, MarlinError, MarlinOk, Reply, Started
 
 WAS_HALTED = "the controller was halted (M112) with the laser off; reset it before it is used again"
 NOT_CONFIRMED = (
@@ -114,7 +114,7 @@ class MarlinWire:
         self._transport = transport
         self._transcript = transcript
         self._check = check
-        self._connection = Connection()
+        self._connection = MarlinConnection()
         self._start = transport.now()
 
     def now(self) -> float:
@@ -186,7 +186,7 @@ class MarlinWire:
             replies = self.receive(_LOOK_S)
             for reply in replies:
                 heard = self.now()
-                if isinstance(reply, Ok) and reply.line is line:
+                if isinstance(reply, MarlinOk) and reply.line is line:
                     return said
                 self._look(reply, line, where)
                 said.append(reply)
@@ -216,7 +216,7 @@ class MarlinWire:
                 f"The controller restarted by itself {where}; what it held is lost, so look at its "
                 "power supply and its reset button."
             )
-        if isinstance(reply, Fault):
+        if isinstance(reply, MarlinError):
             code = line.data.decode("ascii") if line is not None else ""
             number = f"line {line.number} ('{code}')" if line and line.number else f"'{code}'"
             raise ControllerError(f"The controller refused {number}: '{text}'.")

@@ -1,6 +1,6 @@
 """What can be said of a job before any port is opened: its lines, its program, and its hazards.
 
-A :class:`Plan` is a job that passed, with how it is to be sent.
+A :class:`JobPlan` is a job that passed, with how it is to be sent.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _NO_CHECK_MODE = ("marlin", "hpgl")
 
 
 @dataclass(frozen=True)
-class Plan:
+class JobPlan:
     """A job that passed the checks which need no controller.
 
     ``program`` is None where it could not be read and that was forced or is left to check mode;
@@ -57,7 +57,7 @@ def plan_job(
     resumption: Resumption | None = None,
     most_power: float = 1.0,
     program: Program | None = None,
-) -> Plan:
+) -> JobPlan:
     """Check ``job`` by itself; raises :class:`~miurafab.errors.InputError` for what is wrong.
 
     ``force`` names checks to override (:data:`~miurafab.machine.preflight.CHECKS`). With
@@ -99,7 +99,7 @@ def plan_job(
         program=program,
     )
     remarks = raise_findings(findings, force)
-    return Plan(job, machine, count, program, force, check_mode, home, at, resumption, remarks)
+    return JobPlan(job, machine, count, program, force, check_mode, home, at, resumption, remarks)
 
 
 def examine_job(

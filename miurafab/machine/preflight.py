@@ -22,7 +22,7 @@ from miurafab.gcode.moves import BEAM_M3, DWELL
 from miurafab.gcode.program import Program
 from miurafab.grbl.events import StatusReport
 from miurafab.grbl.settings import Settings, profile_settings
-from miurafab.machine.loose import burnt_on_loose_pieces, open_outlines, says_operations
+from miurafab.machine.loose_parts import burnt_on_loose_pieces, open_outlines, says_operations
 from miurafab.profiles import MachineProfile
 
 CHECKS = {

@@ -21,7 +21,7 @@ from miurafab.machine.delivery import Errand
 from miurafab.machine.dialects import delivery_of, open_machine
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import Keys, NoKeys
-from miurafab.machine.planning import Plan
+from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transcript import Transcript
@@ -47,7 +47,7 @@ class StreamOptions(Files, total=False):
 
 
 def stream_plan(
-    plan: Plan,
+    plan: JobPlan,
     port: str,
     *,
     virtual_speed: float | None = None,
@@ -75,7 +75,7 @@ def stream_plan(
 
 
 def deliver(
-    plan: Plan,
+    plan: JobPlan,
     transport: FlowTransport,
     signals: StopSignals,
     *,

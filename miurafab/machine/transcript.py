@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from miurafab.machine.durable import DurableFile
+from miurafab.machine.append_log import DurableFile
 
 
 class Transcript:

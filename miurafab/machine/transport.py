@@ -20,8 +20,8 @@ import serial
 import serial.tools.list_ports
 
 from miurafab.errors import PortError
-from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.motion.beam import BeamSegment
+from miurafab.simulate.grbl.controller import VirtualGrbl
 
 VIRTUAL = "virtual"
 """The port name of the controller in memory."""

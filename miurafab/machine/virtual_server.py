@@ -27,15 +27,15 @@ from typing import Protocol, TextIO
 
 from miurafab.errors import InputError, PortError, ProfileError
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl
-from miurafab.grbl.virtual_dialect import DIALECTS
 from miurafab.machine.actions import read_dump
 from miurafab.machine.dialects import virtual_machine
 from miurafab.machine.faulty import FaultyDevice
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import BAUD, Device
 from miurafab.profiles import load_machine
-from miurafab.wire.faults import Fault
+from miurafab.simulate.faults import Fault
+from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.dialect import DIALECTS
 
 STOCK = "stock"
 _GRBL_FAULTS = ("alarm", "stall")

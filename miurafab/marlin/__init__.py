@@ -1,0 +1,1 @@
+"""The Marlin protocol without I/O."""

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Iterator
 
 from miurafab.gcode.job import SendLine
-from miurafab.marlin.replies import Fault, Ok, Reply, Resend, Started, parse_reply
+from miurafab.marlin.replies import MarlinError, MarlinOk, Reply, Resend, Started, parse_reply
 from miurafab.wire.lines import LineReader
 
 EMERGENCY = b"\nM112\n"
@@ -27,7 +27,7 @@ MOST_TRIES = 5
 """How often a line is sent before the wire is given up."""
 
 
-class Connection:
+class MarlinConnection:
     """The state of one wire: what is in flight, and how far the count is."""
 
     def __init__(self) -> None:
@@ -86,15 +86,15 @@ class Connection:
             yield self._replies.popleft()
 
     def _take(self, reply: Reply) -> None:
-        if isinstance(reply, Ok):
+        if isinstance(reply, MarlinOk):
             if self._again:
                 self._taken = True  # the wire is free for the line that it wants
                 return
             line, self.in_flight = self.in_flight, None
-            reply = Ok(reply.text, line)
+            reply = MarlinOk(reply.text, line)
         elif isinstance(reply, Resend):
             if self.in_flight is None or reply.number not in (self._number, self._number + 1):
-                reply = Fault(f"{reply.text}, a line that was not in flight")
+                reply = MarlinError(f"{reply.text}, a line that was not in flight")
             elif reply.number == self._number:
                 self._again, self._taken = True, False
         elif isinstance(reply, Started):

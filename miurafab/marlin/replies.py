@@ -23,7 +23,7 @@ class Reply:
 
 
 @dataclass(frozen=True, slots=True)
-class Ok(Reply):
+class MarlinOk(Reply):
     """``ok``: the line in flight was taken; ``line`` is that line, None for one of our own."""
 
     line: SendLine | None = None
@@ -52,7 +52,7 @@ class Killed(Reply):
 
 
 @dataclass(frozen=True, slots=True)
-class Fault(Reply):
+class MarlinError(Reply):
     """It did not do what the line in flight says, or has stopped."""
 
 
@@ -69,7 +69,7 @@ _FAULT = re.compile(
 def parse_reply(text: str) -> Reply:
     """The meaning of one line, without its end. What it does not know is a plain :class:`Reply`."""
     if _OK.match(text):
-        return Ok(text)
+        return MarlinOk(text)
     resend = _RESEND.match(text)
     if resend is not None:
         return Resend(text, int(resend[1]))
@@ -81,5 +81,5 @@ def parse_reply(text: str) -> Reply:
         return Killed(text)
     # A line that came damaged is asked for again in the next words.
     if _FAULT.match(text) and not _WANTS_AGAIN.search(text):
-        return Fault(text)
+        return MarlinError(text)
     return Reply(text)

@@ -1,0 +1,1 @@
+"""The motion planner of the firmware, for time estimates and the simulators."""

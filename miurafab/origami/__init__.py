@@ -1,0 +1,1 @@
+"""The origami tower: tessellations, crease patterns, fitting, folding, energy, file formats."""

@@ -1,0 +1,1 @@
+"""The HPGL plotter protocol without I/O."""

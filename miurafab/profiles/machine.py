@@ -30,7 +30,7 @@ class Bed:
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionLimits:
     """What the firmware's planner is set to: rates in mm/min, accelerations in mm/s²."""
 
     max_rate_mm_min: tuple[float, float]
@@ -103,7 +103,7 @@ class MachineProfile:
     title: str
     dialect: str
     bed: Bed
-    motion: Motion
+    motion: MotionLimits
     tool: Tool
     controller: Controller
     settings: dict[int, float]
@@ -152,8 +152,8 @@ def _bed(table: Table) -> Bed:
     return bed
 
 
-def _motion(table: Table) -> Motion:
-    motion = Motion(
+def _motion(table: Table) -> MotionLimits:
+    motion = MotionLimits(
         max_rate_mm_min=(
             table.feed("max_rate_x", low=1, high=1e6),
             table.feed("max_rate_y", low=1, high=1e6),

@@ -29,10 +29,10 @@ import miurafab
 from miurafab.errors import MiurafabError
 from miurafab.fabrication.options import TAB_SIDES
 from miurafab.profiles import load_machine, load_material, shipped_names
-from miurafab.studio.bench import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
-from miurafab.studio.messages import Request, Response, answer, made_file, own_file, refusal
+from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
 from miurafab.studio.orders import read_fit, read_layout, read_source
+from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
 from miurafab.surfaces.mesh import MESH_SUFFIXES
 from miurafab.workflow.design import DEFAULT_FACETS, DEFAULT_SIZE_MM, can_close
@@ -52,7 +52,7 @@ class Studio:
         self._page = resources.files(__package__).joinpath("page")
         self._catalogue = _catalogue()
 
-    def handle(self, request: Request) -> Response:
+    def handle(self, request: HttpRequest) -> Response:
         """The answer to ``request``; what is not let in or is wrong is refused in a sentence."""
         refused = self.guard.refuse(request.method, request.path, request.headers)
         if refused is not None:
@@ -88,7 +88,7 @@ class Studio:
             return refusal(404, "There is nothing at this address (any more).")
         return made_file(path, download=query == "save")
 
-    def _post(self, route: str, request: Request) -> Response:
+    def _post(self, route: str, request: HttpRequest) -> Response:
         bench = self.bench
         if route == UPLOAD:
             name = unquote(request.headers.get("x-file-name", ""))

@@ -49,7 +49,7 @@ TYPES = {
 
 
 @dataclass(frozen=True)
-class Request:
+class HttpRequest:
     """What was asked: ``path`` as it was sent, with its query; names of ``headers`` are small."""
 
     method: str

@@ -24,10 +24,10 @@ from typing import Any
 from miurafab.errors import InputError, PatternError, PortError, TargetError
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import find_file
-from miurafab.studio.bench import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.core import Studio
 from miurafab.studio.guard import ADDRESS, Guard
-from miurafab.studio.messages import Request, Response, refusal
+from miurafab.studio.messages import HttpRequest, Response, refusal
+from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.worker import Process
 from miurafab.surfaces.catalogue import make_surface, parse_target
 from miurafab.surfaces.mesh import MESH_SUFFIXES
@@ -163,7 +163,7 @@ class _Handler(BaseHTTPRequestHandler):
                 self.close_connection = True
                 return
         with self.server.lock:
-            response = studio.handle(Request(self.command, self.path, headers, body))
+            response = studio.handle(HttpRequest(self.command, self.path, headers, body))
         self._send(response)
 
     def _send(self, response: Response) -> None:

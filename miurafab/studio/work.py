@@ -18,7 +18,7 @@ import miurafab
 from miurafab.errors import MiurafabError, PatternError
 from miurafab.fabrication.drawing.svg import pattern_svg
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fold_format import read_fold
+from miurafab.origami.formats.fold import read_fold
 from miurafab.studio.recipe import job_name
 from miurafab.workflow.job_directory import GUIDE, write_text
 from miurafab.workflow.picture_svg import svg_text

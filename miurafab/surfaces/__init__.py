@@ -1,0 +1,1 @@
+"""Targets: analytic surfaces, revolutions, functions, height fields, meshes."""

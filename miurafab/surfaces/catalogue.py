@@ -18,7 +18,7 @@ from miurafab.units import parse_angle
 
 
 @dataclass(frozen=True)
-class Parameter:
+class SurfaceParameter:
     """One parameter of a named surface; lengths in the target's own unit, angles in radians."""
 
     default: float
@@ -36,21 +36,21 @@ class NamedSurface:
 
     name: str
     summary: str
-    parameters: Mapping[str, Parameter]
+    parameters: Mapping[str, SurfaceParameter]
     make: Callable[..., TargetSurface]
     profile_axes: str | None = None
 
 
-def _length(default: float, meaning: str, low: float = 1e-6) -> Parameter:
-    return Parameter(default, low, 1e6, meaning)
+def _length(default: float, meaning: str, low: float = 1e-6) -> SurfaceParameter:
+    return SurfaceParameter(default, low, 1e6, meaning)
 
 
-def _angle(default_deg: float, meaning: str, high_deg: float) -> Parameter:
-    return Parameter(math.radians(default_deg), 1e-3, math.radians(high_deg), meaning, True)
+def _angle(default_deg: float, meaning: str, high_deg: float) -> SurfaceParameter:
+    return SurfaceParameter(math.radians(default_deg), 1e-3, math.radians(high_deg), meaning, True)
 
 
-def _signed(default: float, meaning: str) -> Parameter:
-    return Parameter(default, -1e6, 1e6, meaning)
+def _signed(default: float, meaning: str) -> SurfaceParameter:
+    return SurfaceParameter(default, -1e6, 1e6, meaning)
 
 
 _TURN = {"angle": _angle(120, "angle turned through", 360)}
@@ -126,8 +126,8 @@ _ENTRIES = (
         "a logarithmic spiral extruded",
         {
             "start": _length(0.25, "radius at the inner end"),
-            "growth": Parameter(0.18, 1e-3, 2.0, "r grows by exp(growth) a radian"),
-            "turns": Parameter(1.25, 0.05, 10.0, "number of turns"),
+            "growth": SurfaceParameter(0.18, 1e-3, 2.0, "r grows by exp(growth) a radian"),
+            "turns": SurfaceParameter(1.25, 0.05, 10.0, "number of turns"),
             "length": _length(1.5, "length of the extrusion"),
         },
         _log_spiral,
@@ -175,9 +175,11 @@ _ENTRIES = (
         "a spiral ramp",
         {
             "radius": _length(1.0, "outer radius"),
-            "inner": Parameter(-1.0, -1e6, 1e6, "inner radius; negative reaches across the axis"),
+            "inner": SurfaceParameter(
+                -1.0, -1e6, 1e6, "inner radius; negative reaches across the axis"
+            ),
             "pitch": _length(3.0, "rise in one turn"),
-            "turns": Parameter(0.5, 0.02, 20.0, "number of turns"),
+            "turns": SurfaceParameter(0.5, 0.02, 20.0, "number of turns"),
         },
         lambda radius, inner, pitch, turns: analytic.helicoid(radius, inner, pitch, turns),
     ),
@@ -298,7 +300,7 @@ def parse_target(text: str) -> tuple[str, dict[str, str]]:
     return name.strip(), parameters
 
 
-def _value(surface: str, key: str, text: Any, parameter: Parameter) -> float:
+def _value(surface: str, key: str, text: Any, parameter: SurfaceParameter) -> float:
     try:
         value = parse_angle(text) if parameter.is_angle else float(text)
     except (UnitError, ValueError, TypeError):

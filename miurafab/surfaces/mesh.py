@@ -35,7 +35,7 @@ from miurafab.surfaces.mesh_repair import (
 )
 from miurafab.surfaces.parameterise import flatten
 from miurafab.surfaces.placement import (
-    Placement,
+    GridPlacement,
     Region,
     covered,
     largest_rectangle,
@@ -61,7 +61,7 @@ _ROUGH_SPANS = 24
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class MeshChart:
     """A mesh laid flat. ``faces`` (F, 3) are all triangles, of which the first ``real`` are of the
     mesh and the others fill holes; the first ``known`` of ``vertices`` (V, 3) are of the mesh.
     ``flat`` (V, 2) are their places; ``rough`` says that the mesh is a noisy scan.
@@ -75,7 +75,7 @@ class Layout:
     rough: bool
     name: str
 
-    def surface(self, placement: Placement, stiffness: float = 0.0) -> MeshSurface:
+    def surface(self, placement: GridPlacement, stiffness: float = 0.0) -> MeshSurface:
         """The target over ``placement``, the spline as stiff as the data ask, or ``stiffness``."""
         frame = turned(self.flat, placement.angle)
         domain = placement.domain
@@ -123,9 +123,9 @@ class MeshSurface:
     spline: NdBSpline
     domain: Domain
     triangles: Floats
-    placement: Placement
+    placement: GridPlacement
     stiffness: float
-    layout: Layout = field(repr=False)
+    layout: MeshChart = field(repr=False)
     remarks: tuple[str, ...] = ()
     free: bool = True
 
@@ -236,22 +236,22 @@ def mesh_surface(vertices: Floats, faces: Ints, name: str = "The mesh") -> MeshS
     return replace(layout.surface(_placement(layout, None, None)), remarks=remarks)
 
 
-def _placement(layout: Layout, region: Region | None, rotate: float | None) -> Placement:
+def _placement(layout: MeshChart, region: Region | None, rotate: float | None) -> GridPlacement:
     if region is not None:
         angle = rotate or 0.0
-        return Placement(angle, region.domain(turned(layout.flat, angle)))
+        return GridPlacement(angle, region.domain(turned(layout.flat, angle)))
     if rotate is not None:
         domain = largest_rectangle(turned(layout.flat, rotate), layout.faces)
         if domain is None:
             raise TargetError(f"{layout.name}: no rectangle fits into the mesh at this --rotate.")
-        return Placement(rotate, domain)
+        return GridPlacement(rotate, domain)
     found = placements(layout.vertices, layout.flat, layout.faces)
     if not found:
         raise TargetError(f"{layout.name}: no rectangle fits into the mesh; it is too narrow.")
     return found[0][1]
 
 
-def _placed_before(place: dict[str, Any], name: str) -> tuple[Placement, float]:
+def _placed_before(place: dict[str, Any], name: str) -> tuple[GridPlacement, float]:
     try:
         u0, u1, v0, v1 = (float(value) for value in place["rectangle"])
         angle, stiffness = float(place["rotate"]), float(place["stiffness"])
@@ -259,10 +259,10 @@ def _placed_before(place: dict[str, Any], name: str) -> tuple[Placement, float]:
         raise TargetError(f"{name}: the pattern's note of the rectangle is damaged.") from None
     if not (u0 < u1 and v0 < v1 and math.isfinite(angle) and 0 <= stiffness < math.inf):
         raise TargetError(f"{name}: the pattern's note of the rectangle is damaged.")
-    return Placement(angle, Domain(u0, u1, v0, v1)), stiffness
+    return GridPlacement(angle, Domain(u0, u1, v0, v1)), stiffness
 
 
-def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[Layout, tuple[str, ...]]:
+def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[MeshChart, tuple[str, ...]]:
     """The mesh laid flat, and remarks on it. Raises ``TargetError`` if it is not one disk."""
     vertices, faces = clean(vertices, faces, name)
     remarks = size_remarks(vertices, name)
@@ -281,7 +281,7 @@ def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[Layout, tuple[str
         even = np.asarray(smoothed.spline(flat), dtype=np.float64)
         if doubled_areas(even, faces).min() > 1e-6 * np.median(doubled_areas(even, faces)):
             flat = flatten(even, faces)
-    return Layout(vertices, faces, real, known, flat, rough, name), remarks
+    return MeshChart(vertices, faces, real, known, flat, rough, name), remarks
 
 
 def _smoothed(points: Floats, flat: Floats, faces: Ints) -> Smoothed:

@@ -26,18 +26,18 @@ _SAMPLES = 13
 
 
 @dataclass(frozen=True)
-class Placement:
+class GridPlacement:
     """The rectangle ``domain`` in the layout turned back by ``angle`` (radians)."""
 
     angle: float
     domain: Domain
 
-    def shrunk(self, factor: float) -> Placement:
+    def shrunk(self, factor: float) -> GridPlacement:
         """The same about the same centre, ``factor`` times as wide and high."""
         d = self.domain
         u, v = (d.u0 + d.u1) / 2, (d.v0 + d.v1) / 2
         half_u, half_v = factor * d.width / 2, factor * d.height / 2
-        return Placement(self.angle, Domain(u - half_u, u + half_u, v - half_v, v + half_v))
+        return GridPlacement(self.angle, Domain(u - half_u, u + half_u, v - half_v, v + half_v))
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def turned(flat: Floats, angle: float) -> Floats:
     return frame
 
 
-def placements(vertices: Floats, flat: Floats, faces: Ints) -> list[tuple[float, Placement]]:
+def placements(vertices: Floats, flat: Floats, faces: Ints) -> list[tuple[float, GridPlacement]]:
     """The best placement at each angle with its score, the best first.
 
     The score is the area times the evenness, the product over both directions of the least over
@@ -98,7 +98,7 @@ def placements(vertices: Floats, flat: Floats, faces: Ints) -> list[tuple[float,
         domain = largest_rectangle(frame, faces)
         if domain is not None:
             score = domain.width * domain.height * evenness(vertices, frame, faces, domain) ** 0.5
-            found.append((score, Placement(angle, domain)))
+            found.append((score, GridPlacement(angle, domain)))
     # what is as good to a hundredth goes to the angle nearest to the axes of the layout
     best = max((score for score, _ in found), default=0.0)
     return sorted(found, key=lambda pair: (-math.floor(50 * pair[0] / best), abs(pair[1].angle)))

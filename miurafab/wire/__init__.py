@@ -1,0 +1,1 @@
+"""Bytes on a cable: what a controller says, split into lines."""

@@ -26,7 +26,7 @@ from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.perforation import MIN_STROKE_MM
 from miurafab.fabrication.sheets import Layout, Sheet, Totals
-from miurafab.origami.fold_format import fold_text
+from miurafab.origami.formats.fold import fold_text
 from miurafab.posting.sections import post_sections
 from miurafab.profiles import (
     Material,

@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 
 from miurafab.errors import InputError, PatternError
-from miurafab.origami.collisions import triangulate
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
-from miurafab.origami.fold_format import read_fold
-from miurafab.origami.interop_lines import (
+from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.formats.fold import read_fold
+from miurafab.origami.formats.lines import (
     cp_text,
     dxf_text,
     opx_text,
@@ -35,13 +35,13 @@ from miurafab.origami.interop_lines import (
     parse_dxf,
     parse_opx,
 )
-from miurafab.origami.interop_planar import Lines, lines_of, pattern_from_lines
-from miurafab.origami.interop_solid import glb_bytes, obj_text, stl_bytes
-from miurafab.origami.interop_svg import parse_svg, svg_text
-from miurafab.origami.obj_format import pattern_from_obj_pair
+from miurafab.origami.formats.mesh import glb_bytes, obj_text, stl_bytes
+from miurafab.origami.formats.obj import pattern_from_obj_pair
+from miurafab.origami.formats.planar_graph import CreaseLines, lines_of, pattern_from_lines
+from miurafab.origami.formats.svg import parse_svg, svg_text
 from miurafab.workflow.design import save_pattern
 
-DRAWINGS: dict[str, Callable[[str], Lines]] = {
+DRAWINGS: dict[str, Callable[[str], CreaseLines]] = {
     ".svg": parse_svg,
     ".dxf": parse_dxf,
     ".cp": parse_cp,

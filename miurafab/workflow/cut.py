@@ -87,8 +87,8 @@ def prepare(
         return Prepared(
             path.name, profile, (gcode,), (_dry_run(gcode, profile),), None, path.parent
         )
-    from miurafab.origami.audit import audit
-    from miurafab.origami.fit import fit
+    from miurafab.origami.fitting.fit import fit
+    from miurafab.origami.verify import audit
     from miurafab.workflow.design import design, load_pattern, save_pattern
 
     if path.suffix.lower() == ".fold":

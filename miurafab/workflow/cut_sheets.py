@@ -13,15 +13,15 @@ from pathlib import Path
 
 from miurafab.errors import InputError
 from miurafab.gcode.job import Job
-from miurafab.machine.framing import frame_job
 from miurafab.machine.job_process import stream_apart
 from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import Keys
-from miurafab.machine.planning import Plan, examine_job, plan_job
+from miurafab.machine.planning import JobPlan, examine_job, plan_job
 from miurafab.machine.preflight import Finding
 from miurafab.machine.resume import resume
 from miurafab.machine.sender import Progress as StreamProgress
 from miurafab.machine.sender import StreamResult, stream_plan
+from miurafab.machine.trace_box import frame_job
 from miurafab.machine.transport import VIRTUAL
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.cut import Prepared
@@ -121,7 +121,7 @@ def cut(
 def cut_sheet(
     prepared: Prepared,
     number: int,
-    plan: Plan,
+    plan: JobPlan,
     port: str,
     send: Callable[..., StreamResult],
     *,
@@ -175,13 +175,13 @@ def _chosen(prepared: Prepared, sheets: Sequence[int] | None) -> list[int]:
 
 def plan_sheets(
     prepared: Prepared, sheets: Sequence[int] | None, options: CutOptions
-) -> list[tuple[int, Plan]]:
+) -> list[tuple[int, JobPlan]]:
     """The sheets to send, each checked by itself, those interrupted from where they go on.
 
     Of the ``sheets`` (None: all) those that a resumed job has done already are left out. Raises
     :class:`~miurafab.errors.InputError` for what is wrong with any.
     """
-    plans: list[tuple[int, Plan]] = []
+    plans: list[tuple[int, JobPlan]] = []
     for number in _chosen(prepared, sheets):
         job = prepared.jobs[number - 1]
         resumption = None

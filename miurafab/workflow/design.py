@@ -17,9 +17,9 @@ from typing import Any, cast
 from miurafab.errors import InputError, PatternError, TargetError
 from miurafab.fabrication.options import LayoutOptions, read_options
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fit import FitRequest
-from miurafab.origami.fold_format import read_fold, write_fold
-from miurafab.origami.polish import Follow
+from miurafab.origami.fitting.fit import FitRequest
+from miurafab.origami.fitting.polish import Follow
+from miurafab.origami.formats.fold import read_fold, write_fold
 from miurafab.profiles import Table, find_file, read_toml
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
 from miurafab.surfaces.catalogue import make_surface, parse_target

@@ -10,8 +10,8 @@ import numpy as np
 
 from miurafab.errors import InputError
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.energy import EnergyCurve, Progress, energy_curve
-from miurafab.origami.energy_model import Paper, sheet_model
+from miurafab.origami.energy.bar_hinge import Paper, sheet_model
+from miurafab.origami.energy.path import EnergyCurve, Progress, energy_curve
 from miurafab.profiles import Material, load_material
 from miurafab.workflow import plotting
 
@@ -33,7 +33,7 @@ def energy(
     ``material``, a profile or its name, gives joules; without it the unit is k_f times the mean
     edge. ``crease_ratio`` is how stiff creases are, compared with facets; ``crease`` the edge that
     is driven. Raises :class:`~miurafab.errors.InputError` for a material without a modulus, and
-    what :func:`~miurafab.origami.energy.energy_curve` raises.
+    what :func:`~miurafab.origami.energy.path.energy_curve` raises.
     """
     if not 0 <= crease_ratio < math.inf:
         raise InputError(f"--crease-ratio is {crease_ratio:g}; it must be zero or more.")

@@ -17,14 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError, PatternError
-from miurafab.origami.collisions import triangulate
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fold_format import write_fold
-from miurafab.origami.interop_solid import glb_bytes
-from miurafab.origami.kinematics import Motion, facet_strain, rigid_motion, states_between
-from miurafab.origami.motion_bending import bending_motion
-from miurafab.origami.motion_output import Contact, angles_csv, contacts
-from miurafab.origami.thickness import ThickPanels
+from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
+from miurafab.origami.folding.bending import bending_motion
+from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.folding.kinematics import (
+    FoldingMotion,
+    facet_strain,
+    rigid_motion,
+    states_between,
+)
+from miurafab.origami.folding.thick_panels import ThickPanels
+from miurafab.origami.formats.fold import write_fold
+from miurafab.origami.formats.mesh import glb_bytes
 from miurafab.workflow.fold_gif import target_frame, write_gif
 from miurafab.workflow.page import Slider, write_page
 
@@ -41,7 +46,7 @@ class Folding:
     mean edges, whether that motion was taken or not.
     """
 
-    motion: Motion
+    motion: FoldingMotion
     contacts: tuple[Contact, ...]
     mismatch: float
 
@@ -136,13 +141,13 @@ def write_angles(folding: Folding, path: Path) -> None:
     path.write_text(angles_csv(folding.motion), encoding="utf-8", newline="\n")
 
 
-def _strain(motion: Motion) -> NDArray[np.float64]:
+def _strain(motion: FoldingMotion) -> NDArray[np.float64]:
     """Strains as the page shows them: rounding, which a rigid motion has for strain, is none."""
     strain = facet_strain(motion.pattern, motion.frames)
     return np.where(strain < 1e-9, 0.0, strain)
 
 
-def _names(motion: Motion) -> tuple[str, ...]:
+def _names(motion: FoldingMotion) -> tuple[str, ...]:
     target = target_frame(motion)
     names = []
     for frame, state in enumerate(motion.states.tolist()):

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from miurafab.origami.kinematics import Motion
+from miurafab.origami.folding.kinematics import FoldingMotion
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ _RAMP = np.array([[69, 117, 180], [171, 217, 233], [255, 255, 191], [253, 174, 9
 
 def write_gif(
     path: Path,
-    motion: Motion,
+    motion: FoldingMotion,
     strain: Floats | None = None,
     on_progress: Callable[[float, str], None] | None = None,
 ) -> None:
@@ -64,7 +64,7 @@ def write_gif(
     )
 
 
-def picture(motion: Motion, frame: int, strain: Floats | None = None) -> Image.Image:
+def picture(motion: FoldingMotion, frame: int, strain: Floats | None = None) -> Image.Image:
     """One ``frame`` of ``motion`` as a picture of :data:`WIDTH` x :data:`HEIGHT` pixels."""
     right, up, out = _axes()
     centre, scale = _camera(motion)
@@ -102,7 +102,7 @@ def picture(motion: Motion, frame: int, strain: Floats | None = None) -> Image.I
     return image.resize((WIDTH, HEIGHT), Image.Resampling.BOX)
 
 
-def target_frame(motion: Motion) -> int:
+def target_frame(motion: FoldingMotion) -> int:
     """The frame nearest to the folded form."""
     return int(np.argmin(np.abs(np.where(np.isfinite(motion.states), motion.states, 1e9) - 1.0)))
 
@@ -117,7 +117,7 @@ def _axes() -> tuple[Floats, Floats, Floats]:
     )
 
 
-def _camera(motion: Motion) -> tuple[Floats, float]:
+def _camera(motion: FoldingMotion) -> tuple[Floats, float]:
     """The middle of what is seen and the pixels a millimetre at which all frames fit."""
     right, up, _ = _axes()
     across, upward = motion.frames @ right, motion.frames @ up
@@ -135,7 +135,7 @@ def _ramp(strain: Floats, frame: int) -> Floats:
     return np.stack([np.interp(at, steps, _RAMP[:, c]) for c in range(3)], axis=1)
 
 
-def _bar(draw: ImageDraw.ImageDraw, motion: Motion, frame: int) -> None:
+def _bar(draw: ImageDraw.ImageDraw, motion: FoldingMotion, frame: int) -> None:
     """How far the motion has come, with a mark where the folded form is."""
     last = max(len(motion.frames) - 1, 1)
     left, right = _MARGIN * _FINE, (WIDTH - _MARGIN) * _FINE

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.program import Program
 from miurafab.gcode.reading import has_laser_mode
-from miurafab.machine.loose import burnt_on_loose_pieces, says_operations
+from miurafab.machine.loose_parts import burnt_on_loose_pieces, says_operations
 from miurafab.profiles import MachineProfile
 
 _HALF_MICRON = 5e-4

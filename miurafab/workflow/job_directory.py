@@ -23,7 +23,7 @@ from miurafab.fabrication.options import LayoutOptions, read_options
 from miurafab.fabrication.sheets import Layout, lay_out
 from miurafab.gcode.job import Job
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fold_format import fold_text, read_fold
+from miurafab.origami.formats.fold import fold_text, read_fold
 from miurafab.posting import post
 from miurafab.profiles import (
     MachineProfile,

@@ -214,7 +214,7 @@ def _pattern(path: Path, layout: _Layout, remarks: list[str]) -> CreasePattern |
         file = folder / layout.pattern_file
         if file.is_file():
             if hashlib.sha256(file.read_bytes()).hexdigest() == layout.pattern_sha256:
-                from miurafab.origami.fold_format import read_fold  # slow to load, seldom needed
+                from miurafab.origami.formats.fold import read_fold  # slow to load, seldom needed
 
                 return read_fold(file)
             remarks.append(f"{file} has changed since the sheets were made, so it is not shown.")

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from miurafab.errors import InputError
-from miurafab.origami.fit import fit
+from miurafab.origami.fitting.fit import fit
 from miurafab.origami.tradeoff import WEIGHTS, Sample, Tradeoff, cost, optimal_side, summarise
 from miurafab.workflow import plotting
 from miurafab.workflow.design import design

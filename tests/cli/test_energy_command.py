@@ -12,7 +12,7 @@ from command_line import sentence
 from problems import regular
 
 from miurafab.errors import InputError
-from miurafab.origami.fit import FitRequest, fit
+from miurafab.origami.fitting.fit import FitRequest, fit
 from miurafab.profiles import load_material
 from miurafab.surfaces.catalogue import make_surface
 from miurafab.workflow.design import save_pattern

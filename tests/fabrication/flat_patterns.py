@@ -7,7 +7,7 @@ import shapely
 from numpy.typing import NDArray
 
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.profiles.machine import Bed, Controller, MachineProfile, Motion, Tool
+from miurafab.profiles.machine import Bed, Controller, MachineProfile, MotionLimits, Tool
 from miurafab.profiles.material import Material, Operation, Perforation, TabRule
 
 
@@ -18,7 +18,7 @@ def bed(width: float, height: float, margin: float = 5.0) -> MachineProfile:
         title="Test laser",
         dialect="grbl-1.1",
         bed=Bed(width, height, margin),
-        motion=Motion((6000.0, 6000.0), (500.0, 500.0), 0.01),
+        motion=MotionLimits((6000.0, 6000.0), (500.0, 500.0), 0.01),
         tool=Tool("laser", 0, 1000, "M4", False, 1000, 0, 0.0),
         controller=Controller(115_200, "character-counting", 128, 79, 15),
         settings={},

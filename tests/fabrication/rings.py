@@ -6,7 +6,7 @@ import numpy as np
 
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cylinder import cylinder_over_polyline
-from miurafab.origami.fit import fit
+from miurafab.origami.fitting.fit import fit
 from miurafab.origami.unfold import unfold
 from miurafab.workflow.design import design
 

@@ -18,13 +18,13 @@ from readers import assert_same, read_dxf, read_hpgl, read_pdf, read_svg
 from rings import revolved, tube
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.boxes import best_turn
 from miurafab.fabrication.drawing.dxf import VERSIONS, sheet_dxf
 from miurafab.fabrication.drawing.hpgl import UNITS_PER_MM, sheet_hpgl
 from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.layout import read_layout, write_layout
 from miurafab.fabrication.options import TAB_SIDES, LayoutOptions, NestingOptions
+from miurafab.fabrication.partition.fit_box import best_turn
 from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.sheets import lay_out
 from miurafab.posting import post

@@ -8,7 +8,7 @@ import pytest
 from flat_patterns import bed, card, miura, triangles, without_grid
 
 from miurafab.fabrication.assembly import assembly_order
-from miurafab.fabrication.growing import is_disk
+from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.sheets import lay_out
 
 CASES = {

@@ -14,9 +14,9 @@ from flat_patterns import bed, card, miura, zigzag
 from rings import revolved, tube
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.boxes import best_turn
 from miurafab.fabrication.bridges import bridged
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.partition.fit_box import best_turn
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.strokes import PIN_MM, pin_centres
 from miurafab.profiles import OPERATIONS

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miurafab.fabrication.kerf import allowance, cut_lines
-from miurafab.fabrication.pieces import make_pieces
+from miurafab.fabrication.partition.patch_outline import make_pieces
 from miurafab.fabrication.sheets import lay_out
 
 

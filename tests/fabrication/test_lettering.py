@@ -13,7 +13,7 @@ from flat_patterns import bed, card, miura, triangles, zigzag
 from miurafab.errors import LayoutError
 from miurafab.fabrication.labels import CLEARANCE_MM, place_texts
 from miurafab.fabrication.lettering import text_strokes, text_width
-from miurafab.fabrication.pieces import make_pieces
+from miurafab.fabrication.partition.patch_outline import make_pieces
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tabs import choose_tabs
 

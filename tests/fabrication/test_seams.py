@@ -15,7 +15,7 @@ from miurafab.fabrication.assembly import assembly_order
 from miurafab.fabrication.labels import place_texts
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.pieces import make_pieces
+from miurafab.fabrication.partition.patch_outline import make_pieces
 from miurafab.fabrication.seams import ring_seams
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tabs import inset_of

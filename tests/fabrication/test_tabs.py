@@ -13,7 +13,7 @@ from flat_patterns import card, facet_polygons, miura, triangles, zigzag
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miurafab.fabrication.pieces import make_pieces
+from miurafab.fabrication.partition.patch_outline import make_pieces
 from miurafab.fabrication.tabs import MIN_AREA_MM2, MIN_SIDE_MM, choose_tabs, inset_of
 from miurafab.origami.crease_pattern import CreasePattern
 

@@ -16,9 +16,9 @@ from miurafab.gcode.job import Job, prepare
 from miurafab.gcode.moves import Program
 from miurafab.gcode.program import parse_program
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.motion.beam import BeamSegment
 from miurafab.profiles import load_machine
+from miurafab.simulate.grbl.controller import VirtualGrbl
 
 LASER = virtual_settings(load_machine("grbl-laser-400")) | {12: 0.01}
 STEP_MM = 1 / 80

@@ -18,10 +18,10 @@ import pytest
 from problems import fitted, regular
 
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fold_format import read_fold, write_fold
-from miurafab.origami.interop_lines import opx_text
-from miurafab.origami.interop_planar import lines_of
-from miurafab.origami.kinematics import laid_on, rigid_motion
+from miurafab.origami.folding.kinematics import laid_on, rigid_motion
+from miurafab.origami.formats.fold import read_fold, write_fold
+from miurafab.origami.formats.lines import opx_text
+from miurafab.origami.formats.planar_graph import lines_of
 from miurafab.origami.unfold import with_angles_of_the_folded_form
 
 HERE = Path(__file__).parent

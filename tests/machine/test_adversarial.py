@@ -17,7 +17,6 @@ from wires import FakeWire
 from miurafab.errors import GcodeError, MiurafabError
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import Resumption, resume
@@ -25,7 +24,8 @@ from miurafab.machine.sender import StreamResult, deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.motion.beam import standing_seconds
 from miurafab.profiles import load_machine
-from miurafab.wire.faults import parse_faults
+from miurafab.simulate.faults import parse_faults
+from miurafab.simulate.grbl.controller import VirtualGrbl
 
 MACHINE = load_machine("grbl-laser-400")
 JOB = dashes("absolute")

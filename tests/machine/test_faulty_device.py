@@ -21,10 +21,10 @@ from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import Device, VirtualTransport
 from miurafab.machine.virtual_server import load_controller
-from miurafab.marlin.virtual import VirtualMarlin
-from miurafab.plotter.virtual import VirtualPlotter
 from miurafab.profiles import MachineProfile, load_machine
-from miurafab.wire.faults import parse_faults
+from miurafab.simulate.faults import parse_faults
+from miurafab.simulate.marlin.controller import VirtualMarlin
+from miurafab.simulate.plotter import VirtualPlotter
 
 MARLIN, CUTTER = load_machine("marlin-laser-220"), load_machine("hpgl-cutter-a3")
 DASHES = 25

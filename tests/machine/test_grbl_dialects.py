@@ -12,15 +12,15 @@ from wires import FakeWire
 from miurafab.errors import ControllerError, JobStopped, MachineError
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl
-from miurafab.grbl.virtual_dialect import DIALECTS
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import resume
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile, load_machine
-from miurafab.wire.faults import parse_faults
+from miurafab.simulate.faults import parse_faults
+from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.dialect import DIALECTS
 
 PROFILES = ("grbl-laser-400", "grbl09-laser-300", "grblhal-laser-600", "fluidnc-laser-600")
 

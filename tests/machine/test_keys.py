@@ -13,14 +13,14 @@ from miurafab.errors import GcodeError, InputError, JobStopped
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.actions import talk
-from miurafab.machine.framing import frame_job
 from miurafab.machine.keys import NoKeys, terminal_keys
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import StreamResult, deliver
 from miurafab.machine.signals import StopSignals
+from miurafab.machine.trace_box import frame_job
 from miurafab.profiles import load_machine
+from miurafab.simulate.grbl.controller import VirtualGrbl
 
 MACHINE = load_machine("grbl-laser-400")
 JOB = Job(

@@ -23,11 +23,11 @@ from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
 from miurafab.machine.virtual_server import PtyWire, load_controller
-from miurafab.marlin.virtual import VirtualMarlin
 from miurafab.motion.parameters import MotionParameters
-from miurafab.plotter.virtual import VirtualPlotter
 from miurafab.profiles import load_machine
-from miurafab.wire.faults import parse_faults
+from miurafab.simulate.faults import parse_faults
+from miurafab.simulate.marlin.controller import VirtualMarlin
+from miurafab.simulate.plotter import VirtualPlotter
 from miurafab.workflow.dry_run import dry_run
 
 MACHINE = load_machine("marlin-laser-220")

@@ -18,8 +18,8 @@ from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
 from miurafab.machine.virtual_server import PtyWire
-from miurafab.plotter.virtual import VirtualPlotter
 from miurafab.profiles import load_machine
+from miurafab.simulate.plotter import VirtualPlotter
 
 MACHINE = load_machine("hpgl-cutter-a3")
 ROWS = 120

@@ -9,7 +9,7 @@ import pytest
 
 from miurafab.errors import InputError, MachineError
 from miurafab.gcode.job import Job
-from miurafab.machine.durable import DurableFile
+from miurafab.machine.append_log import DurableFile
 from miurafab.machine.journal import Journal, job_digest, read_journal
 from miurafab.machine.transcript import Transcript
 

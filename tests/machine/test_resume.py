@@ -18,7 +18,6 @@ from miurafab.errors import GcodeError, InputError, JobStopped, MachineError
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program, strokes
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.journal import JournalRun, job_digest, read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import Resumption, resume
@@ -26,7 +25,8 @@ from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.motion.beam import standing_seconds
 from miurafab.profiles import load_machine
-from miurafab.wire.faults import parse_faults
+from miurafab.simulate.faults import parse_faults
+from miurafab.simulate.grbl.controller import VirtualGrbl
 
 MACHINE = load_machine("grbl-laser-400")
 KINDS = ("disconnect", "reset", "interrupt", "power", "alarm", "hang")

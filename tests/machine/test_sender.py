@@ -21,13 +21,13 @@ from miurafab.errors import (
 from miurafab.gcode.job import Job, prepare
 from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.streamer import LineRefused
-from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile, load_machine
-from miurafab.wire.faults import parse_faults
+from miurafab.simulate.faults import parse_faults
+from miurafab.simulate.grbl.controller import VirtualGrbl
 
 MACHINE = load_machine("grbl-laser-400")
 
@@ -425,7 +425,7 @@ def test_a_full_disk_is_told_before_anything_moves() -> None:
 def test_a_disk_that_fills_up_in_mid_job_stops_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from miurafab.machine.durable import DurableFile
+    from miurafab.machine.append_log import DurableFile
 
     appended: list[int] = []
     append = DurableFile.append

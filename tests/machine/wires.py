@@ -1,6 +1,6 @@
 """A fake wire between the sender and the virtual controller: it chops and delays.
 
-What fails on order is the virtual controller's (:mod:`miurafab.wire.faults`). Time is the
+What fails on order is the virtual controller's (:mod:`miurafab.simulate.faults`). Time is the
 controller's: no test sleeps. What the host wrote is kept with the time, and so can
 be held against what the controller's beam log says.
 """
@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable
 
 from miurafab.errors import PortError
-from miurafab.grbl.virtual import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl
 
 BANNER = b"\r\nGrbl 1.1h ['$' for help]\r\n"
 

@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miurafab.gcode.job import SendLine
-from miurafab.marlin.connection import MOST_TRIES, Connection, framed
+from miurafab.marlin.connection import MOST_TRIES, MarlinConnection, framed
 from miurafab.marlin.replies import (
     Busy,
-    Fault,
     Killed,
-    Ok,
+    MarlinError,
+    MarlinOk,
     Reply,
     Resend,
     Started,
@@ -25,9 +25,9 @@ LINE = SendLine(7, b"G1X10")
 @pytest.mark.parametrize(
     ("text", "kind"),
     [
-        ("ok", Ok),
-        ("ok N12 P15 B3", Ok),
-        ("ok T:20.0 /0.0", Ok),
+        ("ok", MarlinOk),
+        ("ok N12 P15 B3", MarlinOk),
+        ("ok T:20.0 /0.0", MarlinOk),
         ("Resend: 12", Resend),
         ("rs 12", Resend),
         ("echo:busy: processing", Busy),
@@ -37,8 +37,8 @@ LINE = SendLine(7, b"G1X10")
         ("!! KILLED", Killed),
         ("Error:checksum mismatch, Last Line: 4", Reply),
         ("Error:Line Number is not Last Line Number+1, Last Line: 4", Reply),
-        ("Error:Heating failed", Fault),
-        ('echo:Unknown command: "G17"', Fault),
+        ("Error:Heating failed", MarlinError),
+        ('echo:Unknown command: "G17"', MarlinError),
         ("echo:  G21    ; Units in mm", Reply),
         ("oksana", Reply),
     ],
@@ -52,23 +52,23 @@ def test_a_frame_is_what_marlin_documents() -> None:
     assert framed(4, b"G92 E0") == b"N4 G92 E0*67\n"
 
 
-def heard(connection: Connection, text: str) -> list[Reply]:
+def heard(connection: MarlinConnection, text: str) -> list[Reply]:
     connection.receive_data(text.encode())
     return list(connection.replies())
 
 
 def test_the_count_begins_anew_and_runs_on() -> None:
-    connection = Connection()
+    connection = MarlinConnection()
     assert connection.restart_count().startswith(b"N0 M110N0*")
     assert not connection.idle
     heard(connection, "ok\n")
     assert connection.send_line(LINE).startswith(b"N1 G1X10*")
-    assert heard(connection, "ok\r\n") == [Ok("ok", LINE)]
+    assert heard(connection, "ok\r\n") == [MarlinOk("ok", LINE)]
     assert connection.send_line(LINE).startswith(b"N2 ")
 
 
 def test_a_line_asked_for_again_is_sent_again_and_answered_once() -> None:
-    connection = Connection()
+    connection = MarlinConnection()
     connection.restart_count()
     heard(connection, "ok\n")
     sent = connection.send_line(LINE)
@@ -78,26 +78,26 @@ def test_a_line_asked_for_again_is_sent_again_and_answered_once() -> None:
     assert connection.wants_again
     assert connection.send_again() == b"\n" + sent
     assert not connection.wants_again
-    assert heard(connection, "ok\n") == [Ok("ok", LINE)]
+    assert heard(connection, "ok\n") == [MarlinOk("ok", LINE)]
 
 
 def test_a_line_that_was_taken_though_its_ok_was_lost_is_not_made_twice() -> None:
-    connection = Connection()
+    connection = MarlinConnection()
     connection.restart_count()
     heard(connection, "ok\n")
     connection.send_line(LINE)
     connection.send_again()
     said = "Error:Line Number is not Last Line Number+1, Last Line: 1\nResend: 2\nok\n"
-    assert heard(connection, said)[-1] == Ok("ok", LINE)
+    assert heard(connection, said)[-1] == MarlinOk("ok", LINE)
     assert connection.idle
 
 
 def test_a_line_of_long_ago_is_a_fault_and_tries_are_counted() -> None:
-    connection = Connection()
+    connection = MarlinConnection()
     connection.restart_count()
     heard(connection, "ok\n")
     connection.send_line(LINE)
-    assert isinstance(heard(connection, "Resend: 0\n")[0], Fault)
+    assert isinstance(heard(connection, "Resend: 0\n")[0], MarlinError)
     for _ in range(MOST_TRIES - 1):
         assert connection.send_again()
     assert connection.send_again() == b""
@@ -105,7 +105,7 @@ def test_a_line_of_long_ago_is_a_fault_and_tries_are_counted() -> None:
 
 @given(st.binary(max_size=300), st.integers(1, 20))
 def test_noise_in_any_chunks_never_breaks_the_books(noise: bytes, size: int) -> None:
-    connection = Connection()
+    connection = MarlinConnection()
     connection.send_line(LINE)
     for begin in range(0, len(noise), size):
         connection.receive_data(noise[begin : begin + size])

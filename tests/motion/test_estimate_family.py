@@ -16,10 +16,10 @@ import pytest
 from miurafab.gcode.job import Job, prepare
 from miurafab.gcode.program import Program, parse_program
 from miurafab.grbl.settings import virtual_settings
-from miurafab.grbl.virtual import VirtualGrbl
 from miurafab.motion.estimate import Estimate, estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.profiles import load_machine
+from miurafab.simulate.grbl.controller import VirtualGrbl
 
 MACHINES = (
     {100: 80, 110: 12_000, 120: 1000},

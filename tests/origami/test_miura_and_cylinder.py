@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miurafab.errors import InputError
-from miurafab.fabrication.opening import open_ring
+from miurafab.fabrication.open_ring import open_ring
 from miurafab.fabrication.seams import ring_seams
-from miurafab.origami.audit import audit
-from miurafab.origami.constraints import OrigamiConstraints
 from miurafab.origami.cylinder import cylinder_on
-from miurafab.origami.fit import fit
+from miurafab.origami.fitting.constraints import OrigamiConstraints
+from miurafab.origami.fitting.fit import fit
 from miurafab.origami.miura import MiuraCell, regular_miura
 from miurafab.origami.tessellation import Tessellation
+from miurafab.origami.verify import audit
 from miurafab.surfaces.analytic import GeneralizedCylinder
 from miurafab.surfaces.catalogue import make_surface
 from miurafab.workflow.design import design

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from miurafab.errors import GcodeError
 from miurafab.gcode.job import Job
 from miurafab.plotter.stream import DROP_ALL, XOFF, XON, PlotterStream, prepared
-from miurafab.plotter.virtual import VirtualPlotter
+from miurafab.simulate.plotter import VirtualPlotter
 
 TEXT = "IN;PA;\nPU;SP4;VS5;FS120;\nPU400,400;PD800,400,800,800;\nPU;PU0,0;SP0;\n"
 

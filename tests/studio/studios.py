@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 
 from miurafab.errors import MiurafabError
-from miurafab.studio.bench import Bench
 from miurafab.studio.core import Studio
 from miurafab.studio.guard import Guard
-from miurafab.studio.messages import Request
+from miurafab.studio.messages import HttpRequest
+from miurafab.studio.session import Bench
 from miurafab.studio.work import carry_out, failure
 
 PORT, KEY = 8123, "k" * 32
@@ -76,7 +76,7 @@ def request(method, route, body=b"", **headers):
     if method == "POST":
         given |= {"origin": ORIGIN, "x-studio-key": KEY, "content-length": str(len(content))}
     given |= {name.replace("_", "-"): value for name, value in headers.items()}
-    return Request(method, f"/{KEY}/{route}", given, content)
+    return HttpRequest(method, f"/{KEY}/{route}", given, content)
 
 
 def sentence(response, status=400):

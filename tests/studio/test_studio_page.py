@@ -8,10 +8,10 @@ import pytest
 from browser import CHROMIUM, Browser
 from studios import saddle_obj
 
-from miurafab.studio.bench import Bench
 from miurafab.studio.core import Studio
 from miurafab.studio.guard import Guard
 from miurafab.studio.server import _Server
+from miurafab.studio.session import Bench
 from miurafab.studio.worker import Process
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")

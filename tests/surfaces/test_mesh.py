@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from miurafab.cli import app
 from miurafab.errors import TargetError
-from miurafab.surfaces.mesh import Layout, load_mesh, mesh_surface
+from miurafab.surfaces.mesh import MeshChart, load_mesh, mesh_surface
 from miurafab.surfaces.placement import Region
 from miurafab.surfaces.surface import tangents
 from miurafab.workflow.design import design, load_pattern
@@ -275,7 +275,7 @@ def test_a_scan_that_folds_over_itself_when_projected():
     assert sides[1] == pytest.approx(220, rel=0.05)
 
 
-def laid() -> Layout:
+def laid() -> MeshChart:
     v, f = square(21)
     return mesh_surface(v * [1, 0.5, 1], f).layout
 

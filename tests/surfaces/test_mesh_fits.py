@@ -11,9 +11,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from miurafab.origami import attempts
-from miurafab.origami.fit import fit
-from miurafab.origami.fit_request import Attempt, FitRequest
+from miurafab.origami.fitting import strategies as attempts
+from miurafab.origami.fitting.fit import fit
+from miurafab.origami.fitting.request import Attempt, FitRequest
 from miurafab.surfaces.mesh import mesh_surface
 
 SOME = ("bump-disc", "saddle-noisy", "cap", "twisted", "torus-top", "waves-noisy")

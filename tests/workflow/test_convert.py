@@ -9,10 +9,10 @@ import pytest
 from problems import fitted, regular, saddle_mesh
 
 from miurafab.errors import InputError, PatternError
-from miurafab.origami.audit import audit
-from miurafab.origami.fit import fit
-from miurafab.origami.fold_format import read_fold
-from miurafab.origami.kinematics import rigid_motion, states_between
+from miurafab.origami.fitting.fit import fit
+from miurafab.origami.folding.kinematics import rigid_motion, states_between
+from miurafab.origami.formats.fold import read_fold
+from miurafab.origami.verify import audit
 from miurafab.workflow.convert import WRITTEN, convert, read_pattern
 from miurafab.workflow.design import design, load_pattern, save_pattern
 

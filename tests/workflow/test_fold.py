@@ -15,14 +15,14 @@ from PIL import Image
 from problems import fitted, regular
 
 from miurafab.errors import InputError, PatternError
-from miurafab.origami.collisions import self_intersections
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fold_format import read_fold
+from miurafab.origami.folding.angles_csv import angles_csv, contacts
+from miurafab.origami.folding.bending import bending_motion
+from miurafab.origami.folding.contact import self_intersections
+from miurafab.origami.folding.kinematics import FoldingMotion, facet_strain, laid_on, place
+from miurafab.origami.folding.thick_panels import thick_panels
+from miurafab.origami.formats.fold import read_fold
 from miurafab.origami.invariants import edge_lengths
-from miurafab.origami.kinematics import Motion, facet_strain, laid_on, place
-from miurafab.origami.motion_bending import bending_motion
-from miurafab.origami.motion_output import angles_csv, contacts
-from miurafab.origami.thickness import thick_panels
 from miurafab.workflow.convert import read_pattern
 from miurafab.workflow.fold import fold, thickness_report, write_motion
 from miurafab.workflow.fold_gif import picture, target_frame
@@ -106,7 +106,7 @@ def test_the_published_pattern_folds_to_its_given_folded_form() -> None:
     assert np.linalg.norm(laid_on(placed, given) - given, axis=1).max() < 2e-9 * size
 
 
-def folded_through_itself() -> Motion:
+def folded_through_itself() -> FoldingMotion:
     """A strip of four squares folded by 150 degrees three times the same way."""
     x = np.repeat(np.arange(5.0), 2) * 10
     flat = np.stack([x, np.tile([0.0, 10.0], 5)], axis=1)

@@ -7,7 +7,7 @@ import os
 import pytest
 
 from miurafab.errors import InputError
-from miurafab.origami.fold_format import fold_text
+from miurafab.origami.formats.fold import fold_text
 from miurafab.origami.miura import MiuraCell, regular_miura
 from miurafab.origami.unfold import unfold
 from miurafab.workflow.job_directory import write_job

@@ -1,0 +1,1 @@
+"""Drawings of sheets and guides: SVG, DXF, PDF, HPGL."""

@@ -27,8 +27,8 @@ from miurafab.fabrication.drawing.page import (
     text,
     tint,
 )
-from miurafab.fabrication.framing import Patch
-from miurafab.fabrication.patches import boundaries
+from miurafab.fabrication.partition.patch_frame import Patch
+from miurafab.fabrication.partition.split import boundaries
 from miurafab.fabrication.sheets import Layout
 from miurafab.geometry.angles import facet_normals
 from miurafab.origami.crease_pattern import CreasePattern

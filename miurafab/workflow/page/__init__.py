@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
-from miurafab.origami.collisions import triangulate
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
+from miurafab.origami.folding.contact import triangulate
 from miurafab.version import __version__
 from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_text
 from miurafab.workflow.preview import Preview

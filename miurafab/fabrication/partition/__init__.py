@@ -1,0 +1,1 @@
+"""Splitting a pattern into patches: grids, regions, rectangle covers, seam minimum cuts."""

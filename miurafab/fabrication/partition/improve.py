@@ -1,0 +1,225 @@
+"""A valid split made better: fewer patches, then shorter seams, never an invalid one.
+
+Covers with fewer and fewer frames are looked for, beginning with the frames of the patches as they
+are and with brickwork (:mod:`~miurafab.fabrication.partition.cover_search`). Each facet goes to the
+frame that it lies deepest in, and the seams are then cut between the frames
+(:mod:`~miurafab.fabrication.partition.min_cut`). The result counts only if every facet and every
+tab is inside the frame of its patch and every patch is a disk; else the split stays as it was, but
+for its seams where they followed no grid.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.partition.cover import brickwork, excess, frame_of, nearest
+from miurafab.fabrication.partition.cover_search import CoverSearch
+from miurafab.fabrication.partition.min_cut import Recut
+from miurafab.fabrication.tabs import TabRegions
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import Material
+
+_EFFORT, _EFFORT_EACH = 500.0, 1.5
+"""Evaluations in a search for one patch less, at most, and for one facet; more facets get more in
+all and fewer each.
+"""
+
+_MORE = 3
+"""Brickwork of so many frames more than there are patches is not tried."""
+
+_LENIENT_MM = 0.6
+"""So much larger than what a patch needs are the frames of a cover; what stands out by that
+is mostly mended when the frames are put about the patches as they are cut.
+"""
+
+_CUTS, _GAIN = 4, 0.001
+"""How often frames are put about their patches anew, and the part of the seams that must be gained
+for another time.
+"""
+
+
+def improved(
+    pattern: CreasePattern,
+    patch: NDArray[np.int64],
+    part: NDArray[np.int64],
+    size: tuple[float, float],
+    ring: TabRegions,
+    depth: float,
+    material: Material,
+    options: LayoutOptions,
+    *,
+    straight: bool,
+) -> NDArray[np.int64]:
+    """(F,) a split no worse than ``patch`` (F,), ids from 0, of which the lower one bears tabs.
+
+    Patches lie within one ``part`` (F,) of the pattern each, and patches of a lower part have lower
+    numbers. ``size`` is that of the bed in mm, ``ring`` the tabs that stand on the border of the
+    pattern, and no tab stands out of its facet by more than ``depth`` mm. ``straight`` seams, along
+    the lines of a grid, are the easiest to glue: they stay as they are unless a patch is saved.
+    """
+    room = _room(pattern, ring)
+    alternate = options.tab_side == "alternate"
+
+    def recut(patch: NDArray[np.int64], frames: NDArray[np.float64]) -> NDArray[np.int64] | None:
+        """The split with shorter seams, or None if it does not hold."""
+        cut = Recut(
+            pattern,
+            patch,
+            frames,
+            size,
+            room,
+            part,
+            material,
+            full_facet=options.full_facet,
+            alternate=alternate,
+        )
+        for turn in range(_CUTS):
+            before = cut.seam_cost
+            cut.run(2)
+            if turn and cut.seam_cost > (1 - _GAIN) * before and not cut.faults():
+                break
+            cut.reframe()
+        return None if cut.faults() or cut.misshapen() else cut.patch
+
+    for fewer in _fewer(pattern, part, patch, size, room, (2 if alternate else 1) * depth):
+        found = recut(*fewer)
+        if found is not None:
+            break
+    else:
+        if straight:
+            return patch
+        found = recut(patch, _frames(room, patch, np.arange(len(patch)), size))
+        if found is not None and _seam_mm(pattern, found) >= _seam_mm(pattern, patch):
+            found = None
+    if found is None:
+        return patch
+    return np.unique(found, return_inverse=True)[1].astype(np.int64)
+
+
+def _seam_mm(pattern: CreasePattern, patch: NDArray[np.int64]) -> float:
+    pair = pattern.edges_faces
+    seam = (pair >= 0).all(axis=1) & (patch[pair[:, 0]] != patch[pair[:, 1]])
+    ends = pattern.vertices_coords[pattern.edges_vertices[seam]]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+
+
+def _frames(
+    room: NDArray[np.float64],
+    patch: NDArray[np.int64],
+    facets: NDArray[np.int64],
+    size: tuple[float, float],
+) -> NDArray[np.float64]:
+    """(K, 3) the frames about the patches that ``facets`` make up, alone."""
+    order = facets[np.argsort(patch[facets], kind="stable")]
+    ends = np.flatnonzero(np.diff(patch[order])) + 1
+    return np.array([frame_of(room[f].reshape(-1, 2), *size) for f in np.split(order, ends)])
+
+
+def _fewer(
+    pattern: CreasePattern,
+    part: NDArray[np.int64],
+    patch: NDArray[np.int64],
+    size: tuple[float, float],
+    room: NDArray[np.float64],
+    depth: float,
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+    """Splits of fewer patches than ``patch``, with their frames, the fewest first; tabs may still
+    stand out.
+    """
+    shapes = _without_rim(pattern, room, depth / 2)
+    small = (size[0] - depth + _LENIENT_MM, size[1] - depth + _LENIENT_MM)
+    if min(small) <= 0:
+        return
+    area = _areas(shapes[:, : pattern.faces_vertices.shape[1]])
+    chains = []
+    for name in np.unique(part).tolist():
+        facets = np.flatnonzero(part == name)
+        least = math.ceil(area[facets].sum() / (small[0] * small[1]) - 1e-9)
+        search = CoverSearch(shapes[facets], *small)
+        effort = min(_EFFORT, _EFFORT_EACH * len(facets) ** 0.6)
+        frames = _frames(room, patch, facets, size)
+        starts = [
+            search.begin(each)
+            for each in (frames, *brickwork(room[facets], small))
+            if len(each) < len(frames) + _MORE
+        ]
+        chain = [starts[0].frames]
+        while len(chain[-1]) > least:
+            cover = search.fewer(starts, len(chain[-1]) - 1, effort)
+            if cover is None:
+                break
+            chain.append(cover)
+        chains.append((facets, chain))
+    for back in range(max(len(chain) for _, chain in chains) - 1):
+        covers = [chain[max(len(chain) - 1 - back, 0)] for _, chain in chains]
+        found = np.empty_like(part)
+        for (facets, _), cover, first in zip(
+            chains, covers, np.cumsum([0, *(len(c) for c in covers)]), strict=False
+        ):
+            found[facets] = first + _deepest(room[facets], cover, size)
+        yield found, np.concatenate(covers)
+
+
+def _deepest(
+    room: NDArray[np.float64], frames: NDArray[np.float64], size: tuple[float, float]
+) -> NDArray[np.int64]:
+    """(N,) the frame that each facet lies deepest in."""
+    near, _ = nearest(room.mean(axis=1), frames, *size, 4)
+    over = np.stack([excess(room, frames[column], *size) for column in near.T], axis=1)
+    found: NDArray[np.int64] = near[np.arange(len(near)), over.argmin(axis=1)]
+    return found
+
+
+def _room(pattern: CreasePattern, ring: TabRegions) -> NDArray[np.float64]:
+    """(F, c, 2) the corners of each facet and of the tabs that stand on the pattern's border."""
+    corners = pattern.faces_vertices
+    room = pattern.vertices_coords[np.where(corners >= 0, corners, corners[:, :1])]
+    order = np.argsort(ring.own_face, kind="stable")
+    own = ring.own_face[order]
+    place = np.arange(len(own)) - np.searchsorted(own, own)
+    points = np.where(ring.present[..., None], ring.points, ring.points[:, :1])
+    for turn in range(int(place.max(initial=-1)) + 1):
+        # One tab of each facet at a time; facets without repeat their first corner.
+        tab = order[place == turn]
+        tab = tab[ring.count[tab] > 0]
+        more = np.repeat(room[:, :1], points.shape[1], axis=1)
+        more[ring.own_face[tab]] = points[tab]
+        room = np.concatenate([room, more], axis=1)
+    return room
+
+
+def _without_rim(
+    pattern: CreasePattern, room: NDArray[np.float64], depth: float
+) -> NDArray[np.float64]:
+    """``room`` with the border of the pattern drawn in by ``depth`` mm, but by no more than half
+    the way to the middle of a facet: no tab of another patch is wanted there.
+    """
+    border = np.flatnonzero((pattern.edges_faces >= 0).sum(axis=1) == 1)
+    face = pattern.edges_faces[border].max(axis=1)
+    middle = room.mean(axis=1)
+    found = room.copy()
+    ends = pattern.vertices_coords[pattern.edges_vertices[border]]
+    along = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    inwards = np.column_stack([-along[:, 1], along[:, 0]]) / np.maximum(length, 1e-12)[:, None]
+    far = ((middle[face] - ends[:, 0]) * inwards).sum(axis=1)
+    inwards *= np.sign(far)[:, None]
+    far = np.abs(far)
+    for slot in range(room.shape[1]):
+        off = ((found[face, slot] - ends[:, 0]) * inwards).sum(axis=1)
+        push = np.clip(np.minimum(depth, far / 2) - off, 0.0, None)
+        np.add.at(found, (face, slot), push[:, None] * inwards)
+    return found
+
+
+def _areas(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(F,) the areas of facets with corners ``points`` (F, k, 2), in mm²."""
+    x, y = (points - points[:, :1]).transpose(2, 0, 1)
+    doubled = (x[:, :-1] * y[:, 1:] - x[:, 1:] * y[:, :-1]).sum(axis=1)
+    found: NDArray[np.float64] = np.abs(doubled) / 2
+    return found

@@ -1,0 +1,292 @@
+"""Where the seams run, given the rectangles that the patches must keep to.
+
+Each patch has a frame (:mod:`~miurafab.fabrication.partition.cover`), and must keep its facets and
+its tabs inside. Where the frames of two patches A and B overlap, the seam between them is free.
+With a patch l(f) for each facet, what a split costs is
+
+    E = Σ over seam edges of their length + P (facets outside their frame + tabs outside theirs)
+
+with P far larger than any length. For one pair of patches, everything else held fast, the least E
+is a minimum cut: facets that both frames hold are nodes, A is the source, B the sink, an edge
+between two of them has as capacity what it costs as a seam of A and B (which is not the same in
+both directions, for it may be A or B that bears the tab), and what a facet costs towards its fixed
+neighbours ties it to source or sink. All pairs in turn, until nothing gains, is the swap algorithm
+of Boykov, Veksler and Zabih (2001). A cut that would leave a patch not a disk is not made.
+
+Along a grid many stepped seams are equally short; so each grid line has a price of its own, all but
+the same, and a seam keeps to one line as long as it can.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import breadth_first_order, maximum_flow
+
+from miurafab.fabrication.partition.cover import excess, frame_of
+from miurafab.fabrication.partition.fit_box import TOLERANCE
+from miurafab.fabrication.partition.region_growing import is_disk
+from miurafab.fabrication.seams import all_seams, inner_seams
+from miurafab.fabrication.tabs import TabRegions, tab_regions
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import Material
+
+_FLUSH_MM = TOLERANCE / 2
+"""What stands out no farther is flush with the frame, and :func:`~.boxes.best_turn` will agree."""
+
+_UNIT = 1000
+"""So many units of cost are the mean edge length."""
+
+_PENALTY = 1_000_000
+"""P in units of cost."""
+
+_PRICE = 0.01
+"""The dearest grid line costs so much more than the cheapest, as a part."""
+
+
+class Recut:
+    """A split under improvement: ``patch`` (F,) the patch of each facet, ``frames`` (K, 3).
+
+    ``room`` (F, c, 2) are the corners of each facet and of what stands on it in any case;
+    ``alternate`` tells that a tab may stand on either side of a seam, not only on the lower patch.
+    Facets in different parts (``part`` (F,)) are never joined.
+    """
+
+    def __init__(
+        self,
+        pattern: CreasePattern,
+        patch: NDArray[np.int64],
+        frames: NDArray[np.float64],
+        size: tuple[float, float],
+        room: NDArray[np.float64],
+        part: NDArray[np.int64],
+        material: Material,
+        *,
+        full_facet: bool,
+        alternate: bool,
+    ) -> None:
+        self.pattern, self.patch, self.frames = pattern, patch.copy(), frames.copy()
+        self.size, self.room, self.part = size, room, part
+        self.material, self.full_facet, self.alternate = material, full_facet, alternate
+        faces = np.arange(len(patch))[:, None]
+        edges = pattern.faces_edges
+        pair = pattern.edges_faces[edges]
+        self.side = np.where(pair[..., 0] == faces, 1, 0)
+        other = np.take_along_axis(pair, self.side[..., None], axis=2)[..., 0]
+        self.across = np.where(edges >= 0, other, -1)
+        ends = pattern.vertices_coords[pattern.edges_vertices]
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        self.cost = np.maximum(np.rint(_UNIT * length * _prices(pattern) / length.mean()), 1.0)
+        self._hold()
+        self._make_tabs()
+
+    def _hold(self) -> None:
+        """Find which facets each frame holds."""
+        centres = self.room.mean(axis=1)
+        radius = np.linalg.norm(self.room - centres[:, None], axis=2).max(axis=1)
+        self.held = []
+        for frame in self.frames:
+            middle = excess(centres[:, None], frame, *self.size)
+            close = np.flatnonzero(middle <= 0)
+            inside = middle[close] <= -radius[close]
+            doubtful = close[~inside]
+            inside[~inside] = excess(self.room[doubtful], frame, *self.size) <= _FLUSH_MM
+            self.held.append(close[inside])
+
+    def _make_tabs(self) -> None:
+        """The tabs, on both sides, of all edges where a seam might run."""
+        pattern = self.pattern
+        times = np.bincount(np.concatenate(self.held), minlength=len(self.patch))
+        pair = pattern.edges_faces
+        inner = (pair >= 0).all(axis=1) & (pattern.edges_assignment != "C")
+        loose = (times[pair] != 1).any(axis=1) | (self.patch[pair[:, 0]] != self.patch[pair[:, 1]])
+        edges = np.flatnonzero(inner & loose)
+        both = np.concatenate([edges, edges])
+        sides = np.repeat([0, 1], len(edges))
+        self.tabs: TabRegions = tab_regions(
+            pattern, inner_seams(pattern, both, sides), self.material, full_facet=self.full_facet
+        )
+        self.tab = np.full((len(pattern.edges_vertices), 2), -1)
+        self.tab[both, sides] = np.arange(len(both))
+        weak = self.tabs.glue < self.material.tabs.min_area_mm2
+        self.weak = weak
+        # A corner that is not there is put where one is.
+        points, present = self.tabs.points, self.tabs.present
+        self.tab_points = np.where(present[..., None], points, points[:, :1])
+        self.tab_points[~present.any(axis=1)] = np.nan
+
+    def _outside(self, tab: NDArray[np.int64], patch: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether each tab, -1 for none, stands out of the frame of ``patch``; same shapes."""
+        found = np.zeros(tab.shape, dtype=bool)
+        real = np.flatnonzero((tab >= 0).ravel() & (patch >= 0).ravel())
+        which, where = tab.ravel()[real], patch.ravel()[real]
+        over = excess(self.tab_points[which], self.frames[where], *self.size)
+        found.ravel()[real] = over > _FLUSH_MM
+        return found
+
+    def _seam_cost(
+        self,
+        facet: NDArray[np.int64],
+        mine: NDArray[np.int64],
+        theirs: NDArray[np.int64],
+    ) -> NDArray[np.float64]:
+        """(n, k) what the sides of ``facet`` (n,) cost if it is in patch ``mine`` (n,) and its
+        neighbours are in ``theirs`` (n, k), -1 for none.
+        """
+        edges, side = self.pattern.faces_edges[facet], self.side[facet]
+        seam = (self.across[facet] >= 0) & (theirs != mine[:, None])
+        lower = mine[:, None] < theirs
+        own, other = self.tab[edges, side], self.tab[edges, 1 - side]
+        bears = seam & (lower | self.alternate | (self.weak[other] & (other >= 0)))
+        taken = seam & (~lower | self.alternate | (self.weak[own] & (own >= 0)))
+        out = self._outside(np.where(bears, own, -1), np.where(bears, mine[:, None], -1))
+        out |= self._outside(np.where(taken, other, -1), np.where(taken, theirs, -1))
+        found: NDArray[np.float64] = np.where(seam, self.cost[edges] + _PENALTY * out, 0.0)
+        return found
+
+    def faults(self) -> int:
+        """How many facets and tabs stand out of the frame of their patch."""
+        held = np.zeros(len(self.patch), dtype=bool)
+        for patch, facets in enumerate(self.held):
+            held[facets] |= self.patch[facets] == patch
+        seam = np.flatnonzero((self.across >= 0).any(axis=1))
+        near = self.across[seam]
+        theirs = np.where(near >= 0, self.patch[near], -1)
+        rim = (near >= 0) & (theirs != self.patch[seam, None])
+        seam, theirs = seam[rim.any(axis=1)], theirs[rim.any(axis=1)]
+        cost = self._seam_cost(seam, self.patch[seam], theirs)
+        return int((~held).sum()) + int((cost >= _PENALTY).sum())
+
+    def reframe(self) -> None:
+        """Put each frame about its patch and the tabs on it, with the room left over shared out."""
+        near = np.where(self.across >= 0, self.patch[self.across], -1)
+        real = self.pattern.faces_edges >= 0
+        rim = (real & (near != self.patch[:, None])).any(axis=1)
+        seams = all_seams(self.pattern, self.patch)
+        seams = seams.take(seams.edges[:, 0] == seams.edges[:, 1])
+        lower = self.patch[seams.faces[:, 0]] < self.patch[seams.faces[:, 1]]
+        if self.alternate:
+            seams = seams.joined(seams.swapped(np.ones(len(seams), dtype=bool)))
+        else:
+            seams = seams.swapped(~lower)
+        edges = seams.edges[:, 0]
+        side = np.where(self.pattern.edges_faces[edges, 0] == seams.faces[:, 1], 0, 1)
+        tab = self.tab[edges, side]
+        points = np.concatenate(
+            [self.room[rim].reshape(-1, 2), self.tab_points[tab].reshape(-1, 2)]
+        )
+        owner = np.concatenate(
+            [
+                np.repeat(self.patch[rim], self.room.shape[1]),
+                np.repeat(self.patch[seams.faces[:, 0]], self.tab_points.shape[1]),
+            ]
+        )
+        owner = np.where(np.isnan(points[:, 0]), len(self.frames), owner)
+        order = np.argsort(owner, kind="stable")
+        ends = np.searchsorted(owner[order], np.arange(len(self.frames) + 1)).tolist()
+        for patch, (start, end) in enumerate(itertools.pairwise(ends)):
+            if end > start:
+                self.frames[patch] = frame_of(points[order[start:end]], *self.size)
+        self._hold()
+        self._make_tabs()
+
+    @property
+    def seam_cost(self) -> float:
+        """What all seams cost, in thousandths of the mean edge length."""
+        pair = self.pattern.edges_faces
+        seam = (pair >= 0).all(axis=1) & (self.patch[pair[:, 0]] != self.patch[pair[:, 1]])
+        return float(self.cost[seam].sum())
+
+    def run(self, rounds: int) -> None:
+        """Cut between all pairs of neighbours, up to ``rounds`` times."""
+        fresh = np.ones(len(self.frames), dtype=bool)
+        for _ in range(rounds):
+            pairs = self._pairs()
+            pairs = pairs[fresh[pairs].any(axis=1)]
+            fresh[:] = False
+            for one, other in pairs.tolist():
+                if self._swap(one, other):
+                    fresh[[one, other]] = True
+            if not fresh.any():
+                return
+
+    def _pairs(self) -> NDArray[np.int64]:
+        """(P, 2) patches next to each other, the lower one first."""
+        pair = self.pattern.edges_faces[(self.pattern.edges_faces >= 0).all(axis=1)]
+        pair = pair[self.part[pair[:, 0]] == self.part[pair[:, 1]]]
+        sides = np.sort(self.patch[pair], axis=1)
+        return np.unique(sides[sides[:, 0] != sides[:, 1]], axis=0)
+
+    def _swap(self, one: int, other: int) -> bool:
+        """Cut anew between two patches; whether anything changed."""
+        zone = np.intersect1d(self.held[one], self.held[other], assume_unique=True)
+        zone = zone[(self.patch[zone] == one) | (self.patch[zone] == other)]
+        if not len(zone):
+            return False
+        zone = zone[self.part[zone] == self.part[zone[0]]] if self._mixed(zone) else zone
+        nodes = len(zone)
+        place = np.full(len(self.patch), -1)
+        place[zone] = np.arange(nodes)
+        near = self.across[zone]
+        to = np.where(near >= 0, place[near], -1)
+        within = to >= 0
+        theirs = np.where(near >= 0, self.patch[near], -1)
+        fixed = np.where(within, -1, theirs)
+        a, b = np.full(nodes, one), np.full(nodes, other)
+        if_a = np.where(fixed >= 0, self._seam_cost(zone, a, fixed), 0.0).sum(axis=1)
+        if_b = np.where(fixed >= 0, self._seam_cost(zone, b, fixed), 0.0).sum(axis=1)
+        apart = self._seam_cost(zone, a, np.where(within, other, -1))
+        row, column = np.nonzero(within)
+        source, sink = nodes, nodes + 1
+        tail = np.concatenate([row, np.full(nodes, source), np.arange(nodes)])
+        head = np.concatenate([to[row, column], np.arange(nodes), np.full(nodes, sink)])
+        cost = np.concatenate([apart[row, column], if_b, if_a])
+        graph = scipy.sparse.csr_array(
+            (cost.astype(np.int32), (tail, head)), shape=(nodes + 2, nodes + 2)
+        )
+        flow = maximum_flow(graph, source, sink)
+        rest = scipy.sparse.coo_array(graph - flow.flow)
+        more = rest.data > 0
+        ahead = scipy.sparse.csr_array(
+            (rest.data[more], (rest.row[more], rest.col[more])), shape=graph.shape
+        )
+        reached = breadth_first_order(ahead, source, return_predecessors=False)
+        is_a = np.zeros(nodes + 2, dtype=bool)
+        is_a[reached] = True
+        before = self.patch[zone]
+        in_a = before == one
+        cut = in_a[row] & ~in_a[to[row, column]]
+        was = if_a[in_a].sum() + if_b[~in_a].sum() + apart[row, column][cut].sum()
+        if flow.flow_value >= was:
+            return False
+        sound = [self._is_disk(patch) for patch in (one, other)]
+        self.patch[zone] = np.where(is_a[:nodes], one, other)
+        if any(was and not self._is_disk(p) for p, was in zip((one, other), sound, strict=True)):
+            self.patch[zone] = before
+            return False
+        return True
+
+    def _is_disk(self, patch: int) -> bool:
+        facets = np.flatnonzero(self.patch == patch)
+        return not len(facets) or is_disk(self.pattern, facets)
+
+    def misshapen(self) -> list[int]:
+        """The patches that are not disks."""
+        return [patch for patch in np.unique(self.patch).tolist() if not self._is_disk(patch)]
+
+    def _mixed(self, zone: NDArray[np.int64]) -> bool:
+        return bool((self.part[zone] != self.part[zone[0]]).any())
+
+
+def _prices(pattern: CreasePattern) -> NDArray[np.float64]:
+    """(E,) what a mm of each edge costs as a seam, 1 or a little more."""
+    if pattern.grid is None:
+        return np.ones(len(pattern.edges_vertices))
+    columns = pattern.grid[0]
+    low, high = np.sort(pattern.edges_vertices, axis=1).T
+    line = np.where(high - low == 1, low // columns, low % columns)
+    price: NDArray[np.float64] = 1.0 + _PRICE * ((line * 0.6180339887498949) % 1.0)
+    return price

@@ -1,0 +1,152 @@
+"""Patches: pieces in a frame of their own, and as many of each as there are copies of the model.
+
+A piece is turned to the smallest box that fits its sheet and moved until that box begins at the
+origin. Where it has to lie along the fibres of a sheet it keeps the directions of the pattern.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import LayoutError
+from miurafab.fabrication.nesting import turned
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.partition.fit_box import Space
+from miurafab.fabrication.partition.patch_outline import Piece, Pieces, make_pieces
+from miurafab.fabrication.stock import LaidStock
+from miurafab.fabrication.tabs import FOLDS, Tab
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import Material
+
+DIGITS = 6
+"""Decimals of mm that a layout keeps, so that what is written is what was computed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """One piece, in its own frame. ``faces`` (n,) int64 index the pattern's facets.
+
+    ``outline_mm`` (m, 2) is the cut line with tabs, kerf included, counter-clockwise, and
+    ``waste_mm`` further closed cut lines inside it, around enclosed waste; there rarely are any.
+    A point p of the pattern is R(``rotation_deg``) (p - ``origin_mm``) in this frame. ``copy`` is
+    the number of the model that it belongs to, from 1.
+    """
+
+    id: int
+    label: str
+    faces: NDArray[np.int64]
+    outline_mm: NDArray[np.float64]
+    waste_mm: tuple[NDArray[np.float64], ...]
+    origin_mm: tuple[float, float]
+    rotation_deg: float
+    tabs: tuple[Tab, ...]
+    copy: int = 1
+
+    def from_pattern(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """``points`` (n, 2) of the pattern in the patch frame."""
+        return turned(points - self.origin_mm, self.rotation_deg)
+
+
+@dataclass(frozen=True, eq=False)
+class Framed:
+    """All ``pieces`` of a pattern, the ``numbers`` (N,) int64 of their tabs, and the patches that
+    they are, of one copy of the model.
+    """
+
+    pieces: Pieces
+    numbers: NDArray[np.int64]
+    patches: tuple[Patch, ...]
+
+
+def frame_patches(
+    pattern: CreasePattern, stock: LaidStock, material: Material, options: LayoutOptions
+) -> Framed:
+    """The patches of a pattern, each no larger than the main sheet of ``stock``.
+
+    Raises :class:`~miurafab.errors.LayoutError` as
+    :func:`~miurafab.fabrication.partition.patch_outline.make_pieces`.
+    """
+    kind = stock.kinds.kinds[stock.main]
+    turns = tuple(sorted({turn // 90 % 2 for turn in kind.rotations})) if stock.upright else None
+    pieces = make_pieces(pattern, kind.width, kind.height, material, options, turns=turns)
+    numbers = _numbers(pieces)
+    space = Space(kind.width, kind.height, turns)
+    patches = (
+        _patch(pattern, number, piece, pieces, numbers, space)
+        for number, piece in enumerate(pieces.pieces)
+    )
+    return Framed(pieces, numbers, tuple(patches))
+
+
+def copied(patches: tuple[Patch, ...], quantity: int) -> tuple[Patch, ...]:
+    """The patches of ``quantity`` models, model by model; told apart by their ids and labels."""
+    if quantity == 1:
+        return patches
+    count = len(patches)
+    return tuple(
+        replace(
+            patch,
+            id=patch.id + count * copy,
+            label=f"{patch.label}-{copy + 1}",
+            tabs=tuple(
+                replace(tab, mate_patch=tab.mate_patch + count * copy) for tab in patch.tabs
+            ),
+            copy=copy + 1,
+        )
+        for copy in range(quantity)
+        for patch in patches
+    )
+
+
+def _numbers(pieces: Pieces) -> NDArray[np.int64]:
+    """The number of each tab, from 1, patch by patch along the outline."""
+    numbers = np.empty(len(pieces.tabs), dtype=np.int64)
+    order = np.concatenate([piece.tabs for piece in pieces.pieces])
+    numbers[order] = np.arange(1, len(order) + 1)
+    return numbers
+
+
+def _patch(
+    pattern: CreasePattern,
+    number: int,
+    piece: Piece,
+    pieces: Pieces,
+    numbers: NDArray[np.int64],
+    space: Space,
+) -> Patch:
+    line = piece.cut_lines[0]
+    angle = space.turn(line)
+    if angle is None:
+        raise LayoutError(f"Patch {number} with its tabs does not fit the bed at any angle.")
+    rotation = round(-math.degrees(angle), 9) if angle else 0.0
+    low = turned(line, rotation).min(axis=0)
+    origin = np.round(turned(low, -rotation), DIGITS)
+
+    def framed(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.round(turned(points - origin, rotation), DIGITS)
+
+    tabs = pieces.tabs
+    return Patch(
+        id=number,
+        label=f"P{number + 1}",
+        faces=piece.faces,
+        outline_mm=framed(line),
+        waste_mm=tuple(framed(ring) for ring in piece.cut_lines[1:]),
+        origin_mm=(float(origin[0]), float(origin[1])),
+        rotation_deg=rotation,
+        tabs=tuple(
+            Tab(
+                number=int(numbers[tab]),
+                edge=int(tabs.edge[tab]),
+                mate_edge=int(tabs.seams.edges[tab, 1]),
+                mate_patch=int(pieces.face_patch[tabs.mate_face[tab]]),
+                polygon_mm=framed(tabs.polygon(tab)),
+                fold=FOLDS.get(str(tabs.seams.fold[tab]), "flat"),
+            )
+            for tab in piece.tabs.tolist()
+        ),
+    )

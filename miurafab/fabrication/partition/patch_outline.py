@@ -1,0 +1,159 @@
+"""A piece: one patch as it is cut out, facets, tabs and cut line, still in the pattern's plane.
+
+The outline of a piece is the boundary of its patch with each of its own tabs let in on its seam
+edge. Tabs lie in facets of other patches, so this is a simple closed curve, unless the flat pattern
+overlaps itself or a tab stands on the border of the pattern, where nothing keeps it clear of the
+rest; tabs that would collide then are left out by name. A piece that outgrows the bed by tabs put
+on the other side of a seam, or made higher, does without those.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from miurafab.fabrication.kerf import allowance, cut_lines
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.partition.fit_box import Space
+from miurafab.fabrication.partition.split import Boundary, boundaries, split
+from miurafab.fabrication.tabs import TabRegions, choose_tabs
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import Material
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One patch in the pattern's plane, in mm.
+
+    ``faces`` (n,) int64 are its facets and ``tabs`` (t,) int64 its tabs, in turn along its
+    outline; ``outline`` (m, 2) is the finished piece, counter-clockwise, and ``cut_lines`` what
+    the beam follows: the outer ring first, then rings around enclosed waste.
+    """
+
+    faces: NDArray[np.int64]
+    tabs: NDArray[np.int64]
+    outline: NDArray[np.float64]
+    cut_lines: list[NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """All pieces of a pattern. ``face_patch`` (F,) is the piece of each facet, ``tabs`` all tabs,
+    and ``untabbed`` (u,) the seam edges where neither side can bear one.
+    """
+
+    pieces: list[Piece]
+    face_patch: NDArray[np.int64]
+    tabs: TabRegions
+    untabbed: NDArray[np.int64]
+
+
+def make_pieces(
+    pattern: CreasePattern,
+    width: float,
+    height: float,
+    material: Material,
+    options: LayoutOptions | None = None,
+    *,
+    turns: tuple[int, ...] | None = None,
+) -> Pieces:
+    """The pattern split into pieces that each fit ``width`` x ``height`` mm, cut lines included,
+    turned at will or by quarter ``turns`` alone.
+
+    Raises :class:`~miurafab.errors.LayoutError` as
+    :func:`~miurafab.fabrication.partition.split.split`.
+    """
+    options = options or LayoutOptions()
+    if options.max_patch_mm is not None:
+        long, short = options.max_patch_mm
+        along, across = (long, short) if width >= height else (short, long)
+        width, height = min(width, along), min(height, across)
+    space = Space(width, height, turns).smaller(2 * allowance(material.kerf_mm))
+    face_patch = split(pattern, space.width, space.height, material, options, turns=turns)
+    around = boundaries(pattern, face_patch)
+    tight = np.zeros(len(around), dtype=bool)
+    while True:
+        tabs, unusual, untabbed = choose_tabs(pattern, face_patch, material, options, tight)
+        outlines, standing = _outlines(pattern, face_patch, around, tabs)
+        outgrown = [
+            bool(unusual[own].any()) and space.turn(outline) is None
+            for outline, own in zip(outlines, standing, strict=True)
+        ]
+        if not any(outgrown):
+            break
+        tight |= outgrown
+    kept = _without_collisions(pattern, around, outlines, standing, tabs)
+    untabbed = np.sort(np.concatenate([untabbed, tabs.edge[~kept]]))
+    tabs = tabs.take(kept)
+
+    outlines, standing = _outlines(pattern, face_patch, around, tabs)
+    lines = cut_lines(outlines, material.kerf_mm)
+    order = np.argsort(face_patch, kind="stable")
+    faces = np.split(order, np.flatnonzero(np.diff(face_patch[order])) + 1)
+    pieces = [Piece(*parts) for parts in zip(faces, standing, outlines, lines, strict=True)]
+    return Pieces(pieces, face_patch, tabs, untabbed)
+
+
+def _outlines(
+    pattern: CreasePattern,
+    face_patch: NDArray[np.int64],
+    around: list[Boundary],
+    tabs: TabRegions,
+) -> tuple[list[NDArray[np.float64]], list[NDArray[np.int64]]]:
+    """The outline of each patch, and its tabs in turn along it."""
+    tab_of_edge = np.full(len(pattern.edges_vertices), -1)
+    tab_of_edge[tabs.edge] = np.arange(len(tabs))
+    owner = face_patch[tabs.own_face]
+    outlines, standing = [], []
+    for patch, boundary in enumerate(around):
+        found = tab_of_edge[boundary.edges]
+        foreign = found >= 0
+        foreign[foreign] = owner[found[foreign]] != patch
+        found[foreign] = -1
+        corners = pattern.vertices_coords[boundary.vertices]
+        parts = []
+        before = 0
+        for at in np.flatnonzero(found >= 0).tolist():
+            # The base is the tab's first side; the outline leaves it out and goes around.
+            parts += [corners[before : at + 1], np.roll(tabs.polygon(found[at]), -1, axis=0)]
+            before = at + 1
+        outlines.append(np.concatenate([*parts, corners[before:]]))
+        standing.append(found[found >= 0])
+    return outlines, standing
+
+
+def _without_collisions(
+    pattern: CreasePattern,
+    around: list[Boundary],
+    outlines: list[NDArray[np.float64]],
+    standing: list[NDArray[np.int64]],
+    tabs: TabRegions,
+) -> NDArray[np.bool_]:
+    """(N,) which tabs may stay."""
+    kept = np.ones(len(tabs), dtype=bool)
+    valid = shapely.is_valid(np.array([shapely.Polygon(outline) for outline in outlines]))
+    for patch in np.flatnonzero(~valid).tolist():
+        taken: BaseGeometry = shapely.Polygon(pattern.vertices_coords[around[patch].vertices])
+        for tab in standing[patch].tolist():
+            shape = shapely.Polygon(tabs.polygon(tab))
+            if _common_area(taken, shape) < 1e-6 and _meets_in_base(taken, shape):
+                taken = shapely.union(taken, shape, grid_size=1e-9)
+            else:
+                kept[tab] = False
+    return kept
+
+
+def _common_area(one: BaseGeometry, other: BaseGeometry) -> float:
+    # Without a grid, GEOS 3.14 can return a whole polygon that only touches the other one.
+    return float(shapely.area(shapely.intersection(one, other, grid_size=1e-9)))
+
+
+def _meets_in_base(taken: BaseGeometry, tab: shapely.Polygon) -> bool:
+    """Whether ``tab`` touches what is taken in its base alone, its first side."""
+    base = shapely.LineString(shapely.get_coordinates(tab)[:2])
+    rest = shapely.difference(tab.exterior, base.buffer(1e-6))
+    return bool(shapely.distance(rest, taken) > 0)

@@ -1,0 +1,283 @@
+"""The route over creases with the least travel: a postman's tour, not a salesman's.
+
+Creases are the edges of a graph whose nodes are pattern vertices, and the beam can pass from one
+crease to the next at a node for nothing. The route begins at a given point and may end anywhere:
+that is a closed tour with one more edge, from a node that is everywhere at once to the starting
+point. A closed tour without travel exists if the graph is connected and every node is even. So
+travel legs are added:
+
+1. The odd nodes are matched in pairs with the least total length. The assignment problem (every
+   node is sent to another one) is a relaxation of matching: half its value is a lower bound. Its
+   cycles of even length split into two matchings, of which the shorter is taken; what remains of
+   odd cycles is assigned again; and pairs of legs are exchanged as long as that shortens them.
+2. Components that are still apart are joined by exchanging two legs ab, cd for ac, bd, the
+   exchange that costs least first. If nothing is tied to the starting point by then, it is let in
+   where that costs least, at a leg or at the nearest node.
+3. The tour passes each node by the cheapest of its pairings
+   (:mod:`~miurafab.fabrication.route.tour`).
+
+The rural postman problem is NP-hard for several components; for one component steps 1 and 3 give
+the optimum whenever the matching is optimal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+import scipy.sparse
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from miurafab.fabrication.route.tour import closed_tour
+
+_ASSIGNED = 1200
+"""Odd nodes that are assigned at once; more are halved along the longer side first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """``order`` (M,) the creases in turn and ``backwards`` (M,) whether from b to a.
+
+    ``legs_mm`` is the travel between the nodes in mm, from the starting point on, and
+    ``bound_mm`` what no route falls below (0 where it is not known).
+    """
+
+    order: NDArray[np.int64]
+    backwards: NDArray[np.bool_]
+    legs_mm: float
+    bound_mm: float
+
+
+def find_route(
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    positions: NDArray[np.float64],
+    start: NDArray[np.float64],
+    ends: NDArray[np.float64] | None = None,
+    corner: float = 1.0,
+) -> Route:
+    """The route over M creases between the nodes ``a`` and ``b`` (M,), none of which is a loop.
+
+    ``positions`` (N, 2) in mm are those of the nodes; the route begins near ``start`` (2,).
+    ``ends`` (M, 2, 2) are the ends of the creases as they are drawn, the nodes if not given, and a
+    corner is taken to cost as much as ``corner`` mm of travel.
+    """
+    if not len(a):
+        return Route(np.empty(0, dtype=np.int64), np.empty(0, dtype=bool), 0.0, 0.0)
+    count, nodes = len(a), len(positions)
+    # The extra edge runs from the starting point to a node whose position, NaN, means anywhere.
+    tails, heads = np.append(a, nodes), np.append(b, nodes + 1)
+    placed = np.concatenate([positions, [start], [[np.nan, np.nan]]])
+    odd = np.flatnonzero(np.bincount(np.concatenate([tails, heads])) % 2)
+    legs, bound = match(odd, placed)
+    legs = _with_bare_components(tails, heads, legs, placed)
+    begins = (np.sort(legs, axis=1) == [nodes, nodes + 1]).all(axis=1)
+    if begins.any():
+        # Nothing is tied to the starting point yet, so it goes in last and where that costs least.
+        legs = _joined(a, b, legs[~begins], placed)
+        legs = _begun(np.unique([a, b]), legs, nodes, placed)
+    else:
+        legs = _joined(tails, heads, legs, placed)
+    drawn = placed[np.stack([np.append(tails, legs[:, 0]), np.append(heads, legs[:, 1])], axis=1)]
+    if ends is not None:
+        drawn[:count] = ends
+    tour = closed_tour(np.append(tails, legs[:, 0]), np.append(heads, legs[:, 1]), drawn, corner)
+    extra = int(np.flatnonzero(tour[:, 0] == count)[0])
+    if tour[extra, 1] == 0:
+        tour = np.column_stack([tour[::-1, 0], 1 - tour[::-1, 1]])
+        extra = len(tour) - 1 - extra
+    tour = np.roll(tour, -extra, axis=0)
+    made = tour[tour[:, 0] < count]
+    return Route(made[:, 0], made[:, 1] == 1, float(_lengths(legs, placed).sum()), bound)
+
+
+def match(
+    nodes: NDArray[np.int64], positions: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], float]:
+    """Pairs (n / 2, 2) of an even number of ``nodes`` (n,), and a lower bound of their length in
+    mm (0 where the nodes were halved).
+    """
+    if len(nodes) > _ASSIGNED:
+        points = positions[nodes]
+        axis = int(np.argmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
+        ordered = nodes[np.argsort(positions[nodes, axis], kind="stable")]
+        half = len(nodes) // 4 * 2
+        one, other = match(ordered[:half], positions)[0], match(ordered[half:], positions)[0]
+        return np.concatenate([one, other]), 0.0
+    pairs: list[tuple[int, int]] = []
+    bound, left = 0.0, nodes
+    while len(left):
+        points = positions[left]
+        apart = _apart(points[:, None], points[None])
+        np.fill_diagonal(apart, 4 * apart.max() + 1.0)
+        _, sent = scipy.optimize.linear_sum_assignment(apart)
+        if left is nodes:
+            bound = float(apart[np.arange(len(left)), sent].sum() / 2)
+        alone = _split_cycles(sent, apart, left, pairs)
+        left = np.array(alone, dtype=np.int64)
+    legs = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    return _exchanged(legs, positions), bound
+
+
+def _split_cycles(
+    sent: NDArray[np.int64],
+    apart: NDArray[np.float64],
+    names: NDArray[np.int64],
+    pairs: list[tuple[int, int]],
+) -> list[int]:
+    """Append the pairs that the cycles of ``sent`` give, and return the nodes left alone."""
+    alone: list[int] = []
+    seen = np.zeros(len(sent), dtype=bool)
+    for first in range(len(sent)):
+        if seen[first]:
+            continue
+        cycle = [first]
+        while (after := int(sent[cycle[-1]])) != first:
+            cycle.append(after)
+        seen[cycle] = True
+        if len(cycle) % 2:
+            # Without one node an odd cycle is a path; the best one to leave out is tried for.
+            turns = [cycle[k + 1 :] + cycle[:k] for k in range(len(cycle))]
+            costs = [apart[turn[0::2], turn[1::2]].sum() for turn in turns]
+            k = int(np.argmin(costs))
+            alone.append(int(names[cycle[k]]))
+            chosen = turns[k]
+        else:
+            other = cycle[1:] + cycle[:1]
+            shorter = apart[cycle[0::2], cycle[1::2]].sum() <= apart[other[0::2], other[1::2]].sum()
+            chosen = cycle if shorter else other
+        ends = names[chosen]
+        pairs += zip(ends[0::2].tolist(), ends[1::2].tolist(), strict=True)
+    return alone
+
+
+def _apart(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The distances of points (..., 2); 0 to a point that is anywhere."""
+    found: NDArray[np.float64] = np.nan_to_num(np.linalg.norm(x - y, axis=-1), nan=0.0)
+    return found
+
+
+def _lengths(legs: NDArray[np.int64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    return _apart(positions[legs[:, 0]], positions[legs[:, 1]])
+
+
+def _exchange_gains(
+    some: NDArray[np.int64], legs: NDArray[np.int64], positions: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """(m, n) what is gained by exchanging ``some`` legs (m, 2) with ``legs`` (n, 2), and whether
+    straight (ac, bd) or crossed (ad, bc).
+    """
+    a, b = positions[some[:, None, 0]], positions[some[:, None, 1]]
+    c, d = positions[legs[:, 0]], positions[legs[:, 1]]
+    straight, crossed = _apart(a, c) + _apart(b, d), _apart(a, d) + _apart(b, c)
+    now = _lengths(some, positions)[:, None] + _lengths(legs, positions)
+    return now - np.minimum(straight, crossed), straight <= crossed
+
+
+def _exchange(legs: NDArray[np.int64], i: int, j: int, straight: bool) -> None:
+    (a, b), (c, d) = legs[i].tolist(), legs[j].tolist()
+    legs[i], legs[j] = ((a, c), (b, d)) if straight else ((a, d), (b, c))
+
+
+def _exchanged(legs: NDArray[np.int64], positions: NDArray[np.float64]) -> NDArray[np.int64]:
+    """The legs after all exchanges of two that shorten them."""
+    if len(legs) < 2:
+        return legs
+    legs = legs.copy()
+    while True:
+        gains, straight = _exchange_gains(legs, legs, positions)
+        np.fill_diagonal(gains, -np.inf)
+        if gains.max() <= 1e-9:
+            return legs
+        used = np.zeros(len(legs), dtype=bool)
+        for i in np.argsort(-gains.max(axis=1), kind="stable").tolist():
+            j = int(np.argmax(gains[i]))
+            if gains[i, j] > 1e-9 and not used[i] and not used[j]:
+                used[[i, j]] = True
+                _exchange(legs, i, j, bool(straight[i, j]))
+
+
+def _joined(
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    legs: NDArray[np.int64],
+    positions: NDArray[np.float64],
+) -> NDArray[np.int64]:
+    """The legs changed so that creases and legs are one component."""
+    _, label = _components(a, b, legs, len(positions))
+    if label.max() == 0:
+        return legs
+    legs = legs.copy()
+    of_leg = label[legs[:, 0]]
+    gains, straight = _exchange_gains(legs, legs, positions)
+    gains[of_leg[:, None] == of_leg] = -np.inf
+    for _ in range(int(label.max())):
+        i, j = divmod(int(np.argmax(gains)), len(legs))
+        _exchange(legs, i, j, bool(straight[i, j]))
+        of_leg[of_leg == of_leg[j]] = of_leg[i]
+        both = [i, j]
+        gains[both], straight[both] = _exchange_gains(legs[both], legs, positions)
+        gains[:, both], straight[:, both] = gains[both].T, straight[both].T
+        one = np.flatnonzero(of_leg == of_leg[i])
+        gains[np.ix_(one, one)] = -np.inf
+    return legs
+
+
+def _begun(
+    used: NDArray[np.int64],
+    legs: NDArray[np.int64],
+    start: int,
+    positions: NDArray[np.float64],
+) -> NDArray[np.int64]:
+    """The legs of a closed tour through the nodes ``used`` with node ``start``, and after it the
+    node that is anywhere, let in: in place of the leg that saves most, or at the nearest node.
+    """
+    away = _apart(positions[used], positions[start])
+    node = int(used[np.argmin(away)])
+    cost = _apart(positions[legs], positions[start]) - _lengths(legs, positions)[:, None]
+    if not len(legs) or away.min() <= cost.min():
+        return np.concatenate([legs, [[start, node], [node, start + 1]]])
+    k, end = divmod(int(np.argmin(cost)), 2)
+    entry, last = legs[k, end], legs[k, 1 - end]
+    return np.concatenate([np.delete(legs, k, axis=0), [[start, entry], [last, start + 1]]])
+
+
+def _components(
+    a: NDArray[np.int64], b: NDArray[np.int64], legs: NDArray[np.int64], nodes: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The nodes in use, and (N,) the component of each node, from 0 for those in use."""
+    tails, heads = np.concatenate([a, legs[:, 0]]), np.concatenate([b, legs[:, 1]])
+    graph = scipy.sparse.coo_array((np.ones(len(tails)), (tails, heads)), shape=(nodes, nodes))
+    _, raw = connected_components(graph, directed=False)
+    used = np.unique(np.concatenate([a, b]))
+    label = np.full(nodes, -1, dtype=np.int64)
+    label[used] = np.unique(raw[used], return_inverse=True)[1]
+    return used, label
+
+
+def _with_bare_components(
+    a: NDArray[np.int64],
+    b: NDArray[np.int64],
+    legs: NDArray[np.int64],
+    positions: NDArray[np.float64],
+) -> NDArray[np.int64]:
+    """The legs with all components that have none joined to one that has."""
+    used, label = _components(a, b, legs, len(positions))
+    for bare in np.setdiff1d(label[used], label[legs[:, 0]]).tolist():
+        members = np.flatnonzero(label == bare)
+        legs = _with_bare(members, legs[label[legs[:, 0]] != bare], positions)
+    return legs
+
+
+def _with_bare(
+    members: NDArray[np.int64], legs: NDArray[np.int64], positions: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """The legs with the nodes ``members``, which have none, joined by the least detour of a leg."""
+    ends = positions[legs]
+    out = _apart(positions[members][:, None, None], ends[None]).sum(axis=2)
+    extra = out - _lengths(legs, positions)
+    w, k = divmod(int(np.argmin(extra)), len(legs))
+    node, (c, d) = int(members[w]), legs[k].tolist()
+    return np.concatenate([np.delete(legs, k, axis=0), [[c, node], [node, d]]])

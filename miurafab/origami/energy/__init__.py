@@ -1,0 +1,1 @@
+"""Folding energy: hinges, the bar-and-hinge model, equilibrium, the folding path."""

@@ -1,0 +1,206 @@
+"""Paper as bars and hinges: edges that keep their length, and folds that resist bending.
+
+Each quad is split on its shorter diagonal. The energy of a shape x is
+
+    E(x) = sum over hinges 1/2 k (rho - rho_0)^2 + sum over bars c^2 / (2 delta),
+    c = (|d|^2 - L^2) / (2 L)
+
+over fold angles rho and bar vectors d; a bar of compliance delta = 0 does not stretch at all. The
+hinges are the diagonals (and edges assigned F), of stiffness k = k_f l and flat at rest, and the
+creases, of stiffness k = k_c l and at rest in the folded form. With k_c = 0, the default and the
+reading of Dudte et al., Nature Materials 15 (2016), only bent facets cost energy. The unit of
+length is the pattern's mean edge L and the unit of energy k_f L, until a material gives a size:
+
+    k of a diagonal = 0.55 D (l / t)^(1/3),   D = E t^3 / (12 (1 - nu^2))
+
+(E. T. Filipov, K. Liu, T. Tachi, M. Schenk and G. H. Paulino, Bar and hinge models for scalable
+analysis of origami, Int. J. Solids Struct. 124 (2017).)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import PatternError
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.hinges import hinge_angles
+from miurafab.origami.invariants import edge_lengths
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+POISSON_RATIO = 0.3
+"""Of a material that gives only its modulus; D changes by 4 % between 0.25 and 0.35."""
+DEGENERATE = 1e-9
+"""In mean edges: a shorter edge or a lower triangle is a fault of the pattern."""
+FACET_BENDING = 0.55
+"""C_B of Filipov et al. 2017, for quads whose sides do not stretch."""
+
+
+@dataclass(frozen=True, eq=False)
+class BarHingeModel:
+    """A sheet of V vertices, in the unit of length ``unit_mm`` and of energy ``unit_joule``.
+
+    ``points`` (V, 3) the shape it was made from. ``bars`` (B, 2) with rest ``lengths`` (B,) and
+    ``compliance`` (B,); ``hinges`` (H, 4) of vertices u, v, a, b with ``stiffness`` (H,) and
+    ``rest`` angles (H,). ``creases`` (C, 4) are hinges too, on the pattern's edges
+    ``creases_edges`` (C,) that have a facet on both sides and are not assigned F, whether they
+    resist or not. ``unit_joule`` is None where no material was given.
+    """
+
+    points: Floats
+    bars: Ints
+    lengths: Floats
+    compliance: Floats
+    hinges: Ints
+    stiffness: Floats
+    rest: Floats
+    creases: Ints = field(default_factory=lambda: np.empty((0, 4), dtype=np.int64))
+    creases_edges: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    unit_mm: float = 1.0
+    unit_joule: float | None = None
+
+    def strains(self, points: Floats) -> Floats:
+        """(B,) c = (|d|^2 - L^2) / (2 L) of each bar at ``points`` (V, 3)."""
+        d = points[self.bars[:, 1]] - points[self.bars[:, 0]]
+        strain: Floats = (np.einsum("bk,bk->b", d, d) - self.lengths**2) / (2 * self.lengths)
+        return strain
+
+    def energy(self, points: Floats) -> float:
+        """The energy at ``points`` (V, 3); bars of compliance 0 add nothing."""
+        bend = hinge_angles(points, self.hinges) - self.rest
+        soft = self.compliance > 0
+        strain = self.strains(points)[soft]
+        stretch = float((strain**2 / self.compliance[soft]).sum())
+        return 0.5 * (float((self.stiffness * bend**2).sum()) + stretch)
+
+
+@dataclass(frozen=True)
+class Paper:
+    """What a sheet is made of: ``thickness_mm`` and Young's ``modulus_pa``."""
+
+    thickness_mm: float
+    modulus_pa: float
+
+    @property
+    def bending_stiffness(self) -> float:
+        """D = E t^3 / (12 (1 - nu^2)) in joules."""
+        thickness = self.thickness_mm * 1e-3
+        return self.modulus_pa * thickness**3 / (12 * (1 - POISSON_RATIO**2))
+
+
+def sheet_model(
+    pattern: CreasePattern, *, paper: Paper | None = None, crease_ratio: float = 0.0
+) -> BarHingeModel:
+    """The bars and hinges of ``pattern``, at rest in its folded form.
+
+    ``crease_ratio`` is k_c / k_f, or with ``paper`` the stiffness of a crease over that of a
+    diagonal of its length. Raises :class:`~miurafab.errors.PatternError` for a pattern without
+    a folded form, with facets of more than four corners, or without a crease.
+    """
+    if pattern.folded_coords is None:
+        raise PatternError(
+            "The pattern has no folded form, so the energy of folding it is not defined; make one "
+            "with 'miurafab fit', or give the folded mesh to 'miurafab convert --folded'."
+        )
+    if pattern.faces_vertices.shape[1] > 4:
+        raise PatternError(
+            "The pattern has facets of more than four corners; split them into triangles or quads."
+        )
+    unit = float(edge_lengths(pattern, pattern.folded_coords).mean())
+    points = pattern.folded_coords / unit
+    facets = _diagonals(points, pattern.faces_vertices)
+    inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+    across = _across_edges(pattern, facets, inner)
+    flat = pattern.edges_assignment[inner] == "F"
+    if flat.all():
+        raise PatternError("The pattern has no crease between two facets, so nothing folds.")
+    diagonals = facets[facets[:, 0] >= 0]
+    _refuse_degenerate(points, pattern.edges_vertices, np.concatenate([diagonals, across]))
+    creases = across[~flat]
+    bending = np.concatenate([diagonals, across[flat]])
+    hinges, weights, rest = bending, np.ones(len(bending)), np.zeros(len(bending))
+    if crease_ratio > 0:
+        hinges = np.concatenate([bending, creases])
+        weights = np.concatenate([weights, np.full(len(creases), crease_ratio)])
+        rest = np.concatenate([rest, hinge_angles(points, creases)])
+    along = _lengths(points, hinges[:, :2])
+    unit_joule = None
+    if paper is not None:
+        slender = float(np.cbrt(unit / paper.thickness_mm))
+        unit_joule = FACET_BENDING * paper.bending_stiffness * slender
+        along = np.cbrt(along)
+    bars = np.concatenate([pattern.edges_vertices, diagonals[:, :2]])
+    return BarHingeModel(
+        points=points,
+        bars=bars,
+        lengths=_lengths(points, bars),
+        compliance=np.zeros(len(bars)),
+        hinges=hinges,
+        stiffness=weights * along,
+        rest=rest,
+        creases=creases,
+        creases_edges=inner[~flat],
+        unit_mm=unit,
+        unit_joule=unit_joule,
+    )
+
+
+def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:
+    short = np.flatnonzero(_lengths(points, edges) < DEGENERATE)
+    if len(short):
+        raise PatternError(f"Edge {short[0]} has no length, so its facets cannot bend about it.")
+    base = points[hinges[:, 1]] - points[hinges[:, 0]]
+    for wing in (2, 3):
+        out = points[hinges[:, wing]] - points[hinges[:, 0]]
+        area = np.linalg.norm(np.cross(base, out), axis=1)
+        thin = np.flatnonzero(area < DEGENERATE * np.linalg.norm(base, axis=1))
+        if len(thin):
+            raise PatternError(f"A facet at vertex {hinges[thin[0], wing]} has no width.")
+
+
+def _lengths(points: Floats, pairs: Ints) -> Floats:
+    length: Floats = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)
+    return length
+
+
+def _diagonals(points: Floats, faces: Ints) -> Ints:
+    """(F, 4) the hinge u, v, a, b on each facet's shorter diagonal, -1 for triangles.
+
+    Where a quad is not convex only the diagonal from its reflex corner lies inside, and is taken.
+    """
+    hinges = np.full((len(faces), 4), -1, dtype=np.int64)
+    if faces.shape[1] < 4:
+        return hinges
+    quads = faces[:, 3] >= 0
+    q = faces[quads]
+    p = points[q]
+    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    turn = np.stack(
+        [np.cross(p[:, k] - p[:, k - 1], p[:, (k + 1) % 4] - p[:, k]) for k in range(4)], axis=1
+    )
+    reflex = np.einsum("qck,qk->qc", turn, normal) < 0
+    first, second = _lengths(points, q[:, [0, 2]]), _lengths(points, q[:, [1, 3]])
+    across = np.where(reflex.any(axis=1), reflex[:, 1] | reflex[:, 3], second < first)
+    # the corner after v is on the left of u -> v
+    hinges[quads] = np.where(across[:, None], q[:, [1, 3, 0, 2]], q[:, [0, 2, 3, 1]])
+    return hinges
+
+
+def _across_edges(pattern: CreasePattern, diagonals: Ints, edges: Ints) -> Ints:
+    """(n, 4) the hinge of each of ``edges``: its ends, and the third corners of its triangles."""
+    faces, ends = pattern.faces_vertices, pattern.edges_vertices[edges]
+    third = []
+    for side in (0, 1):
+        face = pattern.edges_faces[edges, side]
+        corners, split = faces[face], diagonals[face]
+        other = (corners >= 0) & (corners != ends[:, :1]) & (corners != ends[:, 1:])
+        # the end of this face's diagonal that is not on the crease; any corner of a triangle
+        beyond = other & (
+            (corners == split[:, :1]) | (corners == split[:, 1:2]) | (split[:, :1] < 0)
+        )
+        third.append(corners[np.arange(len(corners)), beyond.argmax(axis=1)])
+    return np.concatenate([ends, np.stack(third, axis=1)], axis=1)

@@ -1,0 +1,346 @@
+"""Static equilibrium of bars and hinges with one quantity driven: a saddle-point Newton iteration.
+
+The driven quantity d(x), a fold angle or a distance, is held at s. Equilibrium is a stationary
+point of L = E_hinges + f.c + mu (d - s) with c = delta f, that is F = 0 for
+
+    F_x = grad E_hinges + J' f + mu grad d,   F_c = c - delta f,   F_d = d - s
+
+with bar forces f; -mu is the torque (or force) that has to be applied there. One step solves, with
+A' = (J' grad d), n = (f, mu) and D = diag(delta, 0),
+
+    [ H  A' ] [ dx ]       [ F_x ]
+    [ A  -D ] [ dn ]  =  - [ F_a ],    H = Hessian of L,
+
+by eliminating dn after D has been raised by a tiny eps: K dx = -F_x - A' W F_a and
+dn = W (A dx + F_a), with K = H + A' W A and W = 1 / (D + eps). K is as sparse as the mesh and a
+third of the saddle system in size, without zeros on its diagonal, so one fill-reducing order of
+the vertices serves every factorisation and no pivoting is needed. Where the iteration ends depends
+neither on eps nor on how old K is, since F is exact; so K is factored anew only when the iteration
+slows down.
+
+Rigid motions are taken out by holding six coordinates of one triangle, in axes laid along it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import SuperLU, splu
+
+from miurafab.origami.energy.bar_hinge import BarHingeModel
+from miurafab.origami.energy.hinges import hinge_angles, hinge_derivatives, hinge_gradients
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+TOLERANCE = 1e-11
+"""On every component of F (forces over the stiffest hinge, if that is over 1): convergence is
+judged by what is out of balance, never by the length of a step."""
+EPS = 1e-10
+"""The compliance lent to inextensible bars in K. Larger, and large bar forces slow the iteration
+down; smaller, and rounding does.
+"""
+SLOW = 0.2
+"""K is factored anew when an iteration leaves more than this of the residual."""
+MAX_ITERATIONS = 25
+SHORTEST_STEP = 1.0 / 64
+ENOUGH = 0.1
+"""A step counts if it lowers the residual by this part of what a linear problem would give."""
+
+
+class EquilibriumState(NamedTuple):
+    """A shape with its reactions: ``points`` (V, 3), bar ``forces`` (B,) and the multiplier ``mu``
+    of the driven quantity, in the axes of :attr:`Driven.axes`.
+    """
+
+    points: Floats
+    forces: Floats
+    mu: float
+
+    def plus(self, step: EquilibriumState, factor: float) -> EquilibriumState:
+        """This state plus ``factor`` times ``step``."""
+        return EquilibriumState(
+            self.points + factor * step.points,
+            self.forces + factor * step.forces,
+            self.mu + factor * step.mu,
+        )
+
+
+class Residual(NamedTuple):
+    """F: ``force`` (free coordinates,), ``strain`` (B,), and the driven quantity's ``miss``."""
+
+    force: Floats
+    strain: Floats
+    miss: float
+
+
+class Factored(NamedTuple):
+    """K factored, with the ``bars`` gradients n (B, 3), their weights W (B,) and grad d."""
+
+    lu: SuperLU
+    bars: Floats
+    weights: Floats
+    drive: Floats
+
+
+class Solution(NamedTuple):
+    """Where an iteration ended, its last factorisation (to start the next one with), and whether
+    F fell below the tolerance.
+    """
+
+    state: EquilibriumState
+    factored: Factored | None
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """A model with one driven quantity: the fold angle of the hinge ``stencil`` (4,), or the
+    distance between the two vertices of ``stencil`` (2,).
+    """
+
+    model: BarHingeModel
+    stencil: Ints
+
+    @property
+    def rest(self) -> EquilibriumState:
+        """The shape that the model was made from, free of forces."""
+        return EquilibriumState(self.model.points @ self.axes, np.zeros(len(self.model.bars)), 0.0)
+
+    @cached_property
+    def axes(self) -> Floats:
+        """(3, 3) orthonormal columns: along the first side of the held triangle, and in its plane.
+
+        A state's points are the model's turned into these axes: ``points @ axes``.
+        """
+        p = self.model.points[self._held]
+        x = (p[1] - p[0]) / np.linalg.norm(p[1] - p[0])
+        z = np.cross(x, p[2] - p[0])
+        z /= np.linalg.norm(z)
+        return np.stack([x, np.cross(z, x), z], axis=1)
+
+    def value(self, points: Floats) -> float:
+        """The driven quantity at ``points`` (V, 3)."""
+        if len(self.stencil) == 4:
+            return float(hinge_angles(points, self.stencil[None])[0])
+        return float(np.linalg.norm(points[self.stencil[1]] - points[self.stencil[0]]))
+
+    def residual(self, state: EquilibriumState, target: float) -> Residual:
+        """F at ``state`` with the driven quantity wanted at ``target``."""
+        model, points = self.model, state.points
+        angle, gradient = hinge_gradients(points, model.hinges)
+        bend = (model.stiffness * (angle - model.rest))[:, None, None] * gradient
+        d = points[model.bars[:, 1]] - points[model.bars[:, 0]]
+        pull = (state.forces / model.lengths)[:, None] * d
+        value, drive = self._drive_gradient(points)
+        force = self._gather(bend, pull, state.mu * drive)
+        strain = model.strains(points) - model.compliance * state.forces
+        return Residual(force, strain, value - target)
+
+    def size(self, residual: Residual) -> float:
+        """The largest component of F; not a number where a triangle has degenerated."""
+        force = np.abs(residual.force).max(initial=0.0) / self._stiffest
+        strain = np.abs(residual.strain).max(initial=0.0)
+        return float(np.max([force, strain, abs(residual.miss)]))
+
+    def factor(self, state: EquilibriumState) -> Factored:
+        """K at ``state``. Raises ``RuntimeError`` (SuperLU's) where it is singular."""
+        model, points = self.model, state.points
+        angle, gradient, hessian = hinge_derivatives(points, model.hinges)
+        k = model.stiffness[:, None, None, None, None]
+        bend = k * (gradient[:, :, :, None, None] * gradient[:, None, None, :, :])
+        bend += (model.stiffness * (angle - model.rest))[:, None, None, None, None] * hessian
+        bars = (points[model.bars[:, 1]] - points[model.bars[:, 0]]) / model.lengths[:, None]
+        weights = 1.0 / (model.compliance + EPS)
+        one = weights[:, None, None] * bars[:, :, None] * bars[:, None, :]
+        one += (state.forces / model.lengths)[:, None, None] * np.eye(3)
+        stretch = np.stack([one, -one, -one, one], axis=1)
+        drive, turning = self._drive_hessian(points)
+        held = state.mu * turning + drive[:, :, None, None] * drive / EPS
+        values = (bend.swapaxes(2, 3), stretch, held.swapaxes(1, 2))
+        rows, starts, place = self._sparsity
+        data = np.bincount(place, np.concatenate([v.ravel() for v in values]), len(rows) + 1)[1:]
+        size = len(starts) - 1
+        matrix = sparse.csc_array((data, rows, starts), shape=(size, size))
+        lu = splu(
+            matrix,
+            permc_spec="NATURAL",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        return Factored(lu, bars, weights, drive)
+
+    def step(self, factored: Factored, residual: Residual) -> EquilibriumState:
+        """The Newton step (dx, dn) for ``residual`` with K as ``factored``."""
+        bars, weights, drive = factored.bars, factored.weights, factored.drive
+        pull = (weights * residual.strain)[:, None] * bars
+        none = np.zeros((len(self.model.hinges), 4, 3))
+        right = residual.force + self._gather(none, pull, residual.miss / EPS * drive)
+        coordinates = np.zeros(self.model.points.size)
+        coordinates[self._free] = -factored.lu.solve(right)
+        dx: Floats = coordinates.reshape(-1, 3)
+        first, second = self.model.bars.T
+        stretch = np.einsum("bk,bk->b", bars, dx[second] - dx[first])
+        return EquilibriumState(
+            dx,
+            weights * (stretch + residual.strain),
+            (float((drive * dx[self.stencil]).sum()) + residual.miss) / EPS,
+        )
+
+    def _drive_gradient(self, points: Floats) -> tuple[float, Floats]:
+        if len(self.stencil) == 4:
+            angle, gradient = hinge_gradients(points, self.stencil[None])
+            return float(angle[0]), gradient[0]
+        apart = points[self.stencil[1]] - points[self.stencil[0]]
+        distance = float(np.linalg.norm(apart))
+        return distance, np.stack([-apart, apart]) / distance
+
+    def _drive_hessian(self, points: Floats) -> tuple[Floats, Floats]:
+        """The driven quantity's gradient (k, 3) and Hessian (k, 3, k, 3)."""
+        if len(self.stencil) == 4:
+            _, gradients, hessians = hinge_derivatives(points, self.stencil[None])
+            return gradients[0], hessians[0]
+        distance, gradient = self._drive_gradient(points)
+        across = (np.eye(3) - np.outer(gradient[1], gradient[1])) / distance
+        signs = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        return gradient, signs[:, None, :, None] * across[None, :, None, :]
+
+    def _gather(self, bend: Floats, pull: Floats, drive: Floats) -> Floats:
+        """The free coordinates of the sum, over vertices, of the vectors of hinges, bars, drive."""
+        vectors = np.concatenate([bend.reshape(-1, 3), -pull, pull, drive])
+        count = len(self.model.points)
+        total = np.empty((count, 3))
+        for axis in range(3):
+            total[:, axis] = np.bincount(self._ends, vectors[:, axis], count)
+        return total.ravel()[self._free]
+
+    @cached_property
+    def _stiffest(self) -> float:
+        return float(self.model.stiffness.max(initial=1.0))
+
+    @cached_property
+    def _ends(self) -> Ints:
+        hinges, bars = self.model.hinges, self.model.bars
+        return np.concatenate([hinges.ravel(), bars[:, 0], bars[:, 1], self.stencil])
+
+    @cached_property
+    def _held(self) -> Ints:
+        """The corners (3,) of the triangle that is held: the one nearest to the middle."""
+        model = self.model
+        centres = model.points[model.hinges[:, :3]].mean(axis=1)
+        away = np.linalg.norm(centres - model.points.mean(axis=0), axis=1)
+        return model.hinges[np.argmin(away), :3]
+
+    @cached_property
+    def _free(self) -> Ints:
+        """The free coordinates (3 vertex + axis) in the order of elimination."""
+        first, second, third = self._held * 3
+        held = [first, first + 1, first + 2, second + 1, second + 2, third + 2]
+        coordinates = (self._elimination[:, None] * 3 + np.arange(3)).ravel()
+        return coordinates[~np.isin(coordinates, held)]
+
+    @cached_property
+    def _pairs(self) -> tuple[Ints, Ints]:
+        """The vertex pairs of all 3x3 blocks of K, in the order in which they are computed."""
+        rows, columns = [], []
+        for stencils in (self.model.hinges, self.model.bars, self.stencil[None]):
+            size = stencils.shape[1]
+            rows.append(np.repeat(stencils, size, axis=1).ravel())
+            columns.append(np.tile(stencils, size).ravel())
+        return np.concatenate(rows), np.concatenate(columns)
+
+    @cached_property
+    def _elimination(self) -> Ints:
+        """(V,) vertices in a fill-reducing order: SuperLU's minimum degree on the vertex graph."""
+        count = len(self.model.points)
+        rows, columns = self._pairs
+        ones = np.ones(len(rows))
+        graph = sparse.coo_array((ones, (rows, columns)), shape=(count, count)).tocsc()
+        graph.data[:] = -1.0
+        graph.setdiag(np.diff(graph.indptr) + 1.0)  # diagonally dominant: factored as it stands
+        lu = splu(
+            graph,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        return np.argsort(lu.perm_c).astype(np.int64)
+
+    @cached_property
+    def _sparsity(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Ints]:
+        """Rows and column starts of K (CSC), and the place of each computed value in its data:
+        1 + the index, or 0 for a held coordinate.
+        """
+        free = self._free
+        new = np.full(self.model.points.size, -1, dtype=np.int64)
+        new[free] = np.arange(len(free))
+        of_vertex = new.reshape(-1, 3)
+        row, column = (of_vertex[ends] for ends in self._pairs)
+        rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
+        real = (rows >= 0) & (columns >= 0)
+        key = np.where(real, columns * len(free) + rows, -1).ravel()
+        found, place = np.unique(key, return_inverse=True)
+        columns, rows = np.divmod(found[found >= 0], len(free))
+        starts = np.searchsorted(columns, np.arange(len(free) + 1))
+        offset = 1 - int((found < 0).sum())
+        return rows.astype(np.int32), starts.astype(np.int32), place + offset
+
+
+def solve(
+    driven: Driven, guess: EquilibriumState, target: float, factored: Factored | None = None
+) -> Solution:
+    """The equilibrium near ``guess`` with the driven quantity at ``target``.
+
+    ``factored`` is an earlier K to begin with. A step that does not lower the largest component of
+    F is first taken again with a fresh K, then shortened. Failure is a result, not an exception.
+    """
+    state, fresh = guess, False
+    residual = driven.residual(state, target)
+    size = driven.size(residual)
+    for _ in range(MAX_ITERATIONS):
+        if size <= TOLERANCE:
+            return Solution(_polished(driven, state, target, factored), factored, True)
+        if not np.isfinite(size):
+            break
+        if factored is None:
+            try:
+                factored, fresh = driven.factor(state), True
+            except RuntimeError:  # SuperLU: exactly singular
+                break
+        step = driven.step(factored, residual)
+        length = 1.0
+        while True:
+            trial = state.plus(step, length)
+            left = driven.residual(trial, target)
+            better = driven.size(left) < (1 - ENOUGH * length) * size
+            if better or not fresh or length <= SHORTEST_STEP:
+                break
+            length /= 2
+        if better:
+            stale = driven.size(left) > SLOW * size
+            state, residual, size = trial, left, driven.size(left)
+        elif fresh:
+            break
+        else:
+            stale = True
+        if stale:
+            factored = None
+        fresh = False
+    return Solution(state, None, False)
+
+
+def _polished(
+    driven: Driven, state: EquilibriumState, target: float, factored: Factored | None
+) -> EquilibriumState:
+    """One more step on the last K, which takes the residual down to rounding, if it does."""
+    if factored is None:
+        return state
+    residual = driven.residual(state, target)
+    better = state.plus(driven.step(factored, residual), 1.0)
+    is_better = driven.size(driven.residual(better, target)) < driven.size(residual)
+    return better if is_better else state

@@ -1,0 +1,374 @@
+"""How hard a folded sheet resists unfolding: its energy along the quasi-static path to flat.
+
+One crease is driven from its angle in the folded form towards flat in equal steps; at each the
+whole sheet is in static equilibrium (:mod:`miurafab.origami.energy.equilibrium`). The torque is the
+slope of the energy, dE/d rho, so its zeros are the stable states and the barriers, found between
+the steps by regula falsi. Flat itself is a branch point, where very many motions meet; the path
+stops a little short of it.
+
+A sheet that folds rigidly has an energy of zero all the way; the less flat-foldable it is, the
+higher the barrier that keeps the folded form (Dudte et al., Nature Materials 15 (2016)).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import InputError, PatternError
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
+from miurafab.origami.energy.equilibrium import Driven, EquilibriumState, Factored, solve
+from miurafab.origami.energy.hinges import hinge_angles
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Progress = Callable[[float, str], None]
+
+NEARLY_FLAT = math.radians(2.5)
+"""Where the driven crease stops short of flat."""
+HISTORY = 4
+"""States that the predictor extrapolates from: a cubic through the last four."""
+MAX_HALVINGS = 7
+NOISE = 1e-15
+"""Energies up to this, in the model's unit, are rounding: the sheet folds rigidly."""
+MAX_FALSI = 30
+ZERO_LOAD = 1e-9
+"""Of the torques beside it: what is left where the energy is stationary, to second order."""
+SMALL_TURN = 1e-3
+"""The turn, in radians, to either side of the folded form over which its stiffness is measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """n equilibria in a row, the first of them the folded form.
+
+    ``coords`` (n, V, 3) in mm, in the folded form's own axes with one triangle near the middle
+    held still; ``drives`` (n,) the driven fold angle in radians, or the distance in mm;
+    ``energies`` (n,) and ``loads`` (n,), the torque or force dE/d drive, in the units of ``model``.
+    Where the path could not be followed to its end ``converged`` is False, and it holds what was
+    reached.
+    """
+
+    coords: Floats
+    drives: Floats
+    energies: Floats
+    loads: Floats
+    converged: bool
+    model: BarHingeModel
+
+
+@dataclass(frozen=True)
+class StableState:
+    """A local minimum of the energy along the path: the driven fold ``angle`` in radians."""
+
+    angle: float
+    energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyCurve:
+    """The energy along ``path`` and what it says.
+
+    ``barrier`` is the highest maximum of the energy between the folded form and flat, 0 where there
+    is none, and ``barrier_angle`` the driven angle there, or None. ``stable`` are the local minima
+    from the folded form to flat, none if the sheet folds ``rigidly``, when no state is preferred.
+    ``flat_energy`` is that of the flat sheet, ``stiffness`` d2E/d rho2 at the folded form.
+    Energies are in the units of ``path.model``, angles in radians; ``crease`` is the driven edge of
+    the pattern.
+    """
+
+    path: Path
+    crease: int
+    barrier: float
+    barrier_angle: float | None
+    stable: tuple[StableState, ...]
+    rigid: bool
+    flat_energy: float
+    stiffness: float
+
+    @property
+    def bistable(self) -> bool:
+        """Whether a barrier lies between two stable states."""
+        return self.barrier > 0 and len(self.stable) > 1
+
+    def verdict(self) -> str:
+        """One sentence on what the curve says."""
+        if not self.path.converged:
+            reached = math.degrees(abs(self.path.drives[-1]))
+            return (
+                f"The path was lost at {reached:.1f} degrees, where the sheet jumps to another "
+                "shape; take more --steps, or drive another --crease."
+            )
+        if self.rigid:
+            return "It folds rigidly: no energy is stored on the way to flat."
+        if self.bistable:
+            return "It is bistable: the folded form is held by a barrier on the way to flat."
+        return "It is not bistable: there is no barrier on the way to flat."
+
+    def report(self) -> dict[str, Any]:
+        """The answer of ``miurafab energy --json``; energies in joules if a material was given."""
+        model = self.path.model
+        unit = 1.0 if model.unit_joule is None else model.unit_joule
+        angle = self.barrier_angle
+        return {
+            "converged": self.path.converged,
+            "barrier": self.barrier * unit,
+            "barrier_angle_deg": None if angle is None else math.degrees(angle),
+            "bistable": self.bistable,
+            "rigid": self.rigid,
+            "stable_states": [
+                {"angle_deg": math.degrees(state.angle), "energy": state.energy * unit}
+                for state in self.stable
+            ],
+            "stiffness": self.stiffness * unit,
+            "flat_energy": self.flat_energy * unit,
+            "highest_energy": float(self.path.energies.max()) * unit,
+            "energy_unit": "k_f L" if model.unit_joule is None else "J",
+            "crease": self.crease,
+            "folded_angle_deg": math.degrees(self.path.drives[0]),
+            "last_angle_deg": math.degrees(self.path.drives[-1]),
+            "steps": len(self.path.drives) - 1,
+        }
+
+
+def energy_curve(
+    pattern: CreasePattern,
+    steps: int = 40,
+    *,
+    crease: int | None = None,
+    model: BarHingeModel | None = None,
+    on_progress: Progress | None = None,
+) -> EnergyCurve:
+    """The energy of ``pattern`` from its folded form to nearly flat, with barrier and stable
+    states; arguments, errors and path as for :func:`folding_path`.
+    """
+    model = sheet_model(pattern) if model is None else model
+    traced = _trace(model, steps, crease, NEARLY_FLAT, on_progress)
+    path = _path(traced)
+    flat = np.column_stack([pattern.vertices_coords, np.zeros(len(pattern.vertices_coords))])
+    flat_energy = model.energy(flat / model.unit_mm)
+    rigid = bool(path.energies.max() <= NOISE)
+    maxima, minima = ([], []) if rigid else _stationary(traced, path)
+    ends = []
+    towards_flat = -math.copysign(1.0, path.drives[0])
+    if not rigid and path.converged and path.loads[-1] * towards_flat < 0:
+        ends = [StableState(0.0, flat_energy)]
+    at_rest = float(path.energies[0]) if path.energies[0] > NOISE else 0.0
+    folded = [] if rigid else [StableState(float(path.drives[0]), at_rest)]
+    top = max(maxima, key=lambda state: state.energy, default=None)
+    return EnergyCurve(
+        path=path,
+        crease=int(model.creases_edges[traced.place]),
+        barrier=0.0 if top is None else top.energy,
+        barrier_angle=None if top is None else top.angle,
+        stable=(*folded, *minima, *ends),
+        rigid=rigid,
+        flat_energy=flat_energy,
+        stiffness=_stiffness(traced),
+    )
+
+
+def folding_path(
+    pattern: CreasePattern,
+    steps: int = 40,
+    *,
+    until: float = NEARLY_FLAT,
+    crease: int | None = None,
+    model: BarHingeModel | None = None,
+    on_progress: Progress | None = None,
+) -> Path:
+    """The quasi-static path of ``pattern`` from its folded form, ``steps`` equal steps of one
+    crease's fold angle to +-``until`` radians (below the folded angle: towards flat; above it:
+    further closed), steps + 1 shapes in all.
+
+    ``crease`` is the driven edge of the pattern, by default that of :func:`main_crease`; ``model``
+    defaults to :func:`~miurafab.origami.energy.bar_hinge.sheet_model`. The sheet may bend its
+    facets on their shorter diagonals and never stretches. Raises
+    :class:`~miurafab.errors.PatternError` for a pattern without a folded form, and
+    :class:`~miurafab.errors.InputError` for an edge that is no crease or is flat.
+    """
+    model = sheet_model(pattern) if model is None else model
+    return _path(_trace(model, steps, crease, until, on_progress))
+
+
+def pulled_path(
+    model: BarHingeModel,
+    ends: tuple[int, int],
+    strain: float,
+    steps: int = 40,
+    on_progress: Progress | None = None,
+) -> Path:
+    """The quasi-static path of a sheet whose vertices ``ends`` are drawn apart, until their
+    distance has grown by the fraction ``strain`` (negative: pushed together).
+
+    ``drives`` are then distances in mm, and ``loads`` forces in the energy's unit per mean edge.
+    """
+    driven = Driven(model, np.array(ends, dtype=np.int64))
+    distance = driven.value(driven.rest.points)
+    drives = np.linspace(distance, distance * (1 + strain), steps + 1)
+    states = follow(driven, driven.rest, drives, on_progress)
+    path = _path(_Traced(driven, -1, drives, states))
+    return replace(path, drives=path.drives * model.unit_mm)
+
+
+def follow(
+    driven: Driven, start: EquilibriumState, drives: Floats, on_progress: Progress | None = None
+) -> list[EquilibriumState]:
+    """The equilibria at ``drives`` (n,), the first of them near ``start``.
+
+    Each is guessed from the polynomial through the last four. A step that does not converge is
+    halved, up to seven times; the list is shorter than ``drives`` where that does not help.
+    """
+    known: list[_Known] = []
+    states: list[EquilibriumState] = []
+    factored: Factored | None = None
+    for number, drive in enumerate(drives):
+        goals = [float(drive)]
+        while goals:
+            guess = _extrapolate(known, goals[-1]) if known else start
+            solution = solve(driven, guess, goals[-1], factored)
+            factored = solution.factored
+            if solution.converged:
+                new = _Known(goals.pop(), solution.state)
+                known = [*(k for k in known[1 - HISTORY :] if k.drive != new.drive), new]
+            elif known and len(goals) <= MAX_HALVINGS:
+                goals.append((known[-1].drive + goals[-1]) / 2)
+            else:
+                return states
+        states.append(known[-1].state)
+        if on_progress is not None:
+            on_progress((number + 1) / len(drives), f"step {number} of {len(drives) - 1}")
+    return states
+
+
+class _Known(NamedTuple):
+    drive: float
+    state: EquilibriumState
+
+
+class _Traced(NamedTuple):
+    """A path in the solver's terms; ``place`` is the driven crease's among the model's."""
+
+    driven: Driven
+    place: int
+    drives: Floats
+    states: list[EquilibriumState]
+
+
+def _extrapolate(known: Sequence[_Known], drive: float) -> EquilibriumState:
+    """The polynomial through ``known`` states (Lagrange) at ``drive``."""
+    at = np.array([k.drive for k in known])
+    guess = EquilibriumState(np.zeros(()), np.zeros(()), 0.0)
+    for i, k in enumerate(known):
+        others = np.delete(at, i)
+        guess = guess.plus(k.state, float(np.prod((drive - others) / (at[i] - others))))
+    return guess
+
+
+def _trace(
+    model: BarHingeModel, steps: int, edge: int | None, until: float, on_progress: Progress | None
+) -> _Traced:
+    if steps < 1:
+        raise InputError(f"--steps is {steps}; the path needs at least one.")
+    place = main_crease(model) if edge is None else _place_of(model, edge)
+    driven = Driven(model, model.creases[place])
+    angle = driven.value(driven.rest.points)
+    if abs(angle) <= NEARLY_FLAT:
+        raise InputError(
+            f"The crease at edge {model.creases_edges[place]} is folded by only "
+            f"{math.degrees(abs(angle)):.2g} degrees, too little to be driven; take another one."
+        )
+    drives = np.linspace(angle, math.copysign(until, angle), steps + 1)
+    states = follow(driven, driven.rest, drives, on_progress)
+    if not states:
+        raise PatternError(
+            "The folded form is not in equilibrium: its facets are not flat, or it has a crease of "
+            "no width; see 'miurafab check'."
+        )
+    return _Traced(driven, place, drives, states)
+
+
+def main_crease(model: BarHingeModel) -> int:
+    """The place in ``model.creases`` of the crease driven by default: of those folded at least as
+    much as the median, the one nearest to the middle of the sheet.
+    """
+    angles = np.abs(hinge_angles(model.points, model.creases))
+    middle = model.points[model.creases[:, :2]].mean(axis=1) - model.points.mean(axis=0)
+    away = np.linalg.norm(middle, axis=1)
+    return int(np.argmin(np.where(angles >= np.median(angles), away, np.inf)))
+
+
+def _place_of(model: BarHingeModel, edge: int) -> int:
+    found = np.flatnonzero(model.creases_edges == edge)
+    if not len(found):
+        raise InputError(f"Edge {edge} is not a crease between two facets; drive another.")
+    return int(found[0])
+
+
+def _path(traced: _Traced) -> Path:
+    driven, _, drives, states = traced
+    model = driven.model
+    turned = np.stack([state.points for state in states])
+    return Path(
+        coords=turned @ driven.axes.T * model.unit_mm,
+        drives=drives[: len(states)],
+        energies=np.array([model.energy(points) for points in turned]),
+        loads=np.array([-state.mu for state in states]),
+        converged=len(states) == len(drives),
+        model=model,
+    )
+
+
+def _stationary(traced: _Traced, path: Path) -> tuple[list[StableState], list[StableState]]:
+    """The maxima and minima of the energy strictly between the first and the last state."""
+    maxima: list[StableState] = []
+    minima: list[StableState] = []
+    turns = np.flatnonzero(path.loads[1:-1] * path.loads[2:] < 0) + 1
+    for k in turns:
+        first = max(0, min(int(k) - 1, len(path.drives) - HISTORY))
+        near = slice(first, first + HISTORY)
+        known = [
+            _Known(float(drive), state)
+            for drive, state in zip(path.drives[near], traced.states[near], strict=True)
+        ]
+        found = _zero_load(traced.driven, known, int(k) - first)
+        rising = path.loads[k] * (traced.drives[k + 1] - traced.drives[k]) > 0
+        (maxima if rising else minima).append(found)
+    return maxima, minima
+
+
+def _zero_load(driven: Driven, known: list[_Known], before: int) -> StableState:
+    """The state without load between two neighbours in ``known``, by regula falsi (Illinois)."""
+    left, right = known[before], known[before + 1]
+    a, b = (left.drive, left.state.mu), (right.drive, right.state.mu)
+    scale = max(abs(a[1]), abs(b[1]))
+    best = left if abs(a[1]) < abs(b[1]) else right
+    factored: Factored | None = None
+    for _ in range(MAX_FALSI):
+        if abs(best.state.mu) <= ZERO_LOAD * scale:
+            break
+        drive = (a[0] * b[1] - b[0] * a[1]) / (b[1] - a[1])
+        solution = solve(driven, _extrapolate(known, drive), drive, factored)
+        if not solution.converged:
+            break
+        factored, mu = solution.factored, solution.state.mu
+        best = _Known(drive, solution.state)
+        a = (a[0], a[1] / 2) if (mu < 0) == (b[1] < 0) else b
+        b = (drive, mu)
+    return StableState(best.drive, driven.model.energy(best.state.points))
+
+
+def _stiffness(traced: _Traced) -> float:
+    """d load / d drive at the first state, by a central difference."""
+    driven, _, drives, states = traced
+    loads = []
+    for turn in (-SMALL_TURN, SMALL_TURN):
+        solution = solve(driven, states[0], float(drives[0]) + turn)
+        loads.append(-solution.state.mu if solution.converged else math.nan)
+    return (loads[1] - loads[0]) / (2 * SMALL_TURN)

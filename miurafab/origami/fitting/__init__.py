@@ -1,0 +1,1 @@
+"""Fitting: seed, constraints, solver, polish, and the strategies that combine them."""

@@ -1,0 +1,158 @@
+"""Does a sheet exist that is this close to the target, with no edge shorter than that?
+
+More facets bring the sheet closer and make its edges shorter, so the two limits squeeze the number
+of facets from both sides. The search makes the sheet finer by steps until both are met, then halves
+the last step until the coarsest such sheet is found; each size is tried with several corrugations
+and polished. Where no size meets both, the answer says which fails, and by how much, on the sheet
+that comes nearest.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from miurafab.origami.fitting.request import FitRequest, FitResult
+
+COARSEST = 4
+"""Facets along the longer side of the coarsest sheet tried."""
+FINER = 1.5
+FINEST = 160
+"""Facets along the longer side of the finest sheet tried."""
+PLANS = 4
+"""How many attempts are made at each size."""
+
+
+def coarsest(
+    request: FitRequest,
+    fit: Callable[[FitRequest, int], FitResult],
+    on_progress: Callable[[float, str], None] | None = None,
+) -> FitResult:
+    """The sheet with the fewest facets that meets every limit of ``request``, or the nearest to it.
+    ``fit`` fits one size in at most so many attempts.
+
+    ``request.columns`` and ``rows`` give only the proportion of the sheet.
+    """
+    started = time.perf_counter()
+    tried: dict[int, FitResult] = {}
+
+    def trial(longer: int) -> FitResult:
+        if longer not in tried:
+            columns, rows = _shape(request, longer)
+            if on_progress is not None:
+                on_progress(1 - 0.8 ** len(tried), f"{columns}x{rows} facets")
+            tried[longer] = fit(replace(request, columns=columns, rows=rows), PLANS)
+        return tried[longer]
+
+    enough = None
+    for longer in _sizes():
+        result = trial(longer)
+        if result.status == "converged":
+            enough = longer
+            break
+        if _too_fine(request, result):
+            break
+    if enough is not None:
+        best = _halve(trial, max((n for n in tried if n < enough), default=COARSEST), enough)
+    else:
+        best = replace(min(tried.values(), key=_miss(request)), status="infeasible")
+        best = replace(best, advice=_why(request, list(tried.values()), best))
+    if on_progress is not None:
+        on_progress(1.0, "done")
+    return replace(
+        best,
+        attempts=tuple(itertools.chain.from_iterable(r.attempts for r in tried.values())),
+        iterations=sum(r.iterations for r in tried.values()),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _sizes() -> list[int]:
+    sizes = [COARSEST]
+    while sizes[-1] < FINEST:
+        sizes.append(min(FINEST, 2 * round(sizes[-1] * FINER / 2)))
+    return sizes
+
+
+def _shape(request: FitRequest, longer: int) -> tuple[int, int]:
+    """Columns and rows with the proportion of the request; rows stay even where they are, for a
+    ring to close.
+    """
+    scale = longer / max(request.columns, request.rows)
+    even = request.rows % 2 == 0
+    rows = 2 * round(request.rows * scale / 2) if even else round(request.rows * scale)
+    return max(2, round(request.columns * scale)), max(2, rows)
+
+
+def _halve(trial: Callable[[int], FitResult], coarse: int, fine: int) -> FitResult:
+    """The result at the least size over ``coarse``, which fails, up to ``fine``, which does not."""
+    while fine - coarse > 2:
+        middle = 2 * round((coarse + fine) / 4)
+        if trial(middle).status == "converged":
+            fine = middle
+        else:
+            coarse = middle
+    return trial(fine)
+
+
+def _too_fine(request: FitRequest, result: FitResult) -> bool:
+    """Whether even the mean edge is too short, so that finer sheets are pointless."""
+    if result.pattern is None or request.min_edge_mm is None:
+        return False
+    ends = result.pattern.vertices_coords[result.pattern.edges_vertices]
+    mean = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
+    return mean < request.min_edge_mm
+
+
+def _deviation(result: FitResult) -> float:
+    return float("inf") if result.deviation_mm is None else result.deviation_mm
+
+
+def _miss(request: FitRequest) -> Callable[[FitResult], tuple[bool, float]]:
+    """By what factor a result misses its limits at worst; results that cross themselves last."""
+
+    def miss(result: FitResult) -> tuple[bool, float]:
+        m = result.measurements
+        if m is None:
+            return True, float("inf")
+        factors = [1.0]
+        if request.max_deviation_mm is not None:
+            factors.append(_deviation(result) / request.max_deviation_mm)
+        if request.min_edge_mm is not None:
+            factors.append(request.min_edge_mm / max(m.min_edge_mm, 1e-12))
+        return bool(m.overlaps or m.self_intersections), max(factors)
+
+    return miss
+
+
+def _why(request: FitRequest, results: list[FitResult], best: FitResult) -> str:
+    """Which limit fails and by how much."""
+    sound = [r for r in results if r.measurements and not _miss(request)(r)[0]]
+    if not sound or best.measurements is None:
+        return f"No valid sheet was found at any of {len(results)} sizes. {best.advice}".strip()
+    edge, limit = request.min_edge_mm or 0.0, request.max_deviation_mm or float("inf")
+    parts = []
+    wide = [r for r in sound if r.measurements and r.measurements.min_edge_mm >= edge]
+    if wide:
+        nearest = min(wide, key=_deviation)
+        assert nearest.measurements is not None
+        parts.append(
+            f"with edges of {edge:.3g} mm the closest sheet ({nearest.measurements.facets} facets) "
+            f"lies {_deviation(nearest):.3g} mm from the target, {_deviation(nearest) - limit:.3g} "
+            f"mm over the {limit:.3g} mm allowed"
+        )
+    close = [r for r in sound if _deviation(r) <= limit]
+    if close:
+        longest = max(close, key=lambda r: r.measurements.min_edge_mm if r.measurements else 0.0)
+        assert longest.measurements is not None
+        parts.append(
+            f"within {limit:.3g} mm the longest shortest edge ({longest.measurements.facets} "
+            f"facets) is {longest.measurements.min_edge_mm:.3g} mm, "
+            f"{edge - longest.measurements.min_edge_mm:.3g} mm under the {edge:.3g} mm asked for"
+        )
+    found = "; ".join(parts) or best.advice
+    return f"No sheet meets both limits: {found}. Loosen one of them, or enlarge --size."

@@ -1,0 +1,205 @@
+"""Projection onto a constraint manifold: the nearest point, to first order, step by step.
+
+Given c(x) = 0 and its sparse Jacobian J, one step is the least-norm Gauss-Newton correction
+
+    (J J^T + eps D) mu = c,   dx = -J^T mu,   D = diag(J J^T)
+
+shortened where a coordinate would move by more than ``cap``. J J^T is symmetric, positive definite
+up to redundant constraints (for which eps is there), and a fifth of the size of the KKT system.
+
+Inequalities g(x) >= 0 join by an active set: a row that is violated is held at zero from then on,
+until its multiplier says that the others keep it satisfied.
+
+The rows are eliminated in nested dissection order, found once for each sparsity pattern. Near the
+end J hardly changes any more, so conjugate gradients on the last factor replace a new one.
+This module knows nothing of origami.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, SuperLU, cg, splu
+
+from miurafab.origami.fitting.nested_dissection import boxes_of_rows, nested_dissection
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+Constraints = Callable[[Floats], tuple[Floats, sparse.csr_array]]
+
+REGULARISATION = 1e-12
+SMALL_STEP = 0.02
+"""After a step under this part of ``cap`` the last factor is tried again."""
+REFINEMENTS = 8
+"""Conjugate gradients that cost more iterations than this are dearer than a new factor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """Where a projection ended: ``x`` (n,), the largest residual there, and how it went.
+
+    ``active`` (p,) tells which inequalities are held at their bound there.
+    """
+
+    x: Floats
+    residual: float
+    iterations: int
+    converged: bool
+    reason: str
+    active: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class GramFactor:
+    """A factor of J J^T with its rows in the elimination order ``order`` (m,)."""
+
+    order: Ints
+    lu: SuperLU
+
+    @classmethod
+    def of(cls, jacobian: sparse.csr_array, order: Ints) -> GramFactor | None:
+        """None where the matrix is singular to the last digit."""
+        ordered = jacobian[order]
+        gram = (ordered @ ordered.T.tocsr()).tocsc()
+        gram.setdiag(gram.diagonal() * (1 + REGULARISATION) + 1e-300)
+        try:
+            lu = splu(
+                gram,
+                permc_spec="NATURAL",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError:
+            return None
+        return cls(order, lu)
+
+    def solve(self, right: Floats) -> Floats:
+        """The solution (m,) of J J^T mu = ``right`` (m,)."""
+        solution = np.empty_like(right)
+        solution[self.order] = self.lu.solve(right[self.order])
+        return solution
+
+    def refine(self, jacobian: sparse.csr_array, right: Floats) -> Floats | None:
+        """The same for a slightly different ``jacobian``, or None if that is not quick."""
+        size = (len(right), len(right))
+        transposed = jacobian.T.tocsr()
+        gram = LinearOperator(size, matvec=lambda y: jacobian @ (transposed @ y), dtype=right.dtype)
+        inverse = LinearOperator(size, matvec=self.solve, dtype=right.dtype)
+        solution, left = cg(gram, right, rtol=1e-7, atol=0.0, maxiter=REFINEMENTS, M=inverse)
+        return None if left else np.asarray(solution, dtype=np.float64)
+
+
+def elimination_order(jacobian: sparse.csr_array, places: Ints) -> Ints:
+    """(m,) nested dissection of the rows of ``jacobian``; ``places`` (n, 2) of its columns."""
+    return nested_dissection(*boxes_of_rows(jacobian, places))
+
+
+def project(
+    constraints: Constraints,
+    x: Floats,
+    places: Ints,
+    *,
+    inequalities: Constraints | None = None,
+    tolerance: float = 1e-13,
+    cap: float = np.inf,
+    max_iterations: int = 60,
+) -> Projection:
+    """Move ``x`` onto c(x) = 0, g(x) >= 0 until max|c| and max(-g) are at most ``tolerance``.
+
+    ``places`` (n, 2) are whole-number places of the unknowns in the plane, for the ordering; no
+    coordinate moves by over ``cap`` a step. Failure is a result: ``reason`` then says whether the
+    residual stalled, grew without bound, or the iterations ran out.
+    """
+    state = _Rows.at(constraints, inequalities, x, None)
+    residual, best, since_best = state.residual, state.residual, 0
+    factor: GramFactor | None = None
+    order, ordered_for = np.zeros(0, dtype=np.int64), None
+    last_step = np.inf
+
+    def ended(iterations: int, converged: bool, reason: str) -> Projection:
+        return Projection(x, residual, iterations, converged, reason, state.held)
+
+    for iteration in range(max_iterations):
+        values, jacobian = state.values, state.jacobian
+        if residual <= tolerance:
+            if factor is not None and len(factor.order) == len(values):
+                # one more step on the last factor takes the residual down to rounding
+                trial = x - jacobian.T @ factor.solve(values)
+                following = _Rows.at(constraints, inequalities, trial, state.held)
+                if following.residual < residual:
+                    x, state, residual = trial, following, following.residual
+            return ended(iteration, True, "converged")
+        same_rows = ordered_for is not None and np.array_equal(ordered_for, state.held)
+        mu = None
+        if factor is not None and same_rows and last_step < SMALL_STEP * cap:
+            mu = factor.refine(jacobian, values)
+        if mu is None:
+            if not same_rows:
+                order, ordered_for = elimination_order(jacobian, places), state.held
+            factor = GramFactor.of(jacobian, order)
+            mu = None if factor is None else factor.solve(values)
+        step = None if mu is None else -(jacobian.T @ mu)
+        if mu is None or step is None or not np.isfinite(step).all():
+            return ended(iteration, False, "the linear system became singular")
+        last_step = float(np.abs(step).max())
+        trial = x + step * min(1.0, cap / last_step) if last_step > 0 else x
+        following = _Rows.at(constraints, inequalities, trial, state.kept(mu))
+        if not np.isfinite(following.residual):
+            return ended(iteration, False, "a facet or edge degenerated")
+        x, state, residual = trial, following, following.residual
+        since_best = 0 if residual < 0.9 * best else since_best + 1
+        best = min(best, residual)
+        if since_best >= 20 or (since_best >= 3 and residual <= 50 * tolerance):
+            break
+    else:
+        return ended(max_iterations, residual <= tolerance, "the iterations ran out")
+    return ended(iteration + 1, residual <= tolerance, "the residual stalled")
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """The equalities and the inequalities ``held`` (p,) at one point, stacked; ``residual`` counts
+    an inequality only as far as it is violated.
+    """
+
+    values: Floats
+    jacobian: sparse.csr_array
+    held: Bools
+    residual: float
+
+    @classmethod
+    def at(
+        cls,
+        equalities: Constraints,
+        inequalities: Constraints | None,
+        x: Floats,
+        kept: Bools | None,
+    ) -> _Rows:
+        c, jacobian = equalities(x)
+        residual = float(np.abs(c).max(initial=0.0))
+        if inequalities is None:
+            return cls(c, jacobian, np.zeros(0, dtype=bool), residual)
+        g, gradient = inequalities(x)
+        residual = max(residual, float(np.max(-g, initial=0.0)))
+        before = np.zeros(len(g), dtype=bool) if kept is None else kept
+        held = before | (g < 0)
+        chosen = np.flatnonzero(held)
+        return cls(
+            np.concatenate([c, g[chosen]]),
+            sparse.vstack([jacobian, gradient[chosen]], format="csr"),
+            held,
+            residual,
+        )
+
+    def kept(self, mu: Floats) -> Bools | None:
+        """The held inequalities that the step presses against (mu < 0), to be held further on."""
+        if not len(self.held):
+            return None
+        kept = self.held.copy()
+        kept[self.held] = mu[len(mu) - int(self.held.sum()) :] <= 0
+        return kept

@@ -1,0 +1,398 @@
+"""The attempts of a fit: where the rows run, how strong the corrugation, and what is solved.
+
+A plan is one way from the target to an exact sheet: a start (a closed form, a seed on the target,
+one period of a revolution, a seed bent step by step), the projection onto the constraints, then
+flat-foldability if asked for, then polishing where a limit calls for it. What comes of it is a
+candidate with its faults, or a bare record of the attempt.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.cylinder import cylinder_on
+from miurafab.origami.fitting.constraints import flat_foldability
+from miurafab.origami.fitting.continuation import COARSEST, STEP_CAP, bend, refine, shaken, solve
+from miurafab.origami.fitting.inequalities import Bounds
+from miurafab.origami.fitting.polish import Follow, followers, polish
+from miurafab.origami.fitting.reduction import Unknowns, about_z
+from miurafab.origami.fitting.request import Attempt, FitRequest
+from miurafab.origami.fitting.seed import Corrugation, seed
+from miurafab.origami.fitting.solver import Projection, project
+from miurafab.origami.tessellation import Tessellation
+from miurafab.origami.unfold import unfold
+from miurafab.origami.verify import DEGENERATE, EXACT, Measurements, measure
+from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution, revolution
+from miurafab.surfaces.mesh import MeshSurface
+from miurafab.surfaces.surface import Swapped, TargetSurface
+
+Floats = NDArray[np.float64]
+
+STRETCHES = ((1.3, 1.3), (1.15, 1.6), (1.6, 1.3), (1.3, 1.6), (2.0, 1.3), (2.6, 1.3), (1.15, 2.0))
+"""The stretches along and across the rows that are tried in turn. Strong curvature along the rows
+wants more of the first, strong twist less of the first and more of the second.
+"""
+MESH_BENDS = 3
+SEEDS_ELSEWHERE = 4
+BENDS_ELSEWHERE = 2
+"""How many of those stretches are tried on meshes, first as they lie, then laid elsewhere: enough
+to find a sheet where there is one, and an answer within a minute where there is none.
+"""
+FAR = 0.02
+"""A mid-surface farther from the target than this part of the diagonal makes the search go on."""
+SCALINGS = 4
+"""How often a sheet is polished again because its scale has changed."""
+BOUND_MARGIN = 2e-3
+"""Limits are tightened by this part while polishing, since the scale of the sheet still changes."""
+KEPT_EDGE = 0.4
+"""Without a shortest edge asked for, polishing leaves every edge this part of what was shortest."""
+LEVELS: Mapping[Follow, float] = {"middle": 0.0, "top": -0.5, "bottom": 0.5}
+"""How far the sheet is lifted off the middle for the target to be followed, in parts of its height.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A tessellation that some attempt produced, in the target's own unit."""
+
+    attempt: Attempt
+    pattern: CreasePattern
+    measurements: Measurements
+    faults: tuple[str, ...]
+    deviation_mm: float
+    polished: bool = False
+    active_bounds: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def settles(self) -> bool:
+        """Whether this is a sheet whose only faults are limits, which other ways from the same
+        target will not meet either.
+        """
+        m = self.measurements
+        inexact = max(m.max_planarity or 0.0, m.max_developability or 0.0, m.max_isometry or 0.0)
+        return not (m.self_intersections or m.overlaps or self.rank[1] or inexact > EXACT)
+
+    @property
+    def rank(self) -> tuple[int, bool]:
+        """The smaller the better: the number of faults, then whether it strays from the target."""
+        assert self.pattern.folded_coords is not None
+        extent = np.ptp(self.pattern.folded_coords, axis=0)
+        off = min(self.measurements.hausdorff_midsurface_mm or 0.0, self.deviation_mm)
+        return len(self.faults), bool(off > FAR * np.linalg.norm(extent))
+
+
+@dataclass(frozen=True)
+class Strategy:
+    way: str
+    surface: TargetSurface
+    rows_along: str
+    corrugation: Corrugation
+    place: str = ""
+    layout: dict[str, Any] = field(default_factory=dict)
+
+    def describe(self) -> str:
+        how = {
+            "direct": "direct construction",
+            "strip": "one period of the revolution",
+            "seed": "seed",
+            "bent": "bending step by step",
+            "refined": "from coarse to fine",
+            "shaken": "seed shaken",
+        }
+        place = f", {self.place}" if self.place else ""
+        return f"{how[self.way]}, rows along {self.rows_along}{place}"
+
+    def run(self, request: FitRequest) -> Candidate | Attempt:
+        """The sheet that this plan leads to, or, where it leads to none, what came of it."""
+        unknowns, solution = self._developable(request)
+        iterations = solution.iterations
+        crooked = solution.converged and _worst_kawasaki(unknowns.sheet(solution.x)) > EXACT
+        if request.exactly_flat_foldable and crooked:
+            if unknowns.turn is not None and not (
+                isinstance(self.surface, Revolution) and self.surface.closed
+            ):
+                # a period repeated leaves an open sheet fewer freedoms than it has
+                whole = unknowns.sheet(solution.x)
+                solution = replace(solution, x=whole.vertices.ravel())
+                unknowns = Unknowns(unknowns.columns, unknowns.rows, unknowns.length)
+            solution = solve(unknowns, solution.x, flat_foldable=True)
+            iterations += solution.iterations
+        if not solution.converged:
+            return Attempt(
+                self.way,
+                self.rows_along,
+                self.corrugation,
+                solution.residual,
+                iterations,
+                solution.reason,
+                self.place,
+            )
+        plain = self._candidate(request, unknowns, solution, iterations)
+        asked = request.flat_foldable is not None or plain.rank != (0, False)
+        if request.polish == "off" or (request.polish == "auto" and not asked):
+            return plain
+        if request.is_tube:
+            return plain  # polishing would open the seam
+        if plain.measurements.overlaps:
+            return plain  # so far from a sheet that polishing it is lost work
+        closer = self._polished(request, unknowns, solution, plain)
+        if (closer.rank, closer.deviation_mm) < (plain.rank, plain.deviation_mm):
+            return closer
+        return plain
+
+    def _follow(self, request: FitRequest) -> Follow:
+        """What follows the target in this orientation: the normal turns over with the swap."""
+        turned: dict[Follow, Follow] = {"middle": "middle", "top": "bottom", "bottom": "top"}
+        return request.follow if self.rows_along == "u" else turned[request.follow]
+
+    def _developable(self, request: FitRequest) -> tuple[Unknowns, Projection]:
+        columns, rows = request.columns + 1, request.rows + 1
+        level = LEVELS[self._follow(request)]
+        if self.way == "direct":
+            assert isinstance(self.surface, GeneralizedCylinder)
+            c = self.corrugation
+            sheet = cylinder_on(self.surface, columns, rows, c.amplitude, c.zigzag, level)
+            nothing = np.zeros(0, dtype=bool)
+            unknowns = Unknowns(columns, rows, float(sheet.edge_lengths.mean()))
+            return unknowns, Projection(sheet.vertices.ravel(), 0.0, 0, True, "exact", nothing)
+        if self.way == "bent":
+            return bend(self.surface, columns, rows, self.corrugation, level)
+        if self.way == "refined":
+            return refine(self.surface, columns, rows, self.corrugation, level)
+        if self.way == "strip":
+            assert isinstance(self.surface, Revolution)
+            unknowns, start = _period(self.surface, columns, rows, self.corrugation, level)
+        else:
+            start, _ = seed(self.surface, columns, rows, self.corrugation, level)
+            if self.way == "shaken":
+                start = shaken(start, request.seed)
+            unknowns = Unknowns(columns, rows, float(start.edge_lengths.mean()))
+        return unknowns, solve(unknowns, start.vertices.ravel(), flat_foldable=False)
+
+    def _polished(
+        self, request: FitRequest, unknowns: Unknowns, solution: Projection, plain: Candidate
+    ) -> Candidate:
+        """The sheet ``solution`` brought within the limits and as close to the target as it goes;
+        ``plain`` where that fails. Limits in mm move with the scale, which follows from the sheet:
+        hence the repetition.
+        """
+        constraints = unknowns.constraints(request.exactly_flat_foldable)
+        found, first, least = plain, solution, request.min_edge_mm
+        for _ in range(SCALINGS):
+            limits = replace(request, min_edge_mm=least).bounds(
+                unknowns, found.pattern.scale, BOUND_MARGIN
+            )
+            bounds = unknowns.on_unknowns(limits) if limits.any else None
+            iterations = found.attempt.iterations
+            if bounds is not None:
+                solution = project(
+                    constraints,
+                    solution.x,
+                    unknowns.places,
+                    inequalities=bounds,
+                    cap=STEP_CAP * unknowns.length,
+                )
+                iterations += solution.iterations
+                if not solution.converged:
+                    break
+            better = polish(
+                solution,
+                self.surface,
+                unknowns,
+                constraints,
+                follow=self._follow(request),
+                bounds=bounds,
+            )
+            solution = better.projection
+            found = replace(
+                self._candidate(request, unknowns, solution, iterations + better.rounds),
+                polished=True,
+                active_bounds=limits.count(solution.active) if bounds is not None else {},
+            )
+            shortest = KEPT_EDGE * plain.measurements.min_edge_mm
+            if least is None and found.measurements.min_edge_mm < shortest:
+                found, solution, least = plain, first, shortest
+            elif bounds is None or not found.faults:
+                break
+        return found
+
+    def _candidate(
+        self, request: FitRequest, unknowns: Unknowns, solution: Projection, iterations: int
+    ) -> Candidate:
+        sheet = unknowns.sheet(solution.x)
+        extent = float(np.ptp(sheet.vertices, axis=0).max())
+        scale = 1.0 if request.size_mm is None else request.size_mm / extent
+        pattern = unfold(sheet.scaled(scale), scale=scale, target=request.target | self.layout)
+        measured = measure(pattern, self.surface)
+        deviation = _deviation(sheet, self.surface, self._follow(request)) * scale
+        limits = replace(
+            request.bounds(Unknowns(unknowns.columns, unknowns.rows, unknowns.length), scale),
+            min_edge=None,
+            kawasaki=None,
+        )
+        faults = tuple(_faults(request, pattern, measured, deviation, limits, sheet))
+        attempt = Attempt(
+            self.way,
+            self.rows_along,
+            self.corrugation,
+            max(measured.max_planarity or 0.0, measured.max_developability or 0.0),
+            iterations,
+            " ".join(faults),
+            self.place,
+        )
+        return Candidate(attempt, pattern, measured, faults, deviation)
+
+
+def plans(request: FitRequest) -> Iterator[Strategy]:
+    """The attempts in the order in which they are made, the likeliest first."""
+    corrugations = _corrugations(request)
+    if isinstance(request.surface, GeneralizedCylinder):
+        for corrugation in corrugations:
+            yield Strategy("direct", request.surface, "u", corrugation)
+        return
+    if isinstance(request.surface, MeshSurface):
+        yield from _on_mesh(request.surface, corrugations)
+        return
+    oriented = _oriented(request.surface)
+    if isinstance(request.surface, Revolution):
+        for corrugation in corrugations:
+            yield Strategy("strip", request.surface, "u", corrugation)
+        if request.surface.closed:
+            return  # any other way would open the seam
+    fine = min(request.columns, request.rows) >= COARSEST
+    for way in ("seed", "bent", *(("refined",) if fine else ()), "shaken"):
+        for corrugation in corrugations:
+            for surface, name in oriented:
+                yield Strategy(way, surface, name, corrugation)
+
+
+def _oriented(surface: TargetSurface) -> list[tuple[TargetSurface, str]]:
+    """Both directions of the rows, the one along which the normal turns less first."""
+    both: list[tuple[TargetSurface, str]] = [(surface, "u"), (Swapped(surface), "v")]
+    return sorted(both, key=lambda pair: _turning(pair[0]))
+
+
+def _on_mesh(surface: MeshSurface, corrugations: list[Corrugation]) -> Iterator[Strategy]:
+    """Seeds and bends on the mesh as it lies, then with the sheet laid elsewhere on it; each
+    layout is made when it is needed.
+    """
+    seeds, bends = len(corrugations), MESH_BENDS
+    for place, laid in itertools.chain([("", surface)], surface.alternatives()):
+        oriented = _oriented(laid)
+        layout = laid.description if place else {}
+        for way, some in (("seed", seeds), ("bent", bends)):
+            for corrugation in corrugations[:some]:
+                for turned, name in oriented:
+                    yield Strategy(way, turned, name, corrugation, place, layout)
+        seeds, bends = SEEDS_ELSEWHERE, BENDS_ELSEWHERE
+
+
+def _corrugations(request: FitRequest) -> list[Corrugation]:
+    if request.amplitude is not None and request.zigzag is not None:
+        return [Corrugation(request.amplitude, request.zigzag)]
+    corrugations = []
+    for along, across in STRETCHES:
+        usual = Corrugation.from_stretches(along, across)
+        amplitude = usual.amplitude if request.amplitude is None else request.amplitude
+        if request.zigzag is not None:
+            corrugations.append(Corrugation(amplitude, request.zigzag))
+        else:
+            stretch = float(np.hypot(1.0, amplitude))
+            corrugations.append(Corrugation.from_stretches(along, stretch))
+    return list(dict.fromkeys(corrugations))
+
+
+def _turning(surface: TargetSurface) -> float:
+    """The mean angle through which the normal turns along the u-lines, radians."""
+    normals = surface.normal(surface.domain.lattice(17, 9))
+    cosine = np.einsum("ijk,ijk->ij", normals[:, 1:], normals[:, :-1])
+    return float(np.arccos(np.clip(cosine, -1, 1)).sum(axis=1).mean())
+
+
+def _period(
+    surface: Revolution, columns: int, rows: int, corrugation: Corrugation, level: float
+) -> tuple[Unknowns, Tessellation]:
+    """One period of the pattern on ``surface``, where its sector starts."""
+    beta = surface.angle / (rows - 1)
+    start, _ = seed(revolution(surface.profile, beta), columns, 2, corrugation, level)
+    unknowns = Unknowns(columns, rows, float(start.edge_lengths.mean()), 2 * beta)
+    return unknowns, Tessellation(start.points @ about_z((beta - surface.angle) / 2).T)
+
+
+def _worst_kawasaki(sheet: Tessellation) -> float:
+    return float(np.abs(flat_foldability(sheet.vertices, sheet.grid)).max(initial=0.0))
+
+
+def _deviation(sheet: Tessellation, surface: TargetSurface, follow: Follow) -> float:
+    """How far the surface that follows the target lies from it at most: its points, the middles of
+    neighbours and of each four, so that a few points on the target do not pass for a close sheet.
+    """
+    points = (followers(sheet.grid, follow) @ sheet.vertices).reshape(
+        -1, sheet.grid.columns - (follow == "middle"), 3
+    )
+    between = (points[:, 1:] + points[:, :-1]) / 2
+    rows = (points[1:] + points[:-1]) / 2
+    centres = (between[1:] + between[:-1]) / 2
+    samples = np.concatenate([part.reshape(-1, 3) for part in (points, between, rows, centres)])
+    return float(np.linalg.norm(samples - surface.closest_point(samples), axis=1).max())
+
+
+def _faults(
+    request: FitRequest,
+    pattern: CreasePattern,
+    measured: Measurements,
+    deviation: float,
+    limits: Bounds,
+    sheet: Tessellation,
+) -> Iterator[str]:
+    """What keeps this sheet from being the answer, one sentence of advice each; ``limits`` are
+    those that the measurements do not show.
+    """
+    residual = max(
+        measured.max_planarity or 0.0,
+        measured.max_developability or 0.0,
+        measured.max_isometry or 0.0,
+    )
+    if residual > EXACT:
+        yield f"A residual of {residual:.1e} is left; ask for fewer --facets."
+    if measured.self_intersections:
+        yield (
+            f"{measured.self_intersections} pairs of facets pass through each other; ask for more "
+            "--facets, lower --zigzag or --amplitude, or take a smaller part of the target."
+        )
+    if measured.overlaps:
+        yield f"{measured.overlaps} pairs of facets overlap in the flat pattern; lower --zigzag."
+    mean = float(
+        np.linalg.norm(
+            np.diff(pattern.vertices_coords[pattern.edges_vertices], axis=1), axis=2
+        ).mean()
+    )
+    wanted = request.min_edge_mm or DEGENERATE * mean
+    if measured.min_edge_mm < wanted:
+        yield (
+            f"The shortest edge is {measured.min_edge_mm:.3g} mm, under the {wanted:.3g} mm asked "
+            "for; ask for fewer --facets or a larger --size."
+        )
+    if request.max_deviation_mm is not None and deviation > request.max_deviation_mm:
+        what = "mid-surface" if request.follow == "middle" else request.follow
+        yield (
+            f"The {what} lies up to {deviation:.3g} mm from the target, over the "
+            f"{request.max_deviation_mm:.3g} mm allowed; ask for more --facets."
+        )
+    if limits.any:
+        for kind, number in limits.count(limits(sheet.vertices.ravel())[0] < -1e-9).items():
+            if number:
+                yield (
+                    f"{number} facet corners or sides break the {kind} limit; loosen it, or ask "
+                    "for other --facets, --amplitude or --zigzag."
+                )
+    asked = request.flat_foldable
+    if asked is not None and (measured.max_flat_foldability or 0.0) > max(asked, EXACT):
+        yield f"The sheet is flat-foldable only to {measured.max_flat_foldability:.1e} rad."

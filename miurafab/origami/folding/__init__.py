@@ -1,0 +1,1 @@
+"""Folding motion: rigid kinematics, bending, contact, thick panels."""

@@ -1,0 +1,67 @@
+"""What a folding motion says beyond its shapes: all fold angles, and where paper meets paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from miurafab.origami.folding.contact import self_intersections
+from miurafab.origami.folding.kinematics import FoldingMotion
+
+ON_EACH_OTHER = np.pi - 1e-3
+"""Fold angles from here on lay facets on each other; that is being flat-folded and no collision."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """In ``frame``, at ``state``, paper passes through paper: pairs of ``facets``."""
+
+    frame: int
+    state: float
+    facets: tuple[tuple[int, int], ...]
+
+
+def contacts(
+    motion: FoldingMotion, on_progress: Callable[[float, str], None] | None = None
+) -> tuple[Contact, ...]:
+    """The frames of ``motion`` in which facets pass through each other.
+
+    Frames in which a crease is folded past :data:`ON_EACH_OTHER` are left out: thin paper that is
+    folded flat lies on itself, and which layer is the upper one no coordinates can tell.
+    """
+    found = []
+    for frame, (points, angles) in enumerate(zip(motion.frames, motion.fold_angles, strict=True)):
+        if on_progress is not None:
+            on_progress(frame / len(motion.frames), "self-contact")
+        if np.abs(angles).max(initial=0.0) > ON_EACH_OTHER:
+            continue
+        shape = replace(motion.pattern, folded_coords=points, edges_fold_angle=angles)
+        pairs = self_intersections(shape)
+        if len(pairs):
+            named = tuple((int(a), int(b)) for a, b in pairs)
+            found.append(Contact(frame, float(motion.states[frame]), named))
+    return tuple(found)
+
+
+def angles_csv(motion: FoldingMotion) -> str:
+    """The fold angle of every crease in every frame, degrees: a row a crease, a column a frame.
+
+    A crease is an edge with a facet on either side. Columns are headed by the state.
+    """
+    pattern = motion.pattern
+    inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+    head = ",".join(f"s={state:.9g}" for state in motion.states)
+    rows = [f"edge,tail,head,assignment,{head}"]
+    degrees = np.degrees(motion.fold_angles[:, inner].T).tolist()
+    for edge, (tail, tip), letter, angles in zip(
+        inner.tolist(),
+        pattern.edges_vertices[inner].tolist(),
+        pattern.edges_assignment[inner].tolist(),
+        degrees,
+        strict=True,
+    ):
+        values = ",".join(f"{angle:.9g}" for angle in angles)
+        rows.append(f"{edge},{tail},{tip},{letter},{values}")
+    return "\n".join(rows) + "\n"

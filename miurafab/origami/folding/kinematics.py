@@ -1,0 +1,317 @@
+"""Rigid folding: every facet stays plane and the creases alone move.
+
+At a flat-foldable vertex of degree four the tangents of the half fold angles keep their ratios
+(Huffman 1976; Tachi, "Generalization of rigid foldable quadrilateral mesh origami", IASS 2009,
+eqs 1-3), so that one number moves a whole sheet:
+
+    rho_e(s) = 2 atan(s tan(rho_e* / 2)),    s = 0 flat, 1 the folded form, infinity flat-folded
+
+Facets are placed breadth-first from the middle of the sheet, each turned about the crease that it
+shares with the one before. Creases outside that tree are not used: how far their two facets stand
+apart there, the loop mismatch, is the certificate that the sheet folds rigidly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import shortest_path
+
+from miurafab.errors import PatternError
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.multipliers import fold_speeds
+from miurafab.origami.invariants import edge_lengths
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+RIGID = 1e-6
+"""The loop mismatch, in mean edges, up to which a sheet is said to fold rigidly."""
+
+
+FOLDED_FLAT = np.pi - 1e-6
+"""Fold angles from here on count as 180 degrees, when a file is asked how far its creases fold."""
+
+_POINT = 1e-6  # of the mean edge: a shorter crease has no direction to turn a facet about
+
+
+@dataclass(frozen=True, eq=False)
+class FoldingMotion:
+    """A folding motion of ``pattern`` in T frames.
+
+    ``states`` (T,) float64 are where on the motion the frames lie: s of the closed form, 1 being
+    the folded form. ``frames`` (T, V, 3) float64, mm; ``fold_angles`` (T, E) float64, radians,
+    valley positive. ``mismatch`` (T,) float64 is the loop mismatch of each frame in mean edges, or
+    None where the motion bends its facets and the loops close by construction.
+    """
+
+    pattern: CreasePattern
+    states: Floats
+    frames: Floats
+    fold_angles: Floats
+    mismatch: Floats | None
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether every facet stays plane and every loop closes, to :data:`RIGID`."""
+        return self.mismatch is not None and bool(self.mismatch.max(initial=0.0) <= RIGID)
+
+
+@dataclass(frozen=True, eq=False)
+class FacetPlacement:
+    """Where the facets of T frames stand: a flat point p of facet f goes to turn p + shift.
+
+    ``turn`` (T, F, 3, 3) and ``shift`` (T, F, 3) float64; the facet in the middle keeps its place.
+    ``depth`` (F,) int64 is how many creases away from that facet each was placed.
+    """
+
+    turn: Floats
+    shift: Floats
+    depth: Ints
+
+    def points(self, flat: Floats, facets: Ints) -> Floats:
+        """(T, n, 3) where the points ``flat`` (n, 2) of ``facets`` (n,) come to stand."""
+        moved = np.einsum("tnij,nj->tni", self.turn[:, facets, :, :2], flat)
+        placed: Floats = moved + self.shift[:, facets]
+        return placed
+
+
+def rigid_motion(pattern: CreasePattern, states: ArrayLike) -> FoldingMotion:
+    """The rigid motion of ``pattern`` through ``states`` (T,) of s, each in [0, infinity].
+
+    The frame nearest to s = 1 is laid on the folded form (without one, the frame nearest to 0 on
+    the flat pattern) and each further frame on its neighbour, by the best rigid motion.
+
+    Raises :class:`~miurafab.errors.PatternError` if the facets are not all joined by creases.
+    """
+    s = np.atleast_1d(np.asarray(states, dtype=np.float64))
+    if not (s >= 0).all():
+        raise PatternError("A state of folding is a number from 0, flat, to infinity, flat-folded.")
+    angles = fold_angles_at(pattern, s)
+    return motion_through(pattern, s, angles)
+
+
+def motion_through(pattern: CreasePattern, states: Floats, fold_angles: Floats) -> FoldingMotion:
+    """The motion in which the creases have the ``fold_angles`` (T, E), radians, at ``states``."""
+    placement = place(pattern, fold_angles)
+    frames = placement.points(pattern.vertices_coords, _first_facets(pattern, placement.depth))
+    return FoldingMotion(
+        pattern,
+        states,
+        laid_on_each_other(pattern, states, frames),
+        fold_angles,
+        loop_mismatch(pattern, placement),
+    )
+
+
+def fold_angles_at(pattern: CreasePattern, states: Floats) -> Floats:
+    """(T, E) the fold angles at ``states`` (T,) of s, by the closed form, radians."""
+    half = half_tangents(pattern)
+    moving = half != 0.0
+    angles = np.zeros((len(states), len(half)))
+    angles[:, moving] = 2 * np.arctan(states[:, None] * half[moving])
+    return angles
+
+
+def half_tangents(pattern: CreasePattern) -> Floats:
+    """(E,) tan(rho / 2) of each crease at s = 1.
+
+    Where all fold angles of the pattern are 180 degrees, as in formats that tell only mountains
+    from valleys, s = 1 is where the median crease is folded by 90 degrees, and the others follow
+    from the sectors (:mod:`miurafab.origami.folding.multipliers`).
+    """
+    target = pattern.edges_fold_angle
+    folding = np.abs(target[target != 0.0])
+    if len(folding) and (folding > FOLDED_FLAT).all():
+        return fold_speeds(pattern)
+    # past the float's half circle tan() changes sign, so fold angles stay just inside it
+    half: Floats = np.tan(np.clip(target, -np.pi + 1e-15, np.pi - 1e-15) / 2)
+    return half
+
+
+def states_between(pattern: CreasePattern, steps: int, last: float = np.inf) -> Floats:
+    """(steps + 1,) states from flat through 1 to ``last``, in even steps of a middling fold angle.
+
+    s = tan(phi / 2) / tan(phi* / 2) with phi* the median fold angle of the creases that fold. The
+    state 1 is among them whenever it is within reach and there are at least two steps.
+    """
+    half = np.abs(half_tangents(pattern))
+    if not (half > 0).any():
+        raise PatternError("No crease of the pattern has a fold angle, so nothing folds.")
+    speed = float(np.median(half[half > 0]))
+    middling, end = 2 * np.arctan(speed), 2 * np.arctan(last * speed)
+    if last <= 1.0 or steps < 2:
+        phi = np.linspace(0.0, end, steps + 1)
+    else:
+        before = int(np.clip(round(steps * middling / end), 1, steps - 1))
+        phi = np.concatenate(
+            [
+                np.linspace(0.0, middling, before + 1),
+                np.linspace(middling, end, steps - before + 1)[1:],
+            ]
+        )
+    states = np.tan(phi / 2) / speed
+    states[phi == middling] = 1.0
+    states[-1] = last
+    return np.asarray(states, dtype=np.float64)
+
+
+def place(pattern: CreasePattern, fold_angles: Floats) -> FacetPlacement:
+    """The placement of all facets in T frames with the creases at ``fold_angles`` (T, E), radians.
+
+    Raises :class:`~miurafab.errors.PatternError` if the facets are not all joined by creases.
+    """
+    frames, facets = len(fold_angles), len(pattern.faces_vertices)
+    before, crease, depth = _tree(pattern)
+    turn = np.empty((frames, facets, 3, 3))
+    shift = np.empty((frames, facets, 3))
+    root = depth == 0
+    turn[:, root], shift[:, root] = np.eye(3), 0.0
+    tail = pattern.vertices_coords[pattern.edges_vertices[:, 0]]
+    along = pattern.vertices_coords[pattern.edges_vertices[:, 1]] - tail
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    for level in range(1, int(depth.max()) + 1):
+        here = np.flatnonzero(depth == level)
+        parent, edge = before[here], crease[here]
+        # a valley turns the right facet's normal back about the edge, hence the left one's forward
+        sign = np.where(pattern.edges_faces[edge, 0] == parent, -1.0, 1.0)
+        rotation = _rotations(along[edge], sign * fold_angles[:, edge])
+        hinge = np.pad(tail[edge], ((0, 0), (0, 1)))
+        slip = hinge - np.einsum("tnij,nj->tni", rotation, hinge)
+        turn[:, here] = turn[:, parent] @ rotation
+        shift[:, here] = shift[:, parent] + np.einsum("tnij,tnj->tni", turn[:, parent], slip)
+    return FacetPlacement(turn, shift, depth)
+
+
+def loop_mismatch(pattern: CreasePattern, placement: FacetPlacement) -> Floats:
+    """(T,) how far the two facets of a crease stand apart at its ends, at worst, in mean edges."""
+    joined = _joined(pattern)
+    ends = pattern.edges_vertices[joined].reshape(-1)
+    flat = pattern.vertices_coords[ends]
+    left, right = (np.repeat(pattern.edges_faces[joined, side], 2) for side in (0, 1))
+    gap = placement.points(flat, left) - placement.points(flat, right)
+    mean = float(edge_lengths(pattern, pattern.vertices_coords).mean())
+    worst: Floats = np.linalg.norm(gap, axis=2).max(axis=1, initial=0.0) / mean
+    return worst
+
+
+def facet_strain(pattern: CreasePattern, frames: Floats) -> Floats:
+    """(T, F) the largest relative change of each facet's sides and diagonals, from flat.
+
+    ``frames`` (T, V, 3). It shows bending as well as stretching, for a bent quadrilateral has a
+    shorter diagonal. Lengths count from a hundredth of the mean edge.
+    """
+    faces = pattern.faces_vertices
+    least = 0.01 * float(edge_lengths(pattern, pattern.vertices_coords).mean())
+    worst = np.zeros((len(frames), len(faces)))
+    for one in range(faces.shape[1]):
+        for other in range(one + 1, faces.shape[1]):
+            real = faces[:, other] >= 0
+            a, b = faces[real, one], faces[real, other]
+            flat = np.linalg.norm(pattern.vertices_coords[b] - pattern.vertices_coords[a], axis=1)
+            length = np.linalg.norm(frames[:, b] - frames[:, a], axis=2)
+            change = np.abs(length - flat) / np.maximum(flat, least)
+            worst[:, real] = np.maximum(worst[:, real], change)
+    return worst
+
+
+def _rotations(axis: Floats, angle: Floats) -> Floats:
+    """(T, n, 3, 3) turns by ``angle`` (T, n) about the unit ``axis`` (n, 2) in the plane z = 0."""
+    x, y = axis[:, 0], axis[:, 1]
+    c, s = np.cos(angle), np.sin(angle)
+    k = 2 * np.sin(angle / 2) ** 2
+    rows = (c + k * x * x, k * x * y, s * y, k * x * y, c + k * y * y, -s * x, -s * y, s * x, c)
+    return np.stack(rows, axis=-1).reshape(*angle.shape, 3, 3)
+
+
+def _joined(pattern: CreasePattern) -> Ints:
+    """The edges that join two facets: not cut, and with a facet on either side."""
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    return np.flatnonzero(inner & ~np.isin(pattern.edges_assignment, ("B", "C")))
+
+
+def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
+    """Breadth-first over the facets from the middle one: (F,) the facet before each, the crease
+    between them, and the number of creases from the middle.
+    """
+    facets = len(pattern.faces_vertices)
+    joined = _joined(pattern)
+    lengths = edge_lengths(pattern, pattern.vertices_coords)
+    joined = joined[lengths[joined] > _POINT * lengths.mean()]
+    left, right = pattern.edges_faces[joined].T
+    graph = coo_array((np.ones(len(joined)), (left, right)), shape=(facets, facets)).tocsr()
+    distance, before = shortest_path(
+        graph, directed=False, unweighted=True, indices=_middle(pattern), return_predecessors=True
+    )
+    if np.isinf(distance).any():
+        loose = int(np.isinf(distance).sum())
+        raise PatternError(
+            f"{loose} of {facets} facets hang on to the rest by no crease, so the pattern cannot "
+            "be folded as one sheet."
+        )
+    previous: Ints = np.asarray(before, dtype=np.int64).reshape(facets)
+    depth: Ints = np.asarray(distance, dtype=np.int64).reshape(facets)
+    keys = np.minimum(left, right) * facets + np.maximum(left, right)
+    order = np.argsort(keys, kind="stable")
+    own = np.arange(facets)
+    wanted = np.minimum(own, previous) * facets + np.maximum(own, previous)
+    crease = np.zeros(facets, dtype=np.int64)
+    if len(joined):
+        place_in = np.searchsorted(keys, wanted, sorter=order).clip(max=len(order) - 1)
+        crease = joined[order[place_in]]
+    return previous, crease, depth
+
+
+def _middle(pattern: CreasePattern) -> int:
+    """The facet whose corners' mean lies nearest to the middle of the flat pattern."""
+    faces = pattern.faces_vertices
+    real = faces >= 0
+    corners = np.where(real[..., None], pattern.vertices_coords[faces], 0.0)
+    means = corners.sum(axis=1) / real.sum(axis=1)[:, None]
+    return int(np.argmin(np.linalg.norm(means - means.mean(axis=0), axis=1)))
+
+
+def _first_facets(pattern: CreasePattern, depth: Ints) -> Ints:
+    """(V,) a facet of each vertex, the nearest to the middle; vertices of no facet are refused."""
+    faces = pattern.faces_vertices
+    facet, corner = np.nonzero(faces >= 0)
+    outward = np.argsort(-depth[facet], kind="stable")
+    first = np.full(len(pattern.vertices_coords), -1, dtype=np.int64)
+    first[faces[facet[outward], corner[outward]]] = facet[outward]
+    loose = np.flatnonzero(first < 0)
+    if len(loose):
+        raise PatternError(f"Vertex {loose[0]} of the pattern belongs to no facet.")
+    return first
+
+
+def laid_on_each_other(pattern: CreasePattern, states: Floats, frames: Floats) -> Floats:
+    """``frames`` moved rigidly: one onto the known form, the others each onto its neighbour."""
+    known = pattern.folded_coords
+    if known is None:
+        known = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
+    goal = 0.0 if pattern.folded_coords is None else 1.0
+    order = np.argsort(states, kind="stable")
+    start = int(np.argmin(np.abs(states[order] - goal)))
+    laid = np.empty_like(frames)
+    laid[order[start]] = laid_on(frames[order[start]], known)
+    for step in (1, -1):
+        at = start + step
+        while 0 <= at < len(order):
+            laid[order[at]] = laid_on(frames[order[at]], laid[order[at - step]])
+            at += step
+    return laid
+
+
+def laid_on(points: Floats, onto: Floats) -> Floats:
+    """``points`` (V, 3) moved rigidly to lie on ``onto`` (V, 3) with the least squared distance.
+
+    (W. Kabsch, Acta Cryst. A 32 (1976) 922.)
+    """
+    centre, goal = points.mean(axis=0), onto.mean(axis=0)
+    u, _, vt = np.linalg.svd((points - centre).T @ (onto - goal))
+    mirror = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+    moved: Floats = (points - centre) @ ((u * mirror) @ vt) + goal
+    return moved

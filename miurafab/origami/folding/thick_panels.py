@@ -1,0 +1,252 @@
+"""Thick panels: how far each panel must be cut back so that the sheet still folds.
+
+The creases stay the axes of the motion, in the middle of a panel of thickness t, and so does the
+motion (T. Tachi, "Rigid-foldable thick origami", Origami 5 (2011), tapered panels). Two panels that
+fold by rho about their crease meet in the plane that bisects their angle. Where a facet may fold by
+up to rho, its surface on the side that closes must therefore stay back from the crease by
+
+    d = (t / 2) tan(rho / 2)
+
+on the top for a valley and on the bottom for a mountain; the other side may reach the crease. Made
+of two plies with a film between them, which is the hinge, one ply is cut back by d. Nothing that is
+folded flat can have thickness in this way: d grows without bound.
+
+With k = tan(rho / 2) of a side that closes and 0 of one that opens, the corner p between two sides
+with inward unit normals m and n moves to p + (t / 2) w with m.w = k_m and n.w = k_n. Corners move
+in proportion to t, which gives the thickness up to which each side keeps a positive length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import InputError
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.angles_csv import ON_EACH_OTHER
+from miurafab.origami.folding.contact import self_intersections, triangulate
+from miurafab.origami.folding.kinematics import fold_angles_at, place, rigid_motion
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SIDES = ("top", "bottom")
+STATES = (0.05, 0.35, 0.7, 0.999)
+"""Where between flat and the folded form, as parts of the middling fold angle, solids are tested;
+at the ends themselves panels touch all along their sides.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class ThickPanels:
+    """``pattern`` made of panels ``thickness_mm`` thick, folding from flat to its folded form.
+
+    ``hinge_side`` (E,) is "top" where the panels close on the top (valleys), "bottom" where they do
+    on the bottom (mountains), "" on borders and flat creases. ``offset_mm`` (E,) is the least
+    distance that the panels' surface on that side keeps from the crease, infinite for a crease
+    folded by 180 degrees. ``limit_mm`` (F,) is the thickness up to which each facet keeps all its
+    sides. ``collisions`` are (state, facet, facet) where trimmed panels still run into each other.
+    """
+
+    pattern: CreasePattern
+    thickness_mm: float
+    hinge_side: NDArray[np.str_]
+    offset_mm: Floats
+    limit_mm: Floats
+    collisions: tuple[tuple[float, int, int], ...]
+
+    @property
+    def too_small(self) -> Ints:
+        """(n,) the facets that are too small for the thickness."""
+        return np.flatnonzero(~(self.limit_mm > self.thickness_mm))
+
+    @property
+    def least_scale(self) -> float:
+        """How many times as large the sheet must at least be for all facets to take the thickness;
+        infinite if a crease is folded flat.
+        """
+        least = float(self.limit_mm.min())
+        return self.thickness_mm / least if least > 0 else np.inf
+
+    @property
+    def folds(self) -> bool:
+        """Whether the sheet folds with this thickness."""
+        return not len(self.too_small) and not self.collisions
+
+
+def thick_panels(
+    pattern: CreasePattern,
+    thickness_mm: float,
+    on_progress: Callable[[float, str], None] | None = None,
+) -> ThickPanels:
+    """The panels of ``pattern`` at ``thickness_mm``, and whether they fold to the folded form.
+
+    Raises :class:`~miurafab.errors.InputError` for a thickness that is none, or for a sheet that
+    does not fold rigidly and so cannot be made of panels at all.
+    """
+    if not 0 < thickness_mm < np.inf:
+        raise InputError(f"--thickness is {thickness_mm:g} mm; it must be greater than zero.")
+    motion = rigid_motion(pattern, [0.25, 0.5, 1.0])
+    if not motion.is_rigid:
+        assert motion.mismatch is not None
+        raise InputError(
+            "Thick panels cannot bend, and this sheet does not fold rigidly: on the way its facets "
+            f"miss each other by up to {motion.mismatch.max():.2g} mean edges; fit it with --rigid."
+        )
+    angle = np.where((pattern.edges_faces >= 0).all(axis=1), pattern.edges_fold_angle, 0.0)
+    flat_folded = np.abs(angle) > ON_EACH_OTHER
+    reach = np.where(flat_folded, np.inf, np.tan(np.abs(angle) / 2))
+    side = np.where(angle > 0, SIDES[0], np.where(angle < 0, SIDES[1], ""))
+    limit = facet_limits(pattern, angle)
+    collisions: tuple[tuple[float, int, int], ...] = ()
+    if (limit > thickness_mm).all():
+        collisions = _collisions(pattern, thickness_mm, on_progress)
+    return ThickPanels(pattern, thickness_mm, side, reach * thickness_mm / 2, limit, collisions)
+
+
+def facet_limits(pattern: CreasePattern, angle: Floats) -> Floats:
+    """(F,) the thickness, mm, at which each facet loses a side when folded by ``angle`` (E,).
+
+    Infinite for a facet that no side closes on, 0 for one with a crease folded by 180 degrees.
+    """
+    limits = np.full(len(pattern.faces_vertices), np.inf)
+    for sign in (1.0, -1.0):
+        closing = _closing(pattern, angle * sign)
+        shut = np.isinf(closing).any(axis=1)
+        moves = _corner_moves(pattern, np.where(np.isinf(closing), 0.0, closing))
+        along, length = _sides(pattern)
+        shrink = np.einsum("fkd,fkd->fk", moves - _next(pattern, moves), along)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            lasts = np.where((shrink > 1e-12) & (length > 0), 2 * length / shrink, np.inf)
+        limits = np.minimum(limits, np.where(shut, 0.0, lasts.min(axis=1)))
+    return limits
+
+
+def _collisions(
+    pattern: CreasePattern,
+    thickness: float,
+    on_progress: Callable[[float, str], None] | None,
+) -> tuple[tuple[float, int, int], ...]:
+    """Where the trimmed panels, as solids, pass through each other on the way."""
+    folding = np.abs(pattern.edges_fold_angle[pattern.edges_fold_angle != 0])
+    middling = float(np.median(folding))
+    states = np.tan(np.array(STATES) * middling / 2) / np.tan(middling / 2)
+    found: list[tuple[float, int, int]] = []
+    solids = _Solids.of(pattern, thickness)
+    placement = place(pattern, fold_angles_at(pattern, states))
+    owner_of_vertex = _any_facet(pattern)
+    for frame, state in enumerate(states):
+        if on_progress is not None:
+            on_progress(frame / len(states), "panels")
+        turn, shift = placement.turn[frame], placement.shift[frame]
+        hinge = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
+        points = np.concatenate([hinge, solids.corners])
+        facet = np.concatenate([owner_of_vertex, solids.corner_facet])
+        placed = np.einsum("nij,nj->ni", turn[facet], points) + shift[facet]
+        pairs = self_intersections(solids.as_pattern(placed))
+        panels = np.sort(solids.triangle_facet[pairs], axis=1)
+        panels = np.unique(panels[panels[:, 0] != panels[:, 1]], axis=0)
+        found.extend((float(state), int(a), int(b)) for a, b in panels)
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Solids:
+    """All panels as one mesh: ``corners`` (C, 3) of their tops and bottoms over the flat pattern,
+    and ``triangles`` (n, 3) over the pattern's vertices, which are the hinges, then the corners.
+    """
+
+    corners: Floats
+    corner_facet: Ints
+    triangles: Ints
+    triangle_facet: Ints
+
+    @classmethod
+    def of(cls, pattern: CreasePattern, thickness: float) -> _Solids:
+        faces = pattern.faces_vertices
+        facet, slot = np.nonzero(faces >= 0)
+        vertices, count = len(pattern.vertices_coords), len(facet)
+        number = np.full(faces.shape, -1, dtype=np.int64)
+        number[facet, slot] = np.arange(count)
+        hinge, beside = faces[facet, slot], _next(pattern, faces)[facet, slot]
+        corners, triangles, owners = [], [], []
+        for at, sign in enumerate((1.0, -1.0)):
+            moves = _corner_moves(pattern, _closing(pattern, pattern.edges_fold_angle * sign))
+            flat = (pattern.vertices_coords[faces] + thickness / 2 * moves)[facet, slot]
+            corners.append(np.pad(flat, ((0, 0), (0, 1)), constant_values=sign * thickness / 2))
+            shift = vertices + at * count
+            cap, owner = triangulate(number, flat)
+            corner = number[facet, slot] + shift
+            after = _next(pattern, number)[facet, slot] + shift
+            walls = ((hinge, beside, after), (hinge, after, corner))
+            triangles += [cap + shift, *(np.stack(wall, axis=1) for wall in walls)]
+            owners += [owner, facet, facet]
+        return cls(
+            np.concatenate(corners),
+            np.tile(facet, 2),
+            np.concatenate(triangles),
+            np.concatenate(owners),
+        )
+
+    def as_pattern(self, placed: Floats) -> CreasePattern:
+        """The triangles as facets of a pattern that is folded to ``placed`` (V + C, 3)."""
+        return CreasePattern(
+            vertices_coords=np.zeros((len(placed), 2)),
+            edges_vertices=np.empty((0, 2), dtype=np.int64),
+            edges_assignment=np.empty(0, dtype="U1"),
+            edges_fold_angle=np.empty(0),
+            faces_vertices=self.triangles,
+            folded_coords=placed,
+        )
+
+
+def _any_facet(pattern: CreasePattern) -> Ints:
+    """(V,) a facet of each vertex."""
+    facet, corner = np.nonzero(pattern.faces_vertices >= 0)
+    found = np.zeros(len(pattern.vertices_coords), dtype=np.int64)
+    found[pattern.faces_vertices[facet, corner]] = facet
+    return found
+
+
+def _closing(pattern: CreasePattern, angle: Floats) -> Floats:
+    """(F, k) tan(rho / 2) of each side that closes; ``angle`` (E,) is positive where it does."""
+    flat_folded = angle > ON_EACH_OTHER
+    reach = np.where(flat_folded, np.inf, np.tan(np.clip(angle, 0.0, ON_EACH_OTHER) / 2))
+    return np.where(pattern.faces_edges >= 0, reach[pattern.faces_edges], 0.0)
+
+
+def _next(pattern: CreasePattern, values: NDArray[Any]) -> NDArray[Any]:
+    """``values`` (F, k, ...) of the next corner of each facet."""
+    size = (pattern.faces_vertices >= 0).sum(axis=1)[:, None]
+    slot = np.arange(pattern.faces_vertices.shape[1])[None, :]
+    after = np.where(slot + 1 < size, slot + 1, 0)
+    return values[np.arange(len(values))[:, None], after]
+
+
+def _sides(pattern: CreasePattern) -> tuple[Floats, Floats]:
+    """(F, k, 2) unit directions from each corner to the next, and their lengths (F, k)."""
+    here = pattern.vertices_coords[pattern.faces_vertices]
+    side = _next(pattern, here) - here
+    length = np.where(pattern.faces_vertices >= 0, np.linalg.norm(side, axis=2), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = np.where(length[..., None] > 0, side / length[..., None], 0.0)
+    return along, length
+
+
+def _corner_moves(pattern: CreasePattern, closing: Floats) -> Floats:
+    """(F, k, 2) how far each corner moves inwards for half a millimetre of thickness a unit."""
+    along, _ = _sides(pattern)
+    size = (pattern.faces_vertices >= 0).sum(axis=1)[:, None]
+    slot = np.arange(pattern.faces_vertices.shape[1])[None, :]
+    before = np.where(slot > 0, slot - 1, size - 1)
+    row = np.arange(len(along))[:, None]
+    # u and v point in and out, m and n are their left normals: w = (k_m v - k_n u) / (u x v)
+    u, v, k_in, k_out = along[row, before], along, closing[row, before], closing
+    turn = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moves = (k_in[..., None] * v - k_out[..., None] * u) / turn[..., None]
+    return np.where((pattern.faces_vertices >= 0)[..., None], moves, 0.0)

@@ -1,0 +1,338 @@
+"""Pattern files: FOLD 1.2 as this house writes it, and any FOLD file that holds a crease pattern.
+
+The key frame is the flat crease pattern; ``file_frames[0]`` inherits it and holds the folded form,
+and the frames of a folding motion follow it. In files of other programs the flat pattern may stand
+in any frame, facets may run clockwise or be missing, and angles may have to be taken from the
+folded form (FOLD 1.2, https://github.com/edemaine/fold/blob/main/doc/spec.md).
+
+Numbers are written with as many digits as they need to be read back bit for bit, and the same
+pattern gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import PatternError
+from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
+from miurafab.origami.folding.kinematics import FoldingMotion
+from miurafab.origami.formats.planar_graph import faces_of_plane_graph
+from miurafab.origami.unfold import with_angles_of_the_folded_form
+from miurafab.version import __version__
+
+_UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "um": 1e-3}
+
+
+def fold_text(pattern: CreasePattern, title: str = "", motion: FoldingMotion | None = None) -> str:
+    """``pattern`` as the text of a FOLD 1.2 file, one top-level key a line.
+
+    The frames of a ``motion`` of the pattern follow the folded form, each a frame that inherits
+    the flat pattern and has its own coordinates and fold angles.
+    """
+    keys: dict[str, Any] = {
+        "file_spec": 1.2,
+        "file_creator": f"miurafab {__version__}",
+        "file_title": title,
+        "file_classes": ["singleModel"],
+        "frame_classes": ["creasePattern"],
+        "frame_attributes": ["2D"],
+        "frame_unit": "mm",
+        "vertices_coords": pattern.vertices_coords.tolist(),
+        "edges_vertices": pattern.edges_vertices.tolist(),
+        "edges_assignment": pattern.edges_assignment.tolist(),
+        "edges_foldAngle": np.degrees(pattern.edges_fold_angle).tolist(),
+        "faces_vertices": _polygons(pattern.faces_vertices),
+    }
+    frames = []
+    if pattern.folded_coords is not None:
+        frames.append(_folded_frame(pattern.folded_coords))
+    if motion is not None:
+        keys["file_classes"].append("animation")
+        for state, points, angles in zip(
+            motion.states.tolist(), motion.frames, motion.fold_angles, strict=True
+        ):
+            frames.append(
+                {
+                    "frame_title": f"s = {state:.6g}",
+                    **_folded_frame(points),
+                    "edges_foldAngle": np.degrees(angles).tolist(),
+                }
+            )
+    if frames:
+        keys["file_frames"] = frames
+    if pattern.grid is not None:
+        keys["miurafab:grid"] = list(pattern.grid)
+    if pattern.target:
+        keys["miurafab:target"] = pattern.target
+        keys["miurafab:scale"] = pattern.scale
+    if not title:
+        del keys["file_title"]
+    lines = (
+        f"{json.dumps(key)}: {json.dumps(value, separators=(',', ':'), allow_nan=False)}"
+        for key, value in keys.items()
+    )
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _folded_frame(points: NDArray[np.float64]) -> dict[str, Any]:
+    return {
+        "frame_classes": ["foldedForm"],
+        "frame_attributes": ["3D"],
+        "frame_parent": 0,
+        "frame_inherit": True,
+        "frame_unit": "mm",
+        "vertices_coords": points.tolist(),
+    }
+
+
+def _polygons(faces: NDArray[np.int64]) -> list[list[int]]:
+    if (faces >= 0).all():
+        whole: list[list[int]] = faces.tolist()
+        return whole
+    return [[v for v in face if v >= 0] for face in faces.tolist()]
+
+
+def write_fold(
+    pattern: CreasePattern, path: Path, title: str = "", motion: FoldingMotion | None = None
+) -> None:
+    """Write ``pattern``, with a ``motion`` of it or without, to the FOLD file ``path``."""
+    path.write_text(fold_text(pattern, title, motion), encoding="utf-8", newline="\n")
+
+
+def read_fold(path: Path) -> CreasePattern:
+    """The pattern in the FOLD file ``path``.
+
+    Raises :class:`~miurafab.errors.PatternError` naming the file and what is wrong with it.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise PatternError(f"{path} does not exist.") from None
+    except OSError as fault:
+        raise PatternError(f"{path} cannot be read: {fault.strerror}.") from None
+    except UnicodeDecodeError:
+        raise PatternError(f"{path} is not a FOLD file: it is not UTF-8 text.") from None
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as fault:
+        raise PatternError(
+            f"{path} is not a FOLD file: line {fault.lineno} is not JSON ({fault.msg})."
+        ) from None
+    except RecursionError:
+        raise PatternError(f"{path} is not a FOLD file: it is nested too deeply.") from None
+    try:
+        return parse_fold(document)
+    except PatternError as fault:
+        raise PatternError(f"{path}: {fault}") from None
+
+
+def parse_fold(document: Any) -> CreasePattern:
+    """The pattern in a parsed FOLD document. Raises ``PatternError`` naming the key at fault."""
+    if not isinstance(document, dict):
+        raise PatternError("A FOLD file holds one JSON object.")
+    frames = _frames(document)
+    key = _flat_frame(frames)
+    factor = _unit(key, 1.0)
+    flat = np.ascontiguousarray(_coordinates(key, "vertices_coords")[:, :2] * factor)
+    edges = _indices(key, "edges_vertices", 2)
+    faces = _face_indices(key) if "faces_vertices" in key else _walked(flat, edges)
+    assignment = _assignments(key, len(edges))
+    others = [frame for frame in frames if frame is not key]
+    pattern = CreasePattern(
+        vertices_coords=flat,
+        edges_vertices=edges,
+        edges_assignment=assignment,
+        edges_fold_angle=_fold_angles(key, assignment),
+        faces_vertices=faces,
+        folded_coords=_folded(others, len(flat), factor),
+        grid=_grid(document, len(flat)),
+        scale=_scale(document),
+        target=_target(document),
+    )
+    pattern = replace(pattern, faces_vertices=_counter_clockwise(flat, faces))
+    if pattern.folded_coords is not None and key.get("edges_foldAngle") is None:
+        return with_angles_of_the_folded_form(pattern)
+    return pattern
+
+
+def _frames(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The key frame and ``file_frames``, each with what it inherits filled in."""
+    listed = document.get("file_frames", [])
+    if not isinstance(listed, list) or not all(isinstance(frame, dict) for frame in listed):
+        raise PatternError("'file_frames' is not a list of objects.")
+    frames: list[Mapping[str, Any]] = [document]
+    for number, frame in enumerate(listed, start=1):
+        parent = frame.get("frame_parent", 0)
+        if not frame.get("frame_inherit"):
+            frames.append(frame)
+        elif type(parent) is int and 0 <= parent < number:
+            frames.append({**frames[parent], **frame})
+        else:
+            raise PatternError(f"Frame {number} inherits {parent!r}, which is no frame before it.")
+    return frames
+
+
+def _classes(frame: Mapping[str, Any]) -> list[Any]:
+    classes = frame.get("frame_classes")
+    return classes if isinstance(classes, list) else []
+
+
+def _flat_frame(frames: list[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """The frame with the crease pattern: the one that says so, or the first that lies flat."""
+    said = [frame for frame in frames if "creasePattern" in _classes(frame)]
+    for frame in said or [f for f in frames if "foldedForm" not in _classes(f)] or frames:
+        points = _coordinates(frame, "vertices_coords")
+        if points.shape[1] == 2 or np.ptp(points[:, 2]) <= 1e-9 * np.ptp(points[:, :2]):
+            return frame
+    raise PatternError("No frame of the file holds a flat crease pattern in 'vertices_coords'.")
+
+
+def _unit(frame: Mapping[str, Any], default: float) -> float:
+    """Millimetres in the frame's unit; ``default`` if it has none, or none that is a length."""
+    unit = frame.get("frame_unit")
+    return _UNITS_MM.get(unit, default) if isinstance(unit, str) else default
+
+
+def _counter_clockwise(flat: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """``faces`` with the corners of those that run clockwise in reverse order."""
+    whole = np.where(faces >= 0, faces, faces[:, :1])
+    x, y = np.moveaxis(flat[whole], -1, 0)
+    clockwise = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) < 0
+    size = (faces >= 0).sum(axis=1)[:, None]
+    slot = np.arange(faces.shape[1])[None, :]
+    back = np.take_along_axis(faces, np.where(slot < size, size - 1 - slot, slot), axis=1)
+    return np.where(clockwise[:, None], back, faces)
+
+
+def _walked(flat: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The facets that ``edges`` enclose, for a file that lists none."""
+    if edges.max() >= len(flat):
+        raise PatternError("'edges_vertices' refers to a vertex that does not exist.")
+    faces = faces_of_plane_graph(flat, edges)
+    if not len(faces):
+        raise PatternError("'faces_vertices' is missing and 'edges_vertices' encloses no facet.")
+    return faces
+
+
+def _array(document: Mapping[str, Any], key: str) -> list[Any]:
+    value = document.get(key)
+    if not isinstance(value, list) or not value:
+        raise PatternError(f"'{key}' is missing or empty.")
+    return value
+
+
+def _coordinates(document: Mapping[str, Any], key: str) -> NDArray[np.float64]:
+    try:
+        points = np.array(_array(document, key), dtype=np.float64)
+    except (ValueError, TypeError):
+        raise PatternError(f"'{key}' is not a list of points of equal dimension.") from None
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise PatternError(f"'{key}' is not a list of 2D or 3D points.")
+    return points
+
+
+def _indices(document: Mapping[str, Any], key: str, width: int) -> NDArray[np.int64]:
+    try:
+        found = np.array(_array(document, key))
+    except ValueError:
+        raise PatternError(f"'{key}' is not a list of {width} vertices each.") from None
+    if found.ndim != 2 or found.shape[1] != width or found.dtype.kind not in "iu":
+        raise PatternError(f"'{key}' is not a list of {width} whole numbers each.")
+    if found.min() < 0:
+        raise PatternError(f"'{key}' holds a negative vertex.")
+    return found.astype(np.int64)
+
+
+def _face_indices(document: Mapping[str, Any]) -> NDArray[np.int64]:
+    faces = _array(document, "faces_vertices")
+    sizes = {len(face) if isinstance(face, list) else 0 for face in faces}
+    if min(sizes) < 3:
+        raise PatternError("'faces_vertices' holds a facet of fewer than three corners.")
+    width = max(sizes)
+    if len(sizes) == 1:
+        return _indices(document, "faces_vertices", width)
+    numbers = all(type(v) is int and v >= 0 for face in faces for v in face)
+    if not numbers:
+        raise PatternError("'faces_vertices' holds something that is not a vertex number.")
+    return np.array([face + [-1] * (width - len(face)) for face in faces], dtype=np.int64)
+
+
+def _assignments(document: Mapping[str, Any], edges: int) -> NDArray[np.str_]:
+    given = document.get("edges_assignment", ["U"] * edges)
+    if not isinstance(given, list) or len(given) != edges:
+        raise PatternError("'edges_assignment' does not have one letter for each edge.")
+    unknown = {str(letter) for letter in given} - set(ASSIGNMENTS)
+    if unknown:
+        raise PatternError(
+            f"'edges_assignment' holds {sorted(unknown)[0]!r}; FOLD knows {', '.join(ASSIGNMENTS)}."
+        )
+    return np.array(given, dtype="U1")
+
+
+def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> NDArray[np.float64]:
+    """Given angles in radians; without them a mountain is -pi and a valley pi (flat-folded)."""
+    flat_folded = np.select([assignment == "M", assignment == "V"], [-180.0, 180.0], 0.0)
+    given = document.get("edges_foldAngle")
+    if given is None:
+        return np.asarray(np.radians(flat_folded))
+    if not isinstance(given, list) or len(given) != len(assignment):
+        raise PatternError("'edges_foldAngle' does not have one angle for each edge.")
+    try:
+        angles = np.array([math.nan if a is None else a for a in given], dtype=np.float64)
+    except (ValueError, TypeError):
+        raise PatternError("'edges_foldAngle' holds something that is not a number.") from None
+    return np.radians(np.where(np.isnan(angles), flat_folded, angles))
+
+
+def _folded(
+    frames: list[Mapping[str, Any]], vertices: int, factor: float
+) -> NDArray[np.float64] | None:
+    """The folded form (V, 3), mm, in the first of ``frames`` that says that it is one."""
+    for frame in frames:
+        if "foldedForm" in _classes(frame):
+            points: NDArray[np.float64] = _coordinates(frame, "vertices_coords")
+            points = points * _unit(frame, factor)
+            if points.shape[1] == 2:
+                points = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
+            if len(points) != vertices:
+                raise PatternError(
+                    f"The folded form has {len(points)} vertices and the pattern {vertices}."
+                )
+            return points
+    return None
+
+
+def _grid(document: Mapping[str, Any], vertices: int) -> tuple[int, int] | None:
+    grid = document.get("miurafab:grid")
+    if grid is None:
+        return None
+    if (
+        not isinstance(grid, list)
+        or len(grid) != 2
+        or not all(type(n) is int and n >= 2 for n in grid)
+        or grid[0] * grid[1] != vertices
+    ):
+        raise PatternError(f"'miurafab:grid' is {grid}, which does not give {vertices} vertices.")
+    return grid[0], grid[1]
+
+
+def _scale(document: Mapping[str, Any]) -> float:
+    scale = document.get("miurafab:scale", 1.0)
+    if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0 < scale < math.inf:
+        raise PatternError(f"'miurafab:scale' is {scale!r}, not a positive number.")
+    return float(scale)
+
+
+def _target(document: Mapping[str, Any]) -> dict[str, Any]:
+    target = document.get("miurafab:target", {})
+    if not isinstance(target, dict):
+        raise PatternError("'miurafab:target' is not an object.")
+    return target

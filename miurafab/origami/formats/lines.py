@@ -1,0 +1,234 @@
+"""CP, OPX and DXF: crease patterns as bare lines that carry a type and no fold angle.
+
+ORIPA's type numbers are 0 auxiliary, 1 border or cut, 2 mountain, 3 valley, and its y axis points
+down (ORIPA, ``OriLine.java`` and ``ExporterDXF``, which turns y round). A CP file holds
+``type x0 y0 x1 y1`` a line; an OPX file holds the same as a Java bean in XML. DXF is written as R12
+(AC1009) with LINE entities on the layers CutLine, MountainLine, ValleyLine and AuxLine and with the
+colours that ORIPA reads types from: green, red, blue.
+
+Read back, mountains and valleys are folded flat, for none of the three says how far they fold.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+
+import numpy as np
+
+from miurafab.errors import PatternError
+from miurafab.origami.formats.planar_graph import CreaseLines
+
+_TYPE_OF_LETTER = {"B": 1, "C": 1, "M": 2, "V": 3, "F": 0, "U": 0, "J": 0}
+_LETTER_OF_TYPE = {0: "F", 1: "B", 2: "M", 3: "V"}
+_LAYERS = {0: ("AuxLine", 8), 1: ("CutLine", 3), 2: ("MountainLine", 1), 3: ("ValleyLine", 5)}
+
+
+def cp_text(lines: CreaseLines) -> str:
+    """``lines`` as a CP file; y downwards, mm."""
+    return "".join(f"{kind} {x0!r} {y0!r} {x1!r} {y1!r}\n" for kind, x0, y0, x1, y1 in _down(lines))
+
+
+def parse_cp(text: str) -> CreaseLines:
+    """The lines of a CP file. Raises ``PatternError`` naming the line that cannot be read."""
+    rows = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.split()
+        if not words:
+            continue
+        try:
+            kind, (x0, y0, x1, y1) = int(words[0]), (float(word) for word in words[1:])
+        except ValueError:
+            raise PatternError(
+                f"line {number} is '{line.strip()[:60]}', not a type and four coordinates."
+            ) from None
+        # Orihime adds types above 3 for further auxiliary lines
+        rows.append((_LETTER_OF_TYPE.get(kind, "F"), x0, -y0, x1, -y1))
+    return _lines(rows)
+
+
+def opx_text(lines: CreaseLines, title: str = "") -> str:
+    """``lines`` as an OPX file of ORIPA."""
+    java = ElementTree.Element("java", {"version": "1.8.0", "class": "java.beans.XMLDecoder"})
+    data = ElementTree.SubElement(java, "object", {"class": "oripa.DataSet"})
+    rows = list(_down(lines))
+    size = max((abs(value) for row in rows for value in row[1:]), default=0.0)
+    _property(data, "mainVersion", "int", "1")
+    _property(data, "subVersion", "int", "1")
+    _property(data, "paperSize", "double", repr(size))
+    array = ElementTree.SubElement(
+        ElementTree.SubElement(data, "void", {"property": "lines"}),
+        "array",
+        {"class": "oripa.OriLineProxy", "length": str(len(rows))},
+    )
+    for index, (kind, *ends) in enumerate(rows):
+        place = ElementTree.SubElement(array, "void", {"index": str(index)})
+        line = ElementTree.SubElement(place, "object", {"class": "oripa.OriLineProxy"})
+        _property(line, "type", "int", str(kind))
+        for name, value in zip(("x0", "y0", "x1", "y1"), ends, strict=True):
+            _property(line, name, "double", repr(value))
+    if title:
+        _property(data, "title", "string", title)
+    ElementTree.indent(java, " ")
+    head = '<?xml version="1.0" encoding="UTF-8"?>\n'
+    return head + ElementTree.tostring(java, encoding="unicode") + "\n"
+
+
+def _property(parent: ElementTree.Element, name: str, kind: str, value: str) -> None:
+    holder = ElementTree.SubElement(parent, "void", {"property": name})
+    ElementTree.SubElement(holder, kind).text = value
+
+
+def parse_opx(text: str) -> CreaseLines:
+    """The lines of an OPX file. Raises ``PatternError`` saying what cannot be read."""
+    rows = []
+    for line in xml_root(text, "an OPX file").iter("object"):
+        if line.get("class") != "oripa.OriLineProxy":
+            continue
+        # Java leaves out what is zero
+        values = {"type": 0.0, "x0": 0.0, "y0": 0.0, "x1": 0.0, "y1": 0.0}
+        for void in line.findall("void"):
+            name = void.get("property")
+            if name in values and len(void):
+                values[name] = _number(void[0].text or "", f"'{name}' of a line")
+        letter = _LETTER_OF_TYPE.get(int(values["type"]), "F")
+        rows.append((letter, values["x0"], -values["y0"], values["x1"], -values["y1"]))
+    return _lines(rows)
+
+
+def xml_root(text: str, what: str) -> ElementTree.Element:
+    """The root of the XML ``text``; entities, which can be made to grow without end, are refused.
+
+    Raises ``PatternError`` saying that it is not ``what``.
+    """
+    if "<!ENTITY" in text:
+        raise PatternError(f"it is not {what}: it declares XML entities.")
+    try:
+        return ElementTree.fromstring(text)
+    except ElementTree.ParseError as fault:
+        raise PatternError(f"it is not {what}: {fault}.") from None
+
+
+def dxf_text(lines: CreaseLines) -> str:
+    """``lines`` as an R12 DXF file in millimetres, y upwards."""
+    parts = ["0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1009\n0\nENDSEC\n"]
+    parts.append(f"0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLAYER\n70\n{len(_LAYERS)}\n")
+    for name, colour in _LAYERS.values():
+        parts.append(f"0\nLAYER\n2\n{name}\n70\n0\n62\n{colour}\n6\nCONTINUOUS\n")
+    parts.append("0\nENDTAB\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n")
+    kinds = (_TYPE_OF_LETTER[letter] for letter in lines.assignment.tolist())
+    for kind, ((x0, y0), (x1, y1)) in zip(kinds, lines.ends.tolist(), strict=True):
+        name, colour = _LAYERS[kind]
+        parts.append(
+            f"0\nLINE\n8\n{name}\n62\n{colour}\n"
+            f"10\n{x0!r}\n20\n{y0!r}\n30\n0.0\n11\n{x1!r}\n21\n{y1!r}\n31\n0.0\n"
+        )
+    parts.append("0\nENDSEC\n0\nEOF\n")
+    return "".join(parts)
+
+
+def parse_dxf(text: str) -> CreaseLines:
+    """The LINE, LWPOLYLINE and POLYLINE entities of a DXF file, by layer, else by colour.
+
+    Raises ``PatternError`` naming the line at fault, or for a curved polyline.
+    """
+    rows: list[tuple[str, float, float, float, float]] = []
+    for kind, tags in _entities(text):
+        letter = _dxf_letter(tags)
+        if kind == "LINE":
+            x0, y0, x1, y1 = (_first(tags, code) for code in (10, 20, 11, 21))
+            rows.append((letter, x0, y0, x1, y1))
+        elif kind in ("LWPOLYLINE", "POLYLINE"):
+            if any(code == 42 and _number(value, "a bulge") != 0 for code, value in tags):
+                raise PatternError("a polyline is curved; a crease pattern holds straight lines.")
+            xs = [_number(value, "an x") for code, value in tags if code == 10]
+            ys = [_number(value, "a y") for code, value in tags if code == 20]
+            if kind == "POLYLINE":  # the polyline itself carries a dummy point
+                xs, ys = xs[-_vertex_count(tags) :], ys[-_vertex_count(tags) :]
+            if int(_first(tags, 70)) & 1:
+                xs, ys = xs + xs[:1], ys + ys[:1]
+            ends = list(zip(xs, ys, strict=True))
+            rows.extend((letter, *p, *q) for p, q in itertools.pairwise(ends))
+    return _lines(rows)
+
+
+def _entities(text: str) -> Iterator[tuple[str, list[tuple[int, str]]]]:
+    """Each entity of the ENTITIES section: its kind and its (group code, value) pairs; the vertices
+    of a POLYLINE are joined to it.
+    """
+    rows = text.splitlines()
+    if len(rows) < 4 or rows[0].strip() != "0" or rows[1].strip() != "SECTION":
+        raise PatternError("it is not a DXF file in text form.")
+    section, kind, tags = "", "", list[tuple[int, str]]()
+    for number in range(0, len(rows) - 1, 2):
+        value = rows[number + 1].strip()
+        try:
+            code = int(rows[number])
+        except ValueError:
+            raise PatternError(
+                f"line {number + 1} is '{rows[number].strip()[:40]}', not a DXF group code."
+            ) from None
+        if code != 0:
+            if code == 2 and kind == "SECTION":
+                section = value
+            tags.append((code, value))
+            continue
+        if kind == "POLYLINE" and value == "VERTEX":
+            tags.append((code, value))
+            continue
+        if section == "ENTITIES" and kind not in ("", "SECTION"):
+            yield kind, tags
+        kind, tags = value, []
+
+
+def _vertex_count(tags: list[tuple[int, str]]) -> int:
+    return sum(tag == (0, "VERTEX") for tag in tags)
+
+
+def _dxf_letter(tags: list[tuple[int, str]]) -> str:
+    """The assignment by the layer's name, else by the colour, else unassigned."""
+    found = dict(reversed(tags))  # of several tags of one code the first counts
+    layer = found.get(8, "").lower()
+    for part, letter in (
+        ("mountain", "M"), ("valley", "V"), ("cut", "B"), ("border", "B"), ("boundary", "B"),
+        ("aux", "F"), ("flat", "F"),
+    ):  # fmt: skip
+        if part in layer:
+            return letter
+    colour = int(_number(found.get(62, "0"), "a colour"))
+    return {1: "M", 5: "V", 3: "B"}.get(colour, "U")
+
+
+def _first(tags: list[tuple[int, str]], code: int) -> float:
+    for other, value in tags:
+        if other == code:
+            return _number(value, f"group {code}")
+    return 0.0
+
+
+def _number(text: str, what: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise PatternError(f"{what} is '{text.strip()[:40]}', not a finite number.")
+    return value
+
+
+def _down(lines: CreaseLines) -> Iterator[tuple[int, float, float, float, float]]:
+    """Type and coordinates of each line, y downwards."""
+    for letter, ((x0, y0), (x1, y1)) in zip(
+        lines.assignment.tolist(), lines.ends.tolist(), strict=True
+    ):
+        # 0.0 - y and not -y, which would write -0.0
+        yield _TYPE_OF_LETTER[letter], x0, 0.0 - y0, x1, 0.0 - y1
+
+
+def _lines(rows: list[tuple[str, float, float, float, float]]) -> CreaseLines:
+    ends = np.array([row[1:] for row in rows], dtype=np.float64).reshape(-1, 2, 2)
+    return CreaseLines(
+        ends, np.array([row[0] for row in rows], dtype="U1"), np.full(len(rows), np.nan)
+    )

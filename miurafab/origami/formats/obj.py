@@ -1,0 +1,114 @@
+"""A pattern from two Wavefront OBJ files: the same mesh lying flat and folded.
+
+Many research codes hand their origami on that way. Vertices and facets must come in the same order
+in both; the fold angles follow from the folded form. OBJ has no unit: one unit is read as 1 mm.
+(Wavefront, Advanced Visualizer manual, appendix B1: the ``v`` and ``f`` statements.)
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import PatternError
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.contact import doubled_areas, triangulate
+from miurafab.origami.unfold import with_angles_of_the_folded_form
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
+    """The pattern whose flat form is in ``flat`` and whose folded form is in ``folded``.
+
+    Raises :class:`~miurafab.errors.PatternError` naming the file and what is wrong with it.
+    """
+    points, faces = _read_obj(flat)
+    shape, same = _read_obj(folded)
+    if len(points) != len(shape):
+        raise PatternError(
+            f"{flat} has {len(points)} vertices and {folded} has {len(shape)}; they must be one "
+            "mesh in two forms."
+        )
+    if faces.shape != same.shape or (faces != same).any():
+        raise PatternError(f"{flat} and {folded} do not list the same facets in the same order.")
+    across = int(np.argmin(np.ptp(points, axis=0)))
+    if np.ptp(points[:, across]) > 1e-9 * np.ptp(points):
+        raise PatternError(f"{flat} is not flat: its vertices do not lie in one plane x, y or z.")
+    # the two axes in the order that keeps the view from the positive side of the third
+    plane = np.ascontiguousarray(points[:, [(across + 1) % 3, (across + 2) % 3]])
+    triangles, owner = triangulate(faces, plane)
+    areas = np.bincount(owner, doubled_areas(plane, triangles), minlength=len(faces))
+    if areas.sum() < 0:
+        faces = _reversed(faces)
+    edges = _edges(faces)
+    pattern = CreasePattern(
+        vertices_coords=plane,
+        edges_vertices=edges,
+        edges_assignment=np.full(len(edges), "U"),
+        edges_fold_angle=np.zeros(len(edges)),
+        faces_vertices=faces,
+        folded_coords=shape,
+    )
+    try:
+        return with_angles_of_the_folded_form(pattern)
+    except PatternError as fault:
+        raise PatternError(f"{flat}: {fault}") from None
+
+
+def _read_obj(path: Path) -> tuple[Floats, Ints]:
+    """Vertices (V, 3) and facets (F, k), -1 padded."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise PatternError(f"{path} does not exist.") from None
+    except OSError as fault:
+        raise PatternError(f"{path} cannot be read: {fault.strerror}.") from None
+    except UnicodeDecodeError:
+        raise PatternError(f"{path} is not an OBJ file: it is not UTF-8 text.") from None
+    points: list[list[float]] = []
+    faces: list[list[int]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.split("#")[0].split()
+        try:
+            if words[:1] == ["v"]:
+                x, y, z = (float(word) for word in words[1:4])
+                points.append([x, y, z])
+            elif words[:1] == ["f"]:
+                corners = [int(word.split("/")[0]) for word in words[1:]]
+                # from 1 up, or backwards from the last vertex so far
+                face = [c - 1 if c > 0 else len(points) + c for c in corners]
+                if len(face) < 3 or 0 in corners or min(face) < 0:
+                    raise ValueError
+                faces.append(face)
+        except ValueError:
+            raise PatternError(f"{path}, line {number}: '{line.strip()}' cannot be read.") from None
+    if not points or not faces:
+        raise PatternError(f"{path} holds no {'facets' if points else 'vertices'}.")
+    vertices = np.array(points)
+    if not np.isfinite(vertices).all():
+        raise PatternError(f"{path} holds a coordinate that is not a finite number.")
+    if max(map(max, faces)) >= len(points):
+        raise PatternError(f"{path}: a facet refers to a vertex that does not exist.")
+    width = max(map(len, faces))
+    padded = [face + [-1] * (width - len(face)) for face in faces]
+    return vertices, np.array(padded, dtype=np.int64)
+
+
+def _reversed(faces: Ints) -> Ints:
+    """The facets with their corners in the opposite order, padding last."""
+    sizes = (faces >= 0).sum(axis=1)[:, None]
+    slot = np.broadcast_to(np.arange(faces.shape[1]), faces.shape)
+    backwards = np.where(slot < sizes, sizes - 1 - slot, slot)
+    return np.take_along_axis(faces, backwards, axis=1)
+
+
+def _edges(faces: Ints) -> Ints:
+    sizes = (faces >= 0).sum(axis=1)[:, None]
+    slot = np.broadcast_to(np.arange(faces.shape[1]), faces.shape)
+    after = np.where(slot + 1 < sizes, slot + 1, 0)
+    sides = np.stack([faces, np.take_along_axis(faces, after, axis=1)], axis=-1)
+    return np.unique(np.sort(sides[faces >= 0], axis=1), axis=0)

@@ -1,0 +1,277 @@
+"""From loose lines to a crease pattern: joined where they meet, split where they cross, and faces.
+
+Drawings (SVG, CP, OPX, DXF) hold lines and nothing else; two lines meet where their ends lie within
+a tolerance of each other. The plane graph is walked with the usual rule: at the end of a side turn
+to the next side clockwise, so that each facet is gone round counter-clockwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from miurafab.errors import PatternError
+from miurafab.origami.crease_pattern import CreasePattern
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+TOLERANCE = 1e-4
+"""How near ends count as met, as a part of the median line."""
+
+_FAR = 1e9
+# Where two lines lie on each other the one that says more wins.
+_RANK = {"B": 6, "C": 5, "M": 4, "V": 4, "J": 2, "F": 1, "U": 0}
+
+
+@dataclass(frozen=True, eq=False)
+class CreaseLines:
+    """n straight lines of a drawing, y upwards.
+
+    ``ends`` (n, 2, 2) float64, mm; ``assignment`` (n,) letters of FOLD; ``fold_angle`` (n,)
+    float64, radians, NaN where the drawing does not tell.
+    """
+
+    ends: Floats
+    assignment: NDArray[np.str_]
+    fold_angle: Floats
+
+
+def lines_of(pattern: CreasePattern) -> CreaseLines:
+    """The edges of the flat ``pattern`` as lines."""
+    return CreaseLines(
+        pattern.vertices_coords[pattern.edges_vertices],
+        pattern.edges_assignment,
+        pattern.edges_fold_angle,
+    )
+
+
+def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> CreasePattern:
+    """The pattern that ``lines`` draw.
+
+    Ends within ``tolerance`` (mm; default :data:`TOLERANCE` of the median line) of each other are
+    one vertex, an end that near to a line lies on it, and crossing lines get a vertex. A mountain
+    or valley of unknown angle is folded flat. Lines that bound no facet are left out.
+
+    Raises :class:`~miurafab.errors.PatternError` if no line encloses anything, or if the drawing
+    falls into pieces.
+    """
+    if not len(lines.ends):
+        raise PatternError("The drawing holds no straight line.")
+    if not (np.abs(lines.ends) < _FAR).all():
+        raise PatternError("The drawing holds a coordinate that is not a number or is beyond 1e9.")
+    lengths = np.linalg.norm(lines.ends[:, 1] - lines.ends[:, 0], axis=1)
+    near = TOLERANCE * float(np.median(lengths)) if tolerance is None else tolerance
+    points, sides, source = _split(lines.ends, near)
+    sides, source = _without_doubles(sides, source, lines.assignment)
+    points, sides, source = _without_loose_ends(points, sides, source)
+    if not len(sides):
+        raise PatternError("The lines of the drawing enclose no facet; is the border there?")
+    pieces, _ = connected_components(_graph(sides, len(points)), directed=False)
+    if pieces > 1:
+        raise PatternError(
+            f"The drawing falls into {pieces} pieces that do not touch; put one pattern in a file, "
+            "or give a larger --tolerance."
+        )
+    faces = faces_of_plane_graph(points, sides)
+    letter = lines.assignment[source]
+    faces = _without_holes(faces, sides, letter, len(points))
+    count = _sides_of_faces(faces, sides, len(points))
+    keep = count > 0
+    sides, source, letter, count = sides[keep], source[keep], letter[keep], count[keep]
+    used = np.unique(sides)
+    renumber = np.full(len(points) + 1, -1, dtype=np.int64)  # the last one keeps -1 at -1
+    renumber[used] = np.arange(len(used))
+    letter = np.where(count == 1, "B", np.where(letter == "B", "C", letter))
+    flat_folded = np.select([letter == "M", letter == "V"], [-np.pi, np.pi], 0.0)
+    angle = lines.fold_angle[source]
+    angle = np.where(np.isnan(angle) | (count == 1), flat_folded, angle)
+    return CreasePattern(
+        vertices_coords=points[used] - points[used].min(axis=0),
+        edges_vertices=renumber[sides],
+        edges_assignment=letter,
+        edges_fold_angle=angle,
+        faces_vertices=renumber[faces],
+    )
+
+
+def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
+    """(F, k) the facets between ``sides`` (E, 2) drawn without crossings at ``points`` (V, 2).
+
+    Counter-clockwise, -1 padded, without the outside.
+    """
+    tail = np.concatenate([sides[:, 0], sides[:, 1]])
+    head = np.concatenate([sides[:, 1], sides[:, 0]])
+    count = len(tail)
+    twin = (np.arange(count) + len(sides)) % count
+    direction = points[head] - points[tail]
+    angle = np.arctan2(direction[:, 1], direction[:, 0])
+    order = np.lexsort((angle, tail))
+    rank = np.empty(count, dtype=np.int64)
+    rank[order] = np.arange(count)
+    first = np.searchsorted(tail[order], np.arange(len(points)))
+    degree = np.bincount(tail, minlength=len(points))
+    before = np.where(rank > first[tail], rank - 1, first[tail] + degree[tail] - 1)
+    following = order[before][twin]
+    loops = coo_array((np.ones(count), (np.arange(count), following)), shape=(count, count))
+    number, loop = connected_components(loops, directed=False)
+    cross = points[tail, 0] * points[head, 1] - points[tail, 1] * points[head, 0]
+    area = np.bincount(loop, cross, minlength=number) / 2
+    inside = np.flatnonzero(area > 0)
+    start = np.full(number, count, dtype=np.int64)
+    np.minimum.at(start, loop, np.arange(count))
+    at = start[inside]
+    if not len(at):
+        return np.empty((0, 3), dtype=np.int64)
+    corners = [tail[at]]
+    open_ = np.ones(len(at), dtype=bool)
+    while True:
+        at = following[at]
+        open_ &= at != start[inside]
+        if not open_.any():
+            break
+        corners.append(np.where(open_, tail[at], -1))
+    return np.stack(corners, axis=1)
+
+
+def _split(ends: Floats, near: float) -> tuple[Floats, Ints, Ints]:
+    """Vertices (V, 2), sides (m, 2) between them, and the line (m,) that each side is part of."""
+    first, second = _near_pairs(ends, near)
+    a, b = ends[first], ends[second]
+    along, across = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0]
+    offset = b[:, 0] - a[:, 0]
+    turn = _cross(along, across)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        t, u = _cross(offset, across) / turn, _cross(offset, along) / turn
+    sharp = np.abs(turn) > 1e-9 * np.linalg.norm(along, axis=1) * np.linalg.norm(across, axis=1)
+    crossing = sharp & (t > 0) & (t < 1) & (u > 0) & (u < 1)
+    meet = a[crossing, 0] + t[crossing, None] * along[crossing]
+
+    count = len(ends)
+    loose = np.concatenate([ends.reshape(-1, 2), meet])
+    vertex, points = _merged(loose, near)
+    end = vertex[: 2 * count].reshape(count, 2)
+    cut = vertex[2 * count :]
+    # every line is cut at its ends, at its crossings, and at other lines' ends that lie on it
+    line = [np.arange(count), np.arange(count), first[crossing], second[crossing]]
+    at = [end[:, 0], end[:, 1], cut, cut]
+    for one, other in ((first, second), (second, first)):
+        for which in (0, 1):
+            on = _lies_on(points[end[other, which]], ends[one], near)
+            line.append(one[on])
+            at.append(end[other[on], which])
+    lines, cuts = np.concatenate(line), np.concatenate(at)
+    start = ends[lines, 0]
+    place = np.einsum("nk,nk->n", points[cuts] - start, ends[lines, 1] - start)
+    order = np.lexsort((place, lines))
+    lines, cuts = lines[order], cuts[order]
+    joined = (lines[1:] == lines[:-1]) & (cuts[1:] != cuts[:-1])
+    return points, np.stack([cuts[:-1], cuts[1:]], axis=1)[joined], lines[1:][joined]
+
+
+def _near_pairs(ends: Floats, near: float) -> tuple[Ints, Ints]:
+    """Pairs of lines whose bounding boxes come within ``near``."""
+    low, high = ends.min(axis=1) - near, ends.max(axis=1)
+    by_x = np.argsort(low[:, 0], kind="stable")
+    low, high = low[by_x], high[by_x]
+    # in order of x a line can only meet those that begin before it ends
+    last = np.searchsorted(low[:, 0], high[:, 0], side="right")
+    found: list[tuple[Ints, Ints]] = []
+    chunk = 512
+    for begin in range(0, len(ends), chunk):
+        stop = min(begin + chunk, len(ends))
+        until = int(last[begin:stop].max())
+        mine, other = np.arange(begin, stop), np.arange(begin, until)
+        meet = (
+            (other[None, :] > mine[:, None])
+            & (other[None, :] < last[mine, None])
+            & (low[other, 1][None, :] <= high[mine, 1][:, None])
+            & (low[mine, 1][:, None] <= high[other, 1][None, :])
+        )
+        i, j = np.nonzero(meet)
+        found.append((by_x[mine[i]], by_x[other[j]]))
+    return np.concatenate([f[0] for f in found]), np.concatenate([f[1] for f in found])
+
+
+def _merged(loose: Floats, near: float) -> tuple[Ints, Floats]:
+    """The vertex of each loose point, and the vertices: the first point of each that met."""
+    pairs = cKDTree(loose).query_pairs(near, output_type="ndarray")
+    _, label = connected_components(_graph(pairs, len(loose)), directed=False)
+    _, first, vertex = np.unique(label, return_index=True, return_inverse=True)
+    return np.asarray(vertex, dtype=np.int64), loose[first]
+
+
+def _lies_on(points: Floats, ends: Floats, near: float) -> NDArray[np.bool_]:
+    """Whether each point lies within ``near`` of its line, between the line's ends."""
+    along = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    offset = points - ends[:, 0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        place = np.einsum("nk,nk->n", offset, along) / length
+        away = np.abs(_cross(along, offset)) / length
+    return np.asarray((away <= near) & (place > near) & (place < length - near))
+
+
+def _without_doubles(sides: Ints, source: Ints, assignment: NDArray[np.str_]) -> tuple[Ints, Ints]:
+    """One side between two vertices, the one whose assignment says most."""
+    rank = np.array([_RANK[letter] for letter in assignment.tolist()])
+    key = np.sort(sides, axis=1)
+    order = np.lexsort((source, -rank[source], key[:, 1], key[:, 0]))
+    different = np.ones(len(order), dtype=bool)
+    different[1:] = (np.diff(key[order], axis=0) != 0).any(axis=1)
+    kept = np.sort(order[different])
+    return sides[kept], source[kept]
+
+
+def _without_loose_ends(points: Floats, sides: Ints, source: Ints) -> tuple[Floats, Ints, Ints]:
+    """Without the sides that lead nowhere; points keep their numbers only if all are used."""
+    while True:
+        degree = np.bincount(sides.ravel(), minlength=len(points))
+        firm = (degree[sides] > 1).all(axis=1)
+        if firm.all():
+            break
+        sides, source = sides[firm], source[firm]
+    used = np.unique(sides)
+    renumber = np.zeros(len(points), dtype=np.int64)
+    renumber[used] = np.arange(len(used))
+    return points[used], renumber[sides], source
+
+
+def _without_holes(faces: Ints, sides: Ints, letter: NDArray[np.str_], vertices: int) -> Ints:
+    """Without the facets that border lines alone enclose, unless nothing else is left."""
+    face, side = _face_sides(faces, sides, vertices)
+    cut = np.isin(letter[side], ("B", "C"))
+    creased = np.bincount(face, ~cut, minlength=len(faces)) > 0
+    return faces[creased] if creased.any() else faces
+
+
+def _sides_of_faces(faces: Ints, sides: Ints, vertices: int) -> Ints:
+    """(E,) how many facets each side has, 0 to 2."""
+    _, side = _face_sides(faces, sides, vertices)
+    return np.bincount(side, minlength=len(sides))
+
+
+def _face_sides(faces: Ints, sides: Ints, vertices: int) -> tuple[Ints, Ints]:
+    """The facet and the side of every pair of a facet and a side of it."""
+    size = (faces >= 0).sum(axis=1)
+    face, corner = np.nonzero(faces >= 0)
+    tail = faces[face, corner]
+    head = faces[face, (corner + 1) % size[face]]
+    key = np.minimum(tail, head) * vertices + np.maximum(tail, head)
+    keys = sides.min(axis=1) * vertices + sides.max(axis=1)
+    order = np.argsort(keys)
+    return face, order[np.searchsorted(keys, key, sorter=order)]
+
+
+def _graph(pairs: Ints, nodes: int) -> coo_array:
+    return coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(nodes, nodes))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    turned: Floats = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return turned

@@ -1,0 +1,338 @@
+"""SVG crease patterns as Origami Simulator and Rabbit Ear read and write them.
+
+The stroke colour is the assignment: #000 border, #f00 mountain, #00f valley, #0f0 cut, #ff0 facet
+(flat), #f0f hinge (unassigned); the opacity is the fold angle, |angle| = 180 degrees x opacity
+(https://origamisimulator.org, "File > Design Tips"). Origami Simulator joins ends within 3 user
+units, so the drawing is scaled until its shortest line has 10 or more of them; width, height and
+``viewBox`` keep its size in millimetres. Rabbit Ear's ``data-assignment`` and ``data-foldAngle``
+repeat both exactly, and win where they are read back.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+from xml.sax.saxutils import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.errors import PatternError
+from miurafab.origami.crease_pattern import ASSIGNMENTS
+from miurafab.origami.formats.lines import xml_root
+from miurafab.origami.formats.planar_graph import CreaseLines
+from miurafab.units import parse_length
+
+_STROKES = {
+    "B": "#000000", "M": "#ff0000", "V": "#0000ff", "C": "#00ff00", "F": "#ffff00",
+    "U": "#ff00ff", "J": "#ffff00",
+}  # fmt: skip
+_LETTERS = {(0, 0, 0): "B", (255, 0, 0): "M", (0, 0, 255): "V", (0, 255, 0): "C"}
+_LETTERS |= {(255, 255, 0): "F", (255, 0, 255): "U"}
+_NAMES = {
+    "black": "#000000", "red": "#ff0000", "blue": "#0000ff", "lime": "#00ff00",
+    "green": "#008000", "yellow": "#ffff00", "magenta": "#ff00ff", "fuchsia": "#ff00ff",
+    "gray": "#808080", "grey": "#808080",
+}  # fmt: skip
+_SHORTEST = 10.0
+"""User units of the shortest line."""
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_PATH = re.compile(r"([MmLlHhVvZzCcSsQqTtAa])|(" + _NUMBER.pattern + ")")
+
+Matrix = NDArray[np.float64]
+
+
+def svg_text(lines: CreaseLines, title: str = "") -> str:
+    """``lines`` as an SVG drawing, y upwards in ``lines`` and so upright in the drawing."""
+    low, high = lines.ends.reshape(-1, 2).min(axis=0), lines.ends.reshape(-1, 2).max(axis=0)
+    lengths = np.linalg.norm(lines.ends[:, 1] - lines.ends[:, 0], axis=1)
+    real = lengths[lengths > 1e-6 * lengths.mean()]
+    scale = max(1.0, _SHORTEST / float(real.min()))
+    width, height = ((high - low) * scale).tolist()
+    x = ((lines.ends[..., 0] - low[0]) * scale).tolist()
+    y = ((high[1] - lines.ends[..., 1]) * scale).tolist()
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width / scale!r}mm" '
+        f'height="{height / scale!r}mm" viewBox="0 0 {width!r} {height!r}">\n'
+    ]
+    if title:
+        parts.append(f"<title>{escape(title)}</title>\n")
+    parts.append(f'<g fill="none" stroke-width="{0.15 * _SHORTEST!r}" stroke-linecap="round">\n')
+    degrees = np.degrees(lines.fold_angle).tolist()
+    for letter, angle, (x0, x1), (y0, y1) in zip(
+        lines.assignment.tolist(), degrees, x, y, strict=True
+    ):
+        folds = letter in "MV"
+        opacity = f' stroke-opacity="{min(abs(angle) / 180.0, 1.0)!r}"' if folds else ""
+        exact = f' data-foldAngle="{angle!r}"' if folds else ""
+        parts.append(
+            f'<line x1="{x0!r}" y1="{y0!r}" x2="{x1!r}" y2="{y1!r}" stroke="{_STROKES[letter]}"'
+            f'{opacity} data-assignment="{letter}"{exact}/>\n'
+        )
+    parts.append("</g>\n</svg>\n")
+    return "".join(parts)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What an element inherits: the stroke and its opacity, that of the groups that it stands in,
+    and where user units lie.
+    """
+
+    stroke: str
+    stroke_opacity: float
+    group_opacity: float
+    matrix: Matrix
+
+    @property
+    def opacity(self) -> float:
+        return min(self.stroke_opacity * self.group_opacity, 1.0)
+
+
+def parse_svg(text: str) -> CreaseLines:
+    """The straight lines of an SVG drawing, in millimetres if it has a size, else 1 unit = 1 mm.
+
+    Lines without a stroke are left out. Raises ``PatternError`` for a curve.
+    """
+    root = xml_root(text, "an SVG drawing")
+    if _tag(root) != "svg":
+        raise PatternError("it is not an SVG drawing.")
+    rules = _style_rules(root)
+    letters: list[str] = []
+    angles: list[float] = []
+    ends: list[Matrix] = []
+    for element, look in _walk(root, _Look("none", 1.0, 1.0, _millimetres(root)), rules):
+        letter = _assignment(element, look)
+        if letter is None:
+            continue
+        angle = _fold_angle(element, look, letter)
+        for piece in _pieces(element):
+            with np.errstate(invalid="ignore", over="ignore"):
+                points = piece @ look.matrix[:, :2].T + look.matrix[:, 2]
+            ends.append(np.stack([points[:-1], points[1:]], axis=1))
+            letters += [letter] * (len(points) - 1)
+            angles += [angle] * (len(points) - 1)
+    joined = np.concatenate(ends) if ends else np.empty((0, 2, 2))
+    return CreaseLines(
+        joined * np.array([1.0, -1.0]), np.array(letters, dtype="U1"), np.array(angles, dtype=float)
+    )
+
+
+def _tag(element: Element) -> str:
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+
+
+def _walk(
+    element: Element, look: _Look, rules: dict[str, dict[str, str]]
+) -> Iterator[tuple[Element, _Look]]:
+    """Every drawn element with its look; definitions are not drawn."""
+    if _tag(element) in ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "style"):
+        return
+    style: dict[str, str] = dict(rules.get(_tag(element), {}))
+    for name in (element.get("class") or "").split():
+        style |= rules.get("." + name, {})
+    style |= _declarations(element.get("style") or "")
+
+    def said(name: str) -> str | None:
+        return style.get(name, element.get(name))
+
+    hidden = said("display") == "none" or said("visibility") == "hidden"
+    look = _Look(
+        "none" if hidden else (said("stroke") or look.stroke).strip().lower(),
+        _opacity(said("stroke-opacity"), look.stroke_opacity),
+        look.group_opacity * _opacity(said("opacity"), 1.0),
+        _composed(look.matrix, _transform(element.get("transform") or "")),
+    )
+    yield element, look
+    for child in element:
+        yield from _walk(child, look, rules)
+
+
+def _opacity(text: str | None, default: float) -> float:
+    if text is None:
+        return default
+    return _value(text.strip().rstrip("%"), "an opacity") / (100 if "%" in text else 1)
+
+
+def _style_rules(root: Element) -> dict[str, dict[str, str]]:
+    """Declarations of the style sheets by their selector, a tag or a ``.class``."""
+    rules: dict[str, dict[str, str]] = {}
+    for element in root.iter():
+        if _tag(element) == "style":
+            for selectors, body in re.findall(r"([^{}]+)\{([^{}]*)\}", element.text or ""):
+                for selector in selectors.split(","):
+                    rules.setdefault(selector.strip(), {}).update(_declarations(body))
+    return rules
+
+
+def _declarations(text: str) -> dict[str, str]:
+    pairs = (part.split(":", 1) for part in text.split(";") if ":" in part)
+    return {name.strip(): value.strip() for name, value in pairs}
+
+
+def _assignment(element: Element, look: _Look) -> str | None:
+    said = (element.get("data-assignment") or "").upper()
+    if said in ASSIGNMENTS:
+        return said
+    colour = _colour(look.stroke)
+    if colour is None or look.opacity == 0.0:
+        return None
+    near = min(
+        _LETTERS, key=lambda known: sum((a - b) ** 2 for a, b in zip(known, colour, strict=True))
+    )
+    return _LETTERS[near]
+
+
+def _colour(text: str) -> tuple[int, int, int] | None:
+    text = _NAMES.get(text, text)
+    if re.fullmatch(r"#[0-9a-f]{3}", text):
+        text = "#" + "".join(digit * 2 for digit in text[1:])
+    if re.fullmatch(r"#[0-9a-f]{6}", text):
+        red, green, blue = (int(text[at : at + 2], 16) for at in (1, 3, 5))
+        return red, green, blue
+    found = re.fullmatch(r"rgba?\(([^)]*)\)", text)
+    if found:
+        numbers = _NUMBER.findall(found[1])
+        if len(numbers) >= 3:
+            full = 2.55 if "%" in found[1] else 1.0
+            red, green, blue = (round(float(number) * full) for number in numbers[:3])
+            return red, green, blue
+    if text in ("none", "", "transparent"):
+        return None
+    raise PatternError(f"the stroke '{text[:40]}' is not a colour; write it as #rrggbb.")
+
+
+def _fold_angle(element: Element, look: _Look, letter: str) -> float:
+    said = element.get("data-foldAngle")
+    if said is not None:
+        return math.radians(_value(said, "data-foldAngle"))
+    if letter in "MV":
+        return math.copysign(math.pi * look.opacity, 1.0 if letter == "V" else -1.0)
+    return 0.0
+
+
+def _pieces(element: Element) -> Iterator[Matrix]:
+    """The polylines (n, 2) that an element draws, in its own units."""
+    tag = _tag(element)
+
+    def number(name: str) -> float:
+        return _value(element.get(name) or "0", name)
+
+    if tag == "line":
+        yield np.array([[number("x1"), number("y1")], [number("x2"), number("y2")]])
+    elif tag in ("polyline", "polygon"):
+        numbers = [float(text) for text in _NUMBER.findall(element.get("points") or "")]
+        points = np.array(numbers[: len(numbers) // 2 * 2]).reshape(-1, 2)
+        if len(points) > 1:
+            yield np.concatenate([points, points[:1]]) if tag == "polygon" else points
+    elif tag == "rect":
+        x, y, width, height = (number(name) for name in ("x", "y", "width", "height"))
+        corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height], [x, y]]
+        yield np.array(corners)
+    elif tag == "path":
+        yield from _path_pieces(element.get("d") or "")
+    elif tag in ("circle", "ellipse"):
+        raise PatternError(f"a <{tag}> is curved; a crease pattern holds straight lines.")
+
+
+def _path_pieces(text: str) -> Iterator[Matrix]:
+    tokens = [(found[1], found[2]) for found in _PATH.finditer(text)]
+    command, at, start = "", np.zeros(2), np.zeros(2)
+    points: list[Matrix] = []
+    index = 0
+
+    def number() -> float:
+        nonlocal index
+        if index >= len(tokens) or tokens[index][0]:
+            raise PatternError(f"the path '{text[:40]}' lacks a number.")
+        index += 1
+        return float(tokens[index - 1][1])
+
+    while index < len(tokens):
+        if tokens[index][0]:
+            command = tokens[index][0]
+            index += 1
+        elif not command:
+            raise PatternError(f"the path '{text[:40]}' begins with a number.")
+        kind, relative = command.upper(), command.islower()
+        if kind == "Z":
+            points.append(start)
+            at, command = start, ""
+            continue
+        if kind in "ML":
+            to = np.array([number(), number()]) + (at if relative else 0.0)
+        elif kind == "H":
+            to = np.array([number() + (at[0] if relative else 0.0), at[1]])
+        elif kind == "V":
+            to = np.array([at[0], number() + (at[1] if relative else 0.0)])
+        else:
+            raise PatternError(
+                f"the path '{text[:40]}' is curved; a crease pattern holds straight lines."
+            )
+        if kind == "M":
+            if len(points) > 1:
+                yield np.array(points)
+            points, start = [to], to
+            command = "l" if relative else "L"
+        else:
+            points.append(to)
+        at = to
+    if len(points) > 1:
+        yield np.array(points)
+
+
+def _millimetres(root: Element) -> Matrix:
+    """(2, 3) from user units to millimetres, by width, height and viewBox, else one to one."""
+    box = [float(text) for text in _NUMBER.findall(root.get("viewBox") or "")]
+    width = root.get("width") or ""
+    if len(box) == 4 and box[2] > 0 and re.search(r"(mm|cm|in|m)\s*$", width):
+        scale = parse_length(width) / box[2]
+        return np.array([[scale, 0.0, -box[0] * scale], [0.0, scale, -box[1] * scale]])
+    return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+def _transform(text: str) -> Matrix:
+    """(2, 3) of an SVG transform list."""
+    whole = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    for name, inside in re.findall(r"(\w+)\s*\(([^)]*)\)", text):
+        n = [float(number) for number in _NUMBER.findall(inside)]
+        try:
+            whole = _composed(whole, _one_transform(name, n))
+        except IndexError:
+            raise PatternError(f"the transform '{name}({inside})' lacks a number.") from None
+    return whole
+
+
+def _one_transform(name: str, n: list[float]) -> Matrix:
+    if name == "matrix":
+        return np.array([[n[0], n[2], n[4]], [n[1], n[3], n[5]]])
+    if name == "translate":
+        return np.array([[1.0, 0.0, n[0]], [0.0, 1.0, n[1] if len(n) > 1 else 0.0]])
+    if name == "scale":
+        return np.array([[n[0], 0.0, 0.0], [0.0, n[1] if len(n) > 1 else n[0], 0.0]])
+    if name in ("skewX", "skewY"):
+        slope = math.tan(math.radians(n[0]))
+        x, y = (slope, 0.0) if name == "skewX" else (0.0, slope)
+        return np.array([[1.0, x, 0.0], [y, 1.0, 0.0]])
+    if name == "rotate":
+        c, s = math.cos(math.radians(n[0])), math.sin(math.radians(n[0]))
+        x, y = (n[1], n[2]) if len(n) > 1 else (0.0, 0.0)
+        return np.array([[c, -s, x - c * x + s * y], [s, c, y - s * x - c * y]])
+    raise PatternError(f"'{name}' is not a transform of SVG.")
+
+
+def _composed(outer: Matrix, inner: Matrix) -> Matrix:
+    with np.errstate(invalid="ignore", over="ignore"):
+        linear = outer[:, :2] @ inner[:, :2]
+        shift = outer[:, :2] @ inner[:, 2] + outer[:, 2]
+    return np.concatenate([linear, shift[:, None]], axis=1)
+
+
+def _value(text: str, name: str) -> float:
+    found = re.fullmatch(rf"\s*({_NUMBER.pattern})\s*(?:px)?\s*", text)
+    if found is None:
+        raise PatternError(f"{name} is '{text[:40]}', not a number.")
+    return float(found[1])

@@ -1,0 +1,255 @@
+"""The audit: every invariant of a pattern recomputed from the file alone, and what it means.
+
+:func:`measure` gives the numbers under the names of the fit report; :func:`audit` adds coded
+findings. A finding says what is wrong and where; it mends nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from miurafab.geometry.distances import closest_on_mesh
+from miurafab.origami import invariants
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.contact import overlaps, self_intersections, triangulate
+from miurafab.surfaces.surface import TargetSurface, tangents
+
+Floats = NDArray[np.float64]
+
+EXACT = 1e-10
+"""The residual up to which planarity, developability and isometry count as exact."""
+
+DEGENERATE = invariants.DEGENERATE
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """The numbers of the fit report; None where they need a folded form or a target not there.
+
+    Angles in radians, lengths in mm; the docstrings of :mod:`~miurafab.origami.invariants` define
+    each. ``hausdorff_mm`` is the greater of the farthest sheet point from the target and the
+    farthest target point from the sheet; ``hausdorff_midsurface_mm`` the farthest facet mean from
+    the target; ``area_ratio`` the paper's area over the target's.
+    """
+
+    facets: int
+    vertices: int
+    min_edge_mm: float
+    overlaps: int
+    max_planarity: float | None = None
+    max_developability: float | None = None
+    max_flat_foldability: float | None = None
+    max_isometry: float | None = None
+    self_intersections: int | None = None
+    hausdorff_mm: float | None = None
+    hausdorff_relative: float | None = None
+    hausdorff_midsurface_mm: float | None = None
+    area_ratio: float | None = None
+
+
+@dataclass(frozen=True)
+class AuditFinding:
+    """One fault: a stable ``code``, a sentence, and the ``where`` (facets, vertices or edges)."""
+
+    code: str
+    message: str
+    where: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What an audit found; ``valid`` when nothing is wrong."""
+
+    measurements: Measurements
+    findings: tuple[AuditFinding, ...]
+    seconds: float
+
+    @property
+    def valid(self) -> bool:
+        return not self.findings
+
+    def report(self) -> dict[str, Any]:
+        """The report of ``miurafab check``, under the names of the fit report."""
+        numbers = {f.name: getattr(self.measurements, f.name) for f in fields(self.measurements)}
+        return {
+            "status": "converged" if self.valid else "invalid",
+            "advice": " ".join(finding.message for finding in self.findings),
+            **numbers,
+            "iterations": None,
+            "seconds": self.seconds,
+            "findings": [
+                {"code": f.code, "message": f.message, "where": list(f.where)}
+                for f in self.findings
+            ],
+        }
+
+
+def audit(pattern: CreasePattern, surface: TargetSurface | None = None) -> Audit:
+    """Measure ``pattern`` against its invariants and, if given, against its target ``surface``.
+
+    ``surface`` is the target in its own frame; the pattern's ``scale`` is applied to it.
+    """
+    started = time.perf_counter()
+    measured = measure(pattern, surface)
+    findings = tuple(_findings(pattern, measured))
+    return Audit(measured, findings, time.perf_counter() - started)
+
+
+def measure(pattern: CreasePattern, surface: TargetSurface | None = None) -> Measurements:
+    """The numbers alone."""
+    facets, vertices = len(pattern.faces_vertices), len(pattern.vertices_coords)
+    folded = pattern.folded_coords
+    flat_edges = invariants.edge_lengths(pattern, pattern.vertices_coords)
+    covered = len(overlaps(pattern))
+    if folded is None:
+        return Measurements(facets, vertices, float(flat_edges.min()), covered)
+    ring = invariants.corner_ring(pattern, folded)
+    inner = invariants.interior_vertices(pattern)
+    distances = {} if surface is None else _distances(pattern, surface)
+    shortest = min(flat_edges.min(), invariants.edge_lengths(pattern, folded).min())
+    measured = Measurements(
+        facets,
+        vertices,
+        float(shortest),
+        covered,
+        max_planarity=float(invariants.facet_planarity(pattern, folded).max()),
+        max_developability=_largest(invariants.angle_surplus(ring, inner)) if len(inner) else 0.0,
+        max_flat_foldability=(
+            _largest(invariants.kawasaki_residual(ring, inner)) if len(inner) else 0.0
+        ),
+        max_isometry=float(invariants.isometry(pattern).max()),
+        self_intersections=len(self_intersections(pattern)),
+    )
+    return replace(measured, **distances)
+
+
+def _largest(values: Floats) -> float:
+    return float(np.abs(values).max())
+
+
+def _distances(pattern: CreasePattern, surface: TargetSurface) -> dict[str, Any]:
+    """Distances sheet to target both ways, in mm, and the area ratio."""
+    assert pattern.folded_coords is not None
+    scale, folded = pattern.scale, pattern.folded_coords
+    triangles, _ = triangulate(pattern.faces_vertices)
+    corners = folded[triangles]
+    middle = _facet_means(pattern)
+    sheet = np.concatenate([folded, folded[pattern.edges_vertices].mean(axis=1), middle])
+
+    def to_target(points: Floats) -> float:
+        gap = surface.closest_point(points / scale) * scale - points
+        return float(np.linalg.norm(gap, axis=1).max())
+
+    count = int(np.clip(2 * np.sqrt(len(pattern.faces_vertices)), 40, 400))
+    lattice = surface.domain.lattice(count, count)
+    target = surface.point(lattice).reshape(-1, 3) * scale
+    back = np.linalg.norm(closest_on_mesh(target, corners) - target, axis=1).max()
+    hausdorff = max(to_target(sheet), float(back))
+    diagonal = float(np.linalg.norm(folded.max(axis=0) - folded.min(axis=0)))
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    paper = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+    return {
+        "hausdorff_mm": hausdorff,
+        "hausdorff_relative": hausdorff / diagonal,
+        "hausdorff_midsurface_mm": to_target(middle),
+        "area_ratio": paper / (surface_area(surface) * scale**2),
+    }
+
+
+def surface_area(surface: TargetSurface, samples: int = 200) -> float:
+    """The area of the target over its domain by the midpoint rule, in its own unit squared."""
+    d = surface.domain
+    u = d.u0 + (np.arange(samples) + 0.5) * d.width / samples
+    v = d.v0 + (np.arange(samples) + 0.5) * d.height / samples
+    along, across = tangents(surface, np.stack(np.meshgrid(u, v), axis=-1))
+    density = np.linalg.norm(np.cross(along, across), axis=-1)
+    return float(density.mean() * d.width * d.height)
+
+
+def _facet_means(pattern: CreasePattern) -> Floats:
+    assert pattern.folded_coords is not None
+    real = pattern.faces_vertices >= 0
+    corners = np.where(real[..., None], pattern.folded_coords[pattern.faces_vertices], 0.0)
+    means: Floats = corners.sum(axis=1) / real.sum(axis=1)[:, None]
+    return means
+
+
+def _findings(pattern: CreasePattern, measured: Measurements) -> list[AuditFinding]:
+    found = []
+    edges = invariants.edge_lengths(pattern, pattern.vertices_coords)
+    short = np.flatnonzero(edges < DEGENERATE * edges.mean())
+    if len(short):
+        found.append(
+            AuditFinding(
+                "degenerate-edge",
+                f"{_these(short, 'edge')} shorter than a millionth of the mean edge (down to "
+                f"{edges[short].min():.1e} mm): they cannot be creased or cut, so the sheet cannot "
+                "be made. Fit again with --min-edge.",
+                tuple(short.tolist()),
+            )
+        )
+    if measured.overlaps:
+        pairs = overlaps(pattern)
+        found.append(
+            AuditFinding(
+                "overlap",
+                f"{len(pairs)} pairs of facets overlap in the flat pattern, the first being facets "
+                f"{pairs[0][0]} and {pairs[0][1]}: it cannot be cut from one piece.",
+                tuple(np.unique(pairs).tolist()),
+            )
+        )
+    if pattern.folded_coords is None:
+        return found
+    found += _inexact(pattern, pattern.folded_coords)
+    if measured.self_intersections:
+        pairs = self_intersections(pattern)
+        found.append(
+            AuditFinding(
+                "self-intersection",
+                f"{len(pairs)} pairs of facets pass through or lie on each other in the folded "
+                f"form, the first being facets {pairs[0][0]} and {pairs[0][1]}.",
+                tuple(np.unique(pairs).tolist()),
+            )
+        )
+    return found
+
+
+def _inexact(pattern: CreasePattern, folded: Floats) -> list[AuditFinding]:
+    """Where planarity, developability and isometry are over ``EXACT``."""
+    inner = invariants.interior_vertices(pattern)
+    facets = np.arange(len(pattern.faces_vertices))
+    ring = invariants.corner_ring(pattern, folded)
+    surplus = invariants.angle_surplus(ring, inner) if len(inner) else np.empty(0)
+    checks = (
+        ("planarity", "planar", "facet", facets, invariants.facet_planarity(pattern, folded)),
+        ("developability", "developable", "vertex", inner, np.abs(surplus)),
+        ("isometry", "the same flat and folded", "facet", facets, invariants.isometry(pattern)),
+    )
+    found = []
+    for code, virtue, noun, names, values in checks:
+        over = ~(values <= EXACT)
+        if over.any():
+            where = names[over]
+            found.append(
+                AuditFinding(
+                    code,
+                    f"{_these(where, noun)} not {virtue}: up to {values.max():.1e}, over "
+                    f"{EXACT:.0e}.",
+                    tuple(where.tolist()),
+                )
+            )
+    return found
+
+
+def _these(numbers: NDArray[np.int64], noun: str) -> str:
+    """``Edge 7 is`` or ``12 edges (3, 4, 5, 6, 7, ...) are``."""
+    if len(numbers) == 1:
+        return f"{noun.capitalize()} {numbers[0]} is"
+    shown = ", ".join(str(n) for n in numbers[:5]) + (", ..." if len(numbers) > 5 else "")
+    several = "vertices" if noun == "vertex" else noun + "s"
+    return f"{len(numbers)} {several} ({shown}) are"

@@ -1,0 +1,335 @@
+"""A GRBL controller in memory: bytes in, bytes out, and time only by ``advance``.
+
+It is the firmware's own machinery in virtual time. The main program (``virtual_protocol`` and
+what it calls) runs as a coroutine that yields when it works or waits; the interrupts (received
+bytes, step segments, switches) happen at their cycle of a 16 MHz clock beside it. So `ok` comes
+when the planner has room, a status report shows what the machine does at that moment, EEPROM
+writes lose bytes, and a job takes the time that it takes.
+
+Whatever is done to it, however it is cut into calls, the same bytes at the same times give the
+same output. It is GRBL 1.1h unless it is given another dialect
+(:mod:`miurafab.simulate.grbl.dialect`). ``faults`` (:mod:`miurafab.simulate.faults`) befall it
+and its cable on their own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from miurafab.errors import ProfileError
+from miurafab.grbl.settings import parse_dump
+from miurafab.motion import cpu
+from miurafab.motion.beam import BeamSegment
+from miurafab.motion.stepper import Processor
+from miurafab.simulate.cable import Cable
+from miurafab.simulate.faults import Fault
+from miurafab.simulate.grbl.dialect import DIALECTS
+from miurafab.simulate.grbl.protocol import firmware
+from miurafab.simulate.grbl.settings import FirmwareSettings
+from miurafab.simulate.grbl.state import Machine, Until, Wait
+
+
+class VirtualGrbl:
+    """The device side of the wire.
+
+    ``settings`` maps a ``$`` number to its value, over the firmware's stock defaults (None: just
+    those); an unknown number raises :class:`~miurafab.errors.ProfileError`. ``baud`` paces the
+    wire both ways, ten bit times a byte; None: bytes take no time. ``homing_switches`` False:
+    ``$H`` finds none. ``dialect`` is a name in
+    :data:`~miurafab.simulate.grbl.dialect.DIALECTS`. ``faults`` strike once each. At power-up the
+    banner is in the output.
+    """
+
+    resets_on_open = True
+
+    def __init__(
+        self,
+        settings: Mapping[int, float] | None = None,
+        *,
+        baud: int | None = None,
+        homing_switches: bool = True,
+        dialect: str = "grbl-1.1",
+        faults: Iterable[Fault] = (),
+    ) -> None:
+        stored = FirmwareSettings()
+        unknown = sorted(set(settings or {}) - set(stored.values))
+        if unknown:
+            raise ProfileError(f"${unknown[0]} is not a setting of GRBL 1.1.")
+        stored.write({10: DIALECTS[dialect].report_mask} | dict(settings or {}))
+        self._machine = Machine(stored, baud, homing_switches, DIALECTS[dialect])
+        self._seconds = 0.0
+        self._frozen = False
+        self._thaws_at: int | None = None
+        faults = tuple(faults)
+        self._cable = Cable(faults, self._suffer, cpu.CLOCK) if faults else None
+        self._power_on()
+
+    def _power_on(self) -> None:
+        """Boot; the time that takes until the banner is written is left out."""
+        machine = self._machine
+        machine.power_up()
+        self._processor = Processor(machine.stepper)
+        self._program = firmware(machine)
+        self._wait: Wait = None
+        machine.booting = True
+        while machine.booting:
+            self._wait = next(self._program)
+        self._resume()
+
+    # Time
+
+    @property
+    def now(self) -> float:
+        """Virtual seconds since power-up."""
+        return self._seconds
+
+    def advance(self, seconds: float) -> None:
+        """Let ``seconds`` of virtual time pass: the only way time enters."""
+        self._seconds += max(seconds, 0.0)
+        self._run(round(self._seconds * cpu.CLOCK))
+
+    def advance_to_line(self, seconds: float) -> None:
+        """Let time pass until a line of output has come out whole, ``seconds`` at the most."""
+        target = round((self._seconds + max(seconds, 0.0)) * cpu.CLOCK)
+        reached = self._run(target, stop_at_line=True)
+        self._seconds = reached / cpu.CLOCK if reached < target else self._seconds + seconds
+
+    def next_event_in(self) -> float | None:
+        """Seconds until something changes by itself; None if nothing will without input.
+
+        Output that is out already and only waits to be taken is no change.
+        """
+        machine = self._machine
+        uart = machine.uart
+        events = (
+            machine.stepper.next_change(),
+            uart.next_arrival(),
+            uart.next_departure(machine.now),
+            self._due(),
+            self._next_fault(),
+        )
+        event = min((event for event in events if event is not None), default=None)
+        return None if event is None else max(event / cpu.CLOCK - self._seconds, 0.0)
+
+    # The wire
+
+    def receive(self, data: bytes) -> None:
+        """Bytes that reach the UART (with ``baud``: start down the wire) now."""
+        now, cable = self._machine.now, self._cable
+        if cable is None:
+            self._machine.uart.receive(now, data)
+        else:
+            self._pump()
+            cable.send(now, data)
+        self._run(now)
+
+    def take_output(self) -> bytes:
+        """The bytes that have come out of the UART (and of the cable) since the last call."""
+        now, cable = self._machine.now, self._cable
+        if cable is None:
+            return self._machine.uart.take(now)
+        self._pump()
+        return cable.outward.take(now)
+
+    @property
+    def connected(self) -> bool:
+        """Whether the cable is in; a fault may take it out."""
+        return self._cable is None or self._cable.connected
+
+    @property
+    def lost_bytes(self) -> int:
+        """Bytes that found the receive ring full, or came while an EEPROM write blocked it."""
+        return self._machine.uart.lost
+
+    # What it does
+
+    @property
+    def beam_log(self) -> list[BeamSegment]:
+        """What was burnt so far, in order of time, up to now; clear it to save memory."""
+        machine = self._machine
+        machine.set_pwm(machine.beam.pwm)
+        return machine.beam.segments
+
+    @property
+    def beam_on(self) -> bool:
+        """Whether the beam burns now."""
+        return self._machine.beam.pwm > 0
+
+    @property
+    def position(self) -> tuple[float, float, float]:
+        """The machine position in mm now."""
+        x, y, z = self._machine.millimetres(self._machine.position_now())
+        return x, y, z
+
+    @property
+    def state(self) -> str:
+        """The word of its status report: Idle, Run, Hold, Jog, Home, Alarm, Check, Door, Sleep."""
+        return self._machine.state.value
+
+    @property
+    def settings(self) -> dict[int, float]:
+        """The ``$`` settings now."""
+        return dict(self._machine.settings.values)
+
+    # What befalls it
+
+    def load_settings_dump(self, text: str) -> tuple[int, ...]:
+        """Store the settings of a ``$$`` dump and switch off and on again.
+
+        Returns the numbers that GRBL 1.1 does not have and that were passed over. Raises
+        :class:`~miurafab.errors.ProfileError` for a line that is no setting.
+        """
+        values = parse_dump(text, "the settings dump").values
+        known = self._machine.settings.values
+        self._machine.settings.write({n: v for n, v in values.items() if n in known})
+        self.power_cycle()
+        return tuple(number for number in values if number not in known)
+
+    def power_cycle(self) -> None:
+        """Switch off and on: only the EEPROM survives; output not yet taken is lost."""
+        self._frozen = False
+        self._thaws_at = None
+        self._machine.uart.power_cycle(self._machine.now)
+        self._power_on()
+
+    def freeze(self, seconds: float = math.inf) -> None:
+        """The main program hangs: nothing is answered, prepared motion runs out."""
+        self._frozen = True
+        self._thaws_at = None
+        if seconds < math.inf:
+            self._thaws_at = self._machine.now + round(seconds * cpu.CLOCK)
+
+    def press_limit(self, axis: str, pressed: bool = True) -> None:
+        """Press or release a limit switch, ``"X"``, ``"Y"`` or ``"Z"``."""
+        self._machine.change_limit_pin(axis, pressed)
+        self._run(self._machine.now)
+
+    def press_button(self, name: str, pressed: bool = True) -> None:
+        """Press or release a control button, ``"reset"``, ``"hold"`` or ``"start"``."""
+        self._machine.change_control_pin(name, pressed)
+        self._run(self._machine.now)
+
+    def touch_probe(self, touching: bool = True) -> None:
+        """The probe makes or loses contact."""
+        self._machine.change_probe_pin(touching)
+        self._run(self._machine.now)
+
+    def _suffer(self, fault: Fault, now: int) -> None:
+        """A fault of the controller itself, not of its cable."""
+        machine = self._machine
+        if fault.kind == "reset":
+            machine.change_control_pin("reset", True)
+            machine.change_control_pin("reset", False)
+        elif fault.kind == "power":
+            self.power_cycle()
+        elif fault.kind == "alarm":
+            machine.reset()
+            machine.alarm = int(fault.value)
+        else:
+            machine.uart.deaf = fault.kind == "stall"
+            self.freeze(fault.value)
+
+    def _thaw(self) -> None:
+        """The hang is over: the main program goes on where it was."""
+        now = self._machine.now
+        self._frozen = False
+        self._thaws_at = None
+        self._machine.uart.hear(now)
+        if isinstance(self._wait, Until):
+            self._wait = Until(max(self._wait.time, now))
+        else:
+            self._processor.note(now)
+        if self._wait is None:
+            self._resume()
+
+    def _next_fault(self) -> int | None:
+        """When the next fault strikes or ends, or the cable lets something go."""
+        due = None if self._cable is None else self._cable.next_due(self._machine.now)
+        if due is None or (self._thaws_at is not None and self._thaws_at < due):
+            due = self._thaws_at
+        return due
+
+    # The run of events
+
+    def _due(self) -> int | None:
+        """When the main program goes on, if nothing comes between."""
+        wait = self._wait
+        if wait is None or self._frozen:
+            return None
+        return wait.time if isinstance(wait, Until) else self._processor.finish()
+
+    def _run(self, target: int, stop_at_line: bool = False) -> int:
+        """Let everything happen that is due by ``target``, in its order; returns the time reached.
+
+        With ``stop_at_line`` it ends where a line of output is out.
+        """
+        cable, machine = self._cable, self._machine
+        while True:
+            if cable is not None:
+                self._pump()
+                line = cable.outward.next_line()
+                if stop_at_line and line is not None:
+                    target = min(target, max(line, machine.now))
+            due = self._next_fault()
+            stop = target if due is None else min(target, max(due, machine.now))
+            reached = self._run_events(stop, stop_at_line)
+            if due is not None and due <= reached:
+                self._befall(reached)
+            elif reached == target or cable is None:
+                return reached
+
+    def _befall(self, now: int) -> None:
+        """What is due strikes, or ends."""
+        if self._thaws_at is not None and self._thaws_at <= now:
+            self._thaw()
+        if self._cable is not None:
+            self._pump()
+            self._machine.uart.receive(now, self._cable.happen(now))
+
+    def _pump(self) -> None:
+        """What is out of the UART goes into the cable."""
+        if self._cable is not None:
+            self._cable.reply(self._machine.uart.take_dated(self._machine.now))
+
+    def _run_events(self, target: int, stop_at_line: bool) -> int:
+        """:meth:`_run` while nothing befalls the controller from outside."""
+        machine, processor = self._machine, self._processor
+        stepper, uart = machine.stepper, machine.uart
+        if self._wait is None and machine.pending():
+            self._resume()
+        while True:
+            if stop_at_line:
+                line = uart.next_line()
+                if line is not None:
+                    target = min(target, max(line, machine.now))
+            change, arrival, due = stepper.next_change(), uart.next_arrival(), self._due()
+            now = target + 1
+            for event in (change, arrival, due):
+                if event is not None and event < now:
+                    now = event
+            if now > target:
+                break
+            machine.now = now
+            if change == now:
+                processor.note(now)
+                stepper.run_to(now)
+            elif arrival == now:
+                uart.arrive()
+            if due == now or self._wait is None:
+                self._resume()
+        machine.now = max(machine.now, target)
+        return target
+
+    def _resume(self) -> None:
+        """The main program goes on until it has to wait."""
+        machine = self._machine
+        while not self._frozen:
+            self._wait = next(self._program)
+            if isinstance(self._wait, float):
+                if self._wait <= 0.0:
+                    continue
+                self._processor.start(machine.now, self._wait)
+            elif isinstance(self._wait, Until) and self._wait.time <= machine.now:
+                continue
+            return

@@ -1,0 +1,376 @@
+"""Everything that the virtual controller knows at one moment, and what its interrupts do to it.
+
+The firmware's main program (the other ``virtual_`` modules) is written as generators that yield
+what they wait for: a number of processor cycles to work, :class:`Until` a time, or None for
+whatever happens next. The interrupts (bytes, switches, the end of motion) change this state at
+once, and the main program finds the flags when it looks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+
+from miurafab.gcode.numbers import single
+from miurafab.gcode.parser import ModalState
+from miurafab.motion import cpu
+from miurafab.motion.parameters import MotionParameters
+from miurafab.motion.planner import Planner
+from miurafab.motion.segments import Segment, SegmentGenerator
+from miurafab.motion.stepper import Stepper, steps_taken
+from miurafab.simulate.grbl.beam import BeamLog
+from miurafab.simulate.grbl.dialect import Dialect
+from miurafab.simulate.grbl.settings import LINE_SIZE, FirmwareSettings
+from miurafab.simulate.grbl.wire import Uart
+
+AXES = "XYZ"
+
+
+@dataclass(frozen=True, slots=True)
+class Until:
+    """Wait, doing nothing else, until the cycle ``time``."""
+
+    time: int
+
+
+Wait = float | Until | None
+Run = Generator[Wait, None, None]
+
+
+class FirmwareState(Enum):
+    """What the controller is doing, by the word in its status report."""
+
+    IDLE = "Idle"
+    ALARM = "Alarm"
+    CHECK = "Check"
+    HOMING = "Home"
+    CYCLE = "Run"
+    HOLD = "Hold"
+    JOG = "Jog"
+    DOOR = "Door"
+    SLEEP = "Sleep"
+
+
+class RealtimeRequest(Enum):
+    """What an interrupt asks of the main program."""
+
+    STATUS = auto()
+    START = auto()
+    HOLD = auto()
+    RESET = auto()
+    DOOR = auto()
+    CANCEL = auto()
+    SLEEP = auto()
+
+
+class Suspend(Enum):
+    """How far the controller is in a hold, a door stop or a cancelled motion."""
+
+    HELD = auto()
+    RETRACTED = auto()
+    RESTORING = auto()
+    RESTORED = auto()
+    DOOR_AJAR = auto()
+    MOTION_CANCEL = auto()
+    JOG_CANCEL = auto()
+
+
+class StopOverride(Enum):
+    """The spindle stop during a hold."""
+
+    OFF = auto()
+    BEGIN = auto()
+    ON = auto()
+    RESTORE = auto()
+    RESTORE_AND_START = auto()
+
+
+HARD_LIMIT, SOFT_LIMIT, RESET_IN_MOTION, PROBE_BEFORE, PROBE_NOTHING = 1, 2, 3, 4, 5
+HOMING_RESET, HOMING_DOOR, HOMING_PULL_OFF, HOMING_NO_SWITCH = 6, 7, 8, 9
+"""``ALARM:`` codes."""
+SPINDLE_STOP = 0x9E
+_COMMANDS = {
+    "status": RealtimeRequest.STATUS,
+    "start": RealtimeRequest.START,
+    "hold": RealtimeRequest.HOLD,
+    "door": RealtimeRequest.DOOR,
+}
+_PIN_REQUESTS = {"hold": RealtimeRequest.HOLD, "start": RealtimeRequest.START}
+
+
+class Machine:
+    """The controller's state. ``now`` is in processor cycles since power-up.
+
+    ``position`` is the stepper's count of motor steps. ``switches`` holds, for each homed axis,
+    the direction (1 or -1) and the position of its homing switch; before homing it is half the
+    travel away from where power came on. ``limit_pins`` and ``control_pins`` are the switches
+    that somebody holds. ``line`` is the line buffer with what earlier lines left in it, and
+    ``answer`` the ``error:`` code of the line last executed; ``booting`` lasts from power-up
+    until the banner is written.
+    """
+
+    def __init__(
+        self, settings: FirmwareSettings, baud: int | None, homing_switches: bool, dialect: Dialect
+    ) -> None:
+        self.now = 0
+        self.dialect = dialect
+        self.settings = settings
+        self.homing_switches = homing_switches
+        self.uart = Uart(baud, dialect, self.realtime_byte)
+        self.planner = Planner(self.motion())
+        self.generator = SegmentGenerator(self.planner, self.to_pwm)
+        self.stepper = Stepper()
+        self.stepper.on_segment = self._on_segment
+        self.stepper.on_end = self._on_end
+        self.stepper.on_settled = self._on_settled
+        self.parser = ModalState()
+        self.beam = BeamLog()
+        self.position: tuple[int, ...] = (0, 0, 0)
+        self.limit_pins: set[str] = set()
+        self.control_pins: set[str] = set()
+        self.probe_pin = False
+        self.answer = 0
+        self.booting = False
+        self.power_up()
+
+    def power_up(self) -> None:
+        """Power comes on: only the EEPROM and the switches remember anything."""
+        self.set_pwm(0)
+        self.stepper.halt()
+        self.count_from((0, 0, 0))
+        homing = bool(self.settings.values[22])
+        self.state = FirmwareState.ALARM if homing else FirmwareState.IDLE
+        self.switches: list[tuple[int, int] | None] = [None, None, None]
+        self.line = bytearray(max(self.dialect.line_chars + 1, LINE_SIZE))
+        self.clockwise = True
+        self._follows = False
+        self.flood = False
+        self.clear()
+
+    def clear(self) -> None:
+        """What every reset clears, the state itself excepted (``main.c``)."""
+        self.abort = False
+        self.suspend: set[Suspend] = set()
+        self.soft_limit = False
+        self.probing = self.probe_seen = False
+        self.probe_away = False
+        self.probe_succeeded = False
+        self.probe_position: tuple[int, ...] = (0, 0, 0)
+        self.spindle_speed = 0.0
+        self.spindle_override = 100
+        self.stop_override = StopOverride.OFF
+        self.override_count = 0
+        self.offset_count = 0
+        self.requests: set[RealtimeRequest] = set()
+        self.alarm = 0
+        self.motion_overrides: set[int] = set()
+        self.accessory_overrides: set[int] = set()
+        self.planner.feed_override = self.planner.rapid_override = 100
+        self.interrupt_delay = 0
+
+    def motion(self) -> MotionParameters:
+        """What of the settings and the firmware shapes motion."""
+        blocks = self.dialect.planner_blocks
+        return replace(self.settings.motion(), planner_blocks=blocks)
+
+    # What happens in interrupts
+
+    def realtime_byte(self, now: int, byte: int) -> None:
+        """The receive interrupt took ``byte`` out of the stream."""
+        self.now = now
+        command = self.dialect.realtime[byte]
+        if command == "reset":
+            self.reset()
+        elif command in _COMMANDS:
+            self.requests.add(_COMMANDS[command])
+        elif command == "cancel jog":
+            if self.state is FirmwareState.JOG:
+                self.requests.add(RealtimeRequest.CANCEL)
+        elif command == "motion override":
+            self.motion_overrides.add(byte)
+        else:
+            self.accessory_overrides.add(byte)
+
+    def reset(self) -> None:
+        """Beam, coolant and, if moving, motors off; the main program restarts (``mc_reset``)."""
+        if RealtimeRequest.RESET in self.requests:
+            return
+        self.requests.add(RealtimeRequest.RESET)
+        self.uart.cut(self.now)
+        self.set_pwm(0)
+        self.flood = False
+        generator = self.generator
+        moving = self.state in (FirmwareState.CYCLE, FirmwareState.HOMING, FirmwareState.JOG)
+        if moving or generator.holding or generator.system_move is not None:
+            if self.state is not FirmwareState.HOMING:
+                self.alarm = RESET_IN_MOTION
+            elif not self.alarm:
+                self.alarm = HOMING_RESET
+            self.stop_motors()
+            self.interrupt_delay = self.idle_cycles
+
+    def stop_motors(self) -> None:
+        """The step interrupt ends where it is."""
+        self.position = self.position_now()
+        self.stepper.halt()
+        self.set_pwm(self.beam.pwm)
+
+    def change_limit_pin(self, axis: str, pressed: bool) -> None:
+        """A limit switch changes; with hard limits on, any change kills ($21, ``limits.c``)."""
+        (self.limit_pins.add if pressed else self.limit_pins.discard)(axis)
+        watched = self.settings.values[21] and self.state is not FirmwareState.HOMING
+        if watched and self.state is not FirmwareState.ALARM and not self.alarm:
+            self.reset()
+            self.alarm = HARD_LIMIT
+
+    def change_control_pin(self, name: str, pressed: bool) -> None:
+        """The ``reset``, ``hold`` or ``start`` button changes."""
+        (self.control_pins.add if pressed else self.control_pins.discard)(name)
+        if "reset" in self.control_pins:
+            self.reset()
+        for pin in self.control_pins & _PIN_REQUESTS.keys():
+            self.requests.add(_PIN_REQUESTS[pin])
+
+    def watch_probe(self) -> None:
+        """From now on the step interrupt looks at the probe."""
+        self.probing, self.probe_seen = True, False
+
+    def change_probe_pin(self, touched: bool) -> None:
+        """The probe changes; the step interrupt notes where."""
+        self.probe_pin = touched
+        if self.probing and self.stepper.running and self.probe_triggered:
+            self.probing, self.probe_seen = False, True
+            self.probe_position = self.position_now()
+            self.requests.add(RealtimeRequest.CANCEL)
+
+    @property
+    def probe_triggered(self) -> bool:
+        """The probe as $6 and a move away from contact see it."""
+        inverted = bool(self.settings.values[6]) != self.probe_away
+        return self.probe_pin != inverted
+
+    def home_switch(self, axis: int) -> tuple[int, int]:
+        """The homing direction of ``axis`` (1 or -1, $23) and its switch's position in steps."""
+        values = self.settings.values
+        direction = -1 if int(values[23]) >> axis & 1 else 1
+        known = self.switches[axis]
+        if known is not None and known[0] == direction:
+            return known
+        return direction, direction * round(0.5 * values[130 + axis] * values[100 + axis])
+
+    def engaged_limits(self) -> set[str]:
+        """The axes whose limit pin reads as pressed, under $5.
+
+        The homing switches stand aside except in homing, so that a job may use the whole bed
+        of a machine that was never homed.
+        """
+        position = self.position_now()
+        homing = self.homing_switches and self.state is FirmwareState.HOMING
+        inverted = bool(self.settings.values[5])
+        engaged = set()
+        for axis, name in enumerate(AXES):
+            direction, switch = self.home_switch(axis)
+            reached = homing and direction * (position[axis] - switch) >= 0
+            if (reached or name in self.limit_pins) != inverted:
+                engaged.add(name)
+        return engaged
+
+    def _on_segment(self, now: int, segment: Segment) -> None:
+        self.now = now
+        self._follows = segment.follows
+        self.position = steps_taken(segment.move, segment.done + segment.ticks * segment.stride)
+        self.set_pwm(segment.power)
+
+    def _on_end(self, now: int) -> None:
+        self.now = now
+        self.set_pwm(self.beam.pwm)
+
+    def _on_settled(self, now: int) -> None:
+        """Power that follows the speed is put out at rest; constant power stays on."""
+        self.now = now
+        if self._follows:
+            self.set_pwm(0)
+
+    def count_from(self, position: tuple[int, ...]) -> None:
+        """Where the machine stands is called ``position`` from now on; nothing moves."""
+        self.set_pwm(self.beam.pwm)
+        self.position = position
+        self.set_pwm(self.beam.pwm)
+
+    # What the main program sees
+
+    @property
+    def idle_cycles(self) -> int:
+        """How long the motors are held at a stop."""
+        return round((self.settings.idle_lock or 0.0) * cpu.CLOCK)
+
+    def position_now(self) -> tuple[int, ...]:
+        """The motor position in steps at this moment."""
+        progress = self.stepper.progress(self.now)
+        return self.position if progress is None else steps_taken(*progress)
+
+    def millimetres(self, steps: tuple[int, ...]) -> list[float]:
+        """Motor steps as machine millimetres, in 32-bit floats; NaN for an axis without steps."""
+        return [
+            single(n / k) if k else float("nan")
+            for n, k in zip(steps, self.settings.steps_per_mm, strict=True)
+        ]
+
+    def to_pwm(self, word: float | None) -> int:
+        """The PWM value of an S word, or of none, under the override (``spindle_control.c``)."""
+        values = self.settings.values
+        low, high = values[31], values[30]
+        if word is None:
+            self.spindle_speed = 0.0
+            return 0
+        speed = word * 0.01 * self.spindle_override
+        if low >= high or speed >= high:
+            self.spindle_speed = high
+            return 255
+        if speed <= low:
+            self.spindle_speed = low if speed else 0.0
+            return 1 if speed else 0
+        self.spindle_speed = speed
+        return int((speed - low) * 254.0 / (high - low)) + 1
+
+    def set_pwm(self, pwm: int) -> None:
+        """The beam's PWM changes now."""
+        if pwm or self.beam.pwm:
+            self.beam.mark(self.now / cpu.CLOCK, self.point_now(), pwm)
+
+    def point_now(self) -> tuple[float, float]:
+        """Where the beam is, in machine mm, between motor steps too."""
+        progress = self.stepper.progress(self.now)
+        if progress is None:
+            x, y, _ = self.position
+            return self._point((x, y, 0), (0, 0, 0), 0.0)
+        segment = self.stepper.queue[0]
+        move, part = segment.move, 0.0
+        if segment.cycles:
+            part = (self.now - self.stepper.began) / segment.cycles
+        micro = segment.done + segment.ticks * segment.stride * part
+        return self._point(move.origin, move.steps, micro / (8 * move.events))
+
+    def _point(
+        self, origin: tuple[int, ...], steps: tuple[int, ...], part: float
+    ) -> tuple[float, float]:
+        x, y = (
+            (a + n * part) / k if k else 0.0
+            for a, n, k in zip(origin[:2], steps[:2], self.settings.steps_per_mm[:2], strict=True)
+        )
+        return x, y
+
+    def is_in(self, *states: FirmwareState) -> bool:
+        """Whether the state is one of ``states`` now; it changes across every wait."""
+        return self.state in states
+
+    def pending(self) -> bool:
+        """Whether an interrupt left the main program something to do."""
+        return bool(
+            self.requests
+            or self.alarm
+            or self.stepper.stopped
+            or self.motion_overrides
+            or self.accessory_overrides
+        )

@@ -1,0 +1,1 @@
+"""A Marlin controller, simulated."""

@@ -1,0 +1,139 @@
+"""The figures of a report in words: what a maker wants to know, each with what it means.
+
+A line is a name, a value, a remark and a mark: ``good``, ``bad``, or nothing where it is a matter
+of taste. Numbers that are exact to rounding are called so; the report itself has every digit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from miurafab.origami.verify import EXACT
+from miurafab.workflow.dry_run import clock_text, length_text
+
+HEADLINES = {
+    "converged": "The sheet fits and folds from one flat piece.",
+    "infeasible": "The sheet folds, but not within what was asked.",
+    "stalled": "No sheet was found.",
+    "invalid": "This pattern has faults.",
+}
+
+
+@dataclass(frozen=True)
+class ReportLine:
+    """One figure in words."""
+
+    name: str
+    value: str
+    remark: str = ""
+    mark: str = ""
+
+
+def headline(status: str, *, opened: bool = False) -> str:
+    """One sentence on the whole."""
+    if opened and status == "converged":
+        return "This pattern is sound."
+    return HEADLINES.get(status, status)
+
+
+def pattern_lines(report: Mapping[str, Any]) -> list[dict[str, str]]:
+    """The lines of a fit report or of a check; what was not measured is left out."""
+    lines = [*_shape(report), *_exactness(report), *_clashes(report)]
+    if report.get("min_edge_mm") is not None:
+        lines.append(ReportLine("Shortest edge", _mm(report["min_edge_mm"])))
+    if report.get("area_ratio") is not None:
+        lines.append(ReportLine("Paper", f"{report['area_ratio']:.2f} times the target's area"))
+    if report.get("facets") is not None:
+        vertices = report.get("vertices") or 0
+        lines.append(ReportLine("Facets", f"{report['facets']:,}", f"{vertices:,} vertices"))
+    if report.get("seconds") is not None:
+        lines.append(ReportLine("Computed in", f"{report['seconds']:.1f} s"))
+    return [asdict(line) for line in lines]
+
+
+def _shape(report: Mapping[str, Any]) -> list[ReportLine]:
+    lines = []
+    middle, whole = report.get("hausdorff_midsurface_mm"), report.get("hausdorff_mm")
+    if middle is not None:
+        lines.append(ReportLine("Off the target", _mm(middle), "the sheet's middle, at most"))
+    if whole is not None:
+        part = report.get("hausdorff_relative")
+        of_it = "" if part is None else f", {100 * part:.1f} % of the size"
+        lines.append(ReportLine("With its folds", _mm(whole), f"tips and grooves, at most{of_it}"))
+    return lines
+
+
+def _exactness(report: Mapping[str, Any]) -> list[ReportLine]:
+    names = {
+        "max_planarity": ("Flat facets", ""),
+        "max_developability": ("Folds from flat paper", " rad"),
+        "max_isometry": ("Same lengths flat and folded", ""),
+    }
+    lines = []
+    for key, (name, unit) in names.items():
+        value = report.get(key)
+        if value is not None:
+            exact = value <= EXACT
+            text = "exact" if exact else f"off by {value:.1g}{unit}"
+            lines.append(ReportLine(name, text, f"{value:.0e}" if exact else "", _mark(exact)))
+    kawasaki = report.get("max_flat_foldability")
+    if kawasaki is not None:
+        if kawasaki <= EXACT:
+            lines.append(ReportLine("Folds flat", "exactly", "it also packs flat", "good"))
+        else:
+            off = f"{math.degrees(kawasaki):.2g}° off at the worst vertex"
+            lines.append(ReportLine("Folds flat", "no", off))
+    return lines
+
+
+def _clashes(report: Mapping[str, Any]) -> list[ReportLine]:
+    names = {"self_intersections": "Crossings when folded", "overlaps": "Overlaps when flat"}
+    return [
+        ReportLine(
+            name, "none" if not report[key] else f"{report[key]:,}", mark=_mark(not report[key])
+        )
+        for key, name in names.items()
+        if report.get(key) is not None
+    ]
+
+
+def layout_lines(totals: Mapping[str, Any]) -> list[dict[str, str]]:
+    """The lines of a layout's totals."""
+    density = f"{100 * totals['density']:.0f} % of their area used"
+    lines = [ReportLine("Sheets", f"{totals['sheets']:,}", density)]
+    if totals.get("seconds") is not None:
+        lines.append(ReportLine("Machine time", clock_text(totals["seconds"]), "estimated"))
+    lines += [
+        ReportLine("Patches", f"{totals['patches']:,}"),
+    ]
+    if totals["patches"] > 1 or totals["tabs"]:
+        lines.append(
+            ReportLine("Seams", length_text(totals["seam_mm"]), f"{totals['tabs']:,} tabs")
+        )
+    lines += [
+        ReportLine("Cut", length_text(totals["cut_mm"])),
+        ReportLine("Creases", length_text(totals["perforated_mm"]), "perforated or scored"),
+        ReportLine("Travel", length_text(totals["travel_mm"]), "with the tool off"),
+    ]
+    return [asdict(line) for line in lines]
+
+
+def layout_warnings(part: Mapping[str, Any]) -> list[str]:
+    """What the maker should know of a layout before it is cut."""
+    said = [f"{sheet['name']}: {text}" for sheet in part["sheets"] for text in sheet["warnings"]]
+    if part["untabbed"]:
+        said.append(f"No tab could stand on {part['untabbed']} seam edges; glue strips across.")
+    if part["unlettered"]:
+        said.append(f"{part['unlettered']} names and numbers found no room on the sheets.")
+    return [*said, *part["remarks"]]
+
+
+def _mm(value: float) -> str:
+    return f"{value:.3g} mm" if value >= 0.01 else "less than 0.01 mm"
+
+
+def _mark(good: bool) -> str:
+    return "good" if good else "bad"

@@ -1,0 +1,326 @@
+"""What lies on the bench: the files that were given, one task at a time, and what came of it.
+
+This is the studio's only state. It changes when the page asks for something and when news of the
+task is taken in; everything that was computed lies in one folder, and is found by the names that
+were put down here, never by a path that somebody sends.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from miurafab.errors import InputError
+from miurafab.studio import recipe
+from miurafab.studio.names import safe_stem, suffix_of
+from miurafab.studio.orders import FitOrder, LayoutOrder
+from miurafab.studio.report_text import headline, layout_lines, layout_warnings, pattern_lines
+from miurafab.studio.work import Order
+from miurafab.studio.worker import News, Running
+from miurafab.surfaces.mesh import MESH_SUFFIXES
+
+PATTERN_SUFFIX, DESIGN_SUFFIX = ".fold", ".toml"
+_KEPT = 8
+"""How many files of the browser are kept; the oldest goes."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file to fit or to open: a ``mesh``, a ``pattern`` or a ``design``.
+
+    ``ours`` is what was named on the command line; ``shown`` how a command line names it.
+    """
+
+    id: str
+    kind: str
+    path: Path
+    shown: str
+    ours: bool = False
+
+    @property
+    def name(self) -> str:
+        """What is made of it is called so."""
+        return safe_stem(self.path.name)
+
+
+@dataclass
+class Task:
+    """What is being done, or was done last."""
+
+    order: Order
+    id: str
+    running: Running | None
+    fraction: float = 0.0
+    note: str = ""
+    error: str = ""
+    cancelled: bool = False
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How the pattern on the bench was asked for; ``target`` as a design file has it, if one can.
+    ``file`` is the pattern as the command line names it.
+    """
+
+    command: str
+    file: str
+    target: Mapping[str, str] | None = None
+    options: Mapping[str, str] = field(default_factory=dict)
+    layout: LayoutOrder | None = None
+
+
+class Bench:
+    """The state of one studio; ``folder`` is its own, and ``start`` carries orders out."""
+
+    def __init__(self, folder: Path, start: Callable[[Order], Running]) -> None:
+        self.sources: dict[str, Source] = {}
+        self.files: dict[tuple[str, str], Path] = {}
+        self.task: Task | None = None
+        self.pattern: dict[str, Any] | None = None
+        self.job: dict[str, Any] | None = None
+        self._folder = folder
+        self._own = re.compile(re.escape(str(folder)) + r"[/\\][0-9]+[/\\]")
+        self._start = start
+        self._numbers = 0
+        self._asked: Asked | None = None
+        self._coming: Asked | None = None
+
+    def add_upload(self, name: str, content: bytes) -> Source:
+        """Keep a file of the browser. Raises :class:`~miurafab.errors.InputError`."""
+        suffix = suffix_of(name)
+        kind = "pattern" if suffix == PATTERN_SUFFIX else "mesh"
+        if kind == "mesh" and suffix not in MESH_SUFFIXES:
+            known = ", ".join((*MESH_SUFFIXES, PATTERN_SUFFIX))
+            raise InputError(f"'{name[-60:]}' cannot be opened here; known files are {known}.")
+        if not content:
+            raise InputError(f"'{name[-60:]}' is empty.")
+        held = [source for source in self.sources.values() if not source.ours]
+        for old in held[: max(0, len(held) - _KEPT + 1)]:
+            del self.sources[old.id]
+            shutil.rmtree(old.path.parent)
+        number = self._number()
+        file = f"{safe_stem(name)}{suffix}"
+        path = self._new_folder(number) / file
+        path.write_bytes(content)
+        return self._keep(Source(number, kind, path, file))
+
+    def add_own(self, path: Path, kind: str) -> Source:
+        """Keep a file that was named on the command line."""
+        return self._keep(Source(self._number(), kind, path, str(path), ours=True))
+
+    def fit(self, asked: FitOrder) -> None:
+        """Begin a fit. Raises :class:`~miurafab.errors.InputError` where something else runs."""
+        self._check_idle()
+        if asked.source is None:
+            assert asked.surface is not None
+            target, shown, name = asked.target, asked.target, asked.surface
+            described: Mapping[str, str] | None = {"surface": name, **asked.parameters}
+        else:
+            source = self._source(asked.source, ("mesh", "design"))
+            target, shown, name = str(source.path), source.shown, source.name
+            described = {"mesh": source.shown} if source.kind == "mesh" else None
+        command = recipe.fit_command(shown, asked.options, name)
+        self._coming = Asked(command, f"{name}.fold", described, asked.options)
+        self._begin("fit", name, target=target, options=asked.options)
+
+    def open(self, source_id: str) -> None:
+        """Begin to open a pattern. Raises as :meth:`fit`."""
+        self._check_idle()
+        source = self._source(source_id, ("pattern",))
+        self._coming = Asked(recipe.check_command(source.shown), source.shown)
+        self._begin("open", source.name, file=source.path, ours=source.ours)
+
+    def lay_out(self, asked: LayoutOrder) -> None:
+        """Begin to lay out the pattern on the bench. Raises as :meth:`fit`."""
+        self._check_idle()
+        if self.pattern is None or "fold" not in self.pattern["files"] or self._asked is None:
+            raise InputError("There is no pattern to lay out yet; fit or open one first.")
+        self._coming = Asked(
+            self._asked.command,
+            self._asked.file,
+            self._asked.target,
+            self._asked.options,
+            asked,
+        )
+        self._begin(
+            "sheets",
+            self.pattern["name"],
+            file=self.files[self.pattern["id"], f"{self.pattern['name']}.fold"],
+            machine=asked.machine,
+            material=asked.material,
+            options=asked.options,
+        )
+
+    def cancel(self) -> None:
+        """End what is being done; what there was before, and parts that were finished, stay."""
+        if self.task is not None and self.task.running is not None:
+            self.task.running.stop()
+            self.take_in()
+            self.task.running, self.task.cancelled, self.task.error = None, True, ""
+            self._settle()
+
+    def take_in(self) -> None:
+        """Take in the news of the task."""
+        task = self.task
+        if task is None or task.running is None:
+            return
+        for said in task.running.news():
+            if "progress" in said:
+                task.fraction = max(task.fraction, said["progress"])
+                task.note = said["note"]
+            elif "part" in said:
+                self._take_part(task, said)
+            else:
+                task.error = self._plain(said.get("error", ""))
+                task.running.stop()
+                task.running = None
+                self._settle()
+                return
+
+    def design_text(self) -> str | None:
+        """The design file of the pattern on the bench, None where there can be none."""
+        asked = self._asked
+        if self.pattern is None or asked is None or asked.target is None:
+            return None
+        layout: dict[str, Any] = {}
+        if asked.layout is not None:
+            layout = {"machine": asked.layout.machine, "material": asked.layout.material}
+            layout |= asked.layout.options
+        return recipe.design_text(self.pattern["name"], asked.target, asked.options, layout)
+
+    def state(self) -> dict[str, Any]:
+        """Everything that the page shows."""
+        task = self.task
+        return {
+            "sources": [
+                {"id": s.id, "kind": s.kind, "name": s.path.name} for s in self.sources.values()
+            ],
+            "task": task
+            and {
+                "id": task.id,
+                "kind": task.order.do,
+                "running": task.running is not None,
+                "fraction": task.fraction,
+                "note": task.note,
+                "error": task.error,
+                "cancelled": task.cancelled,
+            },
+            "pattern": self.pattern,
+            "job": self.job,
+        }
+
+    def _take_part(self, task: Task, part: News) -> None:
+        if part["part"] == "pattern":
+            self._new_pattern(task, part)
+        elif part["part"] == "motion" and self.pattern is not None:
+            self.pattern["files"] |= self._put_down(task.id, part.get("files", {}))
+            self.pattern["remarks"] += part.get("remarks", [])
+            self.pattern |= {"folding": False, "still": part.get("missing", "")}
+        elif part["part"] == "job":
+            self._new_job(task, part)
+
+    def _new_pattern(self, task: Task, part: News) -> None:
+        self._forget(self.job)
+        self._forget(self.pattern)
+        self.job, self._asked = None, self._coming
+        assert self._asked is not None
+        report = part["report"]
+        opened = task.order.do == "open"
+        self.pattern = {
+            "id": task.id,
+            "name": task.order.name,
+            "status": report["status"],
+            "headline": headline(report["status"], opened=opened),
+            "advice": self._plain(report["advice"]),
+            "lines": pattern_lines(report),
+            "remarks": [self._plain(remark) for remark in part["remarks"]],
+            "files": self._put_down(task.id, part["files"]),
+            "folding": bool(part["files"]),
+            "still": "",
+            "has_design": self._asked.target is not None,
+            "command": self._asked.command,
+        }
+
+    def _new_job(self, task: Task, part: News) -> None:
+        self._forget(self.job)
+        self._asked = self._coming
+        assert self._asked is not None
+        assert self._asked.layout is not None
+        layout, name = self._asked.layout, task.order.name
+        sheets = recipe.sheets_command(
+            self._asked.file, name, layout.machine, layout.material, layout.options
+        )
+        pictures = {str(n): file for n, file in enumerate(part["pictures"])}
+        self.job = {
+            "id": task.id,
+            "name": recipe.job_name(name),
+            "lines": layout_lines(part["totals"]),
+            "warnings": [*self._doubts(), *layout_warnings(part)],
+            "files": self._put_down(task.id, part["files"]),
+            "pictures": list(self._put_down(task.id, pictures).values()),
+            "command": recipe.both(self._asked.command, sheets, sound=not self._doubts()),
+            "cut": recipe.cut_command(name),
+        }
+
+    def _doubts(self) -> list[str]:
+        """What was wrong with the pattern before it was laid out."""
+        if self.pattern is None or self.pattern["status"] == "converged":
+            return []
+        return [f"{self.pattern['headline']} {self.pattern['advice']}".strip()]
+
+    def _plain(self, sentence: str) -> str:
+        """``sentence`` with files of the studio's own folder called by their names alone."""
+        return self._own.sub("", sentence)
+
+    def _begin(self, do: str, name: str, **what: Any) -> None:
+        number = self._number()
+        order = Order(do, self._new_folder(number), name, **what)
+        self.task = Task(order, number, self._start(order))
+
+    def _settle(self) -> None:
+        """A folding that does not come any more is not waited for; nothing is left lying about."""
+        assert self.task is not None
+        if self.pattern is not None and self.pattern["folding"]:
+            self.pattern |= {"folding": False, "still": "The folding was not computed."}
+        shown = [each["id"] for each in (self.pattern, self.job) if each is not None]
+        if self.task.id not in shown:
+            shutil.rmtree(self.task.order.folder, ignore_errors=True)
+
+    def _check_idle(self) -> None:
+        self.take_in()
+        if self.task is not None and self.task.running is not None:
+            raise InputError("Something is being computed already; wait for it or cancel it.")
+
+    def _source(self, source_id: str, kinds: tuple[str, ...]) -> Source:
+        source = self.sources.get(source_id)
+        if source is None or source.kind not in kinds:
+            raise InputError("That file is not here any more; choose it again.")
+        return source
+
+    def _put_down(self, number: str, files: Mapping[str, str]) -> dict[str, str]:
+        """Note where computed ``files`` are; the addresses by which they are found."""
+        folder = self._folder / number
+        self.files |= {(number, name): folder / name for name in files.values()}
+        return {what: f"files/{number}/{name}" for what, name in files.items()}
+
+    def _forget(self, shown: Mapping[str, Any] | None) -> None:
+        if shown is not None:
+            self.files = {key: path for key, path in self.files.items() if key[0] != shown["id"]}
+            shutil.rmtree(self._folder / shown["id"], ignore_errors=True)
+
+    def _keep(self, source: Source) -> Source:
+        self.sources[source.id] = source
+        return source
+
+    def _number(self) -> str:
+        self._numbers += 1
+        return str(self._numbers)
+
+    def _new_folder(self, number: str) -> Path:
+        folder = self._folder / number
+        folder.mkdir()
+        return folder

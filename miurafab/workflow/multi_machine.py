@@ -1,0 +1,148 @@
+"""Several machines share the sheets of one job: each takes the next sheet when it has none.
+
+Every sheet is cut by a process of its own (:mod:`miurafab.machine.job_process`), so that nothing
+that happens at one machine can disturb another. A machine that fails is given no more sheets; the
+sheet it was at is left as it is, to be looked at and resumed there; the others cut what is left.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from miurafab.errors import InputError, JobStopped, MiurafabError
+from miurafab.machine.job_process import stream_apart
+from miurafab.machine.journal import read_journal
+from miurafab.machine.planning import JobPlan
+from miurafab.machine.signals import StopSignals
+from miurafab.workflow.cut import Prepared
+from miurafab.workflow.cut_sheets import (
+    CutOptions,
+    cut_sheet,
+    head_after,
+    journal_path,
+    plan_sheets,
+)
+
+_LOOK_S = 0.1
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What became of ``sheet``: the ``port`` it went to (empty: none was left), and why not."""
+
+    sheet: str
+    port: str
+    done: bool
+    why: str
+
+
+def share_sheets(
+    prepared: Prepared,
+    ports: Sequence[str],
+    sheets: Sequence[int] | None,
+    options: CutOptions,
+    *,
+    on_progress: Callable[[float, str], None],
+) -> tuple[Shared, ...]:
+    """Cut the sheets of a job directory on the machines at ``ports``; in order of the sheets.
+
+    ``on_progress`` is called with the fraction done and a note when a sheet is done or failed. A
+    machine that fails is part of the answer. With ``options.resume`` an interrupted sheet goes on
+    at the machine that had it, before that takes another. Raises
+    :class:`~miurafab.errors.InputError` for what cannot be shared,
+    :class:`~miurafab.errors.JobStopped` after Ctrl-C, with every machine reset.
+    """
+    if prepared.directory is None:
+        raise InputError(
+            f"{prepared.name} is no job directory, so machines cannot share it; make one with "
+            "'miurafab sheets'."
+        )
+    if options.frame:
+        raise InputError(
+            "A frame is looked at before its sheet is cut, and machines that share sheets do not "
+            "wait: first trace it at each with 'miurafab machine frame' and the same --port."
+        )
+    twice = {port for port in ports if ports.count(port) > 1 and port != "virtual"}
+    if twice:
+        raise InputError(f"The port {min(twice)} is named twice.")
+    plans = dict(plan_sheets(prepared, sheets, options))
+    with StopSignals() as signals:
+        signals.at_once = False
+        work = _Work(prepared, options, plans, ports, signals, on_progress)
+        threads = [threading.Thread(target=work.at_machine, args=(port,)) for port in ports]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            while thread.is_alive():
+                thread.join(_LOOK_S)
+        if signals.caught is not None:
+            raise JobStopped(f"{prepared.name} was stopped by {signals.reason} on every machine.")
+    return tuple(
+        work.outcome.get(number)
+        or Shared(prepared.dry_runs[number - 1].name, "", False, "no machine was left to cut it")
+        for number in plans
+    )
+
+
+class _Work:
+    def __init__(
+        self,
+        prepared: Prepared,
+        options: CutOptions,
+        plans: dict[int, JobPlan],
+        ports: Sequence[str],
+        signals: StopSignals,
+        on_progress: Callable[[float, str], None],
+    ) -> None:
+        self.outcome: dict[int, Shared] = {}
+        self._prepared = prepared
+        self._options = options
+        self._plans = plans
+        self._signals = signals
+        self._on_progress = on_progress
+        self._own = {port: _begun_at(prepared, plans, port) for port in ports}
+        begun = {number for numbers in self._own.values() for number in numbers}
+        self._left = deque(n for n in plans if n not in begun)
+        for number in self._left:
+            if plans[number].resumption is not None:
+                raise InputError(
+                    f"{prepared.dry_runs[number - 1].name} was interrupted at a machine that is "
+                    "not named now; name its --port too, or resume it with that port alone."
+                )
+
+    def at_machine(self, port: str) -> None:
+        """Cut sheets at ``port`` until none is left, or the machine has failed."""
+        at = self._options.at
+        send = partial(
+            stream_apart, signals=self._signals, virtual_speed=self._options.virtual_speed
+        )
+        while self._signals.caught is None:
+            try:
+                number = (self._own[port] or self._left).popleft()
+            except IndexError:
+                return
+            name, why = self._prepared.dry_runs[number - 1].name, ""
+            try:
+                cut_sheet(self._prepared, number, replace(self._plans[number], at=at), port, send)
+            except MiurafabError as error:
+                why = str(error)
+            self.outcome[number] = Shared(name, port, not why, why)
+            note = f"{name} at {port} {'failed' if why else 'is done'}"
+            self._on_progress(len(self.outcome) / len(self._plans), note)
+            if why:
+                return
+            at = head_after(self._prepared, number, at)
+
+
+def _begun_at(prepared: Prepared, plans: dict[int, JobPlan], port: str) -> deque[int]:
+    """The interrupted sheets that ``port`` had."""
+    begun: deque[int] = deque()
+    for number, plan in plans.items():
+        path = journal_path(prepared, prepared.jobs[number - 1])
+        if plan.resumption is not None and path is not None and read_journal(path)[-1].port == port:
+            begun.append(number)
+    return begun

@@ -1,0 +1,102 @@
+"""Covers: facets held by few free rectangles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from flat_patterns import miura
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from miurafab.fabrication.partition.cover import Relaxation, brickwork, excess, frame_of, nearest
+from miurafab.fabrication.partition.cover_search import CoverSearch
+from miurafab.fabrication.partition.fit_box import best_turn
+
+clouds = st.tuples(st.integers(3, 12), st.integers(0, 10_000)).map(
+    lambda t: np.random.default_rng(t[1]).normal(size=(t[0], 2)) * [80.0, 30.0] + [400.0, -70.0]
+)
+sides = st.floats(40.0, 400.0)
+
+
+def squares(columns: int, rows: int, side: float, turn: float = 0.0) -> np.ndarray:
+    """(columns * rows, 4, 2) squares side by side, turned as a whole."""
+    corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
+    row, column = np.indices((rows, columns))
+    base = np.stack([column, row], axis=-1).reshape(-1, 1, 2)
+    c, s = np.cos(turn), np.sin(turn)
+    return (base + corner) * side @ np.array([[c, s], [-s, c]])
+
+
+@settings(derandomize=True, max_examples=100, deadline=None)
+@given(clouds, sides, sides)
+def test_a_frame_holds_points_exactly_if_some_turn_fits_them(points, width, height):
+    frame = frame_of(points, width, height)
+    over = excess(points[None], frame, width, height)[0]
+    fits = any(best_turn(points, *size) is not None for size in ((width, height), (height, width)))
+    assert (over <= 1e-9) == fits
+
+
+def test_nearest_tells_the_frames_that_a_point_lies_deepest_in():
+    rng = np.random.default_rng(1)
+    frames = np.column_stack([rng.uniform(0, 900, (12, 2)), rng.uniform(0, 3, 12)])
+    points = rng.uniform(0, 900, (200, 2))
+    every = np.stack([excess(points[:, None], frame, 300.0, 200.0) for frame in frames], axis=1)
+    near, apart = nearest(points, frames, 300.0, 200.0, 12)
+    np.testing.assert_allclose(apart, np.take_along_axis(every, near, axis=1))
+    assert (np.sort(near, axis=1) == np.arange(12)).all()
+
+
+def test_the_gradient_of_the_loss_is_its_slope():
+    rng = np.random.default_rng(5)
+    relaxation = Relaxation(squares(40, 30, 10.0, 0.2), 130.0, 90.0)
+    frames = brickwork(relaxation.shapes, (130.0, 90.0))[0]
+    frames = frames + rng.normal(size=frames.shape) * [6.0, 6.0, 0.02]
+    relaxation.look(frames)
+    steps = (frames * [1.0, 1.0, 250.0]).ravel()
+    _, slope = relaxation._loss(steps)
+    for place in range(len(steps)):
+        ahead, behind = steps.copy(), steps.copy()
+        ahead[place] += 1e-5
+        behind[place] -= 1e-5
+        drawn = (relaxation._loss(ahead)[0] - relaxation._loss(behind)[0]) / 2e-5
+        assert slope[place] == pytest.approx(drawn, rel=1e-3, abs=1e-2)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, 1.3])
+def test_brickwork_over_whole_rows_is_a_cover(turn):
+    shapes = squares(48, 30, 10.0, turn)
+    relaxation = Relaxation(shapes, 121.0, 101.0)
+    counts = []
+    for frames in brickwork(shapes, (121.0, 101.0)):
+        _, loss = relaxation.relax(frames)
+        counts.append(len(frames))
+        assert loss <= 1.0
+    assert 12 in counts
+
+
+def test_a_needless_frame_is_found_and_left_out():
+    shapes = squares(48, 20, 10.0)
+    frames = np.array([[x, y, 0.0] for y in (50.0, 150.0) for x in (60.0, 180.0, 300.0, 420.0)])
+    extra = np.vstack([frames, [200.0, 90.0, 0.7]])
+    search = CoverSearch(shapes, 122.0, 102.0)
+    cover = search.fewer([search.begin(extra)], 8, 200.0)
+    assert cover is not None
+    assert len(cover) == 8
+    near, _ = nearest(shapes.mean(axis=1), cover, 122.0, 102.0, 8)
+    over = [excess(shapes, cover[column], 122.0, 102.0) for column in near.T]
+    assert np.min(over, axis=0).max() <= 0.8
+    assert search.fewer([search.begin(cover)], 7, 100.0) is None, "7 are smaller than the whole"
+
+
+def test_the_search_is_the_same_each_time():
+    pattern = miura(40, 30)
+    shapes = pattern.vertices_coords[pattern.faces_vertices]
+
+    def searched() -> bytes:
+        search = CoverSearch(shapes, 150.0, 110.0, seed=3)
+        starts = [search.begin(each) for each in brickwork(shapes, (150.0, 110.0))]
+        count = min(len(start.frames) for start in starts)
+        cover = search.fewer(starts, count - 1, 60.0)
+        return b"" if cover is None else cover.tobytes()
+
+    assert searched() == searched()

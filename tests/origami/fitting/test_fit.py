@@ -1,0 +1,231 @@
+"""Fits of every kind: exact, valid, within their limits, and honest when there is none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from problems import fitted
+
+from miurafab.errors import InputError
+from miurafab.origami.fitting.fit import FitRequest, FitResult, fit
+from miurafab.origami.fitting.reduction import about_z
+from miurafab.origami.verify import audit
+from miurafab.surfaces.catalogue import CATALOGUE, make_surface
+
+NAMED = [name for name in CATALOGUE if name != "helicoid"]
+
+
+def request(name: str, columns: int = 12, rows: int = 12, **changes: object) -> FitRequest:
+    surface, parameters = make_surface(name, {})
+    target = {"surface": name, "parameters": parameters}
+    made = FitRequest(surface, columns, rows, size_mm=200.0, target=target)
+    return replace(made, **changes)
+
+
+def check_valid(result: FitResult, name: str) -> None:
+    assert result.status == "converged", result.advice
+    assert result.pattern is not None
+    found = audit(result.pattern, make_surface(name, {})[0])
+    assert found.findings == ()
+    m = found.measurements
+    assert m.max_planarity is not None
+    assert m.max_planarity <= 1e-12
+    assert m.max_developability is not None
+    assert m.max_developability <= 1e-12
+    assert m.max_isometry is not None
+    assert m.max_isometry <= 1e-11
+    assert m.self_intersections == m.overlaps == 0
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_every_named_surface_fits_as_it_stands(name: str) -> None:
+    check_valid(fitted(name, 16, 16), name)
+
+
+def test_a_helicoid_across_its_axis_fits() -> None:
+    surface, _ = make_surface("helicoid", {"pitch": 6})
+    result = fit(FitRequest(surface, 20, 20, size_mm=200.0))
+    assert result.status == "converged"
+    assert result.measurements is not None
+    assert result.measurements.self_intersections == 0
+
+
+def test_the_same_request_gives_the_same_sheet() -> None:
+    one, other = fit(request("sphere")), fit(request("sphere"))
+    assert one.pattern is not None
+    assert other.pattern is not None
+    assert np.array_equal(one.pattern.vertices_coords, other.pattern.vertices_coords)
+
+
+@pytest.mark.parametrize("name", ["hypar", "saddle", "paraboloid", "catenoid", "cylinder"])
+def test_exact_flat_foldability_costs_no_closeness(name: str) -> None:
+    exact = fit(request(name, 16, 16, flat_foldable=0.0))
+    check_valid(exact, name)
+    assert exact.measurements is not None
+    assert exact.measurements.max_flat_foldability is not None
+    assert exact.measurements.max_flat_foldability <= 1e-10
+    free = fitted(name, 16, 16).measurements
+    assert free is not None
+    assert exact.measurements.hausdorff_midsurface_mm is not None
+    assert free.hausdorff_midsurface_mm is not None
+    assert exact.measurements.hausdorff_midsurface_mm <= 1.2 * free.hausdorff_midsurface_mm + 0.01
+
+
+def test_polishing_brings_the_sheet_closer_and_keeps_it_exact() -> None:
+    plain, polished = fit(request("hypar", polish="off")), fit(request("hypar", polish="on"))
+    check_valid(polished, "hypar")
+    assert polished.polished
+    assert not plain.polished
+    assert polished.measurements is not None
+    assert plain.measurements is not None
+    assert polished.measurements.hausdorff_midsurface_mm is not None
+    assert plain.measurements.hausdorff_midsurface_mm is not None
+    assert (
+        polished.measurements.hausdorff_midsurface_mm
+        < plain.measurements.hausdorff_midsurface_mm / 3
+    )
+
+
+def test_polishing_leaves_no_edge_far_shorter_than_the_shortest_before() -> None:
+    sector, _ = make_surface("vase", {"angle": "100deg"})
+    plain, polished = (
+        fit(request("vase", 8, 6, surface=sector, polish=polish)).measurements
+        for polish in ("off", "on")
+    )
+    assert plain is not None
+    assert polished is not None
+    assert polished.min_edge_mm >= 0.4 * plain.min_edge_mm
+
+
+class TestLimits:
+    def test_an_edge_limit_is_met_and_reported_as_active(self) -> None:
+        free = fit(request("hypar", 10, 10))
+        assert free.measurements is not None
+        limit = 1.05 * free.measurements.min_edge_mm
+        result = fit(request("hypar", 10, 10, min_edge_mm=limit, polish="on"))
+        check_valid(result, "hypar")
+        assert result.measurements is not None
+        assert result.measurements.min_edge_mm >= limit
+        assert result.active_bounds["edge"] > 0
+        assert result.report()["active_bounds"] == dict(result.active_bounds)
+
+    def test_a_tolerance_on_flat_foldability_is_an_inequality(self) -> None:
+        result = fit(request("hypar", flat_foldable=0.02))
+        check_valid(result, "hypar")
+        assert result.measurements is not None
+        worst = result.measurements.max_flat_foldability
+        assert worst is not None
+        assert 0.01 < worst <= 0.02
+        assert result.active_bounds["kawasaki"] > 0
+
+    def test_sector_angles_and_aspect_stay_within_bounds(self) -> None:
+        low, aspect = math.radians(62), 1.6
+        result = fit(request("hypar", 8, 8, min_angle=low, max_aspect=aspect, polish="on"))
+        check_valid(result, "hypar")
+        assert result.pattern is not None
+        corners = result.pattern.vertices_coords[result.pattern.faces_vertices]
+        sides = np.roll(corners, -1, axis=1) - corners
+        lengths = np.linalg.norm(sides, axis=2)
+        assert (lengths.max(axis=1) / lengths.min(axis=1)).max() <= aspect
+        back = -np.roll(sides, 1, axis=1)
+        cosine = np.einsum("fck,fck->fc", sides, back) / lengths / np.roll(lengths, 1, axis=1)
+        assert np.arccos(cosine).min() >= low
+
+    @pytest.mark.parametrize("follow", ["top", "bottom"])
+    def test_the_side_that_follows_lies_on_the_target(self, follow: str) -> None:
+        result = fit(request("hypar", 12, 12, follow=follow, polish="on"))
+        check_valid(result, "hypar")
+        assert result.pattern is not None
+        assert result.pattern.folded_coords is not None
+        surface = make_surface("hypar", {})[0]
+        rows = result.pattern.folded_coords.reshape(13, 13, 3)
+        gaps = []
+        for side in (rows[0::2], rows[1::2]):
+            points = side.reshape(-1, 3) / result.pattern.scale
+            gaps.append(points - surface.closest_point(points))
+        near, far = sorted(gaps, key=lambda gap: float(np.abs(gap).max()))
+        assert np.abs(near).max() < 0.05 * np.abs(far).max()
+        # the other side hangs under the top, or stands over the bottom, by the target's normal
+        up = far[:, 2].mean()
+        assert (up < 0) == (follow == "top")
+
+    def test_limits_that_cannot_be_met_are_named_with_their_size(self) -> None:
+        result = fit(request("hypar", 6, 6, min_edge_mm=90.0, amplitude=0.8, zigzag=1.0))
+        assert result.status == "infeasible"
+        assert "90 mm" in result.advice
+        assert result.pattern is not None
+
+
+class TestSearch:
+    def test_the_coarsest_sheet_within_both_limits(self) -> None:
+        limits = {"max_deviation_mm": 0.5, "min_edge_mm": 8.0, "amplitude": 0.8, "zigzag": 1.0}
+        wanted = request("hypar", search=True, **limits)
+        result = fit(wanted)
+        check_valid(result, "hypar")
+        assert result.deviation_mm is not None
+        assert result.deviation_mm <= 0.5
+        assert result.measurements is not None
+        assert result.measurements.min_edge_mm >= 8.0
+        side = math.isqrt(result.measurements.facets)
+        coarser = fit(replace(wanted, columns=side - 2, rows=side - 2, search=False))
+        assert coarser.status != "converged"
+
+    def test_which_limit_fails_and_by_how_much(self) -> None:
+        one = {"amplitude": 0.8, "zigzag": 1.0}
+        result = fit(request("saddle", max_deviation_mm=0.01, min_edge_mm=45.0, search=True, **one))
+        assert result.status == "infeasible"
+        assert "No sheet meets both limits" in result.advice
+        assert "mm over the 0.01 mm allowed" in result.advice
+
+
+class TestRings:
+    def test_a_ring_closes_and_every_period_is_the_same(self) -> None:
+        surface, _ = make_surface("vase", {"angle": "360deg"})
+        result = fit(FitRequest(surface, 14, 24, size_mm=200.0))
+        check = audit(result.pattern, surface)
+        assert check.findings == ()
+        assert result.pattern is not None
+        assert result.pattern.folded_coords is not None
+        rows = result.pattern.folded_coords.reshape(25, 15, 3)
+        assert np.abs(rows[0] - rows[-1]).max() < 1e-11
+        turned = rows[:-2] @ about_z(2 * math.pi / 12).T
+        assert np.abs(turned - rows[2:]).max() < 1e-11
+        assert all(attempt.way == "strip" for attempt in result.attempts)
+
+    def test_a_closed_ring_can_be_flat_foldable_vertex_by_vertex(self) -> None:
+        surface, _ = make_surface("hyperboloid", {"angle": "360deg"})
+        result = fit(FitRequest(surface, 12, 24, size_mm=200.0, flat_foldable=0.0))
+        assert result.status == "converged"
+        assert result.pattern is not None
+        assert result.pattern.folded_coords is not None
+        rows = result.pattern.folded_coords.reshape(25, 13, 3)
+        assert np.abs(rows[0] - rows[-1]).max() < 1e-11
+
+
+def test_a_target_that_bends_too_much_ends_with_a_reason() -> None:
+    surface, _ = make_surface("helicoid", {"turns": 8, "pitch": 0.3})
+    result = fit(FitRequest(surface, 4, 4, size_mm=200.0, amplitude=0.8, zigzag=1.0))
+    assert result.status != "converged"
+    assert result.advice
+    assert result.attempts
+    assert {attempt.way for attempt in result.attempts} >= {"seed", "bent", "shaken"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"columns": 1}, "2x2"),
+        ({"min_edge_mm": -1.0}, "--min-edge"),
+        ({"flat_foldable": 4.0}, "--flat-foldable"),
+        ({"follow": "inside"}, "--follow"),
+        ({"polish": "much"}, "--polish"),
+        ({"max_aspect": 0.5}, "--max-aspect"),
+        ({"min_angle": 1.7}, "90 degrees"),
+    ],
+)
+def test_requests_that_make_no_sense_name_the_option(changes: dict[str, object], word: str) -> None:
+    with pytest.raises(InputError, match=word):
+        request("hypar", **changes)

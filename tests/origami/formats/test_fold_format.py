@@ -1,0 +1,199 @@
+"""FOLD files: what we write is read back bit for bit, and what others write is understood."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from problems import fitted, regular
+
+from miurafab.errors import PatternError
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.kinematics import rigid_motion, states_between
+from miurafab.origami.formats.fold import fold_text, parse_fold, read_fold, write_fold
+
+
+def document(pattern: CreasePattern | None = None) -> dict[str, Any]:
+    loaded: dict[str, Any] = json.loads(fold_text(pattern or regular(4, 3)))
+    return loaded
+
+
+def same(one: CreasePattern, other: CreasePattern) -> bool:
+    assert one.folded_coords is not None
+    assert other.folded_coords is not None
+    return (
+        np.array_equal(one.vertices_coords, other.vertices_coords)
+        and np.array_equal(one.folded_coords, other.folded_coords)
+        and np.array_equal(one.edges_vertices, other.edges_vertices)
+        and np.array_equal(one.edges_assignment, other.edges_assignment)
+        and np.array_equal(one.faces_vertices, other.faces_vertices)
+        and bool(np.abs(one.edges_fold_angle - other.edges_fold_angle).max() < 1e-14)
+        and one.grid == other.grid
+        and one.target == other.target
+        and one.scale == other.scale
+    )
+
+
+def test_a_fitted_sheet_is_read_back_as_it_was(tmp_path: Path) -> None:
+    pattern = fitted("hypar").pattern
+    assert pattern is not None
+    write_fold(pattern, tmp_path / "one.fold", "a hypar")
+    again = read_fold(tmp_path / "one.fold")
+    assert same(pattern, again)
+    write_fold(again, tmp_path / "two.fold", "a hypar")
+    first = json.loads((tmp_path / "one.fold").read_text())
+    second = json.loads((tmp_path / "two.fold").read_text())
+    assert {k: v for k, v in first.items() if k != "edges_foldAngle"} == {
+        k: v for k, v in second.items() if k != "edges_foldAngle"
+    }
+
+
+def test_the_frames_of_a_motion_follow_the_folded_form() -> None:
+    pattern = regular(4, 3)
+    motion = rigid_motion(pattern, states_between(pattern, 5))
+    written = json.loads(fold_text(pattern, motion=motion))
+    assert written["file_classes"] == ["singleModel", "animation"]
+    frames = written["file_frames"]
+    assert len(frames) == 7
+    assert frames[0]["vertices_coords"] == pattern.folded_coords.tolist()
+    for frame, points, angles in zip(frames[1:], motion.frames, motion.fold_angles, strict=True):
+        assert frame["frame_parent"] == 0
+        assert frame["frame_inherit"] is True
+        assert frame["vertices_coords"] == points.tolist()
+        assert frame["edges_foldAngle"] == np.degrees(angles).tolist()
+    assert same(parse_fold(written), pattern)
+
+
+@given(unit=st.sampled_from([("cm", 10.0), ("in", 25.4), ("m", 1000.0), ("unit", 1.0)]))
+def test_units_are_turned_into_millimetres(unit: tuple[str, float]) -> None:
+    given_ = document() | {"frame_unit": unit[0]}
+    given_["file_frames"][0]["frame_unit"] = unit[0]
+    found, expected = parse_fold(given_), regular(4, 3)
+    assert found.vertices_coords == pytest.approx(expected.vertices_coords * unit[1])
+    assert found.folded_coords == pytest.approx(expected.folded_coords * unit[1])
+
+
+def test_clockwise_facets_are_turned_round() -> None:
+    given_ = document()
+    given_["faces_vertices"] = [face[::-1] for face in given_["faces_vertices"]]
+    found = parse_fold(given_)
+    assert {frozenset(face) for face in found.faces_vertices.tolist()} == {
+        frozenset(face) for face in regular(4, 3).faces_vertices.tolist()
+    }
+    assert np.array_equal(
+        np.sort(found.edges_faces, axis=1), np.sort(regular(4, 3).edges_faces, axis=1)
+    )
+
+
+def test_missing_facets_are_walked_from_the_edges() -> None:
+    given_ = document()
+    del given_["faces_vertices"]
+    found = parse_fold(given_)
+    assert {frozenset(face) for face in found.faces_vertices.tolist()} == {
+        frozenset(face) for face in regular(4, 3).faces_vertices.tolist()
+    }
+
+
+def test_missing_angles_are_measured_in_the_folded_form() -> None:
+    given_ = document()
+    del given_["edges_foldAngle"]
+    given_["edges_assignment"] = ["U"] * len(given_["edges_vertices"])
+    found, expected = parse_fold(given_), regular(4, 3)
+    assert np.abs(found.edges_fold_angle - expected.edges_fold_angle).max() < 1e-12
+    assert np.array_equal(found.edges_assignment, expected.edges_assignment)
+
+
+def test_the_crease_pattern_may_stand_in_a_later_frame() -> None:
+    given_ = document()
+    flat = given_["vertices_coords"]
+    folded = given_["file_frames"][0]["vertices_coords"]
+    turned = {
+        **given_,
+        "frame_classes": ["foldedForm"],
+        "vertices_coords": folded,
+        "file_frames": [
+            {
+                "frame_classes": ["creasePattern"],
+                "frame_inherit": True,
+                "frame_parent": 0,
+                "vertices_coords": flat,
+            }
+        ],
+    }
+    assert same(parse_fold(turned), regular(4, 3))
+
+
+def test_mixed_polygons_are_padded() -> None:
+    given_ = {
+        "vertices_coords": [[0, 0], [2, 0], [2, 2], [0, 2], [3, 1]],
+        "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [1, 4], [4, 2]],
+        "edges_assignment": ["B", "V", "B", "B", "B", "B"],
+        "faces_vertices": [[0, 1, 2, 3], [2, 4, 1]],
+    }
+    found = parse_fold(given_)
+    assert found.faces_vertices.tolist() == [[0, 1, 2, 3], [1, 4, 2, -1]]
+    assert found.edges_fold_angle[1] == np.pi
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"edges_vertices": []}, "'edges_vertices' is missing"),
+        ({"edges_assignment": ["B"]}, "one letter for each edge"),
+        ({"edges_assignment": ["Q"] * 17}, "'Q'"),
+        ({"edges_foldAngle": ["x"] * 17}, "not a number"),
+        ({"vertices_coords": [[0, 0, 1], [1, 2, 3]]}, "No frame"),
+        ({"vertices_coords": [[0, 0], [1]]}, "equal dimension"),
+        ({"faces_vertices": [[0, 1]]}, "fewer than three"),
+        ({"faces_vertices": [[0, 1, 99]]}, "does not exist"),
+        ({"faces_vertices": [[0, 1, 2.5]]}, "whole numbers"),
+        ({"file_frames": [3]}, "not a list of objects"),
+        ({"file_frames": [{"frame_inherit": True, "frame_parent": 7}]}, "inherits 7"),
+        ({"miurafab:grid": [3, 3]}, "miurafab:grid"),
+        ({"miurafab:scale": -1}, "miurafab:scale"),
+    ],
+)
+def test_a_fault_is_named(change: dict[str, Any], words: str) -> None:
+    with pytest.raises(PatternError, match=words):
+        parse_fold(document() | change)
+
+
+def test_a_file_that_is_no_fold_file_is_named(tmp_path: Path) -> None:
+    for content, words in ((b"[1, 2]", "one JSON object"), (b"{", "line 1"), (b"\xff", "UTF-8")):
+        path = tmp_path / "bad.fold"
+        path.write_bytes(content)
+        with pytest.raises(PatternError, match=words) as fault:
+            read_fold(path)
+        assert "bad.fold" in str(fault.value)
+    with pytest.raises(PatternError, match="does not exist"):
+        read_fold(tmp_path / "none.fold")
+
+
+def test_the_same_pattern_gives_the_same_bytes() -> None:
+    assert fold_text(regular(4, 3)) == fold_text(replace(regular(4, 3)))
+
+
+def test_any_value_in_any_place_is_read_or_refused_in_a_sentence() -> None:
+    values = [None, [], {}, "x", -1, 1e400, [1], [[1, 2]], 3.5, True, [None], [[None, None]], "M"]
+    random = Random(1)
+    text = fold_text(regular(4, 3))
+    refused = []
+    for _ in range(600):
+        damaged = json.loads(text)
+        key = random.choice(list(damaged))
+        if random.random() < 0.5 or not isinstance(damaged[key], list):
+            damaged[key] = random.choice(values)
+        else:
+            damaged[key][random.randrange(len(damaged[key]))] = random.choice(values)
+        try:
+            assert len(parse_fold(damaged).edges_faces)
+        except PatternError as fault:
+            refused.append(str(fault))
+    assert all(sentence.endswith(".") for sentence in refused)

@@ -1,0 +1,139 @@
+"""Loose lines made into patterns: crossings, tees, doubled and dangling lines, and real sheets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from problems import regular
+
+from miurafab.errors import PatternError
+from miurafab.origami.formats.planar_graph import (
+    CreaseLines,
+    faces_of_plane_graph,
+    lines_of,
+    pattern_from_lines,
+)
+
+
+def drawn(*lines: tuple[str, float, float, float, float]) -> CreaseLines:
+    ends = np.array([line[1:] for line in lines], dtype=np.float64).reshape(-1, 2, 2)
+    return CreaseLines(ends, np.array([line[0] for line in lines]), np.full(len(lines), np.nan))
+
+
+SQUARE = (("B", 0, 0, 2, 0), ("B", 2, 0, 2, 2), ("B", 2, 2, 0, 2), ("B", 0, 2, 0, 0))
+
+
+def edge_set(pattern, letters: str) -> set[tuple[tuple[float, float], ...]]:
+    ends = pattern.vertices_coords[pattern.edges_vertices].round(6)
+    return {
+        tuple(sorted(tuple(map(float, end)) for end in pair))
+        for pair, letter in zip(ends, pattern.edges_assignment, strict=True)
+        if letter in letters
+    }
+
+
+def test_two_crossing_creases_make_four_facets() -> None:
+    found = pattern_from_lines(drawn(*SQUARE, ("M", 0, 0, 2, 2), ("V", 0, 2, 2, 0)))
+    assert found.faces_vertices.shape == (4, 3)
+    assert len(found.vertices_coords) == 5
+    assert sorted(found.edges_assignment) == ["B"] * 4 + ["M"] * 2 + ["V"] * 2
+    assert found.edges_fold_angle[found.edges_assignment == "M"] == pytest.approx(-np.pi)
+
+
+def test_an_end_on_a_line_splits_it() -> None:
+    found = pattern_from_lines(drawn(*SQUARE, ("V", 1, 0, 1, 2)))
+    assert found.faces_vertices.shape == (2, 4)
+    assert edge_set(found, "V") == {((1, 0), (1, 2))}
+    assert len(edge_set(found, "B")) == 6
+
+
+def test_ends_within_the_tolerance_are_one() -> None:
+    crooked = drawn(*SQUARE[:3], ("B", 0.01, 2, 0, 0.012), ("V", 1, 0.009, 1, 1.992))
+    with pytest.raises(PatternError, match="enclose no facet"):
+        pattern_from_lines(crooked)
+    found = pattern_from_lines(crooked, tolerance=0.02)
+    assert found.faces_vertices.shape == (2, 4)
+
+
+def test_doubled_lines_count_once_and_dangling_ones_not_at_all() -> None:
+    found = pattern_from_lines(
+        drawn(*SQUARE, ("V", 1, 0, 1, 2), ("F", 1, 2, 1, 0), ("M", 1, 1, 1.5, 1), ("V", 1, 0, 1, 1))
+    )
+    assert len(found.faces_vertices) == 2
+    assert edge_set(found, "F") == set()
+    assert edge_set(found, "M") == set()
+
+
+def test_an_inner_border_is_a_cut_and_a_hole_is_no_facet() -> None:
+    hole = (
+        ("B", 0.5, 1, 1, 0.5),
+        ("B", 1, 0.5, 1.5, 1),
+        ("B", 1.5, 1, 1, 1.5),
+        ("B", 1, 1.5, 0.5, 1),
+    )
+    creases = (("V", 1, 0, 1, 0.5), ("V", 1, 1.5, 1, 2))
+    found = pattern_from_lines(drawn(*SQUARE, *hole, *creases))
+    assert len(found.faces_vertices) == 2
+    assert (found.edges_assignment == "V").sum() == 2
+    slit = pattern_from_lines(drawn(*SQUARE, ("V", 0, 1, 1, 1), ("B", 1, 1, 2, 1)))
+    assert edge_set(slit, "C") == {((1, 1), (2, 1))}
+
+
+def test_what_is_no_pattern_is_refused() -> None:
+    with pytest.raises(PatternError, match="no straight line"):
+        pattern_from_lines(drawn())
+    with pytest.raises(PatternError, match="enclose no facet"):
+        pattern_from_lines(drawn(("M", 0, 0, 1, 0)))
+    apart = [(letter, x0 + 5, y0, x1 + 5, y1) for letter, x0, y0, x1, y1 in SQUARE]
+    with pytest.raises(PatternError, match="2 pieces"):
+        pattern_from_lines(drawn(*SQUARE, *apart))
+
+
+def test_a_concave_outline_is_gone_round_counter_clockwise() -> None:
+    points = np.array([[0, 0], [4, 0], [4, 4], [2, 1], [0, 4]], dtype=np.float64)
+    sides = np.array([[0, 1], [1, 2], [3, 2], [3, 4], [4, 0]])
+    faces = faces_of_plane_graph(points, sides)
+    assert faces.shape == (1, 5)
+    x, y = points[faces[0]].T
+    assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() > 0
+
+
+@given(seed=st.integers(0, 2**32 - 1), jitter=st.floats(0, 1e-4))
+def test_a_sheet_is_found_again_from_its_shuffled_lines(seed: int, jitter: float) -> None:
+    pattern = regular(5, 4)
+    lines = lines_of(pattern)
+    random = np.random.default_rng(seed)
+    order = random.permutation(len(lines.ends))
+    turned = np.where(
+        random.random(len(order))[:, None, None] < 0.5, lines.ends, lines.ends[:, ::-1]
+    )
+    moved = turned + random.uniform(-jitter, jitter, lines.ends.shape)
+    shuffled = CreaseLines(moved[order], lines.assignment[order], lines.fold_angle[order])
+    found = pattern_from_lines(shuffled)
+    assert len(found.vertices_coords) == len(pattern.vertices_coords)
+    assert found.faces_vertices.shape == pattern.faces_vertices.shape
+    assert len(found.edges_vertices) == len(pattern.edges_vertices)
+    for letter in "BMV":
+        assert (found.edges_assignment == letter).sum() == (
+            pattern.edges_assignment == letter
+        ).sum()
+    assert found.edges_fold_angle.sum() == pytest.approx(pattern.edges_fold_angle.sum())
+
+
+def test_a_sheet_is_found_again_from_its_whole_fold_lines() -> None:
+    # the straight folds of a Miura drawn in one stroke across all its zig-zags
+    pattern = regular(7, 5)
+    grid = np.arange(35).reshape(5, 7)
+    columns = pattern.vertices_coords[grid[[0, -1]].T]
+    zigzags = np.stack([grid[:, :-1], grid[:, 1:]], axis=-1).reshape(-1, 2)
+    ends = np.concatenate([columns, pattern.vertices_coords[zigzags]])
+    found = pattern_from_lines(CreaseLines(ends, np.full(len(ends), "U"), np.zeros(len(ends))))
+    assert len(found.faces_vertices) == len(pattern.faces_vertices)
+    assert len(found.vertices_coords) == 35
+
+
+def test_a_single_sheet_without_creases_stays() -> None:
+    found = pattern_from_lines(drawn(*SQUARE))
+    assert found.faces_vertices.shape == (1, 4)

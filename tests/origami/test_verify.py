@@ -1,0 +1,160 @@
+"""An audit of a pattern broken by hand finds that fault, where it is, and no other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from problems import CELL, fitted, regular
+from test_collisions import fan, rolled
+
+from miurafab.errors import PatternError
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.miura import regular_miura
+from miurafab.origami.tessellation import Tessellation
+from miurafab.origami.unfold import unfold
+from miurafab.origami.verify import audit
+
+PROMISED = {
+    "status", "advice", "facets", "vertices", "max_planarity", "max_developability",
+    "max_flat_foldability", "min_edge_mm", "max_isometry", "hausdorff_mm", "hausdorff_relative",
+    "hausdorff_midsurface_mm", "self_intersections", "overlaps", "area_ratio", "iterations",
+    "seconds",
+}  # fmt: skip
+
+
+def codes(pattern: CreasePattern) -> dict[str, tuple[int, ...]]:
+    return {finding.code: finding.where for finding in audit(pattern).findings}
+
+
+def moved(points: np.ndarray, vertex: int, *by: float) -> np.ndarray:
+    points = points.copy()
+    points[vertex] += by
+    return points
+
+
+def facets_at(pattern: CreasePattern, vertex: int) -> tuple[int, ...]:
+    return tuple(np.flatnonzero((pattern.faces_vertices == vertex).any(axis=1)).tolist())
+
+
+def test_what_is_whole_has_no_findings():
+    assert codes(regular()) == {}
+    assert codes(fitted("hypar").pattern) == {}
+
+
+def test_a_fitted_sheet_measures_as_the_fit_reports():
+    result = fitted("saddle")
+    assert audit(result.pattern).measurements.max_planarity == result.measurements.max_planarity
+
+
+def test_a_vertex_of_the_flat_pattern_moved_a_little_is_a_fault_of_isometry_alone():
+    pattern = regular()
+    vertex = 3 * 9 + 4
+    broken = replace(pattern, vertices_coords=moved(pattern.vertices_coords, vertex, 1e-6, 0.0))
+    assert codes(broken) == {"isometry": facets_at(pattern, vertex)}
+
+
+def test_a_vertex_of_the_folded_form_lifted_is_a_fault_of_all_that_hang_on_it():
+    pattern = regular()
+    vertex = 3 * 9 + 4
+    broken = replace(pattern, folded_coords=moved(pattern.folded_coords, vertex, 0.0, 0.0, 1e-5))
+    found = codes(broken)
+    assert set(found) == {"planarity", "developability", "isometry"}
+    assert found["planarity"] == facets_at(pattern, vertex)
+    assert vertex in found["developability"]
+    assert set(found["developability"]) <= {vertex, vertex - 1, vertex + 1, vertex - 9, vertex + 9}
+
+
+def test_a_corner_vertex_lifted_off_its_facet_spoils_no_developability():
+    pattern = regular()
+    broken = replace(pattern, folded_coords=moved(pattern.folded_coords, 0, 0.0, 0.0, 1e-5))
+    found = codes(broken)
+    assert found["planarity"] == (0,)
+    assert set(found) <= {"planarity", "isometry", "developability"}
+
+
+def test_a_folded_form_scaled_is_a_fault_of_isometry_alone():
+    pattern = regular()
+    broken = replace(pattern, folded_coords=pattern.folded_coords * 1.001)
+    assert codes(broken) == {"isometry": tuple(range(len(pattern.faces_vertices)))}
+
+
+def test_planar_facets_that_do_not_close_are_a_fault_of_developability_alone():
+    """A pyramid of four planar quads, its flat form squeezed so that the sides keep: not possible,
+    so the flat form is left and isometry complains as well; the facets are planar throughout."""
+    pattern = unfold(Tessellation(regular_miura(CELL, 3, 3).points))
+    folded = pattern.folded_coords.copy()
+    right, up = np.array([10.0, 0, 3.0]), np.array([0, 10.0, 3.0])
+    left, down = right * [-1, 1, 1], up * [1, -1, 1]
+    folded[4] = 0
+    folded[5], folded[7], folded[3], folded[1] = right, up, left, down
+    folded[8], folded[6], folded[0], folded[2] = right + up, up + left, left + down, down + right
+    found = codes(replace(pattern, folded_coords=folded))
+    assert found["developability"] == (4,)
+    assert "planarity" not in found
+
+
+def test_a_fan_that_overlaps_is_a_fault_of_overlap_alone():
+    """14 trapezoids of a twelfth of a turn each; folded once across they are free."""
+    flat = fan(math.tau * 14 / 12, 14)
+    bent = _folded_fan(flat, math.radians(70))
+    assert codes(bent) == {"overlap": (0, 1, 12, 13)}
+
+
+def _folded_fan(flat: CreasePattern, angle: float) -> CreasePattern:
+    """The fan folded by ``angle`` at its middle crease."""
+    count = len(flat.faces_vertices)
+    points = np.zeros((2 * count + 2, 3))
+    turn, shift = np.eye(3), np.zeros(3)
+    for n, (inner, outer, next_outer, next_inner) in enumerate(flat.faces_vertices.tolist()):
+        place = np.append(flat.vertices_coords, np.zeros((2 * count + 2, 1)), axis=1)
+        for vertex in (inner, outer, next_outer, next_inner):
+            points[vertex] = turn @ place[vertex] + shift
+        axis = points[next_outer] - points[next_inner]
+        axis /= np.linalg.norm(axis)
+        rho = angle if n == 6 else 0.0
+        k = np.cross(np.eye(3), axis)
+        rotate = np.eye(3) - math.sin(rho) * k + (1 - math.cos(rho)) * (k @ k)
+        shift = rotate @ (shift - points[next_inner]) + points[next_inner]
+        turn = rotate @ turn
+    return replace(flat, folded_coords=points)
+
+
+def test_a_roll_is_a_fault_of_self_intersection_alone():
+    assert codes(rolled(math.radians(60), 8)) == {"self-intersection": (0, 1, 6, 7)}
+
+
+def test_a_degenerate_edge_is_named():
+    pattern = regular()
+    folded, flat = pattern.folded_coords.copy(), pattern.vertices_coords.copy()
+    folded[1], flat[1] = folded[0] + 1e-12, flat[0] + 1e-12
+    broken = replace(pattern, folded_coords=folded, vertices_coords=flat)
+    found = codes(broken)
+    edge = int(np.flatnonzero((pattern.edges_vertices == [0, 1]).all(axis=1))[0])
+    assert found["degenerate-edge"] == (edge,)
+    message = next(f.message for f in audit(broken).findings if f.code == "degenerate-edge")
+    assert f"Edge {edge} is" in message
+
+
+def test_a_flat_pattern_alone_is_measured_flat_alone():
+    pattern = replace(regular(), folded_coords=None)
+    result = audit(pattern)
+    assert result.valid
+    assert result.measurements.max_planarity is None
+    assert result.measurements.self_intersections is None
+
+
+@pytest.mark.parametrize("key", ["vertices_coords", "folded_coords"])
+def test_a_coordinate_that_is_no_number_never_gets_as_far(key):
+    points = getattr(regular(), key).copy()
+    points[3, 0] = math.nan
+    with pytest.raises(PatternError, match="not"):
+        replace(regular(), **{key: points})
+
+
+def test_the_report_names_what_the_fit_report_names():
+    names = set(fitted("hypar").report()) & PROMISED
+    assert names == PROMISED
+    assert names <= set(audit(regular()).report())
