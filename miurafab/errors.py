@@ -4,6 +4,7 @@ The tree (the exit code of the command line in brackets)::
 
     MiurafabError
     ├── InputError [2]          the input is wrong: a file, an option, a value
+    │   ├── OptionError         an option that cannot be taken, by its name
     │   ├── UnitError           a length, angle or feed that cannot be read
     │   ├── ProfileError        a machine or material profile, by file and key
     │   ├── TargetError         a surface, profile curve or mesh that cannot be a target
@@ -20,18 +21,60 @@ Numerical failure is not here: a fit that does not converge is a result with adv
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
+
+_OPTION = re.compile(r"`([a-z][a-z0-9_]*)`")
+
+
+def spell_options(sentence: str, spell: Callable[[str], str]) -> str:
+    """``sentence`` with each option's name, which stands in backticks, as ``spell`` writes it.
+
+    A room below the command line knows the name of an option and not how it is written: the
+    command line writes ``--min-edge``, a design file ``min_edge``, the page a label.
+
+    >>> spell_options("Raise `min_edge`.", lambda name: "--" + name.replace("_", "-"))
+    'Raise --min-edge.'
+    """
+    return _OPTION.sub(lambda match: spell(match[1]), sentence)
+
 
 class MiurafabError(Exception):
     """A failure whose message is a complete sentence for the user.
 
-    ``exit_code`` is what the command line exits with.
+    ``exit_code`` is what the command line exits with. ``str`` quotes the names of options;
+    ``sentence`` has them in backticks, for :func:`spell_options`.
     """
 
     exit_code = 2
 
+    @property
+    def sentence(self) -> str:
+        """The message as it was raised."""
+        return super().__str__()
+
+    def __str__(self) -> str:
+        return spell_options(self.sentence, lambda name: f"'{name}'")
+
 
 class InputError(MiurafabError):
     """Something the user gave is wrong."""
+
+
+class OptionError(InputError):
+    """An option that cannot be taken.
+
+    ``option`` is its name, None where the fault lies between several. The sentence is made of
+    ``where`` (a file or a table; empty for none), the name and the ``complaint``.
+    """
+
+    def __init__(self, option: str | None, complaint: str, where: str = "") -> None:
+        name = "" if option is None else f"`{option}` "
+        place = f"{where}: " if where else ""
+        super().__init__(f"{place}{name}{complaint.rstrip('.')}.")
+        self.option = option
+        self.complaint = complaint
+        self.where = where
 
 
 class UnitError(InputError):

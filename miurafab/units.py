@@ -57,8 +57,8 @@ def parse_length(text: str | float) -> float:
 
 
 def parse_angle(text: str | float) -> float:
-    """An angle in radians; a bare number is radians already. Raises ``UnitError``."""
-    return _parse(text, _ANGLES, "rad", "an angle")
+    """An angle in radians; a bare number is degrees, as in FOLD. Raises ``UnitError``."""
+    return _parse(text, _ANGLES, "deg", "an angle")
 
 
 def parse_feed(text: str | float) -> float:

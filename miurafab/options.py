@@ -1,0 +1,386 @@
+"""How an option is declared: once, as a field of the frozen dataclass that uses it.
+
+A declaration says how a value is written (its :class:`Kind`: unit, range, choices), what it means
+(``help``), where it belongs (``group``) and what holds if nobody gives it. Everything that a person
+sees of an option is made from its declaration: the command line, design and material files, the
+form of the page, the tables in docs and the messages.
+
+Outside, an option has the name of its field without the suffix ``_mm``, and is written in
+millimetres and degrees. Inside, the field holds millimetres, radians or whatever the kind says.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from miurafab.errors import InputError, OptionError, UnitError
+from miurafab.units import parse_angle, parse_feed, parse_length
+
+_KEY = "miurafab.option"
+
+
+class Kind:
+    """How values of an option are written and read.
+
+    ``metavar`` stands for a value in help; ``unit`` follows a number that is shown.
+    """
+
+    metavar = "TEXT"
+    unit = ""
+
+    def read(self, value: object) -> Any:
+        """The value inside. Raises ``ValueError`` with the rest of a sentence, ``is 3; ...``."""
+        raise NotImplementedError
+
+    def check(self, inside: Any) -> None:
+        """Raise ``ValueError`` for a value inside that is out of range."""
+
+    def show(self, inside: Any) -> str:
+        """A value inside as a person writes it."""
+        return str(inside)
+
+    @property
+    def accepts(self) -> str:
+        """What is accepted, for help and tables; empty where the metavar says all."""
+        return ""
+
+
+@dataclass(frozen=True)
+class Quantity(Kind):
+    """A number with or without a unit, from ``low`` to ``high`` (as written, both allowed).
+
+    ``parse`` turns what is written into the value inside, ``factor`` is the value inside of one
+    unit as written. ``above`` leaves ``low`` itself out.
+    """
+
+    parse: Callable[[str | float], float]
+    noun: str
+    metavar: str = "NUMBER"
+    unit: str = ""
+    factor: float = 1.0
+    low: float = -math.inf
+    high: float = math.inf
+    above: bool = False
+
+    def read(self, value: object) -> float:
+        if isinstance(value, bool) or not isinstance(value, str | int | float):
+            if not hasattr(value, "__float__"):
+                raise ValueError(f"is {value!r}, not {self.noun}")
+            value = float(value)
+        try:
+            inside = self.parse(value)
+        except UnitError as fault:
+            raise ValueError(f"cannot be read: {str(fault).rstrip('.')}") from None
+        self.check(inside)
+        return inside
+
+    def check(self, inside: float) -> None:
+        written = inside / self.factor
+        written = round(written, 9)  # a limit in degrees has no exact value in radians
+        too_low = written <= self.low if self.above else written < self.low
+        if too_low or written > self.high or not math.isfinite(written):
+            raise ValueError(f"is {self.show(inside)}; it must be {self.accepts}")
+
+    def show(self, inside: float) -> str:
+        return f"{round(inside / self.factor, 9):.10g}{self.unit}"
+
+    @property
+    def accepts(self) -> str:
+        low, high = (f"{limit:g}{self.unit}" for limit in (self.low, self.high))
+        if math.isinf(self.high):
+            return f"greater than {low}" if self.above else f"{low} or more"
+        return (
+            f"greater than {low} and at most {high}" if self.above else f"between {low} and {high}"
+        )
+
+
+def length(low: float = 0.0, high: float = math.inf, *, above: bool = False) -> Quantity:
+    """A length in mm from ``low`` to ``high`` mm; ``above`` leaves ``low`` itself out."""
+    return Quantity(parse_length, "a length", "LENGTH", " mm", low=low, high=high, above=above)
+
+
+def angle(low: float = 0.0, high: float = 360.0, *, above: bool = False) -> Quantity:
+    """An angle, written in degrees and radians inside; ``low`` and ``high`` in degrees."""
+    return Quantity(parse_angle, "an angle", "ANGLE", " deg", math.pi / 180, low, high, above)
+
+
+def feed(low: float = 1.0, high: float = 1e6) -> Quantity:
+    """A feed in mm/min."""
+    return Quantity(parse_feed, "a feed", "FEED", " mm/min", low=low, high=high)
+
+
+def number(
+    low: float = -math.inf, high: float = math.inf, *, above: bool = False, unit: str = ""
+) -> Quantity:
+    """A plain number; ``unit`` is only shown."""
+    return Quantity(_plain_number, "a number", "NUMBER", unit, low=low, high=high, above=above)
+
+
+def _plain_number(text: str | float) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UnitError(f"{text!r} is not a number.") from None
+
+
+@dataclass(frozen=True)
+class Whole(Kind):
+    """A whole number from ``low`` to ``high``, both allowed."""
+
+    low: int = 0
+    high: int = 2**31 - 1
+    metavar: str = "N"
+
+    def read(self, value: object) -> int:
+        text = value.strip() if isinstance(value, str) else None
+        if text is not None and text.lstrip("+-").isascii() and text.lstrip("+-").isdigit():
+            value = int(text) if len(text) < 20 else self.high + 1
+        elif isinstance(value, bool) or not hasattr(value, "__index__"):
+            raise ValueError(f"is {value!r}, not a whole number")
+        inside = int(value)
+        self.check(inside)
+        return inside
+
+    def check(self, inside: int) -> None:
+        if not self.low <= inside <= self.high:
+            raise ValueError(f"is {inside}; it must be {self.accepts}")
+
+    @property
+    def accepts(self) -> str:
+        if self.high >= 2**31 - 1:
+            return f"{self.low} or more"
+        return f"between {self.low} and {self.high}"
+
+
+@dataclass(frozen=True)
+class Choice(Kind):
+    """One of ``names``."""
+
+    names: tuple[str, ...]
+
+    @property
+    def metavar(self) -> str:  # type: ignore[override]
+        return "|".join(self.names)
+
+    def read(self, value: object) -> str:
+        self.check(value)
+        return str(value)
+
+    def check(self, inside: object) -> None:
+        if inside not in self.names:
+            near = difflib.get_close_matches(str(inside), self.names, n=1)
+            hint = f"did you mean '{near[0]}'" if near else f"it must be {self.accepts}"
+            raise ValueError(f"is '{inside}'; {hint}")
+
+    @property
+    def accepts(self) -> str:
+        return f"one of {', '.join(self.names)}"
+
+
+@dataclass(frozen=True)
+class Flag(Kind):
+    """Yes or no."""
+
+    metavar: str = ""
+
+    def read(self, value: object) -> bool:
+        if isinstance(value, bool):
+            return value
+        if value in ("true", "false"):
+            return value == "true"
+        raise ValueError(f"is {value!r}; it must be true or false")
+
+    def show(self, inside: bool) -> str:
+        return "yes" if inside else "no"
+
+
+@dataclass(frozen=True)
+class Text(Kind):
+    """A text of one line."""
+
+    metavar: str = "TEXT"
+
+    def read(self, value: object) -> str:
+        if not isinstance(value, str) or not value.isprintable():
+            raise ValueError(f"is {value!r}, not a text of one line")
+        return value
+
+
+@dataclass(frozen=True)
+class File(Kind):
+    """The path of a file, taken from the folder of the file that names it."""
+
+    metavar: str = "FILE"
+
+    def read(self, value: object) -> Path:
+        try:
+            return Path(value)  # type: ignore[arg-type]
+        except TypeError:
+            raise ValueError(f"is {value!r}, not a path") from None
+
+
+@dataclass(frozen=True)
+class Written(Kind):
+    """Any other value: ``parse`` reads what is written, ``write`` shows it."""
+
+    parse: Callable[[object], Any]
+    write: Callable[[Any], str]
+    metavar: str = "TEXT"
+    accepted: str = ""
+
+    def read(self, value: object) -> Any:
+        return self.parse(value)
+
+    def show(self, inside: Any) -> str:
+        return self.write(inside)
+
+    @property
+    def accepts(self) -> str:
+        return self.accepted
+
+
+@dataclass(frozen=True)
+class Declared:
+    """One option as everybody who shows or reads it sees it.
+
+    ``name`` is its name outside, ``field`` that of the dataclass field. ``default`` is the value
+    inside if nobody gives it; ``default_text`` how that is written, empty for none.
+    ``page`` says whether the form of the page has it.
+    """
+
+    name: str
+    field: str
+    kind: Kind
+    help: str
+    group: str
+    default: Any
+    default_text: str
+    page: bool
+
+
+def option(
+    kind: Kind,
+    help: str,
+    *,
+    default: Any = None,
+    group: str = "",
+    default_text: str | None = None,
+    page: bool = True,
+) -> Any:
+    """Declare an option as a field of a frozen dataclass.
+
+    Parameters
+    ----------
+    kind : Kind
+        How a value is written: :func:`length`, :func:`angle`, :class:`Choice` and others.
+    help : str
+        What it means, as one sentence.
+    default : any
+        The value inside if nobody gives it; None for an option that may be absent.
+    group : str
+        The heading under which help shows it.
+    default_text : str, optional
+        What holds where ``default`` is None, such as ``the material's``.
+    page : bool
+        Whether the form of the page has it.
+    """
+    shown = default_text
+    if shown is None:
+        absent = default is None or default is False or default == ()
+        shown = "" if absent else kind.show(default)
+    metadata = {_KEY: (kind, help, group, shown, page)}
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+def declared(cls: type) -> Mapping[str, Declared]:
+    """The options of ``cls`` and of the dataclasses that it is made of, by their names outside."""
+    return {each.name: each for each in _declarations(cls)}
+
+
+def _declarations(cls: type) -> Iterator[Declared]:
+    hints = get_type_hints(cls)
+    for entry in fields(cls):
+        if _KEY in entry.metadata:
+            kind, text, group, shown, page = entry.metadata[_KEY]
+            name = entry.name.removesuffix("_mm")
+            yield Declared(name, entry.name, kind, text, group, entry.default, shown, page)
+        elif isinstance(hints[entry.name], type) and is_dataclass(hints[entry.name]):
+            yield from _declarations(hints[entry.name])
+
+
+T = TypeVar("T")
+
+
+def read_options(
+    cls: type[T], given: Mapping[str, object], *, where: str = "", folder: Path = Path()
+) -> T:
+    """The options ``given`` as a value of ``cls``; None leaves an option as it is by default.
+
+    Parameters
+    ----------
+    cls : type
+        A frozen dataclass whose fields are declared by :func:`option`, or are such dataclasses.
+    given : mapping
+        Values as a person writes them, by the names outside: text with a unit, or plain numbers in
+        millimetres and degrees.
+    where : str
+        The file or table, for messages.
+    folder : Path
+        Where the files that an option names are looked for.
+
+    Raises
+    ------
+    OptionError
+        For a name that is no option, and for a value that cannot be taken; it names the option.
+    """
+    known = declared(cls)
+    for name in given:
+        if name not in known:
+            raise OptionError(None, f"'{name}' is not an option; {_nearest(name, known)}", where)
+    return _read(cls, given, where, folder)
+
+
+def _read(cls: type[T], given: Mapping[str, object], where: str, folder: Path) -> T:
+    hints = get_type_hints(cls)
+    values: dict[str, Any] = {}
+    for entry in fields(cls):  # type: ignore[arg-type]
+        if _KEY in entry.metadata:
+            name = entry.name.removesuffix("_mm")
+            if given.get(name) is not None:
+                kind: Kind = entry.metadata[_KEY][0]
+                try:
+                    inside = kind.read(given[name])
+                except ValueError as fault:
+                    raise OptionError(name, str(fault), where) from None
+                values[entry.name] = folder / inside if isinstance(kind, File) else inside
+        elif isinstance(hints[entry.name], type) and is_dataclass(hints[entry.name]):
+            values[entry.name] = _read(hints[entry.name], given, where, folder)
+    try:
+        return cls(**values)
+    except OptionError as fault:
+        raise OptionError(fault.option, fault.complaint, where or fault.where) from None
+    except InputError as fault:
+        raise OptionError(None, fault.sentence, where) from None
+
+
+def check_options(value: Any) -> None:
+    """Raise :class:`~miurafab.errors.OptionError` for a field of ``value`` that is out of range."""
+    for entry in fields(value):
+        inside = getattr(value, entry.name)
+        if _KEY in entry.metadata and inside is not None:
+            kind: Kind = entry.metadata[_KEY][0]
+            try:
+                kind.check(inside)
+            except ValueError as fault:
+                raise OptionError(entry.name.removesuffix("_mm"), str(fault)) from None
+
+
+def _nearest(name: str, known: Sequence[str] | Mapping[str, object]) -> str:
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"did you mean '{near[0]}'" if near else f"there are {', '.join(sorted(known))}"
