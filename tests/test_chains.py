@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from test_posting import CARD, LASER, PERFORATE, joined, toolpath, toolpaths
 
-import miurafab.posting.post as posting
+import miurafab.posting.make_job as posting
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import parse_program, strokes

@@ -12,7 +12,7 @@ from miurafab.errors import ProfileError
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.job import Job
 from miurafab.posting.dialects import words_of
-from miurafab.posting.post import post
+from miurafab.posting.make_job import post
 from miurafab.profiles import MachineProfile, Material
 
 _NAMES = 3
@@ -28,7 +28,7 @@ def post_sections(
     """One file for a laser that makes ``sections`` in turn, each with the powers, feeds and passes
     of its own material. The job is called as the first of them.
 
-    Raises what :func:`~miurafab.posting.post.post` raises, and
+    Raises what :func:`~miurafab.posting.make_job.post` raises, and
     :class:`~miurafab.errors.ProfileError` for a machine that is no laser.
     """
     if machine.tool.kind != "laser":

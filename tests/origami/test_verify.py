@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from problems import CELL, fitted, regular
-from test_collisions import fan, rolled
+from test_contact import fan, rolled
 
 from miurafab.errors import PatternError
 from miurafab.origami.crease_pattern import CreasePattern

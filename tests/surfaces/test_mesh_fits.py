@@ -54,14 +54,14 @@ def test_nine_in_ten_of_all_are_fitted_and_the_others_say_why():
 
 def test_where_no_sheet_is_found_a_smaller_part_is_taken_and_said(monkeypatch):
     """All attempts fail by force but those on the last resort."""
-    run = attempts.Plan.run
+    run = attempts.Strategy.run
 
     def fail_before(plan, request):
         if plan.place.startswith("the middle"):
             return run(plan, request)
         return Attempt(plan.way, plan.rows_along, plan.corrugation, 1.0, 0, "by force", plan.place)
 
-    monkeypatch.setattr(attempts.Plan, "run", fail_before)
+    monkeypatch.setattr(attempts.Strategy, "run", fail_before)
     surface = mesh_surface(*benchmark().meshes()["saddle-disc"])
     result = fit(FitRequest(surface, 6, 6, target=surface.description))
     assert result.status == "converged"

@@ -13,7 +13,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.obj import pattern_from_obj_pair
 from miurafab.origami.verify import audit
 
-DATA = Path(__file__).parent.parent / "data"
+DATA = Path(__file__).parents[2] / "data"
 
 
 def obj(points: np.ndarray, faces: np.ndarray) -> str:
