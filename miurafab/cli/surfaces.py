@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -28,7 +27,7 @@ def surfaces(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
                         "default": parameter.default,
                         "low": parameter.low,
                         "high": parameter.high,
-                        "unit": "rad" if parameter.is_angle else "",
+                        "unit": "deg" if parameter.is_angle else "",
                         "meaning": parameter.meaning,
                     }
                     for key, parameter in entry.parameters.items()
@@ -51,7 +50,6 @@ def surfaces(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
 def _defaults(parameters: Mapping[str, SurfaceParameter]) -> str:
     parts = []
     for key, parameter in parameters.items():
-        value = parameter.default
-        text = f"{math.degrees(value):g}deg" if parameter.is_angle else f"{value:g}"
+        text = f"{parameter.default:g}{'deg' if parameter.is_angle else ''}"
         parts.append(f"{key}={text}")
     return ",".join(parts)

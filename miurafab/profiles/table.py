@@ -118,7 +118,10 @@ class Table:
         return self._quantity(key, default, parse_length, low, high, " mm")
 
     def angle(self, key: str, default: float = _REQUIRED, *, low: float, high: float) -> float:
-        """An angle in radians (``"10deg"``, ``0.17``) within ``low`` and ``high``."""
+        """An angle in radians (``"10deg"``, ``10``) within ``low`` and ``high``, radians too."""
+        if default is not _REQUIRED and not self.has(key):
+            self._asked.append(key)
+            return default
         return self._quantity(key, default, parse_angle, low, high, _DEGREES)
 
     def feed(self, key: str, default: float = _REQUIRED, *, low: float, high: float) -> float:

@@ -20,7 +20,6 @@ All addresses lie behind the key (:mod:`~miurafab.studio.guard`). A refusal is a
 
 from __future__ import annotations
 
-import math
 from importlib import resources
 from typing import Any
 from urllib.parse import unquote
@@ -136,17 +135,14 @@ def _surface(entry: NamedSurface) -> dict[str, Any]:
     surface, values = make_surface(entry.name, {})
     parameters = []
     for key, parameter in entry.parameters.items():
-        low, high, default = parameter.low, parameter.high, parameter.default
-        if parameter.is_angle:
-            low, high, default = (math.degrees(value) for value in (low, high, default))
         parameters.append(
             {
                 "key": key,
                 "meaning": parameter.meaning,
                 "unit": "deg" if parameter.is_angle else "",
-                "default": f"{default:g}",
-                "low": low,
-                "high": high,
+                "default": f"{parameter.default:g}",
+                "low": parameter.low,
+                "high": parameter.high,
             }
         )
     return {

@@ -19,7 +19,7 @@ from miurafab.units import parse_angle
 
 @dataclass(frozen=True)
 class SurfaceParameter:
-    """One parameter of a named surface; lengths in the target's own unit, angles in radians."""
+    """One parameter of a named surface; lengths in the target's own unit, angles in degrees."""
 
     default: float
     low: float
@@ -46,7 +46,7 @@ def _length(default: float, meaning: str, low: float = 1e-6) -> SurfaceParameter
 
 
 def _angle(default_deg: float, meaning: str, high_deg: float) -> SurfaceParameter:
-    return SurfaceParameter(math.radians(default_deg), 1e-3, math.radians(high_deg), meaning, True)
+    return SurfaceParameter(default_deg, 0.1, high_deg, meaning, True)
 
 
 def _signed(default: float, meaning: str) -> SurfaceParameter:
@@ -264,7 +264,8 @@ CATALOGUE: Mapping[str, NamedSurface] = {entry.name: entry for entry in _ENTRIES
 def make_surface(name: str, given: Mapping[str, Any]) -> tuple[TargetSurface, dict[str, Any]]:
     """The named surface and its complete parameters, defaults filled in.
 
-    ``given`` maps parameter names to numbers or texts with a unit; ``profile`` is a list of points.
+    ``given`` maps parameter names to numbers (angles in degrees) or texts with a unit; ``profile``
+    is a list of points.
     Raises :class:`~miurafab.errors.TargetError` naming the surface or parameter and what is
     accepted.
     """
@@ -282,7 +283,10 @@ def make_surface(name: str, given: Mapping[str, Any]) -> tuple[TargetSurface, di
             known = ", ".join(entry.parameters)
             raise TargetError(f"The surface '{name}' has no parameter '{key}'; it has {known}.")
         values[key] = _value(name, key, text, entry.parameters[key])
-    surface = entry.make(**values)
+    angles = {key for key, parameter in entry.parameters.items() if parameter.is_angle}
+    surface = entry.make(
+        **{key: math.radians(value) if key in angles else value for key, value in values.items()}
+    )
     if name == "helicoid" and values["inner"] >= values["radius"]:
         raise TargetError("The helicoid's 'inner' must be smaller than its 'radius'.")
     return surface, values
@@ -302,15 +306,23 @@ def parse_target(text: str) -> tuple[str, dict[str, str]]:
 
 def _value(surface: str, key: str, text: Any, parameter: SurfaceParameter) -> float:
     try:
-        value = parse_angle(text) if parameter.is_angle else float(text)
+        value = _degrees(text) if parameter.is_angle else float(text)
     except (UnitError, ValueError, TypeError):
         kind = "an angle such as 80deg" if parameter.is_angle else "a number"
         raise TargetError(
             f"The parameter '{key}' of '{surface}' is {text!r}, not {kind}."
         ) from None
     if not parameter.low <= value <= parameter.high:
+        unit = " deg" if parameter.is_angle else ""
         raise TargetError(
-            f"The parameter '{key}' of '{surface}' is {value:g}; it must lie between "
-            f"{parameter.low:g} and {parameter.high:g}."
+            f"The parameter '{key}' of '{surface}' is {value:g}{unit}; it must lie between "
+            f"{parameter.low:g} and {parameter.high:g}{unit}."
         )
     return value
+
+
+def _degrees(text: str | float) -> float:
+    """An angle in degrees; a bare number is left as it is, to the last digit."""
+    if isinstance(text, int | float) and not isinstance(text, bool):
+        return float(text)
+    return round(math.degrees(parse_angle(text)), 12)

@@ -7,7 +7,6 @@ file. A design file says the same as the options of ``miurafab fit``, and option
 from __future__ import annotations
 
 import hashlib
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -119,7 +118,7 @@ def _named(
         raise InputError(
             f"--close seam needs an even number of rows of facets, and --facets asks for {rows}."
         )
-    turn = 2 * math.pi * (rows / (rows + 1) if close == "open" else 1.0)
+    turn = 360.0 * (rows / (rows + 1) if close == "open" else 1.0)
     return make_surface(name, {**values, "angle": turn})
 
 
