@@ -1,16 +1,67 @@
-"""What a person should know about a target, a sheet, a layout or a job: one judgement, one value.
+"""Findings: what a person should know about a target, a sheet, a layout or a job.
 
-Every room that judges answers with findings. A finding never changes what it is about: a command
-shows it, ``--json`` prints it, and a refusal stops the work unless it is overridden by its code.
+Every room that judges answers with findings. A finding never changes the value that it is about: a
+command shows it, ``--json`` prints it, and a refusal stops the work unless its code is forced.
+:data:`RULES` lists every code once, with its severity, so that a judgement weighs the same wherever
+it is made.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+from miurafab.errors import spell_options
 
 Severity = Literal["note", "warning", "refusal"]
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What one code stands for.
+
+    ``note``: for information. ``warning``: probably a mistake, but the work goes on. ``refusal``:
+    the work stops, unless the code is ``forceable`` and the user forces it.
+    """
+
+    severity: Severity
+    meaning: str
+    forceable: bool = False
+
+
+def _check(meaning: str) -> Rule:
+    return Rule("refusal", meaning, forceable=True)
+
+
+RULES = {
+    # A target
+    "sampling": Rule("warning", "a function that turns faster than its samples show"),
+    # A job, judged without a machine (miurafab.machine.judge_job)
+    "lines": Rule("refusal", "a line too long for the controller, or not printable ASCII"),
+    "program": _check("a program that GRBL 1.1 would answer with an error, by line and code"),
+    "m3": _check("`M3`: the beam stays on wherever motion stops"),
+    "bounds": _check("a move off the bed"),
+    "islands": _check("a stroke inside an outline that is cut through already"),
+    "outlines": _check("an outline whose end misses its beginning by a little"),
+    "dwell": _check("a dwell (`G4`) with the beam on"),
+    "power": _check("an S word above the machine's full power"),
+    "material": _check("an S word above the `max_power` of the material"),
+    "laser-mode": _check("laser mode (`$32`) that does not suit the tool"),
+    "rate": Rule("warning", "a feed above the machine's largest rate"),
+    "loose": Rule("warning", "a stroke inside a closed stroke that may have cut its piece loose"),
+    "armed": Rule("warning", "a job that ends with the laser armed"),
+    "characters": Rule("warning", "a character in a comment that other senders pass on"),
+    "nothing-burnt": Rule("warning", "a job that burns nothing"),
+    "relative": Rule("note", "relative moves (`G91`)"),
+    # The controller, before a line of the job is sent (miurafab.machine.preflight)
+    "idle": _check("a controller that is not idle"),
+    "beam": _check("a beam that is on already"),
+    "s-range": _check("an S range (`$30`, `$31`) that is not the profile's"),
+    "settings": _check("another `$` setting that is not the profile's"),
+    "travel": _check("a move beyond the soft limits, from where the machine stands"),
+}
+"""Every code, in the order of the work."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,40 +71,50 @@ class Finding:
     Parameters
     ----------
     code : str
-        The name of the judgement, such as ``bounds``. It stays the same from version to version;
-        ``--force CODE`` takes it.
-    severity : {"note", "warning", "refusal"}
-        ``note``: for information. ``warning``: probably not wanted. ``refusal``: the work stops.
+        The name of the judgement, a key of :data:`RULES`. It stays the same from version to
+        version; ``--force CODE`` takes it.
     sentence : str
         The whole judgement as one sentence, with the numbers and the way out. The names of options
         stand in backticks (:func:`miurafab.errors.spell_options`).
-    where : str
-        The place: a file and line, a sheet, a facet. Empty where the sentence is about the whole.
+    where : str or tuple of int
+        The place: a file and line (``edge.nc:5``), a sheet, or the indices of facets, vertices or
+        edges. Empty where the sentence is about the whole.
 
     Examples
     --------
-    >>> Finding("bounds", "refusal", "Line 5 leaves the bed.", "edge.nc:5").as_json()["code"]
-    'bounds'
+    >>> finding = Finding("bounds", "edge.nc, line 5 leaves the bed.", "edge.nc:5")
+    >>> finding.severity
+    'refusal'
     """
 
     code: str
-    severity: Severity
     sentence: str
-    where: str = ""
+    where: str | tuple[int, ...] = ""
 
-    def as_json(self) -> dict[str, str]:
-        """The four fields as text, in the order that reports print them."""
+    @property
+    def severity(self) -> Severity:
+        """How much the judgement weighs: ``note``, ``warning`` or ``refusal``."""
+        return RULES[self.code].severity
+
+    def as_json(self) -> dict[str, Any]:
+        """The fields in the order that reports print them."""
         return {
             "code": self.code,
             "severity": self.severity,
-            "where": self.where,
+            "where": list(self.where) if isinstance(self.where, tuple) else self.where,
             "sentence": self.sentence,
         }
 
     def __str__(self) -> str:
-        return self.sentence
+        """The sentence, with the names of options in quotes."""
+        return spell_options(self.sentence, lambda name: f"'{name}'")
 
 
 def refusals(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """The findings that stop the work."""
     return tuple(finding for finding in findings if finding.severity == "refusal")
+
+
+def as_json(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """``findings`` as every report holds them under ``findings``."""
+    return [finding.as_json() for finding in findings]
