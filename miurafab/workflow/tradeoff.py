@@ -12,8 +12,10 @@ import importlib.util
 import io
 import math
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -111,9 +113,39 @@ def _run(jobs: list[Job], workers: int, cluster: str | None) -> Iterator[Sample]
     else:
         # forking a process with threads (the progress bar is one) is not safe
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context) as pool:
-            for done in as_completed([pool.submit(sample, job) for job in jobs]):
-                yield done.result()
+        count = min(workers, len(jobs))
+        with ProcessPoolExecutor(count, mp_context=context, initializer=_ignore_ctrl_c) as pool:
+            try:
+                with _deaf_children():
+                    running = [pool.submit(sample, job) for job in jobs]
+                for done in as_completed(running):
+                    yield done.result()
+            except BaseException:
+                for worker in multiprocessing.active_children():
+                    worker.terminate()
+                raise
+
+
+def _ignore_ctrl_c() -> None:
+    """Leave Ctrl-C, which reaches every process of a terminal, to the process that waits."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Start processes here that Ctrl-C does not reach even while they load their modules.
+
+    A blocked signal stays blocked in a new process; here it comes when the block ends. Windows has
+    no such block.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _on_cluster(jobs: list[Job], address: str) -> Iterator[Sample]:

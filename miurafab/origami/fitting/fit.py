@@ -26,7 +26,7 @@ import itertools
 import time
 from collections.abc import Callable
 
-from miurafab.origami.fitting.request import Attempt, FitRequest, FitResult
+from miurafab.origami.fitting.request import INTERRUPTED, Attempt, FitRequest, FitResult
 from miurafab.origami.fitting.search import coarsest
 from miurafab.origami.fitting.strategies import Candidate, plans
 
@@ -42,7 +42,9 @@ def fit(
 ) -> FitResult:
     """The tessellation asked for; ``on_progress`` gets a fraction and a word on what is tried.
 
-    Non-convergence is a result with advice. Raises :class:`~miurafab.errors.InputError` only for a
+    Non-convergence is a result with advice. Ctrl-C ends the attempts: the result is then the best
+    exact sheet so far, with status ``interrupted``, and ``KeyboardInterrupt`` is raised only where
+    there is none. Raises :class:`~miurafab.errors.InputError` only for a
     request that makes no sense.
     """
     if request.search:
@@ -59,21 +61,27 @@ def _fit(
     started = time.perf_counter()
     made: list[Attempt] = []
     best: Candidate | None = None
-    for number, plan in enumerate(itertools.islice(plans(request), attempts)):
-        if best is not None and best.settles and plan.way in LAST_RESORTS:
-            break
-        if on_progress is not None:
-            # how many attempts it takes is not known; most sheets need one or two
-            on_progress(1 - 0.9**number, plan.describe())
-        outcome = plan.run(request)
-        if isinstance(outcome, Attempt):
-            made.append(outcome)
-            continue
-        made.append(outcome.attempt)
-        if best is None or outcome.rank < best.rank:
-            best = outcome
-        if outcome.rank == (0, False):
-            break
+    interrupted = False
+    try:
+        for number, plan in enumerate(itertools.islice(plans(request), attempts)):
+            if best is not None and best.settles and plan.way in LAST_RESORTS:
+                break
+            if on_progress is not None:
+                # how many attempts it takes is not known; most sheets need one or two
+                on_progress(1 - 0.9**number, plan.describe())
+            outcome = plan.run(request)
+            if isinstance(outcome, Attempt):
+                made.append(outcome)
+                continue
+            made.append(outcome.attempt)
+            if best is None or outcome.rank < best.rank:
+                best = outcome
+            if outcome.rank == (0, False):
+                break
+    except KeyboardInterrupt:
+        if best is None:
+            raise
+        interrupted = True
     if on_progress is not None:
         on_progress(1.0, "done")
     iterations = sum(a.iterations for a in made)
@@ -81,14 +89,15 @@ def _fit(
     if best is None:
         advice = _advice_when_stalled(made)
         return FitResult("stalled", advice, None, None, tuple(made), iterations, seconds)
-    status = "infeasible" if best.faults else "converged"
+    status = "interrupted" if interrupted else "infeasible" if best.faults else "converged"
     place = best.attempt.place
+    stopped = [INTERRUPTED] if interrupted else []
     remarks = [f"On the whole rectangle no sheet was found; this one has {place}."] if place else []
     if best.rank[1]:
         remarks.append("The mid-surface lies far from the target; ask for more --facets.")
     return FitResult(
         status,
-        " ".join((*best.faults, *remarks)),
+        " ".join((*stopped, *best.faults, *remarks)),
         best.pattern,
         best.measurements,
         tuple(made),

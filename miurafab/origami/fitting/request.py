@@ -18,6 +18,9 @@ from miurafab.origami.verify import EXACT, Measurements
 from miurafab.surfaces.analytic import GeneralizedCylinder
 from miurafab.surfaces.surface import TargetSurface
 
+INTERRUPTED = "The fit was interrupted; this is the best exact sheet up to then."
+"""The advice of a fit that Ctrl-C ended."""
+
 
 @dataclass(frozen=True)
 class FitRequest:
@@ -140,7 +143,8 @@ class Attempt:
 @dataclass(frozen=True, eq=False)
 class FitResult:
     """The outcome. ``status`` is ``converged``, ``infeasible`` (an exact sheet, but a limit is not
-    met) or ``stalled`` (no exact sheet was found); ``pattern`` is the best sheet there is, or None.
+    met), ``interrupted`` (the best exact sheet when Ctrl-C ended the fit) or ``stalled`` (no exact
+    sheet was found); ``pattern`` is the best sheet there is, or None.
 
     ``deviation_mm`` is how far what follows the target lies from it at most; ``polished`` whether
     the sheet was brought closer after it was found; ``active_bounds`` how many inequalities of each

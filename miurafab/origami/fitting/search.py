@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from miurafab.origami.fitting.request import FitRequest, FitResult
+from miurafab.origami.fitting.request import INTERRUPTED, FitRequest, FitResult
 
 COARSEST = 4
 """Facets along the longer side of the coarsest sheet tried."""
@@ -46,21 +46,14 @@ def coarsest(
             if on_progress is not None:
                 on_progress(1 - 0.8 ** len(tried), f"{columns}x{rows} facets")
             tried[longer] = fit(replace(request, columns=columns, rows=rows), PLANS)
+            if tried[longer].status == "interrupted":
+                raise KeyboardInterrupt
         return tried[longer]
 
-    enough = None
-    for longer in _sizes():
-        result = trial(longer)
-        if result.status == "converged":
-            enough = longer
-            break
-        if _too_fine(request, result):
-            break
-    if enough is not None:
-        best = _halve(trial, max((n for n in tried if n < enough), default=COARSEST), enough)
-    else:
-        best = replace(min(tried.values(), key=_miss(request)), status="infeasible")
-        best = replace(best, advice=_why(request, list(tried.values()), best))
+    try:
+        best = _search(request, trial, tried)
+    except KeyboardInterrupt:
+        best = _best_so_far(request, tried)
     if on_progress is not None:
         on_progress(1.0, "done")
     return replace(
@@ -69,6 +62,30 @@ def coarsest(
         iterations=sum(r.iterations for r in tried.values()),
         seconds=time.perf_counter() - started,
     )
+
+
+def _search(
+    request: FitRequest, trial: Callable[[int], FitResult], tried: Mapping[int, FitResult]
+) -> FitResult:
+    """Make the sheet finer until it meets the limits, then coarser; ``trial`` fills ``tried``."""
+    for longer in _sizes():
+        result = trial(longer)
+        if result.status == "converged":
+            coarse = max((n for n in tried if n < longer), default=COARSEST)
+            return _halve(trial, coarse, longer)
+        if _too_fine(request, result):
+            break
+    best = replace(min(tried.values(), key=_miss(request)), status="infeasible")
+    return replace(best, advice=_why(request, list(tried.values()), best))
+
+
+def _best_so_far(request: FitRequest, tried: Mapping[int, FitResult]) -> FitResult:
+    """The result to hand back after Ctrl-C. Raises ``KeyboardInterrupt`` where no size has one."""
+    miss = _miss(request)
+    sheets = [tried[n] for n in sorted(tried) if tried[n].pattern is not None]
+    if not sheets:
+        raise KeyboardInterrupt
+    return replace(min(sheets, key=miss), status="interrupted", advice=INTERRUPTED)
 
 
 def _sizes() -> list[int]:

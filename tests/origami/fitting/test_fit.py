@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -229,3 +230,26 @@ def test_a_target_that_bends_too_much_ends_with_a_reason() -> None:
 def test_requests_that_make_no_sense_name_the_option(changes: dict[str, object], word: str) -> None:
     with pytest.raises(InputError, match=word):
         request("hypar", **changes)
+
+
+def interrupting(calls: int) -> Callable[[float, str], None]:
+    """A progress callback in which Ctrl-C comes once, after so many calls."""
+    left = iter([*[False] * calls, True])
+
+    def on_progress(fraction: float, note: str) -> None:
+        if next(left, False):
+            raise KeyboardInterrupt
+
+    return on_progress
+
+
+@pytest.mark.parametrize("searches", [False, True])
+def test_ctrl_c_leaves_the_best_sheet_up_to_then(searches: bool) -> None:
+    limits = request("hypar", 6, 6, max_deviation_mm=1e-3, min_edge_mm=1.0, search=searches)
+    with pytest.raises(KeyboardInterrupt):
+        fit(limits, interrupting(0))  # there is no sheet yet
+    result = fit(limits, interrupting(2))
+    assert result.status == "interrupted"
+    assert "interrupted" in result.advice
+    assert result.pattern is not None
+    assert max(result.measurements.max_planarity, result.measurements.max_developability) < 1e-9
