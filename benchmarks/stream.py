@@ -36,12 +36,11 @@ import numpy as np
 import serial
 
 from miurafab.gcode.job import Job, prepare, prepare_lines
-from miurafab.grbl.settings import virtual_settings
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import Progress, stream_plan
 from miurafab.machine.virtual_server import PtyWire
 from miurafab.profiles import load_machine
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 MACHINE = "grbl-laser-400"
 DASHES = 1500

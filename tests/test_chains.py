@@ -14,8 +14,9 @@ from test_posting import CARD, LASER, PERFORATE, joined, toolpath, toolpaths
 
 import miurafab.posting.make_job as posting
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import parse_program, strokes
+from miurafab.gcode.program import strokes
 from miurafab.machine.journal import JournalRun, job_digest
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import resume
@@ -86,7 +87,7 @@ def test_read_back_it_is_the_same_strokes(path: Toolpath) -> None:
         moves = slice(read.first_move[index], read.last_move[index] + 1)
         assert (program.power[moves] == round(1000 * operation.power)).all()
         assert (program.feed_mm_min[moves] == operation.feed_mm_min).all()
-        assert read.context_of(index).operation == OPERATIONS[path.operation[index]]
+        assert read.contexts[read.context[index]].operation == OPERATIONS[path.operation[index]]
 
 
 def test_a_chain_says_steps_and_every_chain_where_it_begins() -> None:

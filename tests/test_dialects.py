@@ -87,7 +87,7 @@ def test_posted_and_read_back_it_is_the_same_strokes(name, pattern) -> None:
     tolerance = ROUNDING.get(machine.dialect, 0.00051)
     for index, (operation, points) in enumerate(asked):
         read = made.stroke(index)[:, :2]
-        assert made.context_of(index).operation == OPERATIONS[operation]
+        assert made.contexts[made.context[index]].operation == OPERATIONS[operation]
         assert read[0] == pytest.approx(points[0], abs=tolerance)
         assert read[-1] == pytest.approx(points[-1], abs=tolerance)
         # Points closer than the file can tell apart are one point of it.

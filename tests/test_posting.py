@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from miurafab.errors import LayoutError, ProfileError
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import prepare
-from miurafab.gcode.program import parse_program, strokes
+from miurafab.gcode.program import strokes
 from miurafab.posting import LINE_CHARS, NO_PATCH, post
 from miurafab.profiles import OPERATIONS, MachineProfile, Material, load_machine, load_material
 
@@ -144,7 +145,7 @@ def test_read_back_it_is_the_same_strokes_in_order(path: Toolpath) -> None:
     assert np.abs(read.points[:, :2] - path.points).max(initial=0.0) <= 1e-3
     assert not read.points[:, 2].any()
     for index in range(len(path)):
-        context = read.context_of(index)
+        context = read.contexts[read.context[index]]
         patch = int(path.patch[index])
         assert context.sheet == "sheet-01"
         assert context.operation == OPERATIONS[path.operation[index]]

@@ -36,7 +36,7 @@ _CONSTANT_POWER = 3
 
 
 @dataclass(slots=True)
-class Line:
+class StraightMove:
     """A straight move to ``target`` (machine mm).
 
     ``speed`` is the S it runs with (0 where laser mode darkens it), ``spindle`` 0, 3 or 4;
@@ -57,7 +57,7 @@ class Line:
 class Jog:
     """A jog; whoever performs it says whether it was ``accepted``."""
 
-    line: Line
+    line: StraightMove
     accepted: bool = True
 
 
@@ -65,7 +65,7 @@ class Jog:
 class Probe:
     """A probing move; whoever performs it sets the state's position afterwards."""
 
-    line: Line
+    line: StraightMove
     away: bool
     tolerant: bool
 
@@ -121,15 +121,17 @@ class ProgramEnd:
 
 
 Action = (
-    Line | Jog | Probe | SpindleSync | CoolantSync | Dwell | OffsetsChanged | Store | Synchronize
-    | Pause | ProgramEnd
+    StraightMove | Jog | Probe | SpindleSync | CoolantSync | Dwell | OffsetsChanged | Store
+    | Synchronize | Pause | ProgramEnd
 )  # fmt: skip
 
 
 def execute(block: Block, state: ModalState, rules: Rules) -> Iterator[Action]:
     """The actions of ``block``; ``state`` is updated between them."""
     if block.jog:
-        jog = Jog(Line(block.target, False, block.feed, False, state.speed, state.spindle, True))
+        jog = Jog(
+            StraightMove(block.target, False, block.feed, False, state.speed, state.spindle, True)
+        )
         yield jog
         if jog.accepted:
             state.position = list(block.target)
@@ -163,7 +165,9 @@ def execute(block: Block, state: ModalState, rules: Rules) -> Iterator[Action]:
     state.inches = block.inches
     yield from _offsets(block, state)
     state.distance = block.distance
-    line = Line(block.target, False, state.feed, bool(state.inverse_time), speed, state.spindle)
+    line = StraightMove(
+        block.target, False, state.feed, bool(state.inverse_time), speed, state.spindle
+    )
     if block.action:
         yield from _non_modal(block, state, line)
     state.motion = block.motion
@@ -186,7 +190,7 @@ def _offsets(block: Block, state: ModalState) -> Iterator[Action]:
         yield OffsetsChanged()
 
 
-def _non_modal(block: Block, state: ModalState, line: Line) -> Iterator[Action]:
+def _non_modal(block: Block, state: ModalState, line: StraightMove) -> Iterator[Action]:
     action = block.action
     if action == SET_OFFSET:
         yield Store(block.select, block.stored)
@@ -207,7 +211,7 @@ def _non_modal(block: Block, state: ModalState, line: Line) -> Iterator[Action]:
         yield OffsetsChanged()
 
 
-def _move(block: Block, state: ModalState, rules: Rules, line: Line) -> Iterator[Action]:
+def _move(block: Block, state: ModalState, rules: Rules, line: StraightMove) -> Iterator[Action]:
     motion = block.motion
     line.target = block.target
     line.rapid = motion == SEEK
@@ -223,7 +227,7 @@ def _move(block: Block, state: ModalState, rules: Rules, line: Line) -> Iterator
     state.position = list(block.target)
 
 
-def _arc(block: Block, state: ModalState, rules: Rules, line: Line) -> Iterator[Action]:
+def _arc(block: Block, state: ModalState, rules: Rules, line: StraightMove) -> Iterator[Action]:
     """The chords of an arc. In G93 the firmware multiplies the feed by their number and then
     takes it for mm/min (``mc_arc``); so does this.
     """

@@ -14,9 +14,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from miurafab.gcode import faults
+from miurafab.gcode import block_errors
 from miurafab.gcode.arcs import centre_from_radius
-from miurafab.gcode.faults import BlockFault
+from miurafab.gcode.block_errors import BlockError
 from miurafab.gcode.numbers import read_single, single, whole_byte
 from miurafab.gcode.words import (
     CLOCKWISE,
@@ -133,7 +133,7 @@ def parse_block(
 ) -> Block:
     """The block that ``line`` means in ``state``; ``line`` is bare upper-case words.
 
-    ``jog``: the line is what follows ``$J=``. Raises :class:`BlockFault`.
+    ``jog``: the line is what follows ``$J=``. Raises :class:`BlockError`.
     """
     block = Block(state, jog)
     _read_words(line, block, rules)
@@ -143,19 +143,19 @@ def parse_block(
     if block.axes and block.claim is Claim.NONE:
         block.claim = Claim.MOTION
     if words.get("N", 0.0) > _LARGEST_LINE_NUMBER:
-        raise BlockFault(faults.LINE_NUMBER, f"N{words['N']:.0f}")
+        raise BlockError(block_errors.LINE_NUMBER, f"N{words['N']:.0f}")
     _set_feed(block, state)
     block.speed = words.get("S", state.speed)
     block.tool = int(words.get("T", 0.0))
     if block.action == DWELL:
         if "P" not in words:
-            raise BlockFault(faults.VALUE_MISSING, "G4")
+            raise BlockError(block_errors.VALUE_MISSING, "G4")
         left.discard("P")
     if block.inches:
         for axis in block.axes:
             words[AXES[axis]] *= MM_PER_INCH
     if block.claim is Claim.TOOL_LENGTH and block.tool_length and block.axes != (TOOL_AXIS,):
-        raise BlockFault(faults.OFFSET_AXIS, "G43.1")
+        raise BlockError(block_errors.OFFSET_AXIS, "G43.1")
     if block.offset != state.offset:
         block.coord_system = list(stored(block.offset))
     _set_target(block, state, stored, left)
@@ -166,9 +166,9 @@ def parse_block(
     if block.claim is not Claim.NONE:
         left.difference_update(AXES)
     if left:
-        raise BlockFault(faults.LEFT_OVER, min(left, key=list(words).index))
+        raise BlockError(block_errors.LEFT_OVER, min(left, key=list(words).index))
     if jog and (not block.groups <= _JOG_GROUPS or block.action not in (0, MACHINE)):
-        raise BlockFault(faults.BAD_JOG, "a mode or command")
+        raise BlockError(block_errors.BAD_JOG, "a mode or command")
     return block
 
 
@@ -179,12 +179,12 @@ def _read_words(line: str, block: Block, rules: Rules) -> None:
         if letter in "GM":
             spelling = look_up(letter, text, rules.mist)
             if spelling.claims and block.claim is not Claim.NONE:
-                raise BlockFault(faults.AXES_CLAIMED_TWICE, letter + text)
+                raise BlockError(block_errors.AXES_CLAIMED_TWICE, letter + text)
             command = spelling.command
             if command is None:
-                raise BlockFault(spelling.fault, letter + text)
+                raise BlockError(spelling.error, letter + text)
             if command.group in groups:
-                raise BlockFault(faults.GROUP_CONFLICT, letter + text)
+                raise BlockError(block_errors.GROUP_CONFLICT, letter + text)
             groups.add(command.group)
             if command.claim is not Claim.NONE:
                 block.claim = command.claim
@@ -194,14 +194,14 @@ def _read_words(line: str, block: Block, rules: Rules) -> None:
                 setattr(block, command.slot, command.value)
             continue
         if letter not in _VALUES:
-            raise BlockFault(faults.UNSUPPORTED, letter + text)
+            raise BlockError(block_errors.UNSUPPORTED, letter + text)
         value = number_of(text)
         if letter == "T" and value > _LARGEST_TOOL:
-            raise BlockFault(faults.TOOL_NUMBER, letter + text)
+            raise BlockError(block_errors.TOOL_NUMBER, letter + text)
         if letter in words:
-            raise BlockFault(faults.WORD_REPEATED, letter)
+            raise BlockError(block_errors.WORD_REPEATED, letter)
         if value < 0.0 and letter in _NEVER_NEGATIVE:
-            raise BlockFault(faults.NEGATIVE, letter + text)
+            raise BlockError(block_errors.NEGATIVE, letter + text)
         words[letter] = value
 
 
@@ -210,12 +210,12 @@ def _set_feed(block: Block, state: ModalState) -> None:
     feed = block.words.get("F")
     if block.jog:
         if feed is None:
-            raise BlockFault(faults.NO_FEED, "a jog")
+            raise BlockError(block_errors.NO_FEED, "a jog")
         block.feed = feed * MM_PER_INCH if block.inches else feed
     elif block.inverse_time:
         moves = block.claim is Claim.MOTION and block.motion not in (NO_MOTION, SEEK)
         if moves and feed is None:
-            raise BlockFault(faults.NO_FEED, "a move under G93")
+            raise BlockError(block_errors.NO_FEED, "a move under G93")
         block.feed = feed or 0.0
     elif state.inverse_time:
         block.feed = feed or 0.0
@@ -233,7 +233,7 @@ def _set_target(block: Block, state: ModalState, stored: StoredOffsets, left: se
         return
     if block.action == SHIFT:
         if not block.axes:
-            raise BlockFault(faults.NO_AXES, "G92")
+            raise BlockError(block_errors.NO_AXES, "G92")
         block.target = list(state.coord_offset)
         for axis in block.axes:
             block.target[axis] = position[axis] - block.coord_system[axis] - words[AXES[axis]]
@@ -262,21 +262,21 @@ def _set_target(block: Block, state: ModalState, stored: StoredOffsets, left: se
             block.stored = list(home)
             block.claim = Claim.NONE
     elif block.action == MACHINE and block.motion not in (SEEK, LINEAR):
-        raise BlockFault(faults.G53_MOTION, "G53")
+        raise BlockError(block_errors.G53_MOTION, "G53")
 
 
 def _set_offset(block: Block, state: ModalState, stored: StoredOffsets, left: set[str]) -> None:
     words = block.words
     if not block.axes:
-        raise BlockFault(faults.NO_AXES, "G10")
+        raise BlockError(block_errors.NO_AXES, "G10")
     if "P" not in words and "L" not in words:
-        raise BlockFault(faults.VALUE_MISSING, "G10")
+        raise BlockError(block_errors.VALUE_MISSING, "G10")
     number = whole_byte(words.get("P", 0.0))
     if number > 6:
-        raise BlockFault(faults.NO_SUCH_OFFSET, f"G10 P{number}")
+        raise BlockError(block_errors.NO_SUCH_OFFSET, f"G10 P{number}")
     form = whole_byte(words.get("L", 0.0))
     if form not in (2, 20) or (form == 2 and "R" in words):
-        raise BlockFault(faults.UNSUPPORTED, f"G10 L{form}" + " R" * (form == 2))
+        raise BlockError(block_errors.UNSUPPORTED, f"G10 L{form}" + " R" * (form == 2))
     left -= {"P", "L"}
     block.select = number - 1 if number else block.offset
     offset = list(stored(block.select))
@@ -294,46 +294,46 @@ def _check_motion(block: Block, state: ModalState, left: set[str]) -> None:
     motion = block.motion
     if motion == NO_MOTION:
         if block.axes:
-            raise BlockFault(faults.AXES_WHILE_OFF, "G80")
+            raise BlockError(block_errors.AXES_WHILE_OFF, "G80")
         return
     if block.claim is not Claim.MOTION:
         return
     if motion != SEEK and block.feed == 0.0:
-        raise BlockFault(faults.NO_FEED, "the move")
+        raise BlockError(block_errors.NO_FEED, "the move")
     if motion in (SEEK, LINEAR):
         if not block.axes:
             block.claim = Claim.NONE
     elif not block.axes:
-        raise BlockFault(faults.NO_AXES, "the arc or probing move")
+        raise BlockError(block_errors.NO_AXES, "the arc or probing move")
     elif motion in (CLOCKWISE, COUNTERCLOCKWISE):
         _check_arc(block, state, left)
     elif motion in PROBES and block.target == state.position:
-        raise BlockFault(faults.IMPOSSIBLE_TARGET, "the probing move")
+        raise BlockError(block_errors.IMPOSSIBLE_TARGET, "the probing move")
 
 
 def _check_arc(block: Block, state: ModalState, left: set[str]) -> None:
     first, second, _ = PLANES[block.plane]
     words, scale = block.words, MM_PER_INCH if block.inches else 1.0
     if first not in block.axes and second not in block.axes:
-        raise BlockFault(faults.NO_AXES_IN_PLANE, "the arc")
+        raise BlockError(block_errors.NO_AXES_IN_PLANE, "the arc")
     x = block.target[first] - state.position[first]
     y = block.target[second] - state.position[second]
     if "R" in words:
         left.discard("R")
         if block.target == state.position:
-            raise BlockFault(faults.IMPOSSIBLE_TARGET, "the arc")
+            raise BlockError(block_errors.IMPOSSIBLE_TARGET, "the arc")
         radius = words["R"] * scale
         block.radius = abs(radius)
         centre = centre_from_radius(x, y, radius, block.motion == CLOCKWISE)
         if centre is None:
-            raise BlockFault(faults.IMPOSSIBLE_RADIUS, "the arc")
+            raise BlockError(block_errors.IMPOSSIBLE_RADIUS, "the arc")
         block.centre[first], block.centre[second] = centre
         return
     if _CENTRES[first] not in words and _CENTRES[second] not in words:
-        raise BlockFault(faults.NO_CENTRE, "the arc")
+        raise BlockError(block_errors.NO_CENTRE, "the arc")
     left.difference_update(_CENTRES)
     block.centre = [words.get(letter, 0.0) * scale for letter in _CENTRES]
     block.radius = math.hypot(block.centre[first], block.centre[second])
     miss = abs(math.hypot(x - block.centre[first], y - block.centre[second]) - block.radius)
     if miss > 0.005 and (miss > 0.5 or miss > 0.001 * block.radius):
-        raise BlockFault(faults.IMPOSSIBLE_TARGET, "the arc")
+        raise BlockError(block_errors.IMPOSSIBLE_TARGET, "the arc")

@@ -1,280 +1,135 @@
-"""A job read back to a :class:`~miurafab.gcode.moves.Program`, as the controller would run it."""
+"""A G-code program as data: flat arrays of what the machine would do, line by line.
+
+:func:`~miurafab.gcode.interpreter.parse_program` makes it.
+
+Legend: n moves, e events, L lines sent; positions in mm in the frame of the first line (machine
+position 0, no offsets), feeds in mm/min, power in S words, dwell in seconds.
+"""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
-from miurafab.errors import GcodeError
-from miurafab.gcode.columns import Columns
-from miurafab.gcode.execution import (
-    Dwell,
-    Line,
-    Pause,
-    Probe,
-    ProgramEnd,
-    SpindleSync,
-    Store,
-    Synchronize,
-    execute,
-)
-from miurafab.gcode.faults import BlockFault
-from miurafab.gcode.job import Job, bare_code
-from miurafab.gcode.marlin import grbl_words
-from miurafab.gcode.moves import (
-    BEAM_M3,
-    BEAM_M4,
-    BEAM_OFF,
-    DWELL,
-    END,
-    FEED,
-    PAUSE,
-    RAPID,
-    SYNC,
-    Context,
-    Program,
-    Strokes,
-    strokes,
-)
-from miurafab.gcode.parser import ModalState, parse_block
-from miurafab.gcode.regular import LEAST_RUN, Lines, read_lines, run_of
-
-__all__ = ["Context", "Program", "Strokes", "parse_program", "strokes"]
-
-_COMMENT = re.compile(r"\s*\(\s*(sheet|patch|operation)\s+([^()]*?)\s*\)\s*")
-_NO_LETTERS = str.maketrans("", "", "0123456789.+-")
-_CHUNK = 1 << 18  # characters read at once
+RAPID, FEED = 0, 1
+"""Values of :attr:`Program.motion`."""
+BEAM_OFF, BEAM_M3, BEAM_M4 = 0, 3, 4
+"""Values of :attr:`Program.spindle`."""
+SYNC, DWELL, PAUSE, END = 0, 1, 2, 3
+"""Values of :attr:`Program.event_kind`: the motion stops and (DWELL) waits, (PAUSE) waits for
+somebody, (END) the program ends."""
 
 
-@dataclass(frozen=True, slots=True)
-class _ReaderRules:
-    laser: bool
-    arc_tolerance: float
-    mist: bool = True
-    single_precision: bool = False
-    inline: bool = False
-
-
-def parse_program(
-    job: Job, *, laser: bool = True, arc_tolerance_mm: float = 0.002, inline: bool = False
-) -> Program:
-    """Read ``job`` back as the controller would run it from power-up, at machine position 0.
-
-    ``laser`` is the controller's laser mode ($32), which darkens G0 and lets S change in motion.
-    Arcs become chords that stay within ``arc_tolerance_mm`` of the arc ($12). With ``inline`` the
-    program is one for Marlin (:mod:`miurafab.gcode.marlin`). Raises
-    :class:`~miurafab.errors.GcodeError` naming file and line for what the controller would
-    refuse, and for a ``$`` command, which is no part of a program.
+@dataclass(frozen=True)
+class Context:
+    """What the comments before a move said: ``(sheet NAME)``, ``(patch LABEL)``,
+    ``(operation NAME)``; each empty if never said.
     """
-    return _Reader(_ReaderRules(laser, arc_tolerance_mm, inline=inline)).read(job)
+
+    sheet: str = ""
+    patch: str = ""
+    operation: str = ""
 
 
-class _Reader:
-    def __init__(self, rules: _ReaderRules) -> None:
-        self.rules = rules
-        self.state = ModalState()
-        self.stored: list[Sequence[float]] = [(0.0, 0.0, 0.0)] * 8
-        self.at: Sequence[float] = (0.0, 0.0, 0.0)
-        self.contexts: dict[Context, int] = {Context(): 0}
-        self.context = Context()
-        # x, y, z, motion, feed, power, spindle, line, context
-        self.moves = Columns("f8", "f8", "f8", "i1", "f8", "f8", "i1", "i4", "i4")
-        # move, kind, seconds, power, line
-        self.events = Columns("i8", "i1", "f8", "f8", "i4")
-        # number, bytes, words, points
-        self.sent = Columns("i4", "i4", "i4", "i4")
+@dataclass(frozen=True, eq=False)
+class Program:
+    """What a job does.
 
-    def read(self, job: Job) -> Program:
-        number = 1
-        for text in _chunks(job.text):
-            lines = read_lines(text)
-            first, count = 0, len(lines.regular)
-            for begin, stop in _runs(lines):
-                self._words(job.name, number, text, lines, first, begin)
-                first = begin
-                while stop - first >= LEAST_RUN and not self._run(lines, first, stop, number):
-                    self._words(job.name, number, text, lines, first, first + LEAST_RUN)
-                    first += LEAST_RUN
-                if stop - first >= LEAST_RUN:
-                    first = stop
-            self._words(job.name, number, text, lines, first, count)
-            number += count
-        return self._program(job.name)
+    Per move, in order: ``start`` and ``end`` (n, 3) float64 mm; ``motion`` (n,) int8, RAPID or
+    FEED; ``feed_mm_min`` (n,) float64, 0 for rapids; ``power`` (n,) float64, the S that the beam
+    gets, 0 with the spindle off and for rapids in laser mode; ``spindle`` (n,) int8, BEAM_OFF,
+    BEAM_M3 or BEAM_M4; ``line`` (n,) int32, 1-based in the file; ``context`` (n,) int32 into
+    ``contexts``. Arcs are chords; a move that goes nowhere is left out, and each move starts where
+    the one before it ends, so that both share one array.
 
-    def _words(
-        self, name: str, number: int, text: str, lines: Lines, first: int, stop: int
-    ) -> None:
-        """Lines ``first`` to before ``stop`` of a chunk that begins with line ``number``."""
-        bounds = lines.bounds[first : stop + 1].tolist()
-        for index, (begin, end) in enumerate(pairwise(bounds), number + first):
-            line = text[begin : end - 1]
-            code = bare_code(name, index, line)
-            if code:
-                code = code.upper()
-                words = len(code.translate(_NO_LETTERS))
-                self.sent.add(index, len(code) + 1, words, code.count("."))
-                self._line(name, index, code.replace("/", ""))
-            elif "(" in line:
-                self._comment(line)
+    Per event: ``event_move`` (e,) int64, the number of moves made before it; ``event_kind`` (e,)
+    int8; ``event_seconds`` (e,) float64; ``event_power`` (e,) float64, the S that burns from it
+    on while nothing moves, NaN for as before; ``event_line`` (e,) int32.
 
-    def _run(self, lines: Lines, first: int, stop: int, number: int) -> bool:
-        """A run of regular lines at once; False if the state gives them another meaning."""
-        if self.rules.inline and not lines.commanded[first:stop].all():
-            return False
-        run = run_of(lines, first, stop, self.state)
-        if run is None:
-            return False
-        spindle, laser = self.state.spindle, self.rules.laser
-        numbers = np.arange(number + first, number + stop)
-        self.sent.extend(
-            numbers, lines.size[first:stop] + 1, lines.words[first:stop], lines.points[first:stop]
-        )
-        before = np.concatenate([[self.at], run.target[:-1]])
-        goes = (run.target != before).any(axis=1)
-        power = np.where(run.rapid, 0.0, run.speed) if laser else run.speed
-        made = len(self.moves) + np.cumsum(goes) - goes
-        # Laser mode takes a new power with the motion, but where there is none to M3; else each
-        # new power waits for the motion to end.
-        stops = ~goes & (spindle == BEAM_M3) if laser else run.changes & (spindle != BEAM_OFF)
-        if stops.any():
-            nothing = np.zeros(int(stops.sum()))
-            self.events.extend(made[stops], nothing, nothing, power[stops], numbers[stops])
-        if goes.any():
-            context = self.contexts.setdefault(self.context, len(self.contexts))
-            count = int(goes.sum())
-            self.moves.extend(
-                *run.target[goes].T,
-                np.where(run.rapid, RAPID, FEED)[goes],
-                np.where(run.rapid, 0.0, run.feed)[goes],
-                power[goes] if spindle else np.zeros(count),
-                np.full(count, spindle),
-                numbers[goes],
-                np.full(count, context),
-            )
-        self.at = tuple(run.target[-1].tolist())
-        return True
+    Per line sent: ``line_number``, ``line_bytes`` with the newline, ``line_words`` and
+    ``line_points`` (decimal points), all (L,) int32. In all 50 bytes a move and 16 a line.
+    """
 
-    def _comment(self, line: str) -> None:
-        match = _COMMENT.fullmatch(line)
-        if match is not None:
-            kept = {"sheet": self.context.sheet, "patch": self.context.patch}
-            kept["operation"] = self.context.operation
-            self.context = Context(**{**kept, match[1]: match[2]})
+    name: str
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    motion: NDArray[np.int8]
+    feed_mm_min: NDArray[np.float64]
+    power: NDArray[np.float64]
+    spindle: NDArray[np.int8]
+    line: NDArray[np.int32]
+    context: NDArray[np.int32]
+    contexts: tuple[Context, ...]
+    event_move: NDArray[np.int64]
+    event_kind: NDArray[np.int8]
+    event_seconds: NDArray[np.float64]
+    event_power: NDArray[np.float64]
+    event_line: NDArray[np.int32]
+    line_number: NDArray[np.int32]
+    line_bytes: NDArray[np.int32]
+    line_words: NDArray[np.int32]
+    line_points: NDArray[np.int32]
 
-    def _line(self, name: str, number: int, code: str) -> None:
-        if code.startswith("$"):
-            raise GcodeError(
-                f"{name}, line {number}: {code!r} is a command to the controller and no part of "
-                "a program; remove it."
-            )
-        if self.rules.inline:
-            try:
-                code = grbl_words(code)
-            except ValueError as fault:
-                raise GcodeError(f"{name}, line {number}: {fault}.") from None
-        try:
-            block = parse_block(code, self.state, self.stored.__getitem__, self.rules)
-        except BlockFault as fault:
-            raise GcodeError(f"{name}, line {number}: {fault} (error:{fault.code}).") from None
-        for action in execute(block, self.state, self.rules):
-            if isinstance(action, Line):
-                self._move(action, number)
-            elif isinstance(action, Probe):
-                self._event(SYNC, number)
-                self._move(action.line, number)
-                self._event(SYNC, number)
-                self.state.position = list(action.line.target)
-            elif isinstance(action, Dwell):
-                self._event(DWELL, number, seconds=action.seconds)
-            elif isinstance(action, Pause):
-                self._event(PAUSE, number)
-            elif isinstance(action, ProgramEnd):
-                self.state.coord_system = list(self.stored[0])
-                self._event(END, number, power=0.0)
-            elif isinstance(action, SpindleSync):
-                still = action.spindle == BEAM_M4 and self.rules.laser
-                dark = still or action.spindle == BEAM_OFF
-                self._event(SYNC, number, power=0.0 if dark else action.speed)
-            elif not isinstance(action, Synchronize):  # a pause or the end follows
-                if isinstance(action, Store):
-                    self.stored[action.index] = tuple(action.values)
-                self._event(SYNC, number)
+    def __len__(self) -> int:
+        return len(self.motion)
 
-    def _move(self, line: Line, number: int) -> None:
-        target = tuple(line.target)
-        start, self.at = self.at, target
-        if target == start:
-            if self.rules.laser and line.spindle == BEAM_M3:
-                self._event(SYNC, number, power=line.speed)
-            return
-        feed = line.feed
-        if line.rapid:
-            feed = 0.0
-        elif line.inverse_time:
-            feed *= sum((b - a) ** 2 for a, b in zip(start, target, strict=True)) ** 0.5
-        context = self.contexts.setdefault(self.context, len(self.contexts))
-        self.moves.add(
-            *target,
-            RAPID if line.rapid else FEED,
-            feed,
-            line.speed if line.spindle else 0.0,
-            line.spindle,
-            number,
-            context,
-        )
+    @property
+    def beam_on(self) -> NDArray[np.bool_]:
+        """(n,) whether a move burns."""
+        return np.asarray(self.power > 0.0)
 
-    def _event(
-        self, kind: int, number: int, *, seconds: float = 0.0, power: float = np.nan
-    ) -> None:
-        self.events.add(len(self.moves), kind, seconds, power, number)
-
-    def _program(self, name: str) -> Program:
-        moves, events, sent = self.moves, self.events, self.sent
-        places = np.zeros((len(moves) + 1, 3))
-        for axis in range(3):
-            places[1:, axis] = moves.take(axis)
-        return Program(
-            name=name,
-            start=places[:-1],
-            end=places[1:],
-            motion=moves.take(3),
-            feed_mm_min=moves.take(4),
-            power=moves.take(5),
-            spindle=moves.take(6),
-            line=moves.take(7),
-            context=moves.take(8),
-            contexts=tuple(self.contexts),
-            event_move=events.take(0),
-            event_kind=events.take(1),
-            event_seconds=events.take(2),
-            event_power=events.take(3),
-            event_line=events.take(4),
-            line_number=sent.take(0),
-            line_bytes=sent.take(1),
-            line_words=sent.take(2),
-            line_points=sent.take(3),
-        )
+    @property
+    def lengths(self) -> NDArray[np.float64]:
+        """(n,) lengths of the moves in mm."""
+        return np.asarray(np.linalg.norm(self.end - self.start, axis=1), dtype=np.float64)
 
 
-def _chunks(text: str) -> Iterator[str]:
-    """``text`` in pieces of whole lines, each line ended by one LF."""
-    begin = 0
-    while begin < len(text):
-        end = text.find("\n", begin + _CHUNK) + 1 or len(text)
-        piece = text[begin:end]
-        if "\r" in piece:
-            piece = piece.replace("\r\n", "\n").replace("\r", "\n")
-        yield piece if piece.endswith("\n") else piece + "\n"
-        begin = end
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """S polylines burnt, N points in all.
+
+    ``points`` (N, 3) float64 mm; ``offsets`` (S + 1,) int64, stroke s being
+    ``points[offsets[s]:offsets[s + 1]]``; ``first_move`` and ``last_move`` (S,) int64, its moves
+    in the program, both included; ``context`` (S,) int32 into ``contexts``.
+    """
+
+    points: NDArray[np.float64]
+    offsets: NDArray[np.int64]
+    first_move: NDArray[np.int64]
+    last_move: NDArray[np.int64]
+    context: NDArray[np.int32]
+    contexts: tuple[Context, ...]
+
+    def __len__(self) -> int:
+        return len(self.context)
+
+    def stroke(self, index: int) -> NDArray[np.float64]:
+        """(k, 3) points of one stroke."""
+        return self.points[self.offsets[index] : self.offsets[index + 1]]
 
 
-def _runs(lines: Lines) -> list[tuple[int, int]]:
-    """Where runs of regular lines worth an array begin and stop."""
-    edges = np.flatnonzero(np.diff(lines.regular, prepend=False, append=False))
-    begins, stops = edges[::2], edges[1::2]
-    long = stops - begins >= LEAST_RUN
-    return list(zip(begins[long].tolist(), stops[long].tolist(), strict=True))
+def strokes(program: Program) -> Strokes:
+    """Consecutive moves with the beam on, joined while sheet, patch and operation stay.
+
+    Moves that follow one another always meet, because a program leaves no gap between moves.
+    """
+    burns = np.flatnonzero(program.beam_on)
+    if not len(burns):
+        nothing = np.zeros(0, dtype=np.int64)
+        return Strokes(
+            np.zeros((0, 3)), np.zeros(1, dtype=np.int64), nothing, nothing,
+            program.context[:0], program.contexts,
+        )  # fmt: skip
+    joined = (np.diff(burns) == 1) & (np.diff(program.context[burns]) == 0)
+    first = burns[np.concatenate([[True], ~joined])]
+    last = burns[np.concatenate([~joined, [True]])]
+    counts = last - first + 2
+    offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    points = np.empty((int(offsets[-1]), 3))
+    points[offsets[:-1]] = program.start[first]
+    others = np.ones(len(points), dtype=bool)
+    others[offsets[:-1]] = False
+    points[others] = program.end[burns]
+    return Strokes(points, offsets, first, last, program.context[first], program.contexts)

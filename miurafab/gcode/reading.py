@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from miurafab.gcode.hpgl import parse_hpgl
+from miurafab.gcode.hpgl_reader import parse_hpgl
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import Program, parse_program
+from miurafab.gcode.program import Program
 from miurafab.profiles import MachineProfile
 
 _ARC_TOLERANCE = 12

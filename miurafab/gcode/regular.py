@@ -44,7 +44,7 @@ _WHOLE_TENS = 10 ** np.arange(_MOST_DIGITS + 1, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class TextLines:
     """The lines of a chunk of text.
 
     ``bounds`` (L + 1,) int64: line i is ``text[bounds[i]:bounds[i + 1] - 1]``. ``values`` (5, L)
@@ -67,7 +67,7 @@ class Lines:
         return np.asarray(~np.isnan(self.values[_G]))
 
 
-def read_lines(text: str) -> Lines:
+def read_lines(text: str) -> TextLines:
     """``text``, whole lines that each end in a newline, split into words where regular."""
     raw = np.frombuffer(text.encode("ascii", "replace"), dtype=np.uint8)
     kind = _KIND[raw]
@@ -102,7 +102,7 @@ def read_lines(text: str) -> Lines:
         bad |= (values[_S] < 0.0) | (values[_F] < 0.0)
     moves = ~np.isnan(values[_X]) | ~np.isnan(values[_Y])
     dots = np.concatenate([[0], np.cumsum(kind == _POINT)])
-    return Lines(
+    return TextLines(
         bounds=bounds,
         values=values,
         regular=moves & ~bad,
@@ -153,7 +153,7 @@ def _numbers(
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class RegularMoves:
     """What r regular lines ask for: ``target`` (r, 3) float64 mm, ``rapid`` (r,) bool, ``feed``
     in mm/min and ``speed`` in S words (r,) float64; ``changes`` (r,) bool, whether that is a new
     speed.
@@ -166,7 +166,9 @@ class Run:
     changes: NDArray[np.bool_]
 
 
-def run_of(lines: Lines, first: int, stop: int, state: ModalState) -> Run | None:
+def regular_moves(
+    lines: TextLines, first: int, stop: int, state: ModalState
+) -> RegularMoves | None:
     """The regular lines from ``first`` to before ``stop``, taken up in ``state``; updates it.
 
     None, and ``state`` as it was, if that state gives such lines another meaning, or one of
@@ -190,7 +192,7 @@ def run_of(lines: Lines, first: int, stop: int, state: ModalState) -> Run | None
     state.motion = int(motion[-1])
     state.feed, state.speed = float(feed[-1]), float(speed[-1])
     state.position = target[-1].tolist()
-    return Run(target, rapid, feed, speed, changes)
+    return RegularMoves(target, rapid, feed, speed, changes)
 
 
 def _filled(values: NDArray[np.float64], before: float) -> NDArray[np.float64]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
 
-from miurafab.gcode import faults
-from miurafab.gcode.faults import BlockFault
+from miurafab.gcode import block_errors
+from miurafab.gcode.block_errors import BlockError
 from miurafab.gcode.numbers import read_single, single, to_unsigned
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
@@ -20,7 +20,7 @@ _LINE = re.compile(rf"(?:[A-Z]{_NUMBER})*", re.ASCII)
 def split_words(line: str) -> Iterator[tuple[str, str]]:
     """The (letter, number) pairs of ``line``, which has no comments, blanks or lower case.
 
-    Raises :class:`BlockFault` where the line stops being words, after the words before it.
+    Raises :class:`BlockError` where the line stops being words, after the words before it.
     """
     if _LINE.fullmatch(line):
         yield from _WORD.findall(line)
@@ -31,8 +31,8 @@ def split_words(line: str) -> Iterator[tuple[str, str]]:
         end = match.end()
     bad = line[end]
     if "A" <= bad <= "Z":
-        raise BlockFault(faults.NUMBER_EXPECTED, bad)
-    raise BlockFault(faults.LETTER_EXPECTED, repr(bad))
+        raise BlockError(block_errors.NUMBER_EXPECTED, bad)
+    raise BlockError(block_errors.LETTER_EXPECTED, repr(bad))
 
 
 class Group(IntEnum):
@@ -136,10 +136,10 @@ _POINTED = {28, 30, 38, 43, 61, 90, 91, 92}
 
 @dataclass(frozen=True, slots=True)
 class Spelling:
-    """One spelling of a G or M word: its command or the fault it is, and whether it claims axes."""
+    """A G or M word as written: its command or its ``error`` code, and whether it claims axes."""
 
     command: Command | None
-    fault: int
+    error: int
     claims: bool
 
 
@@ -154,17 +154,17 @@ def look_up(letter: str, number: str, mist: bool) -> Spelling:
     hundredths = _round_half_away(single(100.0 * single(value - whole))) & 0xFFFF
     if letter == "M":
         if hundredths:
-            return Spelling(None, faults.NOT_WHOLE, False)
+            return Spelling(None, block_errors.NOT_WHOLE, False)
         known = _M.get(whole) if mist or whole != 7 else None
-        return Spelling(known, faults.UNSUPPORTED, False)
+        return Spelling(known, block_errors.UNSUPPORTED, False)
     if whole == 49:
         return Spelling(Command(Group.TOOL_LENGTH, "tool_length", 0, Claim.TOOL_LENGTH), 0, True)
     command = _G.get((whole, hundredths))
     if command is not None:
         return Spelling(command, 0, command.claim is not Claim.NONE)
     pointless = (whole, 0) in _G and whole not in _POINTED
-    fault = faults.NOT_WHOLE if pointless else faults.UNSUPPORTED
-    return Spelling(None, fault, whole in _CLAIMING)
+    error = block_errors.NOT_WHOLE if pointless else block_errors.UNSUPPORTED
+    return Spelling(None, error, whole in _CLAIMING)
 
 
 def _round_half_away(value: float) -> int:

@@ -32,7 +32,7 @@ from miurafab.grbl.events import (
 )
 from miurafab.grbl.replies import parse_reply
 from miurafab.grbl.states import KEEPS_ACCOUNT, TRANSITIONS, Input, State
-from miurafab.wire.lines import LineReader
+from miurafab.wire.line_reader import LineReader
 
 SOFT_RESET = b"\x18"
 STATUS_QUERY = b"?"

@@ -15,7 +15,6 @@ from miurafab.errors import ProfileError
 from miurafab.grbl.codes import setting_codes
 from miurafab.grbl.events import Setting
 from miurafab.grbl.replies import parse_reply
-from miurafab.motion.parameters import COMMON_STEPS
 from miurafab.profiles import MachineProfile
 
 _LASER_MODE_IS_32 = ("grbl-1.1", "grblhal")
@@ -32,29 +31,6 @@ def profile_settings(machine: MachineProfile) -> dict[int, float]:
         tool = machine.tool
         implied = {30: tool.s_max, 31: tool.s_min, 32: 1.0 if tool.kind == "laser" else 0.0}
     return implied | machine.settings
-
-
-def virtual_settings(machine: MachineProfile) -> dict[int, float]:
-    """The settings that make a virtual controller this machine.
-
-    What :func:`profile_settings` expects, and the bed, the motion and the motor steps that the
-    time estimate assumes where the profile does not give them as settings; and the tool, which
-    firmware without ``$30`` to ``$32`` keeps elsewhere.
-    """
-    bed, motion, tool = machine.bed, machine.motion, machine.tool
-    pairs = dict.fromkeys((100, 101, 102), COMMON_STEPS) | {
-        30: tool.s_max,
-        31: tool.s_min,
-        32: 1.0 if tool.kind == "laser" and machine.dialect != "grbl-0.9" else 0.0,
-        11: motion.junction_deviation_mm,
-        110: motion.max_rate_mm_min[0],
-        111: motion.max_rate_mm_min[1],
-        120: motion.acceleration_mm_s2[0],
-        121: motion.acceleration_mm_s2[1],
-        130: bed.width_mm,
-        131: bed.height_mm,
-    }
-    return pairs | profile_settings(machine)
 
 
 def describe(number: int) -> str:

@@ -7,7 +7,6 @@ of these asks here by the machine's profile.
 from __future__ import annotations
 
 from miurafab.grbl.connection import Connection
-from miurafab.grbl.settings import virtual_settings
 from miurafab.machine.delivery import Delivery, Errand
 from miurafab.machine.grbl_delivery import NOT_CONFIRMED, WAS_RESET, GrblDelivery
 from miurafab.machine.marlin_delivery import NOT_CONFIRMED as NOT_HALTED
@@ -24,7 +23,7 @@ from miurafab.machine.transport import (
 from miurafab.motion.parameters import MotionParameters
 from miurafab.plotter.stream import DROP_ALL, PEN_UP
 from miurafab.profiles import MachineProfile
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.simulate.marlin.controller import VirtualMarlin
 from miurafab.simulate.plotter import VirtualPlotter
 

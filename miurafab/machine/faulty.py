@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from miurafab.machine.transport import Device
-from miurafab.motion.beam import BeamSegment
+from miurafab.simulate.beam import BeamSegment
 from miurafab.simulate.cable import Cable
 from miurafab.simulate.faults import Fault
 

@@ -14,7 +14,7 @@ import math
 
 from miurafab.errors import ControllerError, MiurafabError
 from miurafab.gcode.job import prepare_lines
-from miurafab.gcode.moves import BEAM_M3
+from miurafab.gcode.program import BEAM_M3
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Error, Ok, Options, StatusReport
 from miurafab.grbl.settings import Settings

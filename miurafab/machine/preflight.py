@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import ControllerError, GcodeError, InputError, MiurafabError
 from miurafab.gcode.job import SendLine
-from miurafab.gcode.moves import BEAM_M3, DWELL
-from miurafab.gcode.program import Program
+from miurafab.gcode.program import BEAM_M3, DWELL, Program
 from miurafab.grbl.events import StatusReport
 from miurafab.grbl.settings import Settings, profile_settings
 from miurafab.machine.loose_parts import burnt_on_loose_pieces, open_outlines, says_operations

@@ -25,9 +25,10 @@ import numpy as np
 
 from miurafab.errors import GcodeError, InputError
 from miurafab.gcode.execution import Jog, OffsetsChanged, Probe, Store, execute
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.parser import ModalState, parse_block
-from miurafab.gcode.program import Program, parse_program, strokes
+from miurafab.gcode.program import Program, strokes
 from miurafab.gcode.reading import read_program
 from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST, NO_MOTION
 from miurafab.machine.journal import JournalRun, job_digest

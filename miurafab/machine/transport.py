@@ -20,7 +20,7 @@ import serial
 import serial.tools.list_ports
 
 from miurafab.errors import PortError
-from miurafab.motion.beam import BeamSegment
+from miurafab.simulate.beam import BeamSegment
 from miurafab.simulate.grbl.controller import VirtualGrbl
 
 VIRTUAL = "virtual"

@@ -26,7 +26,6 @@ from pathlib import Path
 from typing import Protocol, TextIO
 
 from miurafab.errors import InputError, PortError, ProfileError
-from miurafab.grbl.settings import virtual_settings
 from miurafab.machine.actions import read_dump
 from miurafab.machine.dialects import virtual_machine
 from miurafab.machine.faulty import FaultyDevice
@@ -34,7 +33,7 @@ from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import BAUD, Device
 from miurafab.profiles import load_machine
 from miurafab.simulate.faults import Fault
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.simulate.grbl.dialect import DIALECTS
 
 STOCK = "stock"

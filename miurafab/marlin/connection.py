@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 from miurafab.gcode.job import SendLine
 from miurafab.marlin.replies import MarlinError, MarlinOk, Reply, Resend, Started, parse_reply
-from miurafab.wire.lines import LineReader
+from miurafab.wire.line_reader import LineReader
 
 EMERGENCY = b"\nM112\n"
 """Halt: motors and laser off until a reset. The newline ends what may have been begun."""

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab.gcode.moves import DWELL, RAPID, Program
+from miurafab.gcode.program import DWELL, RAPID, Program
 from miurafab.motion import cpu
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.motion.planner import Planner

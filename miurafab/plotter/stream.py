@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from miurafab.gcode.hpgl import instructions
+from miurafab.gcode.hpgl_reader import instructions
 from miurafab.gcode.job import Job
 
 XON, XOFF = 0x11, 0x13

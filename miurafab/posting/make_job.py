@@ -12,8 +12,8 @@ from miurafab.errors import ProfileError
 from miurafab.fabrication.drawing.hpgl import sheet_hpgl
 from miurafab.fabrication.knife import axis_way, tip_way
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import parse_program
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.posting.absolute_moves import hops

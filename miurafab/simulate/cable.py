@@ -1,9 +1,9 @@
 """The cable between a sender and a machine in memory, on which bytes can come to harm.
 
-Each way is a :class:`Way`: bytes go in at one end and come out at the other, at once unless they
-are lost, changed, held up or joined by noise. :class:`Cable` has both, keeps the count and the
-clock by which faults are dated, and says when the next one is due. What befalls the machine
-itself it hands back, since only the machine can do that.
+Each direction is a :class:`Channel`: bytes go in at one end and come out at the other, at once
+unless they are lost, changed, delayed or joined by noise. :class:`Cable` holds both channels,
+counts bytes and time, and says when the next fault is due. A fault of the machine itself is handed
+back to the machine.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from miurafab.simulate.faults import Fault
 _NEWLINE = 10
 
 
-class Way:
+class Channel:
     """One direction; times are in ticks."""
 
     def __init__(self, seed: int) -> None:
@@ -81,7 +81,7 @@ class Cable:
         self, faults: Iterable[Fault], on_fault: Callable[[Fault, int], None], second: int
     ) -> None:
         faults = tuple(faults)
-        self.inward, self.outward = Way(1), Way(2)
+        self.inward, self.outward = Channel(1), Channel(2)
         self.connected = True
         self._on_fault = on_fault
         self._second = second

@@ -24,7 +24,7 @@ from miurafab.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FaultKind:
     """A kind of fault: the ``unit`` of its value ("bytes", "s", "code" or "": none), the value
     it has unless given (None: it must be given), and ``does``, what happens.
     """
@@ -37,21 +37,21 @@ class Kind:
 _FOR_GOOD = math.inf
 KINDS = MappingProxyType(
     {
-        "drop": Kind("bytes", 1, "bytes from the sender are lost"),
-        "drop-reply": Kind("bytes", 1, "bytes to the sender are lost"),
-        "corrupt": Kind("bytes", 1, "bytes from the sender arrive with one bit changed"),
-        "corrupt-reply": Kind("bytes", 1, "bytes to the sender arrive with one bit changed"),
-        "noise": Kind("bytes", 8, "random bytes reach the controller"),
-        "noise-reply": Kind("bytes", 8, "random bytes reach the sender"),
-        "delay": Kind("s", None, "what the sender sends is held up for that long"),
-        "delay-reply": Kind("s", None, "what the controller says is held up for that long"),
-        "slow": Kind("s", None, "a slow host: from now on every byte takes that longer, both ways"),
-        "disconnect": Kind("s", _FOR_GOOD, "the cable comes out, for that long or for good"),
-        "reset": Kind("", None, "the controller's reset button is pressed"),
-        "power": Kind("", None, "the controller loses power for a moment"),
-        "alarm": Kind("code", 1, "the controller stops with that ALARM; 1 is a hard limit"),
-        "stall": Kind("s", 0.1, "the controller is deaf for that long, as while it writes EEPROM"),
-        "hang": Kind("s", _FOR_GOOD, "the controller's program hangs, for that long or for good"),
+        "drop": FaultKind("bytes", 1, "bytes from the sender are lost"),
+        "drop-reply": FaultKind("bytes", 1, "bytes to the sender are lost"),
+        "corrupt": FaultKind("bytes", 1, "bytes from the sender arrive with one bit changed"),
+        "corrupt-reply": FaultKind("bytes", 1, "bytes to the sender arrive with one bit changed"),
+        "noise": FaultKind("bytes", 8, "random bytes reach the controller"),
+        "noise-reply": FaultKind("bytes", 8, "random bytes reach the sender"),
+        "delay": FaultKind("s", None, "what the sender sends is delayed for that long"),
+        "delay-reply": FaultKind("s", None, "what the controller says is delayed for that long"),
+        "slow": FaultKind("s", None, "from now on every byte takes that longer, both ways"),
+        "disconnect": FaultKind("s", _FOR_GOOD, "the cable comes out, for that long or for good"),
+        "reset": FaultKind("", None, "the controller's reset button is pressed"),
+        "power": FaultKind("", None, "the controller loses power for a moment"),
+        "alarm": FaultKind("code", 1, "the controller stops with that ALARM; 1 is a hard limit"),
+        "stall": FaultKind("s", 0.1, "an EEPROM write: the controller is deaf for that long"),
+        "hang": FaultKind("s", _FOR_GOOD, "the controller hangs, for that long or for good"),
     }
 )
 """Every kind of fault."""
@@ -110,7 +110,7 @@ def parse_faults(texts: Iterable[str]) -> tuple[Fault, ...]:
     return tuple(parse_fault(text) for text in texts)
 
 
-def _value(text: str, name: str, kind: Kind, written: str | None) -> float:
+def _value(text: str, name: str, kind: FaultKind, written: str | None) -> float:
     if written is None:
         if kind.unit and kind.stock is None:
             raise InputError(f"The fault '{text}' needs a time, such as '{name}=50ms@3s'.")

@@ -12,9 +12,9 @@ import re
 from collections import deque
 from dataclasses import dataclass
 
-from miurafab.gcode.hpgl import MM_PER_UNIT
-from miurafab.motion.beam import BeamSegment
+from miurafab.gcode.hpgl_reader import MM_PER_UNIT
 from miurafab.plotter.stream import DROP_ALL, XOFF, XON
+from miurafab.simulate.beam import BeamSegment
 
 _FULL, _ROOM = 0.8, 0.4
 """How full the buffer is when it says XOFF, and XON again."""

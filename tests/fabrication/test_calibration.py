@@ -11,7 +11,8 @@ from flat_patterns import bed, card
 
 from miurafab.errors import LayoutError, ProfileError
 from miurafab.fabrication.calibration import STRIPS, calibration_sheet, gauge_mark
-from miurafab.gcode.program import parse_program, strokes
+from miurafab.gcode.interpreter import parse_program
+from miurafab.gcode.program import strokes
 from miurafab.posting.sections import post_sections
 from miurafab.profiles import OPERATIONS, load_machine, load_material, shipped_names
 from miurafab.profiles.material import Operation

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miurafab.gcode.block_errors import BlockError
 from miurafab.gcode.execution import execute
-from miurafab.gcode.faults import BlockFault
 from miurafab.gcode.numbers import read_single, single, to_unsigned, whole_byte
 from miurafab.gcode.parser import Block, ModalState, parse_block
 
@@ -30,11 +30,11 @@ def at_zero(_index: int) -> tuple[float, float, float]:
     return (0.0, 0.0, 0.0)
 
 
-def parse(line: str, state: ModalState, *, jog: bool = False) -> Block | BlockFault:
+def parse(line: str, state: ModalState, *, jog: bool = False) -> Block | BlockError:
     """The block, or why there is none."""
     try:
         return parse_block(line, state, at_zero, StockRules(), jog=jog)
-    except BlockFault as fault:
+    except BlockError as fault:
         return fault
 
 
@@ -45,7 +45,7 @@ def answer(line: str, *before: str, jog: bool = False) -> int:
         for _ in execute(parse_block(earlier, state, at_zero, rules), state, rules):
             pass
     parsed = parse(line, state, jog=jog)
-    return parsed.code if isinstance(parsed, BlockFault) else 0
+    return parsed.code if isinstance(parsed, BlockError) else 0
 
 
 REFUSALS = """
@@ -109,7 +109,7 @@ def test_parsing_leaves_the_state_alone(first: list[str], second: list[str]) -> 
         before = snapshot(state)
         block = parse(line, state)
         assert snapshot(state) == before
-        if isinstance(block, BlockFault):
+        if isinstance(block, BlockError):
             assert block.code in range(1, 39)
             assert str(block)
         else:

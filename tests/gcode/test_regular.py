@@ -12,10 +12,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from miurafab.errors import GcodeError
-from miurafab.gcode import program as reader
+from miurafab.gcode import interpreter
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.moves import Program
-from miurafab.gcode.program import parse_program
+from miurafab.gcode.program import Program
 from miurafab.gcode.regular import LEAST_RUN, read_lines
 
 NUMBERS = st.one_of(
@@ -57,8 +57,8 @@ def both(text: str, **options: bool) -> tuple[Program | str, Program | str]:
     read: list[Program | str] = []
     for least in (2, 1 << 60):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(reader, "LEAST_RUN", least)
-            patch.setattr(reader, "_CHUNK", 200)
+            patch.setattr(interpreter, "LEAST_RUN", least)
+            patch.setattr(interpreter, "_CHUNK", 200)
             try:
                 read.append(parse_program(Job("job.nc", text), **options))
             except GcodeError as refused:

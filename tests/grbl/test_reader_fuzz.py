@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from miurafab.errors import GcodeError
-from miurafab.gcode import program as reader
+from miurafab.gcode import interpreter as reader
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job, prepare
-from miurafab.gcode.moves import Program
-from miurafab.gcode.program import parse_program
-from miurafab.grbl.settings import virtual_settings
-from miurafab.motion.beam import BeamSegment
+from miurafab.gcode.program import Program
 from miurafab.profiles import load_machine
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.beam import BeamSegment
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 LASER = virtual_settings(load_machine("grbl-laser-400")) | {12: 0.01}
 STEP_MM = 1 / 80

@@ -5,16 +5,9 @@ from __future__ import annotations
 import pytest
 
 from miurafab.errors import ProfileError
-from miurafab.grbl.codes import setting_codes
 from miurafab.grbl.connection import Connection
-from miurafab.grbl.settings import (
-    Settings,
-    describe,
-    parse_dump,
-    profile_settings,
-    virtual_settings,
-)
-from miurafab.profiles import load_machine, shipped_names
+from miurafab.grbl.settings import Settings, describe, parse_dump, profile_settings
+from miurafab.profiles import load_machine
 
 DUMP = "$0=10\n$32=1\n$110=6000.000\n$120=1000.000\n$132=200.000\n$70=text\n"
 
@@ -62,18 +55,6 @@ def test_equality_is_that_of_three_printed_decimals() -> None:
 
 def test_an_unknown_number_goes_without_a_name() -> None:
     assert describe(376) == "$376"
-
-
-@pytest.mark.parametrize("name", shipped_names("firmware_profiles"))
-def test_the_virtual_machine_of_a_profile_passes_the_profiles_own_check(name: str) -> None:
-    machine = load_machine(name)
-    texts = {
-        number: f"{value:.{setting_codes()[number].decimals}f}"
-        for number, value in virtual_settings(machine).items()
-        if number in setting_codes()
-    }
-    known = {n: v for n, v in profile_settings(machine).items() if n in setting_codes()}
-    assert Settings(texts).differences(known) == ()
 
 
 def test_a_laser_implies_laser_mode() -> None:

@@ -16,12 +16,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from miurafab.grbl.settings import virtual_settings
 from miurafab.machine.virtual_server import PtyWire
-from miurafab.motion.beam import standing_seconds
 from miurafab.profiles import load_machine
+from miurafab.simulate.beam import standing_seconds
 from miurafab.simulate.faults import parse_faults
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 MACHINE = "grbl-laser-400"
 LONG = "M4 S0\n" + "".join(f"G0 X5 Y{n % 300}\nG1 X15 S500 F2000\n" for n in range(400)) + "M5\n"

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import parse_program, strokes
-from miurafab.motion.beam import BeamSegment
+from miurafab.gcode.program import strokes
+from miurafab.simulate.beam import BeamSegment
 
 STROKES = 200
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 from miurafab.errors import ControllerError, InputError, PortError, ProfileError
-from miurafab.grbl.settings import Settings, virtual_settings
+from miurafab.grbl.settings import Settings
 from miurafab.machine import actions
 from miurafab.machine.transport import open_port
 from miurafab.profiles import load_machine
+from miurafab.simulate.grbl.controller import virtual_settings
 
 LASER = virtual_settings(load_machine("grbl-laser-400"))
 

@@ -16,16 +16,15 @@ from wires import FakeWire
 
 from miurafab.errors import GcodeError, MiurafabError
 from miurafab.gcode.job import Job
-from miurafab.grbl.settings import virtual_settings
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import Resumption, resume
 from miurafab.machine.sender import StreamResult, deliver
 from miurafab.machine.signals import StopSignals
-from miurafab.motion.beam import standing_seconds
 from miurafab.profiles import load_machine
+from miurafab.simulate.beam import standing_seconds
 from miurafab.simulate.faults import parse_faults
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 MACHINE = load_machine("grbl-laser-400")
 JOB = dashes("absolute")

@@ -7,13 +7,12 @@ from wires import BANNER, FakeWire
 
 from miurafab.errors import MiurafabError
 from miurafab.gcode.job import Job
-from miurafab.grbl.settings import virtual_settings
 from miurafab.machine.planning import plan_job
 from miurafab.machine.preflight import CHECKS
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 MACHINE = load_machine("grbl-laser-400")
 OUTLINE = "(operation cut)\nG0 X10 Y10\nG1 X60 S500 F3000\nY60\nX10\nY{}\n"

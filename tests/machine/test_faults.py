@@ -23,15 +23,14 @@ from wires import FakeWire
 
 from miurafab.errors import JobStopped, MiurafabError
 from miurafab.gcode.job import Job, prepare
-from miurafab.grbl.settings import virtual_settings
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import Progress, deliver
 from miurafab.machine.signals import StopSignals
-from miurafab.motion.beam import standing_seconds
 from miurafab.profiles import load_machine
+from miurafab.simulate.beam import standing_seconds
 from miurafab.simulate.faults import KINDS, parse_faults
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.simulate.grbl.dialect import DIALECTS
 
 MACHINE = load_machine("grbl-laser-400")

@@ -11,7 +11,6 @@ from wires import FakeWire
 
 from miurafab.errors import ControllerError, JobStopped, MachineError
 from miurafab.gcode.job import Job
-from miurafab.grbl.settings import virtual_settings
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import resume
@@ -19,7 +18,7 @@ from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile, load_machine
 from miurafab.simulate.faults import parse_faults
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.simulate.grbl.dialect import DIALECTS
 
 PROFILES = ("grbl-laser-400", "grbl09-laser-300", "grblhal-laser-600", "fluidnc-laser-600")

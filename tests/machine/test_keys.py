@@ -10,9 +10,8 @@ import pytest
 from wires import FakeWire
 
 from miurafab.errors import GcodeError, InputError, JobStopped
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import parse_program
-from miurafab.grbl.settings import virtual_settings
 from miurafab.machine.actions import talk
 from miurafab.machine.keys import NoKeys, terminal_keys
 from miurafab.machine.planning import plan_job
@@ -20,7 +19,7 @@ from miurafab.machine.sender import StreamResult, deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.trace_box import frame_job
 from miurafab.profiles import load_machine
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 MACHINE = load_machine("grbl-laser-400")
 JOB = Job(

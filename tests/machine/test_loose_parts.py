@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miurafab.errors import GcodeError
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import parse_program
 from miurafab.machine.loose_parts import burnt_on_loose_pieces, open_outlines
 from miurafab.machine.planning import plan_job
 from miurafab.machine.preflight import CHECKS

@@ -15,18 +15,18 @@ from hypothesis import strategies as st
 from wires import FakeWire
 
 from miurafab.errors import GcodeError, InputError, JobStopped, MachineError
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import parse_program, strokes
-from miurafab.grbl.settings import virtual_settings
+from miurafab.gcode.program import strokes
 from miurafab.machine.journal import JournalRun, job_digest, read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import Resumption, resume
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
-from miurafab.motion.beam import standing_seconds
 from miurafab.profiles import load_machine
+from miurafab.simulate.beam import standing_seconds
 from miurafab.simulate.faults import parse_faults
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 MACHINE = load_machine("grbl-laser-400")
 KINDS = ("disconnect", "reset", "interrupt", "power", "alarm", "hang")

@@ -19,7 +19,6 @@ from miurafab.errors import (
     PortError,
 )
 from miurafab.gcode.job import Job, prepare
-from miurafab.grbl.settings import virtual_settings
 from miurafab.grbl.streamer import LineRefused
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
@@ -27,7 +26,7 @@ from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile, load_machine
 from miurafab.simulate.faults import parse_faults
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 MACHINE = load_machine("grbl-laser-400")
 

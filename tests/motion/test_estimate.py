@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from test_planner import machine
 
 from miurafab.errors import ProfileError
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import parse_program
 from miurafab.motion.estimate import Estimate, estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.profiles import load_machine, shipped_names

@@ -13,13 +13,13 @@ from collections import deque
 import numpy as np
 import pytest
 
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job, prepare
-from miurafab.gcode.program import Program, parse_program
-from miurafab.grbl.settings import virtual_settings
+from miurafab.gcode.program import Program
 from miurafab.motion.estimate import Estimate, estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.profiles import load_machine
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 MACHINES = (
     {100: 80, 110: 12_000, 120: 1000},

@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 from small_jobs import CARD, KNOWN, LASER, dashes, known_toolpath, write_folder, write_nc
 
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import parse_program
 from miurafab.posting import post
 from miurafab.workflow.dry_run import LAYERS, dry_run
 from miurafab.workflow.picture import picture, write_pictures

@@ -7,20 +7,20 @@ from collections.abc import Callable, Generator
 
 from miurafab.gcode.numbers import read_single, to_unsigned, whole_byte
 from miurafab.simulate.grbl import report
+from miurafab.simulate.grbl.eeprom import LINE_SIZE, STARTUP_LINES
 from miurafab.simulate.grbl.homing import home
-from miurafab.simulate.grbl.motion import offsets_changed, remember, run_gcode
+from miurafab.simulate.grbl.motion_control import offsets_changed, remember, run_gcode
 from miurafab.simulate.grbl.output import rest_motors, say
 from miurafab.simulate.grbl.realtime import synchronize
-from miurafab.simulate.grbl.settings import LINE_SIZE, STARTUP_LINES
-from miurafab.simulate.grbl.state import FirmwareState, Machine, RealtimeRequest, Run, Wait
+from miurafab.simulate.grbl.state import FirmwareState, Machine, RealtimeRequest, Routine, Wait
 
 _BAD_NUMBER, _UNKNOWN, _HOMING_OFF, _READ_FAILED, _NOT_IDLE = 2, 3, 5, 7, 8
-Ask = Generator[Wait, None, str | None]
+TextRoutine = Generator[Wait, None, str | None]
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)", re.ASCII)
 _LARGEST_SETTING = 255
 
 
-def command(machine: Machine, line: str) -> Run:
+def command(machine: Machine, line: str) -> Routine:
     """Execute ``line``, which begins with ``$``; :attr:`Machine.answer` is its code."""
     machine.answer = 0
     kind = line[1:2]
@@ -41,7 +41,7 @@ def command(machine: Machine, line: str) -> Run:
         yield from _AT_REST.get(kind, _setting)(machine, line)
 
 
-def run_startup_lines(machine: Machine) -> Run:
+def run_startup_lines(machine: Machine) -> Routine:
     """What ``$N`` stored runs after a reset and after homing."""
     for index in range(STARTUP_LINES):
         text = yield from _startup_text(machine, index)
@@ -52,7 +52,7 @@ def run_startup_lines(machine: Machine) -> Run:
             yield from say(machine, f">{text}:{report.status_code(machine, machine.answer)}")
 
 
-def _startup_text(machine: Machine, index: int) -> Ask:
+def _startup_text(machine: Machine, index: int) -> TextRoutine:
     settings = machine.settings
     return (
         yield from _recall(
@@ -63,7 +63,7 @@ def _startup_text(machine: Machine, index: int) -> Ask:
     )
 
 
-def _recall(machine: Machine, stored: bytes | None, store: Callable[[bytes], int]) -> Ask:
+def _recall(machine: Machine, stored: bytes | None, store: Callable[[bytes], int]) -> TextRoutine:
     """A stored text, read into the line buffer; one that is damaged is None and made empty."""
     if stored is None:
         machine.line[0] = 0
@@ -73,7 +73,7 @@ def _recall(machine: Machine, stored: bytes | None, store: Callable[[bytes], int
     return stored.partition(b"\0")[0].decode("latin-1")
 
 
-def _jog(machine: Machine, line: str) -> Run:
+def _jog(machine: Machine, line: str) -> Routine:
     if machine.state not in (FirmwareState.IDLE, FirmwareState.JOG):
         machine.answer = _NOT_IDLE
     elif line[2:3] != "=":
@@ -82,18 +82,18 @@ def _jog(machine: Machine, line: str) -> Run:
         yield from run_gcode(machine, line[3:], jog=True)
 
 
-def _list_settings(machine: Machine) -> Run:
+def _list_settings(machine: Machine) -> Routine:
     if machine.state in (FirmwareState.CYCLE, FirmwareState.HOLD):
         machine.answer = _NOT_IDLE
     else:
         yield from say(machine, report.settings_list(machine))
 
 
-def _list_modes(machine: Machine) -> Run:
+def _list_modes(machine: Machine) -> Routine:
     yield from say(machine, report.modes(machine))
 
 
-def _check_mode(machine: Machine) -> Run:
+def _check_mode(machine: Machine) -> Routine:
     if machine.state is FirmwareState.CHECK:
         machine.reset()
         yield from say(machine, report.message(machine, "Disabled"))
@@ -104,20 +104,20 @@ def _check_mode(machine: Machine) -> Run:
         yield from say(machine, report.message(machine, "Enabled"))
 
 
-def _unlock(machine: Machine) -> Run:
+def _unlock(machine: Machine) -> Routine:
     if machine.state is FirmwareState.ALARM:
         yield from say(machine, report.message(machine, "Caution: Unlocked"))
         machine.state = FirmwareState.IDLE
 
 
-def _list_parameters(machine: Machine, line: str) -> Run:
+def _list_parameters(machine: Machine, line: str) -> Routine:
     if len(line) > 2:
         machine.answer = _UNKNOWN
     else:
         yield from say(machine, report.parameters(machine))
 
 
-def _home(machine: Machine, line: str) -> Run:
+def _home(machine: Machine, line: str) -> Routine:
     if not machine.settings.values[22]:
         machine.answer = _HOMING_OFF
         return
@@ -133,7 +133,7 @@ def _home(machine: Machine, line: str) -> Run:
         machine.answer = 0
 
 
-def _sleep(machine: Machine, line: str) -> Run:
+def _sleep(machine: Machine, line: str) -> Routine:
     if line != "$SLP":
         machine.answer = _UNKNOWN
     else:
@@ -141,7 +141,7 @@ def _sleep(machine: Machine, line: str) -> Run:
     yield from ()
 
 
-def _build_info(machine: Machine, line: str) -> Run:
+def _build_info(machine: Machine, line: str) -> Routine:
     settings = machine.settings
     if len(line) == 2:
         note = yield from _recall(machine, settings.build_note(), settings.store_build_note)
@@ -153,7 +153,7 @@ def _build_info(machine: Machine, line: str) -> Run:
         yield from remember(machine, settings.store_build_note(bytes(machine.line[:LINE_SIZE])))
 
 
-def _restore(machine: Machine, line: str) -> Run:
+def _restore(machine: Machine, line: str) -> Routine:
     if not re.fullmatch(r"\$RST=[$#*]", line):
         machine.answer = _UNKNOWN
         return
@@ -163,7 +163,7 @@ def _restore(machine: Machine, line: str) -> Run:
     machine.reset()
 
 
-def _startup(machine: Machine, line: str) -> Run:
+def _startup(machine: Machine, line: str) -> Routine:
     if len(line) == 2:
         for index in range(STARTUP_LINES):
             text = yield from _startup_text(machine, index)
@@ -198,7 +198,7 @@ def _startup(machine: Machine, line: str) -> Run:
         yield from remember(machine, waits)
 
 
-def _setting(machine: Machine, line: str) -> Run:
+def _setting(machine: Machine, line: str) -> Routine:
     name = _NUMBER.match(line, 1)
     if name is None:
         machine.answer = _BAD_NUMBER

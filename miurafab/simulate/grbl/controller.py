@@ -18,16 +18,41 @@ import math
 from collections.abc import Iterable, Mapping
 
 from miurafab.errors import ProfileError
-from miurafab.grbl.settings import parse_dump
+from miurafab.grbl.settings import profile_settings
 from miurafab.motion import cpu
-from miurafab.motion.beam import BeamSegment
+from miurafab.motion.parameters import COMMON_STEPS
 from miurafab.motion.stepper import Processor
+from miurafab.profiles import MachineProfile
+from miurafab.simulate.beam import BeamSegment
 from miurafab.simulate.cable import Cable
 from miurafab.simulate.faults import Fault
 from miurafab.simulate.grbl.dialect import DIALECTS
+from miurafab.simulate.grbl.eeprom import FirmwareSettings
 from miurafab.simulate.grbl.protocol import firmware
-from miurafab.simulate.grbl.settings import FirmwareSettings
 from miurafab.simulate.grbl.state import Machine, Until, Wait
+
+
+def virtual_settings(machine: MachineProfile) -> dict[int, float]:
+    """The settings that make a virtual controller this machine.
+
+    What :func:`profile_settings` expects, and the bed, the motion and the motor steps that the
+    time estimate assumes where the profile does not give them as settings; and the tool, which
+    firmware without ``$30`` to ``$32`` keeps elsewhere.
+    """
+    bed, motion, tool = machine.bed, machine.motion, machine.tool
+    pairs = dict.fromkeys((100, 101, 102), COMMON_STEPS) | {
+        30: tool.s_max,
+        31: tool.s_min,
+        32: 1.0 if tool.kind == "laser" and machine.dialect != "grbl-0.9" else 0.0,
+        11: motion.junction_deviation_mm,
+        110: motion.max_rate_mm_min[0],
+        111: motion.max_rate_mm_min[1],
+        120: motion.acceleration_mm_s2[0],
+        121: motion.acceleration_mm_s2[1],
+        130: bed.width_mm,
+        131: bed.height_mm,
+    }
+    return pairs | profile_settings(machine)
 
 
 class VirtualGrbl:
@@ -173,18 +198,6 @@ class VirtualGrbl:
         return dict(self._machine.settings.values)
 
     # What befalls it
-
-    def load_settings_dump(self, text: str) -> tuple[int, ...]:
-        """Store the settings of a ``$$`` dump and switch off and on again.
-
-        Returns the numbers that GRBL 1.1 does not have and that were passed over. Raises
-        :class:`~miurafab.errors.ProfileError` for a line that is no setting.
-        """
-        values = parse_dump(text, "the settings dump").values
-        known = self._machine.settings.values
-        self._machine.settings.write({n: v for n, v in values.items() if n in known})
-        self.power_cycle()
-        return tuple(number for number in values if number not in known)
 
     def power_cycle(self) -> None:
         """Switch off and on: only the EEPROM survives; output not yet taken is lost."""

@@ -21,7 +21,7 @@ from miurafab.simulate.grbl.state import (
     HOMING_PULL_OFF,
     Machine,
     RealtimeRequest,
-    Run,
+    Routine,
     Until,
 )
 
@@ -30,7 +30,7 @@ _SEARCH, _LOCATE = 1.5, 5.0
 """Times the travel that is searched, and times the pull-off that is searched again."""
 
 
-def home(machine: Machine) -> Run:
+def home(machine: Machine) -> Routine:
     """``$H``: home all axes; the state is HOMING already."""
     machine.stepper.idle_lock = 0
     for axes in _CYCLES:
@@ -42,7 +42,7 @@ def home(machine: Machine) -> Run:
         sync_positions(machine)
 
 
-def _home(machine: Machine, axes: tuple[int, ...]) -> Run:
+def _home(machine: Machine, axes: tuple[int, ...]) -> Routine:
     """One cycle: search, pull off, locate, pull off."""
     values = machine.settings.values
     reach = max(_SEARCH * values[130 + axis] for axis in axes)
@@ -76,7 +76,7 @@ def _set_home(machine: Machine, axis: int) -> None:
 
 def _leg(
     machine: Machine, axes: tuple[int, ...], approach: bool, distance: float, rate: float
-) -> Run:
+) -> Routine:
     """Move ``axes`` towards their switches until each is pressed, or away by ``distance``."""
     _count_from_zero(machine, axes)
     target = machine.millimetres(machine.position)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from miurafab.motion import cpu
-from miurafab.simulate.grbl.state import FirmwareState, Machine, Run, Until
+from miurafab.simulate.grbl.state import FirmwareState, Machine, Routine, Until
 
 _DIGIT_PRINTED = 620
 """Cycles: a 32-bit division by ten for each digit of a number."""
 
 
-def say(machine: Machine, text: str) -> Run:
+def say(machine: Machine, text: str) -> Routine:
     """Print ``text``, waiting while the transmit ring is full."""
     data = text.encode("latin-1")
     done = machine.uart.write(machine.now, data)
@@ -19,7 +19,7 @@ def say(machine: Machine, text: str) -> Run:
         yield Until(done)
 
 
-def prepare(machine: Machine) -> Run:
+def prepare(machine: Machine) -> Routine:
     """Fill the segment queue."""
     stepper, generator = machine.stepper, machine.generator
     while stepper.room:
@@ -53,7 +53,7 @@ def set_flood(machine: Machine, on: bool) -> None:
         machine.override_count = 0
 
 
-def rest_motors(machine: Machine) -> Run:
+def rest_motors(machine: Machine) -> Routine:
     """Stop the step interrupt and hold the motors for the idle lock time."""
     machine.stop_motors()
     locks = machine.settings.idle_lock is not None or machine.alarm
@@ -63,7 +63,7 @@ def rest_motors(machine: Machine) -> Run:
         yield machine.settings.values[1] * 1e-3 * cpu.CLOCK
 
 
-def reset_motors(machine: Machine) -> Run:
+def reset_motors(machine: Machine) -> Routine:
     """Stop, and forget all prepared segments."""
     yield from rest_motors(machine)
     machine.generator.reset()

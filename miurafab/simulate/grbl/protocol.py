@@ -6,16 +6,16 @@ from miurafab.gcode.parser import ModalState
 from miurafab.motion import cpu
 from miurafab.simulate.grbl import report
 from miurafab.simulate.grbl.commands import command, run_startup_lines, take_settings
-from miurafab.simulate.grbl.motion import run_gcode
+from miurafab.simulate.grbl.motion_control import run_gcode
 from miurafab.simulate.grbl.output import reset_motors, say, sync_positions
 from miurafab.simulate.grbl.realtime import realtime, start_when_idle
-from miurafab.simulate.grbl.state import FirmwareState, Machine, Run
+from miurafab.simulate.grbl.state import FirmwareState, Machine, Routine
 
 _LOCKED, _TOO_LONG = 9, 11
 _ENDS = (0x0A, 0x0D)
 
 
-def firmware(machine: Machine) -> Run:
+def firmware(machine: Machine) -> Routine:
     """The program from power-up, for ever: each reset leads back to its start."""
     while True:
         yield from _restart(machine)
@@ -24,7 +24,7 @@ def firmware(machine: Machine) -> Run:
         yield from _serve(machine)
 
 
-def _restart(machine: Machine) -> Run:
+def _restart(machine: Machine) -> Routine:
     """What a reset clears; the machine's position survives it."""
     machine.clear()
     machine.uart.ring.clear()
@@ -38,7 +38,7 @@ def _restart(machine: Machine) -> Run:
     sync_positions(machine)
 
 
-def _serve(machine: Machine) -> Run:
+def _serve(machine: Machine) -> Routine:
     if machine.settings.values[21] and machine.engaged_limits():
         machine.state = FirmwareState.ALARM
         yield from say(machine, report.message(machine, "Check Limits"))
@@ -48,7 +48,7 @@ def _serve(machine: Machine) -> Run:
     else:
         machine.state = FirmwareState.IDLE
         yield from run_startup_lines(machine)
-    reader = _LineReader(machine.line)
+    reader = _LineBuffer(machine.line)
     ring = machine.uart.ring
     while True:
         while ring:
@@ -71,7 +71,7 @@ def _serve(machine: Machine) -> Run:
             yield None
 
 
-def _line(machine: Machine, reader: _LineReader) -> Run:
+def _line(machine: Machine, reader: _LineBuffer) -> Routine:
     """Execute the line that was read, and answer it."""
     text, too_long = reader.finish()
     if too_long:
@@ -87,7 +87,7 @@ def _line(machine: Machine, reader: _LineReader) -> Run:
     yield from say(machine, report.status_code(machine, machine.answer))
 
 
-class _LineReader:
+class _LineBuffer:
     """Collects a line: blanks, comments and slashes dropped, letters upper case, 79 at most."""
 
     def __init__(self, buffer: bytearray) -> None:

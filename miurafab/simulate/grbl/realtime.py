@@ -25,7 +25,7 @@ from miurafab.simulate.grbl.state import (
     FirmwareState,
     Machine,
     RealtimeRequest,
-    Run,
+    Routine,
     StopOverride,
     Suspend,
     Until,
@@ -56,14 +56,14 @@ _STEPPING = {
 _FLOOD_STATES = {FirmwareState.IDLE, FirmwareState.CYCLE, FirmwareState.HOLD, FirmwareState.JOG}
 
 
-def realtime(machine: Machine) -> Run:
+def realtime(machine: Machine) -> Routine:
     """Do what the flags ask; while suspended, stay here."""
     yield from flags(machine)
     if machine.suspend:
         yield from _suspended(machine)
 
 
-def flags(machine: Machine) -> Run:
+def flags(machine: Machine) -> Routine:
     """Do what the flags ask, once."""
     if machine.pending():
         yield from _flags(machine)
@@ -79,7 +79,7 @@ def start_when_idle(machine: Machine) -> None:
         machine.requests.add(RealtimeRequest.START)
 
 
-def synchronize(machine: Machine) -> Run:
+def synchronize(machine: Machine) -> Routine:
     """Wait until all motion is made (or the machine is reset)."""
     while True:
         start_when_idle(machine)
@@ -92,7 +92,7 @@ def synchronize(machine: Machine) -> Run:
             yield None
 
 
-def dwell(machine: Machine, seconds: float) -> Run:
+def dwell(machine: Machine, seconds: float) -> Routine:
     """Wait ``seconds``, in steps of 50 ms with a look at the flags before each."""
     for _ in range(cpu.dwell_steps(seconds)):
         if machine.abort:
@@ -101,7 +101,7 @@ def dwell(machine: Machine, seconds: float) -> Run:
         yield float(cpu.DWELL_STEP)
 
 
-def _flags(machine: Machine) -> Run:
+def _flags(machine: Machine) -> Routine:
     if machine.interrupt_delay:
         delay, machine.interrupt_delay = machine.interrupt_delay, 0
         yield Until(machine.now + delay)
@@ -131,7 +131,7 @@ def _flags(machine: Machine) -> Run:
         _override_accessories(machine)
 
 
-def _raise_alarm(machine: Machine) -> Run:
+def _raise_alarm(machine: Machine) -> Routine:
     machine.state = FirmwareState.ALARM
     yield from say(machine, machine.dialect.alarm_text(machine.alarm))
     yield _ALARM_PAUSE * cpu.CLOCK
@@ -143,7 +143,7 @@ def _raise_alarm(machine: Machine) -> Run:
     machine.alarm = 0
 
 
-def _hold(machine: Machine, requests: set[RealtimeRequest]) -> Run:
+def _hold(machine: Machine, requests: set[RealtimeRequest]) -> Routine:
     if machine.state not in (FirmwareState.ALARM, FirmwareState.CHECK):
         suspend = machine.suspend
         if machine.state in (FirmwareState.CYCLE, FirmwareState.JOG):
@@ -172,7 +172,7 @@ def _hold(machine: Machine, requests: set[RealtimeRequest]) -> Run:
         machine.state = FirmwareState.SLEEP
 
 
-def _start(machine: Machine) -> Run:
+def _start(machine: Machine) -> Routine:
     suspend = machine.suspend
     if machine.state is FirmwareState.DOOR and Suspend.DOOR_AJAR not in suspend:
         if Suspend.RESTORED in suspend:
@@ -197,7 +197,7 @@ def _start(machine: Machine) -> Run:
         machine.state = FirmwareState.IDLE
 
 
-def _stop(machine: Machine) -> Run:
+def _stop(machine: Machine) -> Routine:
     """All prepared motion is made: a hold is complete, or the cycle is over."""
     generator, suspend = machine.generator, machine.suspend
     holding = machine.state in (FirmwareState.HOLD, FirmwareState.DOOR, FirmwareState.SLEEP)
@@ -261,7 +261,7 @@ def _override_accessories(machine: Machine) -> None:
         set_flood(machine, bool(machine.parser.coolant))
 
 
-def _suspended(machine: Machine) -> Run:
+def _suspended(machine: Machine) -> Routine:
     """Stay until the hold, door or cancelled motion is over."""
     move = machine.planner.moves[0] if machine.planner.moves else None
     if move is None:
@@ -297,7 +297,7 @@ def _progress(machine: Machine) -> tuple[object, ...]:
     )
 
 
-def _sleep(machine: Machine) -> Run:
+def _sleep(machine: Machine) -> Routine:
     yield from say(machine, report.message(machine, "Sleeping"))
     set_spindle(machine, 0, 0.0)
     set_flood(machine, False)
@@ -308,7 +308,7 @@ def _sleep(machine: Machine) -> Run:
             yield None
 
 
-def _door(machine: Machine, restore: tuple[int, float, bool]) -> Run:
+def _door(machine: Machine, restore: tuple[int, float, bool]) -> Routine:
     """Power down once stopped; on a start with the door closed, power up and go on."""
     suspend = machine.suspend
     if Suspend.RETRACTED not in suspend:
@@ -335,7 +335,7 @@ def _door(machine: Machine, restore: tuple[int, float, bool]) -> Run:
         machine.requests.add(RealtimeRequest.START)
 
 
-def _restore_wait(machine: Machine, seconds: float) -> Run:
+def _restore_wait(machine: Machine, seconds: float) -> Routine:
     """Let spindle or coolant come up, unless the door opens again."""
     for _ in range(cpu.dwell_steps(seconds)):
         yield from flags(machine)
@@ -344,7 +344,7 @@ def _restore_wait(machine: Machine, seconds: float) -> Run:
         yield float(cpu.DWELL_STEP)
 
 
-def _held(machine: Machine, restore: tuple[int, float, bool]) -> Run:
+def _held(machine: Machine, restore: tuple[int, float, bool]) -> Routine:
     """In a complete hold: stop the spindle if asked, bring it back before going on."""
     stop = machine.stop_override
     spindle, word, _ = restore

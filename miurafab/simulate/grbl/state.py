@@ -19,10 +19,10 @@ from miurafab.motion.parameters import MotionParameters
 from miurafab.motion.planner import Planner
 from miurafab.motion.segments import Segment, SegmentGenerator
 from miurafab.motion.stepper import Stepper, steps_taken
-from miurafab.simulate.grbl.beam import BeamLog
+from miurafab.simulate.beam import BeamLog
 from miurafab.simulate.grbl.dialect import Dialect
-from miurafab.simulate.grbl.settings import LINE_SIZE, FirmwareSettings
-from miurafab.simulate.grbl.wire import Uart
+from miurafab.simulate.grbl.eeprom import LINE_SIZE, FirmwareSettings
+from miurafab.simulate.grbl.uart import Uart
 
 AXES = "XYZ"
 
@@ -35,7 +35,7 @@ class Until:
 
 
 Wait = float | Until | None
-Run = Generator[Wait, None, None]
+Routine = Generator[Wait, None, None]
 
 
 class FirmwareState(Enum):

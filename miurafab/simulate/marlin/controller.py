@@ -15,14 +15,14 @@ from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
-from miurafab.gcode.execution import Line, execute
-from miurafab.gcode.faults import BlockFault
+from miurafab.gcode.block_errors import BlockError
+from miurafab.gcode.execution import StraightMove, execute
 from miurafab.gcode.marlin import grbl_words
 from miurafab.gcode.parser import ModalState, parse_block
 from miurafab.marlin.connection import checksum
-from miurafab.motion.beam import BeamSegment
 from miurafab.motion.parameters import MotionParameters
-from miurafab.simulate.marlin.motion import Carriage
+from miurafab.simulate.beam import BeamSegment
+from miurafab.simulate.marlin.carriage import Carriage
 
 QUEUE = 4
 """Commands that wait (``BUFSIZE``)."""
@@ -36,7 +36,7 @@ _WORD = re.compile(r"([A-Z])([-+]?[\d.]*)")
 _NAME = re.compile(r"([GM])0*(\d+)(?:\.\d+)?(?=[A-Z]|$)")
 _CUTTER = re.compile(r"M0*([345])(I?)(?:S([\d.]+))?(I?)$")
 
-Command = Generator[Callable[[], bool], None, None]
+CommandRoutine = Generator[Callable[[], bool], None, None]
 """A command under way: it yields what must be true before it goes on."""
 
 
@@ -90,7 +90,7 @@ class VirtualMarlin:
         self._text = bytearray()
         self._early = bytearray()
         self._queue: deque[str] = deque()
-        self._command: Command | None = None
+        self._command: CommandRoutine | None = None
         self._condition: Callable[[], bool] = _now
         self._busy_at = self._wake_at = math.inf
         self._thaws_at = -math.inf
@@ -276,7 +276,7 @@ class VirtualMarlin:
 
     # Commands
 
-    def _obey(self, code: str) -> Command:
+    def _obey(self, code: str) -> CommandRoutine:
         name = _NAME.match(code)
         words = dict(_WORD.findall(code[name.end() :] if name else ""))
         said = f"{name[1]}{name[2]}" if name else ""
@@ -309,11 +309,11 @@ class VirtualMarlin:
         else:
             yield from self._gcode(code)
 
-    def _until(self, end: float) -> Command:
+    def _until(self, end: float) -> CommandRoutine:
         self._wake_at = end
         yield lambda: self.now >= end
 
-    def _cutter(self, match: re.Match[str]) -> Command:
+    def _cutter(self, match: re.Match[str]) -> CommandRoutine:
         off = match[1] == "5"
         self._inline = bool(match[2] or match[4]) and not off
         power = float(match[3] or 0) / self._parameters.s_max
@@ -324,7 +324,7 @@ class VirtualMarlin:
         self._power = 0.0
         self._carriage.stand(self.now, 0.0 if off else power)
 
-    def _gcode(self, code: str) -> Command:
+    def _gcode(self, code: str) -> CommandRoutine:
         try:
             code = grbl_words(code)
         except ValueError:
@@ -334,13 +334,13 @@ class VirtualMarlin:
         state.feed = state.feed or _STOCK_FEED
         try:
             block = parse_block(code, state, lambda index: (0.0, 0.0, 0.0), rules)
-        except BlockFault:
+        except BlockError:
             self._say(f'echo:Unknown command: "{code}"')
             return
         rapid = block.motion == 0
         self._power = 0.0 if rapid else block.words.get("S", self._power)
         for action in execute(block, state, rules):
-            if isinstance(action, Line):
+            if isinstance(action, StraightMove):
                 yield lambda: not self._carriage.planner.full
                 power = self._power if self._inline else 0.0
                 self._carriage.plan(self.now, action.target, state.feed, power)

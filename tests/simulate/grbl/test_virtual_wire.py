@@ -10,7 +10,9 @@ from virtual_player import BANNER, LASER, ask, play, ready
 from miurafab.errors import ProfileError
 from miurafab.gcode.numbers import single
 from miurafab.grbl.codes import alarm_codes, error_codes, setting_codes
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.grbl.settings import Settings, parse_dump, profile_settings
+from miurafab.profiles import load_machine, shipped_names
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.simulate.grbl.report import number
 
 
@@ -221,8 +223,7 @@ def test_numbers_are_rounded_as_the_firmware_rounds(value: float, decimals: int,
 
 def test_a_settings_dump_is_taken_over() -> None:
     source = ready({110: 7000, 32: 1, 100: 80})
-    device = VirtualGrbl()
-    assert device.load_settings_dump(ask(source, "$$") + "$77=1\n") == (77,)
+    device = VirtualGrbl(parse_dump(ask(source, "$$"), "dump").values)
     assert device.settings == source.settings
     assert device.take_output().decode() == BANNER
 
@@ -230,8 +231,18 @@ def test_a_settings_dump_is_taken_over() -> None:
 def test_an_unknown_setting_is_refused_by_number() -> None:
     with pytest.raises(ProfileError, match=r"\$77 is not a setting of GRBL 1\.1"):
         VirtualGrbl({77: 1})
-    with pytest.raises(ProfileError, match="line 1: 'nonsense' is not a setting"):
-        VirtualGrbl().load_settings_dump("nonsense")
+
+
+@pytest.mark.parametrize("name", shipped_names("firmware_profiles"))
+def test_the_virtual_machine_of_a_profile_passes_the_profiles_own_check(name: str) -> None:
+    machine = load_machine(name)
+    texts = {
+        number: f"{value:.{setting_codes()[number].decimals}f}"
+        for number, value in virtual_settings(machine).items()
+        if number in setting_codes()
+    }
+    known = {n: v for n, v in profile_settings(machine).items() if n in setting_codes()}
+    assert Settings(texts).differences(known) == ()
 
 
 def test_power_off_in_motion_forgets_position_and_alarm() -> None:

@@ -8,8 +8,8 @@ import pytest
 from firmware_jobs import TIMED
 from virtual_player import ready, stream
 
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job, prepare
-from miurafab.gcode.program import parse_program
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import MotionParameters
 

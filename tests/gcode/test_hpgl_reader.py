@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from miurafab.errors import GcodeError
-from miurafab.gcode.hpgl import parse_hpgl
+from miurafab.gcode.hpgl_reader import parse_hpgl
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import parse_program, strokes
+from miurafab.gcode.program import strokes
 
 
 def read(text: str):
@@ -20,9 +21,9 @@ def test_moves_pens_speed_and_force() -> None:
     assert program.power.tolist() == [0, 80, 80, 0]
     assert program.feed_mm_min.tolist() == [0, 3000, 3000, 0]
     assert program.line.tolist() == [3, 3, 3, 4]
-    (stroke,) = [strokes(program).stroke(0)]
-    assert stroke[:, :2].tolist() == [[10, 20], [20, 20], [20, 10]]
-    assert strokes(program).context_of(0).operation == "cut"
+    burnt = strokes(program)
+    assert burnt.stroke(0)[:, :2].tolist() == [[10, 20], [20, 20], [20, 10]]
+    assert burnt.contexts[burnt.context[0]].operation == "cut"
     assert program.line_bytes.sum() == len("IN;PA;\nPU;SP4;VS5;FS80;\n") + len(
         "PU400,800;PD800,800,800,400;\nPU;PU0,0;SP0;\n"
     )

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from miurafab.motion.beam import BeamSegment
 from miurafab.motion.parameters import MotionParameters
 from miurafab.motion.planner import Move, Planner
+from miurafab.simulate.beam import BeamSegment
 
 _FIRST_MOVE_S = 0.1
 

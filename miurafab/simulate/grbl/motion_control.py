@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+from miurafab.gcode.block_errors import BlockError
 from miurafab.gcode.execution import (
     Action,
     CoolantSync,
     Dwell,
     Jog,
-    Line,
     OffsetsChanged,
     Pause,
     Probe,
     ProgramEnd,
     SpindleSync,
     Store,
+    StraightMove,
     Synchronize,
     execute,
 )
-from miurafab.gcode.faults import BlockFault
 from miurafab.gcode.parser import parse_block
 from miurafab.motion import cpu
 from miurafab.simulate.grbl import report
@@ -37,7 +37,7 @@ from miurafab.simulate.grbl.state import (
     FirmwareState,
     Machine,
     RealtimeRequest,
-    Run,
+    Routine,
 )
 
 _TRAVEL_EXCEEDED = 15
@@ -45,7 +45,7 @@ _EEPROM_BYTE = round(3.4e-3 * cpu.CLOCK)
 """Cycles to program one EEPROM byte (ATmega328P data sheet, table 8-2)."""
 
 
-def run_gcode(machine: Machine, line: str, *, jog: bool = False) -> Run:
+def run_gcode(machine: Machine, line: str, *, jog: bool = False) -> Routine:
     """Execute one line of G-code (or what follows ``$J=``); :attr:`Machine.answer` is its code."""
     letters = sum("A" <= character <= "Z" for character in line)
     yield float(cpu.LINE_FIXED + cpu.words_cost(letters, len(line), line.count(".")))
@@ -53,7 +53,7 @@ def run_gcode(machine: Machine, line: str, *, jog: bool = False) -> Run:
     machine.answer = 0
     try:
         block = parse_block(line, machine.parser, settings.position, settings, jog=jog)
-    except BlockFault as fault:
+    except BlockError as fault:
         machine.answer = fault.code
         return
     chord = float(cpu.ARC_CHORD) if block.radius else 0.0
@@ -64,7 +64,7 @@ def run_gcode(machine: Machine, line: str, *, jog: bool = False) -> Run:
         yield from _perform(machine, action)
 
 
-def remember(machine: Machine, waits: int) -> Run:
+def remember(machine: Machine, waits: int) -> Routine:
     """Write to the EEPROM: deaf while waiting for each byte that must be programmed first."""
     for _ in range(waits):
         machine.uart.deaf = machine.dialect.deaf_writes
@@ -72,15 +72,15 @@ def remember(machine: Machine, waits: int) -> Run:
         machine.uart.hear(machine.now)
 
 
-def offsets_changed(machine: Machine) -> Run:
+def offsets_changed(machine: Machine) -> Routine:
     """Let all motion end, and report the new offset next."""
     yield from synchronize(machine)
     machine.offset_count = 0
 
 
-def _perform(machine: Machine, action: Action) -> Run:
+def _perform(machine: Machine, action: Action) -> Routine:
     checking = machine.state is FirmwareState.CHECK
-    if isinstance(action, Line):
+    if isinstance(action, StraightMove):
         yield from line(machine, action)
     elif isinstance(action, Jog):
         yield from _jog(machine, action)
@@ -113,7 +113,7 @@ def _perform(machine: Machine, action: Action) -> Run:
         yield from _end_program(machine)
 
 
-def line(machine: Machine, move: Line) -> Run:
+def line(machine: Machine, move: StraightMove) -> Routine:
     """Plan a line as soon as there is room."""
     if machine.settings.values[20] and machine.state is not FirmwareState.JOG:
         yield from _check_soft_limits(machine, move)
@@ -145,7 +145,7 @@ def line(machine: Machine, move: Line) -> Run:
         set_spindle(machine, 3, move.speed)
 
 
-def _check_soft_limits(machine: Machine, move: Line) -> Run:
+def _check_soft_limits(machine: Machine, move: StraightMove) -> Routine:
     """A target beyond the travel: stop in good order, then the alarm."""
     if not machine.settings.beyond_travel(move.target):
         return
@@ -160,7 +160,7 @@ def _check_soft_limits(machine: Machine, move: Line) -> Run:
     yield from realtime(machine)
 
 
-def _until_idle(machine: Machine) -> Run:
+def _until_idle(machine: Machine) -> Routine:
     """Wait until the motion under way has ended, or the machine is reset."""
     while True:
         yield from realtime(machine)
@@ -170,7 +170,7 @@ def _until_idle(machine: Machine) -> Run:
             yield None
 
 
-def _jog(machine: Machine, jog: Jog) -> Run:
+def _jog(machine: Machine, jog: Jog) -> Routine:
     settings = machine.settings
     if settings.values[20] and settings.beyond_travel(jog.line.target):
         jog.accepted = False
@@ -183,7 +183,7 @@ def _jog(machine: Machine, jog: Jog) -> Run:
         machine.stepper.wake(machine.now)
 
 
-def _probe(machine: Machine, probe: Probe) -> Run:
+def _probe(machine: Machine, probe: Probe) -> Routine:
     """Move until the probe changes (``mc_probe_cycle``), and leave the parser where that is."""
     if machine.is_in(FirmwareState.CHECK):
         machine.parser.position = list(probe.line.target)
@@ -205,7 +205,7 @@ def _probe(machine: Machine, probe: Probe) -> Run:
     yield from _end_probe(machine, probe)
 
 
-def _end_probe(machine: Machine, probe: Probe) -> Run:
+def _end_probe(machine: Machine, probe: Probe) -> Routine:
     if machine.abort:
         return
     machine.probe_succeeded = machine.probe_seen
@@ -225,7 +225,7 @@ def _end_probe(machine: Machine, probe: Probe) -> Run:
         machine.parser.position = list(probe.line.target)
 
 
-def _end_program(machine: Machine) -> Run:
+def _end_program(machine: Machine) -> Routine:
     machine.planner.feed_override = machine.planner.rapid_override = 100
     machine.spindle_override = 100
     if machine.state is not FirmwareState.CHECK:

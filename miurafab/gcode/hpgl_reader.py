@@ -1,4 +1,4 @@
-"""A plotter's HPGL file read back to a :class:`~miurafab.gcode.moves.Program`.
+"""A plotter's HPGL file read back to a :class:`~miurafab.gcode.program.Program`.
 
 Read is what a cutter needs of HP-GL: ``IN``, ``PA``, ``PR``, ``PU``, ``PD``, ``SP``, ``VS`` and
 ``FS``. A plotter unit is 0.025 mm, ``VS`` is in cm/s, and the pen's number says which operation a
@@ -16,7 +16,7 @@ import numpy as np
 from miurafab.errors import GcodeError
 from miurafab.gcode.columns import Columns
 from miurafab.gcode.job import Job
-from miurafab.gcode.moves import BEAM_M3, FEED, RAPID, Context, Program
+from miurafab.gcode.program import BEAM_M3, FEED, RAPID, Context, Program
 from miurafab.profiles import OPERATIONS
 
 MM_PER_UNIT = 0.025

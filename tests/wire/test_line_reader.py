@@ -7,7 +7,7 @@ from itertools import pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miurafab.wire.lines import MOST_BYTES, LineReader
+from miurafab.wire.line_reader import MOST_BYTES, LineReader
 
 
 @settings(derandomize=True, max_examples=60)

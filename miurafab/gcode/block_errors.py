@@ -56,7 +56,7 @@ _SENTENCES = {
 }
 
 
-class BlockFault(Exception):
+class BlockError(Exception):
     """A block that the controller would refuse: its error ``code``, and ``what`` is at fault."""
 
     def __init__(self, code: int, what: str) -> None:

@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from virtual_player import RECORDED, ready, stream, until_answer
 
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job, prepare
-from miurafab.gcode.program import parse_program
-from miurafab.motion.beam import standing_seconds
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import MotionParameters
+from miurafab.simulate.beam import standing_seconds
 
-DATA = Path(__file__).parent.parent / "data" / "grbl"
+DATA = Path(__file__).parents[2] / "data" / "grbl"
 CASES = json.loads((DATA / "transcripts.json").read_text(encoding="utf-8"))
 MEASURED = json.loads((DATA / "measured.json").read_text(encoding="ascii"))["jobs"]
 _NUMBER = re.compile(r"-?\d+\.?\d*")

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miurafab.errors import GcodeError
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.gcode.moves import DWELL, END, PAUSE, SYNC, Context
-from miurafab.gcode.program import Program, parse_program, strokes
+from miurafab.gcode.program import DWELL, END, PAUSE, SYNC, Context, Program, strokes
 
 
 def read(text: str, **options: object) -> Program:
@@ -125,7 +125,7 @@ def test_strokes_join_what_burns_and_know_where_they_belong() -> None:
         [5, 6],
         [0, 1],
     ]
-    assert [burnt.context_of(i) for i in range(4)] == [
+    assert [burnt.contexts[burnt.context[i]] for i in range(4)] == [
         Context("A", "1", "perforate"),
         Context("A", "1", "perforate"),
         Context("A", "1", "cut"),

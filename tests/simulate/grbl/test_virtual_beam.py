@@ -5,10 +5,9 @@ from __future__ import annotations
 import pytest
 from virtual_player import LASER, RECORDED, play, ready
 
-from miurafab.grbl.settings import virtual_settings
-from miurafab.motion.beam import BeamSegment, standing_seconds
 from miurafab.profiles import load_machine
-from miurafab.simulate.grbl.controller import VirtualGrbl
+from miurafab.simulate.beam import BeamSegment, standing_seconds
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 
 def burnt(device: VirtualGrbl) -> list[BeamSegment]:
