@@ -28,7 +28,9 @@ SIZES = (5, 10, 20, 30, 45, 60)
 
 def measure(surface: str, cells: int, steps: int) -> dict[str, float | int | bool]:
     """One sheet of ``cells`` x ``cells``: times in seconds, and what was found."""
-    request = FitRequest(make_surface(surface, {})[0], 2 * cells, 2 * cells, size_mm=200.0)
+    request = FitRequest(
+        surface=make_surface(surface, {})[0], facets=(2 * cells, 2 * cells), size_mm=200.0
+    )
     pattern = fit(request).pattern
     if pattern is None:
         raise SystemExit(f"{surface} cannot be fitted with {2 * cells}x{2 * cells} facets.")

@@ -48,7 +48,9 @@ def developable(name: str, facets: int) -> CreasePattern:
     """The sheet that is fitted to a target when nothing is asked about flat-foldability."""
     surface, parameters = make_surface(name, TARGETS[name])
     target = {"surface": name, "parameters": parameters}
-    pattern = fit(FitRequest(surface, facets, facets, size_mm=SIZE_MM, target=target)).pattern
+    pattern = fit(
+        FitRequest(surface=surface, facets=(facets, facets), size_mm=SIZE_MM, target=target)
+    ).pattern
     assert pattern is not None, name
     return pattern
 
@@ -91,7 +93,9 @@ def scaled(name: str, facets: int, worst: float) -> CreasePattern:
 def fitted(name: str, facets: int, worst: float) -> FitResult:
     """What the fit gives when it is asked for residuals within ``worst``, 0 for exact."""
     surface, _ = make_surface(name, TARGETS[name])
-    return fit(FitRequest(surface, facets, facets, size_mm=SIZE_MM, flat_foldable=worst))
+    return fit(
+        FitRequest(surface=surface, facets=(facets, facets), size_mm=SIZE_MM, flat_foldable=worst)
+    )
 
 
 def _pattern(like: CreasePattern, x: np.ndarray) -> CreasePattern:

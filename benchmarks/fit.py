@@ -58,7 +58,9 @@ def whole_fit(target: str, facets: int) -> dict[str, Any]:
     """One fit, and again the solving alone."""
     side = round(math.sqrt(facets))
     worked = time.process_time()
-    result: FitResult = fit(FitRequest(make_surface(target, {})[0], side, side, size_mm=200.0))
+    result: FitResult = fit(
+        FitRequest(surface=make_surface(target, {})[0], facets=(side, side), size_mm=200.0)
+    )
     worked = time.process_time() - worked
     x, constraints = start(target, facets)
     began = time.perf_counter()

@@ -34,9 +34,9 @@ def main() -> int:
     failed = False
     for name in options.targets:
         surface, _ = make_surface(name, {})
-        request = FitRequest(surface, side, side, size_mm=200.0, flat_foldable=0.0)
+        request = FitRequest(surface=surface, facets=(side, side), size_mm=200.0, flat_foldable=0.0)
         result = fit(request)
-        without = fit(FitRequest(surface, side, side, size_mm=200.0)).measurements
+        without = fit(FitRequest(surface=surface, facets=(side, side), size_mm=200.0)).measurements
         m = result.measurements
         if m is None or without is None or result.pattern is None:
             print(f"{name:<12} {result.advice}")

@@ -23,8 +23,8 @@ from scipy.spatial import Delaunay, cKDTree
 
 from miurafab.errors import TargetError
 from miurafab.origami.fitting.fit import FitRequest, fit
+from miurafab.origami.fitting.request import FacetCounts
 from miurafab.surfaces.mesh import mesh_surface
-from miurafab.workflow.design import parse_facets
 
 Array = np.ndarray
 Formula = Callable[[Array, Array], Array]
@@ -247,7 +247,7 @@ def trial(name: str, mesh: tuple[Array, Array], facets: tuple[int, int]) -> dict
         surface = mesh_surface(*mesh, name)
     except TargetError as refusal:
         return answer | {"why": str(refusal), "seconds": time.perf_counter() - started}
-    result = fit(FitRequest(surface, *facets))
+    result = fit(FitRequest(surface=surface, facets=facets))
     answer |= {
         "status": result.status,
         "attempts": len(result.attempts),
@@ -293,7 +293,7 @@ def main() -> None:
     print(f"{'mesh':14} {'fitted':6} {'residual':>9} {'deviation':>9} {'tries':>5} {'s':>6}  how")
     answers = []
     for name, mesh in chosen.items():
-        a = trial(name, mesh, parse_facets(asked.facets))
+        a = trial(name, mesh, FacetCounts().read(asked.facets))
         answers.append(a)
         print(
             f"{name:14} {'yes' if a['fitted'] else 'no':6} {a.get('residual', np.nan):9.1e} "

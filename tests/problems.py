@@ -33,9 +33,8 @@ def fitted(
     """A named surface with its default parameters, 200 mm long."""
     surface, parameters = make_surface(name, {})
     request = FitRequest(
-        surface,
-        columns,
-        rows,
+        surface=surface,
+        facets=(columns, rows),
         size_mm=200.0,
         flat_foldable=flat_foldable,
         target={"surface": name, "parameters": parameters},

@@ -30,7 +30,7 @@ from miurafab.cli import (
     tradeoff,
     virtual,
 )
-from miurafab.errors import MiurafabError
+from miurafab.errors import MiurafabError, spell_options
 from miurafab.version import __version__
 from miurafab.workflow.json_text import json_text
 
@@ -84,16 +84,20 @@ def main(serve_studio: studio.ServeStudio) -> NoReturn:
     try:
         app(obj=serve_studio)
     except MiurafabError as error:
-        _fail(str(error), type(error).__name__, error.exit_code)
+        _fail(_spelt(error), type(error).__name__, error.exit_code)
     except OSError as error:
         told = error.__context__
         while told is not None and not isinstance(told, MiurafabError):
             told = told.__context__
         if told is not None:  # the terminal went away while this was being shown
-            _fail(str(told), type(told).__name__, told.exit_code)
+            _fail(_spelt(told), type(told).__name__, told.exit_code)
         where = f"{error.filename}: " if error.filename else ""
         _fail(f"{where}{error.strerror or error}.", type(error).__name__, 2)
     sys.exit(0)
+
+
+def _spelt(error: MiurafabError) -> str:
+    return spell_options(error.sentence, lambda name: "--" + name.replace("_", "-"))
 
 
 def _fail(sentence: str, kind: str, exit_code: int) -> NoReturn:

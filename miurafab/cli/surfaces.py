@@ -25,9 +25,9 @@ def surfaces(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
                 "parameters": {
                     key: {
                         "default": parameter.default,
-                        "low": parameter.low,
-                        "high": parameter.high,
-                        "unit": "deg" if parameter.is_angle else "",
+                        "low": parameter.kind.low,
+                        "high": parameter.kind.high,
+                        "unit": parameter.kind.unit.strip(),
                         "meaning": parameter.meaning,
                     }
                     for key, parameter in entry.parameters.items()
@@ -48,8 +48,4 @@ def surfaces(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
 
 
 def _defaults(parameters: Mapping[str, SurfaceParameter]) -> str:
-    parts = []
-    for key, parameter in parameters.items():
-        text = f"{parameter.default:g}{'deg' if parameter.is_angle else ''}"
-        parts.append(f"{key}={text}")
-    return ",".join(parts)
+    return ",".join(f"{key}={each.default_text}" for key, each in parameters.items())

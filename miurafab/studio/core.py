@@ -27,6 +27,7 @@ from urllib.parse import unquote
 import miurafab
 from miurafab.errors import MiurafabError
 from miurafab.fabrication.options import TAB_SIDES
+from miurafab.origami.fitting.request import DEFAULT_FACETS, DEFAULT_SIZE_MM, FacetCounts
 from miurafab.profiles import load_machine, load_material, shipped_names
 from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
@@ -34,7 +35,7 @@ from miurafab.studio.orders import read_fit, read_layout, read_source
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
 from miurafab.surfaces.mesh import MESH_SUFFIXES
-from miurafab.workflow.design import DEFAULT_FACETS, DEFAULT_SIZE_MM, can_close
+from miurafab.workflow.design import can_close
 
 PAGE = "studio.html"
 PARTS = ("icon.svg", "studio.css", "tools.js", "choices.js", "results.js", "studio.js")
@@ -123,7 +124,7 @@ def _catalogue() -> dict[str, Any]:
         "file_suffixes": (*MESH_SUFFIXES, PATTERN_SUFFIX),
         "file_limit": FILE_LIMIT,
         "defaults": {
-            "facets": DEFAULT_FACETS,
+            "facets": FacetCounts().show(DEFAULT_FACETS),
             "size": f"{DEFAULT_SIZE_MM:g}mm",
             "machine": miurafab.DEFAULT_MACHINE,
             "material": miurafab.DEFAULT_MATERIAL,
@@ -133,21 +134,19 @@ def _catalogue() -> dict[str, Any]:
 
 def _surface(entry: NamedSurface) -> dict[str, Any]:
     surface, values = make_surface(entry.name, {})
-    parameters = []
-    for key, parameter in entry.parameters.items():
-        parameters.append(
-            {
-                "key": key,
-                "meaning": parameter.meaning,
-                "unit": "deg" if parameter.is_angle else "",
-                "default": f"{parameter.default:g}",
-                "low": parameter.low,
-                "high": parameter.high,
-            }
-        )
     return {
         "name": entry.name,
         "summary": entry.summary,
-        "parameters": parameters,
+        "parameters": [
+            {
+                "key": key,
+                "meaning": parameter.meaning,
+                "unit": parameter.kind.unit.strip(),
+                "default": f"{parameter.default:g}",
+                "low": parameter.kind.low,
+                "high": parameter.kind.high,
+            }
+            for key, parameter in entry.parameters.items()
+        ],
         "turned": can_close(surface, values),
     }

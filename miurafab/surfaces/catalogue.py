@@ -6,26 +6,32 @@
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from miurafab.errors import TargetError, UnitError
+from miurafab.errors import TargetError
+from miurafab.options import Quantity, angle, number
 from miurafab.surfaces import analytic, curves
 from miurafab.surfaces.surface import TargetSurface
-from miurafab.units import parse_angle
 
 
 @dataclass(frozen=True)
 class SurfaceParameter:
-    """One parameter of a named surface; lengths in the target's own unit, angles in degrees."""
+    """One parameter of a named surface.
 
+    ``kind`` says how it is written; ``default`` is as written, angles in degrees and lengths in the
+    target's own unit.
+    """
+
+    kind: Quantity
     default: float
-    low: float
-    high: float
     meaning: str
-    is_angle: bool = False
+
+    @property
+    def default_text(self) -> str:
+        """The default with its unit, as in ``hypar:height=0.5``."""
+        return f"{self.default:g}{self.kind.unit.strip()}"
 
 
 @dataclass(frozen=True)
@@ -42,15 +48,15 @@ class NamedSurface:
 
 
 def _length(default: float, meaning: str, low: float = 1e-6) -> SurfaceParameter:
-    return SurfaceParameter(default, low, 1e6, meaning)
+    return SurfaceParameter(number(low, 1e6), default, meaning)
 
 
-def _angle(default_deg: float, meaning: str, high_deg: float) -> SurfaceParameter:
-    return SurfaceParameter(default_deg, 0.1, high_deg, meaning, True)
+def _angle(default: float, meaning: str, high: float) -> SurfaceParameter:
+    return SurfaceParameter(angle(0.1, high), default, meaning)
 
 
 def _signed(default: float, meaning: str) -> SurfaceParameter:
-    return SurfaceParameter(default, -1e6, 1e6, meaning)
+    return SurfaceParameter(number(-1e6, 1e6), default, meaning)
 
 
 _TURN = {"angle": _angle(120, "angle turned through", 360)}
@@ -126,8 +132,8 @@ _ENTRIES = (
         "a logarithmic spiral extruded",
         {
             "start": _length(0.25, "radius at the inner end"),
-            "growth": SurfaceParameter(0.18, 1e-3, 2.0, "r grows by exp(growth) a radian"),
-            "turns": SurfaceParameter(1.25, 0.05, 10.0, "number of turns"),
+            "growth": SurfaceParameter(number(1e-3, 2), 0.18, "r grows by exp(growth) a radian"),
+            "turns": SurfaceParameter(number(0.05, 10), 1.25, "number of turns"),
             "length": _length(1.5, "length of the extrusion"),
         },
         _log_spiral,
@@ -175,11 +181,9 @@ _ENTRIES = (
         "a spiral ramp",
         {
             "radius": _length(1.0, "outer radius"),
-            "inner": SurfaceParameter(
-                -1.0, -1e6, 1e6, "inner radius; negative reaches across the axis"
-            ),
+            "inner": _signed(-1.0, "inner radius; negative reaches across the axis"),
             "pitch": _length(3.0, "rise in one turn"),
-            "turns": SurfaceParameter(0.5, 0.02, 20.0, "number of turns"),
+            "turns": SurfaceParameter(number(0.02, 20), 0.5, "number of turns"),
         },
         lambda radius, inner, pitch, turns: analytic.helicoid(radius, inner, pitch, turns),
     ),
@@ -262,10 +266,10 @@ CATALOGUE: Mapping[str, NamedSurface] = {entry.name: entry for entry in _ENTRIES
 
 
 def make_surface(name: str, given: Mapping[str, Any]) -> tuple[TargetSurface, dict[str, Any]]:
-    """The named surface and its complete parameters, defaults filled in.
+    """The named surface and its complete parameters as written, angles in degrees.
 
-    ``given`` maps parameter names to numbers (angles in degrees) or texts with a unit; ``profile``
-    is a list of points.
+    ``given`` maps parameter names to numbers or texts with a unit, a bare angle in degrees;
+    ``profile`` is a list of points. What is left out has its default.
     Raises :class:`~miurafab.errors.TargetError` naming the surface or parameter and what is
     accepted.
     """
@@ -274,22 +278,25 @@ def make_surface(name: str, given: Mapping[str, Any]) -> tuple[TargetSurface, di
         near = difflib.get_close_matches(name, CATALOGUE, n=1)
         hint = f"did you mean '{near[0]}'" if near else f"there are {', '.join(CATALOGUE)}"
         raise TargetError(f"'{name}' is not a known surface; {hint}, or give a .toml or mesh file.")
-    values: dict[str, Any] = {key: p.default for key, p in entry.parameters.items()}
+    written: dict[str, Any] = {key: p.default for key, p in entry.parameters.items()}
     for key, text in given.items():
         if key == "profile" and entry.profile_axes is not None:
-            values["profile"] = text
+            written["profile"] = text
             continue
         if key not in entry.parameters:
             known = ", ".join(entry.parameters)
             raise TargetError(f"The surface '{name}' has no parameter '{key}'; it has {known}.")
-        values[key] = _value(name, key, text, entry.parameters[key])
-    angles = {key for key, parameter in entry.parameters.items() if parameter.is_angle}
-    surface = entry.make(
-        **{key: math.radians(value) if key in angles else value for key, value in values.items()}
-    )
-    if name == "helicoid" and values["inner"] >= values["radius"]:
+        kind = entry.parameters[key].kind
+        try:
+            # Rounded, so that a pattern file holds 80 and not 80.00000000000001 degrees.
+            written[key] = round(kind.read(text) / kind.factor, 12)
+        except ValueError as fault:
+            raise TargetError(f"The parameter '{key}' of '{name}' {fault}.") from None
+    inside = {key: written[key] * p.kind.factor for key, p in entry.parameters.items()}
+    surface = entry.make(**written | inside)
+    if name == "helicoid" and written["inner"] >= written["radius"]:
         raise TargetError("The helicoid's 'inner' must be smaller than its 'radius'.")
-    return surface, values
+    return surface, written
 
 
 def parse_target(text: str) -> tuple[str, dict[str, str]]:
@@ -302,27 +309,3 @@ def parse_target(text: str) -> tuple[str, dict[str, str]]:
             raise TargetError(f"'{part}' in '{text}' is not of the form parameter=value.")
         parameters[key.strip()] = value.strip()
     return name.strip(), parameters
-
-
-def _value(surface: str, key: str, text: Any, parameter: SurfaceParameter) -> float:
-    try:
-        value = _degrees(text) if parameter.is_angle else float(text)
-    except (UnitError, ValueError, TypeError):
-        kind = "an angle such as 80deg" if parameter.is_angle else "a number"
-        raise TargetError(
-            f"The parameter '{key}' of '{surface}' is {text!r}, not {kind}."
-        ) from None
-    if not parameter.low <= value <= parameter.high:
-        unit = " deg" if parameter.is_angle else ""
-        raise TargetError(
-            f"The parameter '{key}' of '{surface}' is {value:g}{unit}; it must lie between "
-            f"{parameter.low:g} and {parameter.high:g}{unit}."
-        )
-    return value
-
-
-def _degrees(text: str | float) -> float:
-    """An angle in degrees; a bare number is left as it is, to the last digit."""
-    if isinstance(text, int | float) and not isinstance(text, bool):
-        return float(text)
-    return round(math.degrees(parse_angle(text)), 12)

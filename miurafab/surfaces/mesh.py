@@ -108,8 +108,8 @@ class MeshChart:
             )
         )
         return (
-            f"{self.name}: --region reaches beyond the mesh; the largest rectangle at this "
-            f"rotation is --region {parts}."
+            f"{self.name}: `region` reaches beyond the mesh; the largest rectangle at this "
+            f"rotation is `region` {parts}."
         )
 
 
@@ -150,10 +150,11 @@ class MeshSurface:
 
     @property
     def description(self) -> dict[str, Any]:
-        """Where the rectangle lies, for :func:`load_mesh` to lay it there again."""
+        """Where the rectangle lies, for :func:`load_mesh` to lay it there again: ``rotate`` in
+        degrees, ``rectangle`` and ``stiffness`` in the layout's own unit."""
         d = self.domain
         return {
-            "rotate": self.placement.angle,
+            "rotate": round(math.degrees(self.placement.angle), 12),
             "rectangle": [d.u0, d.u1, d.v0, d.v1],
             "stiffness": self.stiffness,
         }
@@ -243,7 +244,7 @@ def _placement(layout: MeshChart, region: Region | None, rotate: float | None) -
     if rotate is not None:
         domain = largest_rectangle(turned(layout.flat, rotate), layout.faces)
         if domain is None:
-            raise TargetError(f"{layout.name}: no rectangle fits into the mesh at this --rotate.")
+            raise TargetError(f"{layout.name}: no rectangle fits into the mesh at this `rotate`.")
         return GridPlacement(rotate, domain)
     found = placements(layout.vertices, layout.flat, layout.faces)
     if not found:
@@ -254,7 +255,7 @@ def _placement(layout: MeshChart, region: Region | None, rotate: float | None) -
 def _placed_before(place: dict[str, Any], name: str) -> tuple[GridPlacement, float]:
     try:
         u0, u1, v0, v1 = (float(value) for value in place["rectangle"])
-        angle, stiffness = float(place["rotate"]), float(place["stiffness"])
+        angle, stiffness = math.radians(place["rotate"]), float(place["stiffness"])
     except (KeyError, TypeError, ValueError):
         raise TargetError(f"{name}: the pattern's note of the rectangle is damaged.") from None
     if not (u0 < u1 and v0 < v1 and math.isfinite(angle) and 0 <= stiffness < math.inf):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab.errors import TargetError, UnitError
+from miurafab.errors import UnitError
 from miurafab.surfaces.parameterise import locate
 from miurafab.surfaces.surface import Domain, Floats
 from miurafab.units import parse_length
@@ -50,21 +50,26 @@ class Region:
     fractions: bool
 
     @classmethod
-    def parse(cls, text: str) -> Region:
-        """``0.1,0.9,0.2,0.8`` (fractions) or ``10mm,90mm,2cm,8cm``. Raises ``TargetError``."""
-        words = [word.strip() for word in text.split(",")]
+    def read(cls, value: object) -> Region:
+        """``0.1,0.9,0.2,0.8`` (fractions) or ``10mm,90mm,2cm,8cm``, as text or as four values.
+
+        Raises ``ValueError`` with the rest of a sentence.
+        """
         example = "write u0,u1,v0,v1 such as 0.1,0.9,0.2,0.8 or 10mm,90mm,2cm,8cm"
-        if len(words) != 4:
-            raise TargetError(f"--region is '{text}'; {example}.")
         try:
-            values = [parse_length(word) for word in words]
-        except UnitError as fault:
-            raise TargetError(f"--region is '{text}': {fault}") from None
+            parts = value.split(",") if isinstance(value, str) else list(value)  # type: ignore[call-overload]
+            words = [str(part).strip() for part in parts]
+            u0, u1, v0, v1 = values = [parse_length(word) for word in words]
+        except (TypeError, ValueError, UnitError):
+            raise ValueError(f"is '{value}'; {example}") from None
+        if not (0 <= u0 < u1 and 0 <= v0 < v1):
+            raise ValueError(f"is '{value}'; each start must be under its end: {example}")
         bare = [word.replace(".", "").replace("e-", "").isdigit() for word in words]
-        fractions = all(bare) and max(values) <= 1
-        if not (0 <= values[0] < values[1] and 0 <= values[2] < values[3]):
-            raise TargetError(f"--region is '{text}'; each start must be under its end: {example}.")
-        return cls((values[0], values[1], values[2], values[3]), fractions)
+        return cls((u0, u1, v0, v1), all(bare) and max(values) <= 1)
+
+    def __str__(self) -> str:
+        unit = "" if self.fractions else "mm"
+        return ",".join(f"{value:g}{unit}" for value in self.values)
 
     def domain(self, frame: Floats) -> Domain:
         """The rectangle in the turned layout ``frame`` (V, 2)."""

@@ -90,7 +90,7 @@ def test_check_says_no_to_a_torn_pattern(run, tmp_path):
         (("fit", "hyppar", "-o", "x.fold"), "did you mean 'hypar'"),
         (("fit", "hypar:hight=1", "-o", "x.fold"), "no parameter 'hight'"),
         (("fit", "hypar:height", "-o", "x.fold"), "parameter=value"),
-        (("fit", "sphere:width=900deg", "-o", "x.fold"), "must lie between"),
+        (("fit", "sphere:width=900deg", "-o", "x.fold"), "must be between"),
         (("fit", "gone.stl", "-o", "x.fold"), "gone.stl does not exist"),
         (("fit", "gone.toml", "-o", "x.fold"), "gone"),
         (("fit", "hypar", "--facets", "20", "-o", "x.fold"), "--facets"),

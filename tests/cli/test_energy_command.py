@@ -22,7 +22,9 @@ from miurafab.workflow.energy import energy, energy_plot, energy_table
 @pytest.fixture(scope="module")
 def hypar():
     """A hypar of 8 x 8 facets, which does not fold rigidly."""
-    return fit(FitRequest(make_surface("hypar", {})[0], 8, 8, size_mm=200.0)).pattern
+    return fit(
+        FitRequest(surface=make_surface("hypar", {})[0], facets=(8, 8), size_mm=200.0)
+    ).pattern
 
 
 @pytest.fixture

@@ -102,8 +102,8 @@ def test_a_tube_that_is_fitted_is_closed_wherever_it_is_opened() -> None:
     ("target", "options", "why"),
     [
         ("cylinder", {"facets": "8x9"}, "needs an even number of rows of facets"),
-        ("cylinder", {"facets": "8x2"}, "A tube of 2 rows of facets has no inside"),
-        ("cylinder", {"polish": "on"}, "--polish on would open the seam of a closed tube"),
+        ("cylinder", {"facets": "8x2"}, "has 2 rows; a closed tube has an inside from 4 rows on"),
+        ("cylinder", {"polish": "on"}, "is on, which would open the seam of a closed tube"),
         ("log-spiral", {}, "needs a surface of revolution or a circular cylinder"),
     ],
 )

@@ -72,7 +72,7 @@ def test_a_fit_means_what_it_says_or_is_refused(surface, data, options):
         ({"surface": "patterns/hypar.toml"}, "not a known surface"),
         ({"surface": "hypar", "parameters": {"height": "1.toml"}}, "not a number"),
         ({"surface": "revolution", "parameters": {"profile": "[[1, 0]]"}}, "profile"),
-        ({"surface": "sphere", "parameters": {"width": "900deg"}}, "must lie between"),
+        ({"surface": "sphere", "parameters": {"width": "900deg"}}, "must be between"),
         ({"surface": "hypar", "parameters": {"height": 1}}, "text"),
         ({"source": ["1"]}, "text"),
     ],
@@ -137,7 +137,7 @@ def test_command_lines():
 
 def test_the_design_file_asks_for_the_same(tmp_path):
     for surface, entry in CATALOGUE.items():
-        angles = {key: "35deg" for key, value in entry.parameters.items() if value.is_angle}
+        angles = {key: "35deg" for key, value in entry.parameters.items() if value.kind.unit}
         parameters = angles or {next(iter(entry.parameters)): "1.25"}
         options = {"facets": "6x8", "size": "12in", "amplitude": "0.3", "flat_foldable": "5deg"}
         order = read_fit(

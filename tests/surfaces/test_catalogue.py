@@ -45,7 +45,7 @@ class TestEverySurface:
 
     def test_every_default_lies_within_its_range(self, name: str) -> None:
         for parameter in CATALOGUE[name].parameters.values():
-            assert parameter.low <= parameter.default <= parameter.high
+            assert parameter.kind.low <= parameter.default <= parameter.kind.high
 
 
 def gauss(name: str) -> np.ndarray:
@@ -90,7 +90,7 @@ def test_a_sphere_has_its_curvature() -> None:
 def test_a_drawn_profile_is_turned_as_drawn() -> None:
     points = [[0.5, 0.0], [0.8, 0.5], [0.6, 1.0]]
     surface, values = make_surface("revolution", {"profile": points, "angle": "90deg"})
-    assert math.isclose(values["angle"], 90.0)
+    assert math.isclose(values["angle"], 90)
     ends = surface.point(np.array([[0.0, 0.0], [1.0, 0.0]]))
     assert np.allclose(ends[:, [0, 2]], [points[0], points[-1]])
 

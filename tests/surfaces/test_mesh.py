@@ -13,7 +13,7 @@ from problems import saddle_mesh
 from typer.testing import CliRunner
 
 from miurafab.cli import app
-from miurafab.errors import TargetError
+from miurafab.errors import InputError, TargetError
 from miurafab.surfaces.mesh import MeshChart, load_mesh, mesh_surface
 from miurafab.surfaces.placement import Region
 from miurafab.surfaces.surface import tangents
@@ -284,7 +284,7 @@ def test_region_in_fractions_and_in_lengths_are_the_same(tmp_path):
     v, f = square(21)
     path = written(tmp_path / "mesh.off", v * [1, 0.5, 1], f)
     for text in ("0.2,0.8,0.1,0.5", "20,80,5,25", "2cm,8cm,5mm,2.5cm"):
-        domain = load_mesh(path, region=Region.parse(text))[0].domain
+        domain = load_mesh(path, region=Region.read(text))[0].domain
         assert domain.width == pytest.approx(60)
         assert domain.height == pytest.approx(20)
 
@@ -300,8 +300,8 @@ def test_rotate_turns_the_grid(tmp_path):
 
 @pytest.mark.parametrize("text", ["", "1,2,3", "a,b,c,d", "0.9,0.1,0,1", "0,1,-1,1", "0,1,0,nan"])
 def test_regions_that_are_none(text):
-    with pytest.raises(TargetError, match="--region is"):
-        Region.parse(text)
+    with pytest.raises(ValueError, match=f"is '{text}'; "):
+        Region.read(text)
 
 
 def test_a_region_beyond_the_mesh_names_one_that_is_not(tmp_path):
@@ -314,16 +314,16 @@ def test_a_region_beyond_the_mesh_names_one_that_is_not(tmp_path):
     path = written(
         tmp_path / "disc.off", np.pad(points, ((0, 0), (0, 1))), Delaunay(points).simplices
     )
-    with pytest.raises(TargetError, match="--region reaches beyond") as refusal:
-        load_mesh(path, region=Region.parse("0,1,0,1"))
-    words = str(refusal.value).split("--region ")[-1].rstrip(".")
-    load_mesh(path, region=Region.parse(words))
+    with pytest.raises(TargetError, match="'region' reaches beyond") as refusal:
+        load_mesh(path, region=Region.read("0,1,0,1"))
+    words = str(refusal.value).split("'region' ")[-1].rstrip(".")
+    load_mesh(path, region=Region.read(words))
 
 
 def test_region_and_rotate_are_for_meshes():
-    for option in ("region", "rotate"):
-        with pytest.raises(Exception, match=f"--{option} is for mesh targets"):
-            design("hypar", **{option: "0.5"})
+    for option, value in (("region", "0,1,0,1"), ("rotate", 30)):
+        with pytest.raises(InputError, match=f"'{option}' is for mesh targets"):
+            design("hypar", **{option: value})
 
 
 def test_a_mesh_is_fitted_checked_and_laid_out_again_from_its_file(tmp_path):
@@ -337,7 +337,7 @@ def test_a_mesh_is_fitted_checked_and_laid_out_again_from_its_file(tmp_path):
     report = json.loads(result.stdout)
     pattern, _, missing = load_pattern(out)
     assert missing is None
-    assert pattern.target["rotate"] == pytest.approx(math.radians(10))
+    assert pattern.target["rotate"] == pytest.approx(10)
     checked = CliRunner().invoke(app, ["check", str(out), "--json"])
     assert checked.exit_code == 0
     again = json.loads(checked.stdout)

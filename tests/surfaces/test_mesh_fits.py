@@ -63,7 +63,7 @@ def test_where_no_sheet_is_found_a_smaller_part_is_taken_and_said(monkeypatch):
 
     monkeypatch.setattr(attempts.Strategy, "run", fail_before)
     surface = mesh_surface(*benchmark().meshes()["saddle-disc"])
-    result = fit(FitRequest(surface, 6, 6, target=surface.description))
+    result = fit(FitRequest(surface=surface, facets=(6, 6), target=surface.description))
     assert result.status == "converged"
     assert "the middle 85 % of the rectangle" in result.advice
     places = list(dict.fromkeys(attempt.place for attempt in result.attempts))

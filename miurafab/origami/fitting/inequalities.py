@@ -19,6 +19,9 @@ from scipy import sparse
 
 from miurafab.geometry.angles import sectors
 from miurafab.geometry.quads import QuadGrid
+from miurafab.origami.fitting.reduction import Unknowns
+from miurafab.origami.fitting.request import FitOptions
+from miurafab.origami.verify import EXACT
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -107,6 +110,24 @@ class Bounds:
             values.append((limit * sides[one][0] - sides[other][0]) / self.length)
             rows.append((limit * sides[one][1] - sides[other][1]) / self.length)
         return np.concatenate(values), _stacked(rows)
+
+
+def limits(options: FitOptions, unknowns: Unknowns, scale: float, margin: float = 0.0) -> Bounds:
+    """The limits among ``options`` in the target's own unit, which is ``scale`` mm long, tightened
+    by the part ``margin``.
+    """
+    tighter, looser = 1 + margin, 1 - margin
+    bounded = options.min_angle is not None or options.max_angle is not None
+    low, high = options.angles
+    tolerance = options.flat_foldable
+    return Bounds(
+        unknowns.grid,
+        unknowns.length,
+        min_edge=None if options.min_edge_mm is None else options.min_edge_mm / scale * tighter,
+        angles=(low * tighter, np.pi - (np.pi - high) * tighter) if bounded else None,
+        aspect=None if options.max_aspect is None else options.max_aspect * looser,
+        kawasaki=None if tolerance is None or tolerance <= EXACT else tolerance * looser,
+    )
 
 
 def _lengths(points: Floats, edges: Ints) -> tuple[Floats, sparse.csr_array]:

@@ -2,125 +2,255 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, get_args
 
-import numpy as np
-
-from miurafab.errors import InputError
+from miurafab.errors import OptionError, UnitError
+from miurafab.options import (
+    Choice,
+    Kind,
+    Whole,
+    Written,
+    angle,
+    check_options,
+    length,
+    number,
+    option,
+)
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fitting.inequalities import Bounds
 from miurafab.origami.fitting.polish import Follow
-from miurafab.origami.fitting.reduction import Unknowns
 from miurafab.origami.fitting.seed import Corrugation
 from miurafab.origami.verify import EXACT, Measurements
 from miurafab.surfaces.analytic import GeneralizedCylinder
+from miurafab.surfaces.placement import Region
 from miurafab.surfaces.surface import TargetSurface
+from miurafab.units import parse_angle
+
+DEFAULT_FACETS = (20, 20)
+DEFAULT_SIZE_MM = 200.0
+"""The longest side of a named surface's folded form; a mesh keeps the size of its file."""
+CLOSINGS = ("sector", "open", "seam")
+
+
+class FacetCounts(Kind):
+    """Columns and rows of facets, ``20x20`` or a pair of whole numbers."""
+
+    metavar = "COLSxROWS"
+
+    def read(self, value: object) -> tuple[int, int]:
+        parts = value.lower().replace("×", "x").split("x") if isinstance(value, str) else value
+        try:
+            columns, rows = (Whole().read(part) for part in parts)  # type: ignore[attr-defined]
+        except (TypeError, ValueError):
+            raise ValueError(
+                f"is {value!r}; write columns x rows, such as {self.show(DEFAULT_FACETS)}"
+            ) from None
+        self.check((columns, rows))
+        return columns, rows
+
+    def check(self, inside: tuple[int, int]) -> None:
+        if min(inside) < 2:
+            raise ValueError(f"is {self.show(inside)}; a sheet that folds has 2x2 facets or more")
+
+    def show(self, inside: tuple[int, int]) -> str:
+        return f"{inside[0]}x{inside[1]}"
+
+
+class FlatFoldability(Kind):
+    """``exact`` (0 inside), ``off`` (None) or the largest difference of pi - a1 - a3 from 0.
+
+    The paper gives this limit in radians, every other angle here is in degrees; so a number must
+    carry its unit.
+    """
+
+    metavar = "exact|off|ANGLE"
+
+    def read(self, value: object) -> float | None:
+        if value == "exact":
+            return 0.0
+        if value == "off":
+            return None
+        try:
+            float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            pass
+        else:
+            raise ValueError(
+                f"is {value} without a unit; write {value}rad, as the paper does, or degrees such "
+                "as 0.9deg"
+            )
+        try:
+            inside = parse_angle(value if isinstance(value, str) else repr(value))
+        except UnitError:
+            raise ValueError(
+                f"is {value!r}; it must be exact, off, or an angle such as 0.016rad or 0.9deg"
+            ) from None
+        self.check(inside)
+        return inside
+
+    def check(self, inside: float) -> None:
+        if not 0 <= inside < math.pi:
+            raise ValueError(
+                f"is {math.degrees(inside):g} deg; it must be exact, off, or an angle under 180 deg"
+            )
+
+    def show(self, inside: float) -> str:
+        return f"{inside:g}rad" if inside else "exact"
+
 
 INTERRUPTED = "The fit was interrupted; this is the best exact sheet up to then."
 """The advice of a fit that Ctrl-C ended."""
 
 
 @dataclass(frozen=True)
-class FitRequest:
-    """What is asked. ``columns`` x ``rows`` facets on ``surface``.
+class FitOptions:
+    """The options of a fit. Inside, lengths are in mm and angles in radians."""
 
-    ``size_mm`` is the longest side of the folded bounding box, None for the target's own size;
-    ``amplitude`` and ``zigzag`` the corrugation (height over row spacing, zig-zag over column
-    spacing), None for automatic; ``flat_foldable`` the largest allowed |pi - a1 - a3| in radians, 0
-    for exact, None for off; ``min_edge_mm`` and ``max_deviation_mm`` (of the mid-surface) are
-    limits; ``seed`` decides the random attempts. ``target`` describes the surface in the file.
-
-    ``follow`` is what lies on the target: the ``middle`` of the sheet, or its ``top`` or ``bottom``
-    vertices (top is the side of the target's normal). ``min_angle`` and ``max_angle`` bound the
-    sector angles, radians; ``max_aspect`` the ratio of two sides of a facet. ``polish`` is ``on``,
-    ``off``, or ``auto``: where a limit is not met or flat-foldability is asked for.
-    With ``search``, ``columns`` and ``rows`` give only the proportion, and the coarsest sheet that
-    meets all limits is looked for.
-    """
-
-    surface: TargetSurface
-    columns: int
-    rows: int
-    size_mm: float | None = None
-    amplitude: float | None = None
-    zigzag: float | None = None
-    flat_foldable: float | None = None
-    min_edge_mm: float | None = None
-    max_deviation_mm: float | None = None
-    seed: int = 0
-    target: dict[str, Any] = field(default_factory=dict)
-    follow: Follow = "middle"
-    min_angle: float | None = None
-    max_angle: float | None = None
-    max_aspect: float | None = None
-    polish: str = "auto"
-    search: bool = False
+    facets: tuple[int, int] | None = option(
+        FacetCounts(),
+        "Columns and rows of facets.",
+        group="Sheet",
+        default_text=f"{FacetCounts().show(DEFAULT_FACETS)}; with both max-deviation and min-edge, "
+        "the coarsest sheet that meets them",
+    )
+    size_mm: float | None = option(
+        length(above=True),
+        "Longest side of the folded bounding box.",
+        group="Sheet",
+        default_text=f"{DEFAULT_SIZE_MM:g} mm; a mesh keeps its file's size",
+    )
+    amplitude: float | None = option(
+        number(0, above=True),
+        "Height of the corrugation over the row spacing.",
+        group="Sheet",
+        default_text="automatic",
+    )
+    zigzag: float | None = option(
+        number(0, above=True),
+        "Zig-zag over the column spacing.",
+        group="Sheet",
+        default_text="automatic",
+    )
+    close: str = option(
+        Choice(CLOSINGS),
+        "For surfaces of revolution and the circular cylinder: sector (of the angle given), open "
+        "(all round but one facet), or seam (all round, to be glued).",
+        default="sector",
+        group="Sheet",
+    )
+    follow: Follow = option(
+        Choice(get_args(Follow)),
+        "What lies on the target: the middle of the sheet, or its top or bottom vertices (top is "
+        "the side of the target's normal).",
+        default="middle",
+        group="Sheet",
+    )
+    flat_foldable: float | None = option(
+        FlatFoldability(),
+        "Largest |pi - a1 - a3| at a vertex, with its unit: 0.016rad or 0.9deg.",
+        group="Limits",
+        default_text="off",
+    )
+    min_edge_mm: float | None = option(
+        length(above=True), "The shortest edge allowed.", group="Limits"
+    )
+    max_deviation_mm: float | None = option(
+        length(above=True),
+        "The farthest that the mid-surface may lie from the target.",
+        group="Limits",
+    )
+    min_angle: float | None = option(
+        angle(0, 90), "The least sector angle allowed.", group="Limits"
+    )
+    max_angle: float | None = option(
+        angle(90, 180), "The greatest sector angle allowed.", group="Limits"
+    )
+    max_aspect: float | None = option(
+        number(1, above=True), "The greatest ratio of two sides of a facet.", group="Limits"
+    )
+    region: Region | None = option(
+        Written(Region.read, str, "U0,U1,V0,V1"),
+        "The part of the mesh to cover, in its flat layout, as fractions or lengths.",
+        group="Mesh targets",
+        default_text="automatic",
+    )
+    rotate: float | None = option(
+        angle(-360, 360),
+        "Turn the grid on the mesh by this angle.",
+        group="Mesh targets",
+        default_text="automatic",
+    )
+    polish: str = option(
+        Choice(("auto", "on", "off")),
+        "Bring the sheet as close to the target as it goes: on, off, or auto (where a limit is not "
+        "met or flat-foldability is asked for).",
+        default="auto",
+        group="Search",
+    )
+    seed: int = option(Whole(), "Seed of the random attempts.", default=0, group="Search")
 
     def __post_init__(self) -> None:
-        if self.columns < 2 or self.rows < 2:
-            raise InputError(
-                f"A sheet of {self.columns}x{self.rows} facets cannot fold; ask for 2x2 or more."
-            )
-        for name in ("size_mm", "amplitude", "zigzag", "min_edge_mm", "max_deviation_mm"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < np.inf:
-                option = "--" + name.removesuffix("_mm").replace("_", "-")
-                raise InputError(f"{option} is {value:g}; it must be greater than zero.")
-        if self.flat_foldable is not None and not 0 <= self.flat_foldable < np.pi:
-            raise InputError(
-                f"--flat-foldable is {self.flat_foldable:g}; it must be exact, off, or an angle "
-                "from 0 to pi."
-            )
-        if self.follow not in ("middle", "top", "bottom"):
-            raise InputError(f"--follow is '{self.follow}'; it must be middle, top or bottom.")
-        if self.polish not in ("auto", "on", "off"):
-            raise InputError(f"--polish is '{self.polish}'; it must be auto, on or off.")
-        if self.is_tube and self.rows == 2:
-            raise InputError("A tube of 2 rows of facets has no inside; ask for 4 rows or more.")
-        if self.polish == "on" and self.is_tube:
-            raise InputError("--polish on would open the seam of a closed tube; leave it out.")
-        if self.max_aspect is not None and not self.max_aspect > 1:
-            raise InputError(f"--max-aspect is {self.max_aspect:g}; it must be greater than 1.")
+        check_options(self)
         low, high = self.angles
-        if not 0 <= low < np.pi / 2 < high <= np.pi:
-            raise InputError(
-                f"The sector angles are to lie between {np.degrees(low):g} and "
-                f"{np.degrees(high):g} degrees; no sheet folds unless 90 degrees lie between."
+        if not low < math.pi / 2 < high:
+            raise OptionError(
+                None,
+                f"The sector angles are to lie between {math.degrees(low):g} and "
+                f"{math.degrees(high):g} degrees (`min_angle`, `max_angle`); no sheet folds unless "
+                "90 degrees lie between",
             )
+
+    @property
+    def columns(self) -> int:
+        """Columns of facets; only the proportion to the rows counts in a search."""
+        return (self.facets or DEFAULT_FACETS)[0]
+
+    @property
+    def rows(self) -> int:
+        """Rows of facets; only the proportion to the columns counts in a search."""
+        return (self.facets or DEFAULT_FACETS)[1]
+
+    @property
+    def search(self) -> bool:
+        """Whether the coarsest sheet that meets both limits is looked for."""
+        return self.facets is None and None not in (self.min_edge_mm, self.max_deviation_mm)
 
     @property
     def angles(self) -> tuple[float, float]:
         """The least and the greatest sector angle allowed, radians."""
         low = 0.0 if self.min_angle is None else self.min_angle
-        return low, np.pi if self.max_angle is None else self.max_angle
-
-    @property
-    def is_tube(self) -> bool:
-        """Whether the sheet is built as a closed tube, whose first and last row are one."""
-        tube = isinstance(self.surface, GeneralizedCylinder) and self.surface.closed
-        return tube and self.rows % 2 == 0
+        return low, math.pi if self.max_angle is None else self.max_angle
 
     @property
     def exactly_flat_foldable(self) -> bool:
         """Whether Kawasaki's condition is a constraint and not a limit."""
         return self.flat_foldable is not None and self.flat_foldable <= EXACT
 
-    def bounds(self, unknowns: Unknowns, scale: float, margin: float = 0.0) -> Bounds:
-        """The limits as inequalities in the target's own unit, tightened by the part ``margin``."""
-        tighter, looser = 1 + margin, 1 - margin
-        bounded = self.min_angle is not None or self.max_angle is not None
-        low, high = self.angles
-        tolerance = self.flat_foldable
-        return Bounds(
-            unknowns.grid,
-            unknowns.length,
-            min_edge=None if self.min_edge_mm is None else self.min_edge_mm / scale * tighter,
-            angles=(low * tighter, np.pi - (np.pi - high) * tighter) if bounded else None,
-            aspect=None if self.max_aspect is None else self.max_aspect * looser,
-            kawasaki=None if tolerance is None or tolerance <= EXACT else tolerance * looser,
-        )
+
+@dataclass(frozen=True)
+class FitRequest(FitOptions):
+    """What is asked of one fit: its options, and the ``surface`` that the sheet is to follow.
+
+    ``target`` describes the surface in the file. A ``size_mm`` of None is the surface's own size.
+    """
+
+    surface: TargetSurface = field(kw_only=True)
+    target: dict[str, Any] = field(default_factory=dict, kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.is_tube and self.rows == 2:
+            raise OptionError("facets", "has 2 rows; a closed tube has an inside from 4 rows on")
+        if self.is_tube and self.polish == "on":
+            raise OptionError("polish", "is on, which would open the seam of a closed tube")
+
+    @property
+    def is_tube(self) -> bool:
+        """Whether the sheet is built as a closed tube, whose first and last row are one."""
+        tube = isinstance(self.surface, GeneralizedCylinder) and self.surface.closed
+        return tube and self.rows % 2 == 0
 
 
 @dataclass(frozen=True)

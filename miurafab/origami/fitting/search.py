@@ -45,7 +45,7 @@ def coarsest(
             columns, rows = _shape(request, longer)
             if on_progress is not None:
                 on_progress(1 - 0.8 ** len(tried), f"{columns}x{rows} facets")
-            tried[longer] = fit(replace(request, columns=columns, rows=rows), PLANS)
+            tried[longer] = fit(replace(request, facets=(columns, rows)), PLANS)
             if tried[longer].status == "interrupted":
                 raise KeyboardInterrupt
         return tried[longer]

@@ -20,7 +20,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cylinder import cylinder_on
 from miurafab.origami.fitting.constraints import flat_foldability
 from miurafab.origami.fitting.continuation import COARSEST, STEP_CAP, bend, refine, shaken, solve
-from miurafab.origami.fitting.inequalities import Bounds
+from miurafab.origami.fitting.inequalities import Bounds, limits
 from miurafab.origami.fitting.polish import Follow, followers, polish
 from miurafab.origami.fitting.reduction import Unknowns, about_z
 from miurafab.origami.fitting.request import Attempt, FitRequest
@@ -186,10 +186,9 @@ class Strategy:
         constraints = unknowns.constraints(request.exactly_flat_foldable)
         found, first, least = plain, solution, request.min_edge_mm
         for _ in range(SCALINGS):
-            limits = replace(request, min_edge_mm=least).bounds(
-                unknowns, found.pattern.scale, BOUND_MARGIN
-            )
-            bounds = unknowns.on_unknowns(limits) if limits.any else None
+            asked = replace(request, min_edge_mm=least)
+            on_grid = limits(asked, unknowns, found.pattern.scale, BOUND_MARGIN)
+            bounds = unknowns.on_unknowns(on_grid) if on_grid.any else None
             iterations = found.attempt.iterations
             if bounds is not None:
                 solution = project(
@@ -214,7 +213,7 @@ class Strategy:
             found = replace(
                 self._candidate(request, unknowns, solution, iterations + better.rounds),
                 polished=True,
-                active_bounds=limits.count(solution.active) if bounds is not None else {},
+                active_bounds=on_grid.count(solution.active) if bounds is not None else {},
             )
             shortest = KEPT_EDGE * plain.measurements.min_edge_mm
             if least is None and found.measurements.min_edge_mm < shortest:
@@ -232,12 +231,12 @@ class Strategy:
         pattern = unfold(sheet.scaled(scale), scale=scale, target=request.target | self.layout)
         measured = measure(pattern, self.surface)
         deviation = _deviation(sheet, self.surface, self._follow(request)) * scale
-        limits = replace(
-            request.bounds(Unknowns(unknowns.columns, unknowns.rows, unknowns.length), scale),
+        unmeasured = replace(
+            limits(request, Unknowns(unknowns.columns, unknowns.rows, unknowns.length), scale),
             min_edge=None,
             kawasaki=None,
         )
-        faults = tuple(_faults(request, pattern, measured, deviation, limits, sheet))
+        faults = tuple(_faults(request, pattern, measured, deviation, unmeasured, sheet))
         attempt = Attempt(
             self.way,
             self.rows_along,
@@ -349,11 +348,11 @@ def _faults(
     pattern: CreasePattern,
     measured: Measurements,
     deviation: float,
-    limits: Bounds,
+    unmeasured: Bounds,
     sheet: Tessellation,
 ) -> Iterator[str]:
-    """What keeps this sheet from being the answer, one sentence of advice each; ``limits`` are
-    those that the measurements do not show.
+    """What keeps this sheet from being the answer, one sentence of advice each; ``unmeasured``
+    are the limits that the measurements do not show.
     """
     residual = max(
         measured.max_planarity or 0.0,
@@ -386,8 +385,9 @@ def _faults(
             f"The {what} lies up to {deviation:.3g} mm from the target, over the "
             f"{request.max_deviation_mm:.3g} mm allowed; ask for more --facets."
         )
-    if limits.any:
-        for kind, number in limits.count(limits(sheet.vertices.ravel())[0] < -1e-9).items():
+    if unmeasured.any:
+        broken = unmeasured(sheet.vertices.ravel())[0] < -1e-9
+        for kind, number in unmeasured.count(broken).items():
             if number:
                 yield (
                     f"{number} facet corners or sides break the {kind} limit; loosen it, or ask "

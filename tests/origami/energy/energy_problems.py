@@ -29,7 +29,7 @@ SURFACES = {
 def developable(name: str, facets: int) -> CreasePattern:
     """One of ``SURFACES`` fitted, with nothing asked about flat-foldability."""
     surface, _ = make_surface(name, SURFACES[name])
-    pattern = fit(FitRequest(surface, facets, facets, size_mm=200.0)).pattern
+    pattern = fit(FitRequest(surface=surface, facets=(facets, facets), size_mm=200.0)).pattern
     assert pattern is not None
     return pattern
 

@@ -22,7 +22,7 @@ NAMED = [name for name in CATALOGUE if name != "helicoid"]
 def request(name: str, columns: int = 12, rows: int = 12, **changes: object) -> FitRequest:
     surface, parameters = make_surface(name, {})
     target = {"surface": name, "parameters": parameters}
-    made = FitRequest(surface, columns, rows, size_mm=200.0, target=target)
+    made = FitRequest(surface=surface, facets=(columns, rows), size_mm=200.0, target=target)
     return replace(made, **changes)
 
 
@@ -48,7 +48,7 @@ def test_every_named_surface_fits_as_it_stands(name: str) -> None:
 
 def test_a_helicoid_across_its_axis_fits() -> None:
     surface, _ = make_surface("helicoid", {"pitch": 6})
-    result = fit(FitRequest(surface, 20, 20, size_mm=200.0))
+    result = fit(FitRequest(surface=surface, facets=(20, 20), size_mm=200.0))
     assert result.status == "converged"
     assert result.measurements is not None
     assert result.measurements.self_intersections == 0
@@ -163,7 +163,7 @@ class TestLimits:
 class TestSearch:
     def test_the_coarsest_sheet_within_both_limits(self) -> None:
         limits = {"max_deviation_mm": 0.5, "min_edge_mm": 8.0, "amplitude": 0.8, "zigzag": 1.0}
-        wanted = request("hypar", search=True, **limits)
+        wanted = request("hypar", facets=None, **limits)
         result = fit(wanted)
         check_valid(result, "hypar")
         assert result.deviation_mm is not None
@@ -171,12 +171,12 @@ class TestSearch:
         assert result.measurements is not None
         assert result.measurements.min_edge_mm >= 8.0
         side = math.isqrt(result.measurements.facets)
-        coarser = fit(replace(wanted, columns=side - 2, rows=side - 2, search=False))
+        coarser = fit(replace(wanted, facets=(side - 2, side - 2)))
         assert coarser.status != "converged"
 
     def test_which_limit_fails_and_by_how_much(self) -> None:
         one = {"amplitude": 0.8, "zigzag": 1.0}
-        result = fit(request("saddle", max_deviation_mm=0.01, min_edge_mm=45.0, search=True, **one))
+        result = fit(request("saddle", max_deviation_mm=0.01, min_edge_mm=45.0, facets=None, **one))
         assert result.status == "infeasible"
         assert "No sheet meets both limits" in result.advice
         assert "mm over the 0.01 mm allowed" in result.advice
@@ -185,7 +185,7 @@ class TestSearch:
 class TestRings:
     def test_a_ring_closes_and_every_period_is_the_same(self) -> None:
         surface, _ = make_surface("vase", {"angle": "360deg"})
-        result = fit(FitRequest(surface, 14, 24, size_mm=200.0))
+        result = fit(FitRequest(surface=surface, facets=(14, 24), size_mm=200.0))
         check = audit(result.pattern, surface)
         assert check.findings == ()
         assert result.pattern is not None
@@ -198,7 +198,7 @@ class TestRings:
 
     def test_a_closed_ring_can_be_flat_foldable_vertex_by_vertex(self) -> None:
         surface, _ = make_surface("hyperboloid", {"angle": "360deg"})
-        result = fit(FitRequest(surface, 12, 24, size_mm=200.0, flat_foldable=0.0))
+        result = fit(FitRequest(surface=surface, facets=(12, 24), size_mm=200.0, flat_foldable=0.0))
         assert result.status == "converged"
         assert result.pattern is not None
         assert result.pattern.folded_coords is not None
@@ -208,7 +208,9 @@ class TestRings:
 
 def test_a_target_that_bends_too_much_ends_with_a_reason() -> None:
     surface, _ = make_surface("helicoid", {"turns": 8, "pitch": 0.3})
-    result = fit(FitRequest(surface, 4, 4, size_mm=200.0, amplitude=0.8, zigzag=1.0))
+    result = fit(
+        FitRequest(surface=surface, facets=(4, 4), size_mm=200.0, amplitude=0.8, zigzag=1.0)
+    )
     assert result.status != "converged"
     assert result.advice
     assert result.attempts
@@ -218,13 +220,14 @@ def test_a_target_that_bends_too_much_ends_with_a_reason() -> None:
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"columns": 1}, "2x2"),
-        ({"min_edge_mm": -1.0}, "--min-edge"),
-        ({"flat_foldable": 4.0}, "--flat-foldable"),
-        ({"follow": "inside"}, "--follow"),
-        ({"polish": "much"}, "--polish"),
-        ({"max_aspect": 0.5}, "--max-aspect"),
-        ({"min_angle": 1.7}, "90 degrees"),
+        ({"facets": (1, 12)}, "2x2"),
+        ({"min_edge_mm": -1.0}, "'min_edge' is -1 mm"),
+        ({"flat_foldable": 4.0}, "'flat_foldable' is 229.183 deg"),
+        ({"follow": "inside"}, "'follow' is 'inside'"),
+        ({"polish": "much"}, "'polish' is 'much'"),
+        ({"max_aspect": 0.5}, "'max_aspect' is 0.5"),
+        ({"min_angle": 1.7}, "'min_angle' is 97.4.* deg; it must be between 0 deg and 90 deg"),
+        ({"min_angle": math.pi / 2}, "90 degrees"),
     ],
 )
 def test_requests_that_make_no_sense_name_the_option(changes: dict[str, object], word: str) -> None:
@@ -245,7 +248,8 @@ def interrupting(calls: int) -> Callable[[float, str], None]:
 
 @pytest.mark.parametrize("searches", [False, True])
 def test_ctrl_c_leaves_the_best_sheet_up_to_then(searches: bool) -> None:
-    limits = request("hypar", 6, 6, max_deviation_mm=1e-3, min_edge_mm=1.0, search=searches)
+    facets = None if searches else (6, 6)
+    limits = request("hypar", facets=facets, max_deviation_mm=1e-3, min_edge_mm=1.0)
     with pytest.raises(KeyboardInterrupt):
         fit(limits, interrupting(0))  # there is no sheet yet
     result = fit(limits, interrupting(2))

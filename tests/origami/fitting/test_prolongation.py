@@ -37,7 +37,7 @@ def test_the_way_from_coarse_to_fine_ends_in_an_exact_sheet(name):
     surface = Swapped(make_surface(name, {})[0])
     plan = Strategy("refined", surface, "v", CORRUGATION)
     side = 4 * COARSEST
-    found = plan.run(FitRequest(surface, side, side, size_mm=200.0))
+    found = plan.run(FitRequest(surface=surface, facets=(side, side), size_mm=200.0))
     measured = found.measurements
     assert found.attempt.way == "refined"
     assert max(measured.max_planarity, measured.max_developability) <= 1e-12
@@ -47,7 +47,9 @@ def test_the_way_from_coarse_to_fine_ends_in_an_exact_sheet(name):
 def test_a_refined_start_is_nearer_the_solution_than_the_seed():
     """Fewer steps are left to do on the finest grid than from its own seed."""
     surface = Bent(make_surface("sphere", {})[0], 1.0)
-    coarse = Strategy("seed", surface, "u", CORRUGATION).run(FitRequest(surface, 16, 16))
+    coarse = Strategy("seed", surface, "u", CORRUGATION).run(
+        FitRequest(surface=surface, facets=(16, 16))
+    )
     assert coarse.measurements is not None
     sheet = coarse.pattern.folded_coords.reshape(17, 17, 3)
     start = refined(surface, Tessellation(sheet), 33, 33)
