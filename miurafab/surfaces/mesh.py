@@ -42,10 +42,15 @@ from miurafab.surfaces.placement import (
     placements,
     turned,
 )
-from miurafab.surfaces.smoothing import Smoothed, smooth
+from miurafab.surfaces.smoothing import Smoothed, continued, smooth
 from miurafab.surfaces.surface import Domain, Floats, tangents, unit
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb")
+
+FROM_POINTS = (
+    "make a triangle mesh of it (MeshLab, CloudCompare and Open3D do) or a height map on a regular "
+    "grid, and fit that."
+)
 
 ROUGH = 0.03
 """A mesh is rough where the smooth spline leaves it by this part of its median edge."""
@@ -131,15 +136,7 @@ class MeshSurface:
 
     def point(self, uv: Floats) -> Floats:
         """Within reach the spline, beyond it the spline continued straight on."""
-        low = np.array([knots[0] for knots in self.spline.t])
-        high = np.array([knots[-1] for knots in self.spline.t])
-        inside = np.clip(uv, low, high)
-        beyond = uv - inside
-        points: Floats = self.spline(inside)
-        if beyond.any():
-            points = points + beyond[..., :1] * self.spline(inside, nu=(1, 0))
-            points = points + beyond[..., 1:] * self.spline(inside, nu=(0, 1))
-        return points
+        return continued(self.spline, uv)
 
     def normal(self, uv: Floats) -> Floats:
         along, across = tangents(self, uv)
@@ -147,6 +144,9 @@ class MeshSurface:
 
     def closest_point(self, points: Floats) -> Floats:
         return closest_on_mesh(points, self.triangles)
+
+    def __repr__(self) -> str:
+        return f"<MeshSurface {self.layout.name}: {len(self.triangles)} triangles>"
 
     @property
     def description(self) -> dict[str, Any]:
@@ -207,34 +207,53 @@ def load_mesh(
         raise TargetError(f"{path} does not exist.") from None
     except OSError as fault:
         raise TargetError(f"{path} cannot be read: {fault.strerror}.") from None
+    kind = path.suffix[1:].lower()
     try:
-        mesh = trimesh.load_mesh(
-            io.BytesIO(content), file_type=path.suffix[1:].lower(), process=False
-        )
+        mesh: object = trimesh.load_mesh(io.BytesIO(content), file_type=kind, process=False)
+        if not len(getattr(mesh, "faces", ())):  # load_mesh drops the points of a point cloud
+            mesh = trimesh.load(io.BytesIO(content), file_type=kind, process=False)
     except Exception as fault:  # noqa: BLE001 - trimesh's readers raise whatever their parser does
         reason = " ".join(str(fault).split()) or type(fault).__name__
         raise TargetError(f"{path} cannot be read as a mesh: {reason.rstrip('.')}.") from None
+    vertices, faces = arrays_of(mesh, str(path))
+    surface = mesh_surface(vertices, faces, path.name, region=region, rotate=rotate, place=place)
+    return surface, hashlib.sha256(content).hexdigest()
+
+
+def arrays_of(mesh: object, name: str) -> tuple[Floats, Ints]:
+    """The vertices (V, 3) and triangles (F, 3) of a mesh of trimesh, called ``name`` in messages.
+
+    Raises :class:`~miurafab.errors.TargetError` for a point cloud and for a scene.
+    """
+    if isinstance(mesh, trimesh.PointCloud):
+        raise TargetError(f"{name} is a point cloud and not a surface; {FROM_POINTS}")
     if not isinstance(mesh, trimesh.Trimesh):
-        raise TargetError(f"{path} holds no triangle mesh.")
-    vertices = np.asarray(mesh.vertices, dtype=np.float64)
-    faces = np.asarray(mesh.faces, dtype=np.int64)
-    layout, remarks = lay_out(vertices, faces, path.name)
+        raise TargetError(f"{name} holds no triangle mesh.")
+    return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+
+
+def mesh_surface(
+    vertices: Floats,
+    faces: Ints,
+    name: str = "The mesh",
+    *,
+    region: Region | None = None,
+    rotate: float | None = None,
+    place: dict[str, Any] | None = None,
+) -> MeshSurface:
+    """A target from the arrays of a triangle mesh, ``vertices`` (V, 3) and ``faces`` (F, 3).
+
+    The other arguments are those of :func:`load_mesh`. Raises
+    :class:`~miurafab.errors.TargetError` if the mesh is not one disk.
+    """
+    layout, remarks = lay_out(vertices, faces, name)
     if place is not None:
-        placement, stiffness = _placed_before(place, path.name)
+        placement, stiffness = _placed_before(place, name)
         surface = layout.surface(placement, stiffness)
     else:
         surface = layout.surface(_placement(layout, region, rotate))
     free = place is None and region is None and rotate is None
-    return replace(surface, remarks=remarks, free=free), hashlib.sha256(content).hexdigest()
-
-
-def mesh_surface(vertices: Floats, faces: Ints, name: str = "The mesh") -> MeshSurface:
-    """A target from the arrays of a triangle mesh, ``vertices`` (V, 3) and ``faces`` (F, 3).
-
-    Raises :class:`~miurafab.errors.TargetError` if it is not one disk.
-    """
-    layout, remarks = lay_out(vertices, faces, name)
-    return replace(layout.surface(_placement(layout, None, None)), remarks=remarks)
+    return replace(surface, remarks=remarks, free=free)
 
 
 def _placement(layout: MeshChart, region: Region | None, rotate: float | None) -> GridPlacement:

@@ -88,6 +88,19 @@ def smooth(
     return Smoothed(spline, best[1], float(np.sqrt(best[3] / len(points))))
 
 
+def continued(spline: NdBSpline, uv: Floats) -> Floats:
+    """(..., 3) points of ``spline`` at ``uv`` (..., 2); beyond its knots it goes straight on."""
+    low = np.array([knots[0] for knots in spline.t])
+    high = np.array([knots[-1] for knots in spline.t])
+    inside = np.clip(uv, low, high)
+    beyond = uv - inside
+    points: Floats = spline(inside)
+    if beyond.any():
+        points = points + beyond[..., :1] * spline(inside, nu=(1, 0))
+        points = points + beyond[..., 1:] * spline(inside, nu=(0, 1))
+    return points
+
+
 def _knots(low: float, high: float, spans: int) -> Floats:
     return np.concatenate([[low] * 3, np.linspace(low, high, spans + 1), [high] * 3])
 

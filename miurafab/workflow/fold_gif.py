@@ -1,8 +1,7 @@
 """A folding motion as an animated GIF, drawn facet by facet from the back to the front.
 
-The sheet is seen from one fixed direction in parallel projection. Facets are sorted by the depth of
-their middle and painted over each other (the painter's algorithm), shaded by two lights, on a
-canvas twice as large that is then averaged down. All frames share one palette.
+The sheet is seen from one fixed direction (:func:`~miurafab.origami.picture.project`) and drawn on
+a canvas twice as large, which is then averaged down. All frames share one palette.
 """
 
 from __future__ import annotations
@@ -16,16 +15,15 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from miurafab.origami.folding.kinematics import FoldingMotion
+from miurafab.origami.picture import BACK, FRONT, axes, project
 
 Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT = 640, 480
 _FINE = 2  # canvas pixels for one pixel of the picture, along each axis
-_YAW, _PITCH = -0.6, 0.62
+_AZIMUTH, _ELEVATION = -0.6 - math.pi / 2, 0.62
 _MARGIN, _BAR = 26, 4
 _PAGE, _RULE, _DONE, _MARK = (244, 245, 247), (213, 218, 224), (11, 107, 203), (29, 35, 41)
-_FRONT, _BACK = np.array([242.0, 230.0, 207.0]), np.array([157.0, 181.0, 161.0])
-_KEY, _FILL = np.array([-0.45, 0.6, 0.66]), np.array([0.7, -0.15, 0.5])
 _MILLISECONDS, _HOLD = 60, 700
 
 # Control points of a ramp from blue over pale to red, dark at neither end, for strains.
@@ -66,35 +64,24 @@ def write_gif(
 
 def picture(motion: FoldingMotion, frame: int, strain: Floats | None = None) -> Image.Image:
     """One ``frame`` of ``motion`` as a picture of :data:`WIDTH` x :data:`HEIGHT` pixels."""
-    right, up, out = _axes()
     centre, scale = _camera(motion)
-    points = motion.frames[frame]
     faces = motion.pattern.faces_vertices
-    whole = np.where(faces >= 0, faces, faces[:, :1])
-    corners = points[whole]
-    spokes = corners - corners[:, :1]
-    normal = np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    front = normal @ out > 0
-    facing = np.where(front[:, None], normal, -normal) @ np.stack([right, up, out], axis=1)
-    key = np.maximum(facing @ (_KEY / np.linalg.norm(_KEY)), 0.0)
-    fill = np.maximum(facing @ (_FILL / np.linalg.norm(_FILL)), 0.0)
-    shade = 0.5 + 0.42 * key + 0.14 * fill
-    base = np.where(front[:, None], _FRONT, _BACK) if strain is None else _ramp(strain, frame)
-    if strain is not None:
-        shade = 0.8 + 0.2 * key  # colours that mean a number stay near what they are
-    fills = np.clip(base * shade[:, None], 0, 255).astype(np.uint8)
+    view = project(motion.frames[frame], faces, _AZIMUTH, _ELEVATION)
+    if strain is None:
+        base, shade = np.where(view.front[:, None], FRONT, BACK), view.shade
+    else:  # colours that mean a number stay near what they are
+        base, shade = _ramp(strain, frame), 0.8 + 0.2 * view.key
+    colours = np.clip(base * shade[:, None], 0, 255).astype(np.uint8)
     lines = np.clip(base * (shade - 0.28)[:, None], 0, 255).astype(np.uint8)
-    flat = np.stack([(points - centre) @ right, -((points - centre) @ up)], axis=1) * scale
+    flat = (view.places - centre) * [scale, -scale]
     flat = (flat + np.array([WIDTH / 2, (HEIGHT - _BAR) / 2])) * _FINE
     image = Image.new("RGB", (WIDTH * _FINE, HEIGHT * _FINE), _PAGE)
     draw = ImageDraw.Draw(image)
-    order = np.argsort((corners.mean(axis=1) @ out), kind="stable")
-    places = flat[whole]
+    places = flat[np.where(faces >= 0, faces, faces[:, :1])]
     for polygon, colour, line in zip(
-        places[order].reshape(len(order), -1).tolist(),
-        map(tuple, fills[order].tolist()),
-        map(tuple, lines[order].tolist()),
+        places[view.order].reshape(len(faces), -1).tolist(),
+        map(tuple, colours[view.order].tolist()),
+        map(tuple, lines[view.order].tolist()),
         strict=True,
     ):
         draw.polygon(polygon, fill=colour, outline=line)
@@ -107,24 +94,14 @@ def target_frame(motion: FoldingMotion) -> int:
     return int(np.argmin(np.abs(np.where(np.isfinite(motion.states), motion.states, 1e9) - 1.0)))
 
 
-def _axes() -> tuple[Floats, Floats, Floats]:
-    """The screen's right, up and out of it, in space; z is up in space."""
-    cy, sy, cp, sp = math.cos(_YAW), math.sin(_YAW), math.cos(_PITCH), math.sin(_PITCH)
-    return (
-        np.array([cy, sy, 0.0]),
-        np.array([-sy * sp, cy * sp, cp]),
-        np.array([sy * cp, -cy * cp, sp]),
-    )
-
-
 def _camera(motion: FoldingMotion) -> tuple[Floats, float]:
-    """The middle of what is seen and the pixels a millimetre at which all frames fit."""
-    right, up, _ = _axes()
-    across, upward = motion.frames @ right, motion.frames @ up
-    spans = np.ptp(across), np.ptp(upward)
-    scale = min((WIDTH - 2 * _MARGIN) / spans[0], (HEIGHT - 2 * _MARGIN - 6 * _BAR) / spans[1])
-    middle = (across.max() + across.min()) / 2 * right + (upward.max() + upward.min()) / 2 * up
-    return middle, float(scale)
+    """The middle of what is seen, on the screen, and the pixels a millimetre at which all frames
+    fit.
+    """
+    seen = (motion.frames @ axes(_AZIMUTH, _ELEVATION)[:2].T).reshape(-1, 2)
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    room = np.array([WIDTH - 2 * _MARGIN, HEIGHT - 2 * _MARGIN - 6 * _BAR])
+    return (low + high) / 2, float((room / (high - low)).min())
 
 
 def _ramp(strain: Floats, frame: int) -> Floats:

@@ -145,7 +145,7 @@ FILES = {
     "text.stl": (b"Dear Sir or Madam,\n" * 9, "cannot be read as a mesh|holds no tri"),
     "text.ply": (b"Dear Sir or Madam,\n", "cannot be read as a mesh|holds no tri"),
     "text.glb": (b"Dear Sir or Madam,\n", "cannot be read as a mesh|holds no tri"),
-    "points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "cannot be read as a mesh|holds no tri"),
+    "points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "is a point cloud and not a surface; make"),
     "wild.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read|does not exist"),
     "sheet.step": (b"ISO-10303-21;", "is not a mesh file"),
 }

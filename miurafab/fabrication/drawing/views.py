@@ -30,10 +30,9 @@ from miurafab.fabrication.drawing.page import (
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.partition.split import boundaries
 from miurafab.fabrication.sheets import Layout
-from miurafab.geometry.angles import facet_normals
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.picture import project
 
-_AZIMUTH, _ELEVATION = math.radians(-55), math.radians(28)
 _TALL = 1.25
 """A flat pattern so many times taller than wide is shown lying on its side."""
 
@@ -109,32 +108,17 @@ class Views:
         ``shown`` all other patches are pale.
         """
         assert self.pattern.folded_coords is not None
-        points = self.pattern.folded_coords - self.pattern.folded_coords.mean(axis=0)
-        ca, sa = math.cos(_AZIMUTH), math.sin(_AZIMUTH)
-        ce, se = math.cos(_ELEVATION), math.sin(_ELEVATION)
-        towards = np.array([ce * ca, ce * sa, se])
-        right = np.array([-sa, ca, 0.0])
-        seen, scale = fitted(
-            np.stack([points @ right, points @ np.cross(towards, right)], axis=1), box
-        )
         faces = self.pattern.faces_vertices
-        corners = np.where(faces >= 0, faces, faces[:, :1])
-        depth = (points @ towards)[corners].mean(axis=1)
-        quads = corners[:, [0, 1, 2, min(3, corners.shape[1] - 1)]]
-        normals = np.nan_to_num(facet_normals(points, quads))
-        light = np.array([0.35 * ca - 0.5 * sa, 0.35 * sa + 0.5 * ca, 0.8])
-        facing = np.where(normals @ towards < 0, -1.0, 1.0)
-        shade = 0.6 + 0.4 * np.clip(
-            (normals * facing[:, None]) @ (light / np.linalg.norm(light)), 0, 1
-        )
+        view = project(self.pattern.folded_coords, faces)
+        seen, scale = fitted(view.places, box)
         fills = [
             tint(patch.id) if shown is None or patch.id in shown else PALE for patch in self.patches
         ]
         outlined = len(faces) <= OUTLINED
         canvas.setLineWidth(0.08 * mm)
         canvas.setLineJoin(1)
-        for face in np.argsort(depth, kind="stable").tolist():
-            base, level = fills[self.face_patch[face]], float(shade[face])
+        for face in view.order.tolist():
+            base, level = fills[self.face_patch[face]], min(float(view.shade[face]), 1.0)
             fill = Color(base.red * level, base.green * level, base.blue * level)
             canvas.setFillColor(fill)
             canvas.setStrokeColor(Color(fill.red * 0.75, fill.green * 0.75, fill.blue * 0.75))

@@ -1,0 +1,43 @@
+"""Paths as callers give them: text or any path object, turned into a ``Path`` in one place."""
+
+from __future__ import annotations
+
+import os
+import reprlib
+from pathlib import Path
+
+from miurafab.errors import InputError
+
+AnyPath = str | os.PathLike[str]
+"""A path as every public function takes it."""
+
+
+def as_path(value: object, what: str) -> Path:
+    """``value`` as a path; ``what`` begins the sentence if it is none, such as ``The pattern``.
+
+    Raises :class:`~miurafab.errors.InputError`.
+
+    >>> as_path("hypar.fold", "The pattern").suffix
+    '.fold'
+    """
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(text, str):
+        raise InputError(
+            f"{what} is {reprlib.repr(value)}, which is a {type(value).__name__} and no path."
+        )
+    if not text or "\0" in text:
+        raise InputError(f"{what} is {text!r}, which is no path.")
+    return Path(text)
+
+
+def new_file(value: object, what: str, endings: tuple[str, ...]) -> Path:
+    """A path that can be written: it has one of ``endings`` and its folder is there.
+
+    Raises :class:`~miurafab.errors.InputError`.
+    """
+    path = as_path(value, what)
+    if path.suffix.lower() not in endings:
+        raise InputError(f"{path} does not end in one of {', '.join(endings)}.")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"The folder of {path} does not exist.")
+    return path
