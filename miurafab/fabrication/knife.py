@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.geometry.arrays import places_in_runs
 from miurafab.profiles import OPERATIONS, Knife
 
 ALIGNING_OFFSETS = 20
@@ -134,7 +135,7 @@ def axis_way(toolpath: Toolpath, knife: Knife) -> Toolpath:
     count[np.abs(turn) < _STRAIGHT] = 0.0
     size = count.astype(np.int64) + 1
     corner = np.repeat(np.arange(len(corners)), size)
-    step = np.arange(len(corner)) - np.repeat(np.cumsum(size) - size, size)
+    step = places_in_runs(size)
     angle = np.arctan2(before[corner, 1], before[corner, 0])
     angle += turn[corner] * step / np.maximum(count[corner], 1.0)
     fan = points[corners[corner]] + d * np.stack([np.cos(angle), np.sin(angle)], axis=1)

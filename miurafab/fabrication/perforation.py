@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
+from miurafab.geometry.arrays import places_in_runs
 from miurafab.profiles import Material
 from miurafab.profiles.material import Perforation
 
@@ -107,7 +108,7 @@ def _drawn(
     kerf: float,
 ) -> Dashes:
     crease = np.repeat(np.arange(len(length)), fit.count)
-    index = np.arange(len(crease)) - np.repeat(np.cumsum(fit.count) - fit.count, fit.count)
+    index = places_in_runs(fit.count)
     last = index == fit.count[crease] - 1
     begin, period = fit.bridge + fit.end + fit.gap, fit.cut + fit.gap
     inner = begin[crease] + (index - 1) * period[crease]

@@ -22,7 +22,8 @@ import numpy as np
 import scipy.spatial
 from numpy.typing import NDArray
 
-from miurafab.geometry.angles import facet_normals, fold_angles
+from miurafab.geometry.angles import fold_angles
+from miurafab.geometry.polygons import edge_lengths, facet_normals
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.unfold import FLAT_ANGLE
 
@@ -112,20 +113,15 @@ def ring_seams(pattern: CreasePattern) -> Seams:
     pairs = np.sort(pairs, axis=1)
     one, other = folded[pairs[:, 0]], folded[pairs[:, 1]][:, ::-1]
     met = (np.linalg.norm(one - other, axis=2) <= near).all(axis=1)
-    length = np.linalg.norm(np.diff(pattern.vertices_coords[ends], axis=1)[:, 0], axis=1)
+    length = edge_lengths(pattern.vertices_coords, ends)
     met &= np.abs(length[pairs[:, 0]] - length[pairs[:, 1]]) <= near
     alone = np.bincount(pairs.ravel(), minlength=len(border)) == 1
     pairs = pairs[met & alone[pairs].all(axis=1)]
     pairs = pairs[np.argsort(pairs[:, 0])]
     faces = pattern.edges_faces[border].max(axis=1)[pairs]
-    normal = _normals(pattern.folded_coords, pattern.faces_vertices[faces.ravel()])
+    normal = facet_normals(pattern.folded_coords, pattern.faces_vertices[faces.ravel()])
     left, right = normal.reshape(-1, 2, 3).swapaxes(0, 1)
     angle = fold_angles(pattern.folded_coords, ends[pairs[:, 0]], left, right)
     fold = np.select([angle > FLAT_ANGLE, angle < -FLAT_ANGLE], ["V", "M"], "F")
     glued = np.abs(angle) < math.pi - TOGETHER
     return Seams(border[pairs], faces, fold).take(glued)
-
-
-def _normals(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    corners = np.where(faces >= 0, faces, faces[:, :1])
-    return facet_normals(points, corners[:, [0, 1, 2, min(3, corners.shape[1] - 1)]])

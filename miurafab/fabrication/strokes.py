@@ -31,6 +31,7 @@ from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
 from miurafab.fabrication.relief import Holes, circles, relief_holes
 from miurafab.fabrication.route.order import HOLE, OUTLINE, StrokeSet
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.geometry.arrays import run_starts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import OPERATIONS, Material
 from miurafab.profiles.material import CREASE_KINDS
@@ -132,7 +133,7 @@ def sheet_strokes(
     side = 2 * motion.sheet[patch] + behind
     by_side = np.argsort(side, kind="stable")
     begin = np.searchsorted(side[by_side], np.arange(2 * len(sheets) + 1))
-    first = np.cumsum(count) - count
+    first = run_starts(count)
 
     def taken(number: int, blank: Blank, name: str) -> StrokeSet:
         chosen = by_side[begin[number] : begin[number + 1]]

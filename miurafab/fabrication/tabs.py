@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.seams import Seams, all_seams, ring_seams
+from miurafab.geometry.polygons import edge_lengths, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -115,10 +116,7 @@ class TabRegions:
     def areas(self) -> NDArray[np.float64]:
         """(N,) glue areas in mm²."""
         ahead = np.where(self.present[..., None], self.points, self.points[:, :1])
-        x, y = (ahead - self.points[:, :1]).transpose(2, 0, 1)
-        doubled = x[:, :-1] * y[:, 1:] - x[:, 1:] * y[:, :-1]
-        area: NDArray[np.float64] = doubled.sum(axis=1) / 2
-        return area
+        return signed_areas(ahead)
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -203,7 +201,7 @@ def tab_regions(
         points, sides = clip_convex(points, sides, towards, np.where(shared, limit, NO_LIMIT))
     points, sides = _base_first(points, sides)
     # Where the facet is not convex at an end of its side, the line of the side runs on inside it.
-    length = np.linalg.norm(np.diff(pattern.vertices_coords[ends_of], axis=1)[:, 0], axis=1)
+    length = edge_lengths(pattern.vertices_coords, ends_of)
     for way, reach_out, limit in (
         (1.0, points[:, 0, 0] < -1e-9, zero),
         (-1.0, points[:, 1, 0] > length + 1e-9, -length),

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from miurafab.geometry.arrays import Floats, Ints
 
 
 def angle_between(a: Floats, b: Floats) -> Floats:
@@ -32,7 +31,7 @@ def sectors(a: Floats, b: Floats) -> tuple[Floats, Floats, Floats]:
     return angle, to_a, to_b
 
 
-def sector_angles(points: Floats, vertices: NDArray[np.int64], ring: NDArray[np.int64]) -> Floats:
+def sector_angles(points: Floats, vertices: Ints, ring: Ints) -> Floats:
     """(I, 4) sector angles at ``vertices`` (I,) with neighbours ``ring`` (I, 4), radians.
 
     Sector k lies between neighbour k and the next. ``points`` is (V, 3).
@@ -41,19 +40,7 @@ def sector_angles(points: Floats, vertices: NDArray[np.int64], ring: NDArray[np.
     return angle_between(spokes, np.roll(spokes, -1, axis=1))
 
 
-def facet_normals(points: Floats, faces: NDArray[np.int64]) -> Floats:
-    """(F, 3) unit normals of quads (F, 4) in ``points`` (V, 3), by the cross of the diagonals.
-
-    A degenerate facet has the normal NaN.
-    """
-    p = points[faces]
-    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        unit: Floats = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    return unit
-
-
-def fold_angles(points: Floats, edges: NDArray[np.int64], left: Floats, right: Floats) -> Floats:
+def fold_angles(points: Floats, edges: Ints, left: Floats, right: Floats) -> Floats:
     """(E,) signed fold angles, valley positive, radians.
 
     ``edges`` (E, 2) run from tail to head; ``left`` and ``right`` (E, 3) are the unit normals of

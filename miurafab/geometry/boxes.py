@@ -9,10 +9,8 @@ all coarser ones.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs
 
 
 def meeting_pairs(low: Floats, high: Floats) -> tuple[Ints, Ints]:
@@ -47,7 +45,7 @@ def meeting_pairs(low: Floats, high: Floats) -> tuple[Ints, Ints]:
     return keys // len(low), keys % len(low)
 
 
-def _sharing_cells(first: Ints, last: Ints, large: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+def _sharing_cells(first: Ints, last: Ints, large: Bools) -> tuple[Ints, Ints]:
     """Pairs (a < b) of boxes that share a cell, one of them ``large``. A pair may come again.
 
     ``first`` and ``last`` (B, 3) are each box's range of cells.
@@ -55,7 +53,7 @@ def _sharing_cells(first: Ints, last: Ints, large: NDArray[np.bool_]) -> tuple[I
     spans = last - first + 1
     counts = spans.prod(axis=1)
     box = np.repeat(np.arange(len(first)), counts)
-    within = np.arange(len(box)) - np.repeat(np.cumsum(counts) - counts, counts)
+    within = places_in_runs(counts)
     cell = first[box].copy()
     for axis in range(3):
         cell[:, axis] += within % spans[box, axis]

@@ -10,11 +10,9 @@ bound of all the others.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from miurafab.geometry.arrays import Floats, Ints
 
 _CHUNK = 50_000
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
+from miurafab.geometry.arrays import Floats, Ints
 
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 
@@ -32,12 +33,12 @@ class CreasePattern:
     the folded form lies on ``scale`` times it.
     """
 
-    vertices_coords: NDArray[np.float64]
-    edges_vertices: NDArray[np.int64]
+    vertices_coords: Floats
+    edges_vertices: Ints
     edges_assignment: NDArray[np.str_]
-    edges_fold_angle: NDArray[np.float64]
-    faces_vertices: NDArray[np.int64]
-    folded_coords: NDArray[np.float64] | None = None
+    edges_fold_angle: Floats
+    faces_vertices: Ints
+    folded_coords: Floats | None = None
     grid: tuple[int, int] | None = None
     scale: float = 1.0
     target: dict[str, Any] = field(default_factory=dict)
@@ -63,17 +64,17 @@ class CreasePattern:
             raise PatternError(f"The grid {self.grid} does not have {vertices} vertices.")
 
     @cached_property
-    def faces_edges(self) -> NDArray[np.int64]:
+    def faces_edges(self) -> Ints:
         """(F, k) index of the edge from each face corner to the next, -1 where there is none."""
         return self._faces_edges_and_edges_faces[0]
 
     @cached_property
-    def edges_faces(self) -> NDArray[np.int64]:
+    def edges_faces(self) -> Ints:
         """(E, 2) the faces left and right of each edge in its own direction, -1 for none."""
         return self._faces_edges_and_edges_faces[1]
 
     @cached_property
-    def _faces_edges_and_edges_faces(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _faces_edges_and_edges_faces(self) -> tuple[Ints, Ints]:
         faces, k = self.faces_vertices.shape
         count = (self.faces_vertices >= 0).sum(axis=1)
         slot = np.broadcast_to(np.arange(k), (faces, k))

@@ -15,12 +15,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.tessellation import Tessellation
 from miurafab.surfaces.analytic import GeneralizedCylinder
-
-Floats = NDArray[np.float64]
 
 
 def cylinder_over_polyline(profile: Floats, step: float, push: float, columns: int) -> Tessellation:

@@ -10,13 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.geometry.angles import angle_between
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 DEGENERATE = 1e-6
 """An edge shorter than this part of the mean edge cannot be creased."""
@@ -108,7 +106,7 @@ def facet_planarity(pattern: CreasePattern, points: Floats) -> Floats:
     the cube of the mean edge length; 0 for triangles.
     """
     faces = pattern.faces_vertices
-    mean = float(edge_lengths(pattern, points).mean())
+    mean = float(edge_lengths(points, pattern.edges_vertices).mean())
     worst = np.zeros(len(faces))
     for corner in range(3, faces.shape[1]):
         real = faces[:, corner] >= 0
@@ -119,13 +117,6 @@ def facet_planarity(pattern: CreasePattern, points: Floats) -> Floats:
     return worst
 
 
-def edge_lengths(pattern: CreasePattern, points: Floats) -> Floats:
-    """(E,) lengths of the edges in ``points`` (V, 2 or 3)."""
-    ends = points[pattern.edges_vertices]
-    lengths: Floats = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return lengths
-
-
 def isometry(pattern: CreasePattern) -> Floats:
     """(F,) the largest relative difference, flat to folded, of each facet's sides and diagonals.
 
@@ -134,15 +125,15 @@ def isometry(pattern: CreasePattern) -> Floats:
     """
     assert pattern.folded_coords is not None
     faces = pattern.faces_vertices
-    mean = float(edge_lengths(pattern, pattern.folded_coords).mean())
+    mean = float(edge_lengths(pattern.folded_coords, pattern.edges_vertices).mean())
     worst = np.zeros(len(faces))
     k = faces.shape[1]
     for one in range(k):
         for other in range(one + 1, k):
             real = faces[:, other] >= 0
             ends = faces[real][:, [one, other]]
-            flat = np.linalg.norm(np.diff(pattern.vertices_coords[ends], axis=1)[:, 0], axis=1)
-            folded = np.linalg.norm(np.diff(pattern.folded_coords[ends], axis=1)[:, 0], axis=1)
+            flat = edge_lengths(pattern.vertices_coords, ends)
+            folded = edge_lengths(pattern.folded_coords, ends)
             longer = np.maximum(flat, folded)
             sound = longer > DEGENERATE * mean
             difference = np.where(sound, np.abs(flat - folded) / np.where(sound, longer, 1.0), 0.0)

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
-
-Floats = NDArray[np.float64]
 
 AZIMUTH, ELEVATION = math.radians(-55), math.radians(30)
 """From where a folded form is seen: over its front right corner."""
@@ -53,8 +52,8 @@ class View:
     """
 
     places: Floats
-    order: NDArray[np.int64]
-    front: NDArray[np.bool_]
+    order: Ints
+    front: Bools
     shade: Floats
     key: Floats
 
@@ -68,7 +67,7 @@ def axes(azimuth: float = AZIMUTH, elevation: float = ELEVATION) -> Floats:
 
 def project(
     points: Floats,
-    faces: NDArray[np.int64],
+    faces: Ints,
     azimuth: float = AZIMUTH,
     elevation: float = ELEVATION,
 ) -> View:
@@ -166,7 +165,7 @@ def _creases(pattern: CreasePattern, points: Floats) -> list[str]:
     return parts
 
 
-def _facing(points: Floats, faces: NDArray[np.int64]) -> float:
+def _facing(points: Floats, faces: Ints) -> float:
     """The azimuth from which an upright sheet shows its front, a little from the side."""
     corners = points[np.where(faces >= 0, faces, faces[:, :1])]
     spokes = corners - corners[:, :1]

@@ -8,11 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Floats
 from miurafab.geometry.quads import QuadGrid
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,9 +20,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from miurafab.geometry.arrays import Floats
 
 UNIT_DISTANCE = 0.01
 UNIT_FACETS = 1000.0

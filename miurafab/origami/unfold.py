@@ -14,14 +14,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from miurafab.geometry.angles import angle_between, facet_normals, fold_angles
+from miurafab.geometry.angles import angle_between, fold_angles
+from miurafab.geometry.arrays import Bools, Floats
+from miurafab.geometry.polygons import facet_normals
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.tessellation import Tessellation
-
-Floats = NDArray[np.float64]
 
 FLAT_ANGLE = 1e-9
 """Fold angles below this many radians are flat: an edge that is there but need not be folded."""
@@ -58,7 +57,7 @@ def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
     crease or facet without extent, about which nothing can turn, is flat.
     """
     assert pattern.folded_coords is not None
-    normals = _polygon_normals(pattern.folded_coords, pattern.faces_vertices)
+    normals = facet_normals(pattern.folded_coords, pattern.faces_vertices)
     inner = (pattern.edges_faces >= 0).all(axis=1)
     left, right = (normals[pattern.edges_faces[inner, side]] for side in (0, 1))
     angle = np.zeros(len(pattern.edges_vertices))
@@ -73,16 +72,6 @@ def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
         edges_assignment=np.where(folds, letter, kept),
         edges_fold_angle=np.where(folds, angle, 0.0),
     )
-
-
-def _polygon_normals(points: Floats, faces: NDArray[np.int64]) -> Floats:
-    """(F, 3) unit normals of polygons (F, k), -1 padded, by Newell's sum over their corners."""
-    corners = points[np.where(faces >= 0, faces, faces[:, :1])]
-    spokes = corners - corners[:, :1]
-    normal = np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        unit: Floats = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    return unit
 
 
 def grid_fold_angles(points: Floats, grid: QuadGrid) -> Floats:
@@ -103,7 +92,7 @@ def grid_fold_angles(points: Floats, grid: QuadGrid) -> Floats:
     return np.concatenate([along.ravel(), across.ravel()])
 
 
-def _border(grid: QuadGrid) -> NDArray[np.bool_]:
+def _border(grid: QuadGrid) -> Bools:
     along = np.zeros((grid.rows, grid.columns - 1), dtype=bool)
     across = np.zeros((grid.rows - 1, grid.columns), dtype=bool)
     along[[0, -1]] = True

@@ -11,15 +11,14 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
+from miurafab.geometry.polygons import edge_lengths, facet_means
 from miurafab.origami import invariants
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import overlaps, self_intersections, triangulate
 from miurafab.surfaces.surface import TargetSurface, tangents
-
-Floats = NDArray[np.float64]
 
 EXACT = 1e-10
 """The residual up to which planarity, developability and isometry count as exact."""
@@ -104,14 +103,14 @@ def measure(pattern: CreasePattern, surface: TargetSurface | None = None) -> Mea
     """The numbers alone."""
     facets, vertices = len(pattern.faces_vertices), len(pattern.vertices_coords)
     folded = pattern.folded_coords
-    flat_edges = invariants.edge_lengths(pattern, pattern.vertices_coords)
+    flat_edges = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
     covered = len(overlaps(pattern))
     if folded is None:
         return Measurements(facets, vertices, float(flat_edges.min()), covered)
     ring = invariants.corner_ring(pattern, folded)
     inner = invariants.interior_vertices(pattern)
     distances = {} if surface is None else _distances(pattern, surface)
-    shortest = min(flat_edges.min(), invariants.edge_lengths(pattern, folded).min())
+    shortest = min(flat_edges.min(), edge_lengths(folded, pattern.edges_vertices).min())
     measured = Measurements(
         facets,
         vertices,
@@ -138,7 +137,7 @@ def _distances(pattern: CreasePattern, surface: TargetSurface) -> dict[str, Any]
     scale, folded = pattern.scale, pattern.folded_coords
     triangles, _ = triangulate(pattern.faces_vertices)
     corners = folded[triangles]
-    middle = _facet_means(pattern)
+    middle = facet_means(folded, pattern.faces_vertices)
     sheet = np.concatenate([folded, folded[pattern.edges_vertices].mean(axis=1), middle])
 
     def to_target(points: Floats) -> float:
@@ -171,17 +170,9 @@ def surface_area(surface: TargetSurface, samples: int = 200) -> float:
     return float(density.mean() * d.width * d.height)
 
 
-def _facet_means(pattern: CreasePattern) -> Floats:
-    assert pattern.folded_coords is not None
-    real = pattern.faces_vertices >= 0
-    corners = np.where(real[..., None], pattern.folded_coords[pattern.faces_vertices], 0.0)
-    means: Floats = corners.sum(axis=1) / real.sum(axis=1)[:, None]
-    return means
-
-
 def _findings(pattern: CreasePattern, measured: Measurements) -> list[AuditFinding]:
     found = []
-    edges = invariants.edge_lengths(pattern, pattern.vertices_coords)
+    edges = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
     short = np.flatnonzero(edges < DEGENERATE * edges.mean())
     if len(short):
         found.append(
@@ -246,7 +237,7 @@ def _inexact(pattern: CreasePattern, folded: Floats) -> list[AuditFinding]:
     return found
 
 
-def _these(numbers: NDArray[np.int64], noun: str) -> str:
+def _these(numbers: Ints, noun: str) -> str:
     """``Edge 7 is`` or ``12 edges (3, 4, 5, 6, 7, ...) are``."""
     if len(numbers) == 1:
         return f"{noun.capitalize()} {numbers[0]} is"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.geometry.arrays import places_in_runs, run_starts
 from miurafab.profiles import OPERATIONS, MachineProfile
 
 
@@ -39,8 +40,8 @@ def runs_of(toolpath: Toolpath, passes_of_operation: Sequence[int]) -> Runs:
     passes = np.asarray(passes_of_operation, dtype=np.int64)[toolpath.operation[first]]
     # Run r stands passes[r] times in a row; a stroke's index is its run's first plus its place.
     source = np.repeat(np.arange(len(first)), passes)
-    number = np.arange(len(source)) - np.repeat(np.cumsum(passes) - passes, passes) + 1
-    made = np.cumsum(size[source]) - size[source]
+    number = places_in_runs(passes) + 1
+    made = run_starts(size[source])
     total = int(size[source].sum())
     order = np.arange(total) + np.repeat(first[source] - made, size[source])
     return Runs(
@@ -56,7 +57,7 @@ def runs_of(toolpath: Toolpath, passes_of_operation: Sequence[int]) -> Runs:
 def repeated(toolpath: Toolpath, runs: Runs) -> Toolpath:
     """``toolpath`` with its strokes in the order of ``runs``, passes repeated."""
     size = np.diff(toolpath.offsets)[runs.order]
-    begin = np.cumsum(size) - size
+    begin = run_starts(size)
     source = np.arange(int(size.sum()))
     source += np.repeat(toolpath.offsets[:-1][runs.order] - begin, size)
     return replace(
@@ -107,7 +108,7 @@ def points_of(toolpath: Toolpath, machine: MachineProfile) -> Points:
             f"{_named(toolpath, int(np.argmax(kept < 2)))} is shorter than 0.001 mm "
             "and cannot be made; remove it from the layout."
         )
-    return Points(xy[keep], np.cumsum(kept) - kept, starts[keep], toolpath.operation)
+    return Points(xy[keep], run_starts(kept), starts[keep], toolpath.operation)
 
 
 def _microns(toolpath: Toolpath, machine: MachineProfile) -> NDArray[np.int64]:

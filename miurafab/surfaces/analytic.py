@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from miurafab.geometry.arrays import Floats
 from miurafab.surfaces.curves import ProfileCurve
-from miurafab.surfaces.surface import Domain, Floats, ParametricSurface
+from miurafab.surfaces.surface import Domain, ParametricSurface
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from miurafab.errors import TargetError
-
-Floats = NDArray[np.float64]
+from miurafab.geometry.arrays import Floats
 
 
 @dataclass(frozen=True)

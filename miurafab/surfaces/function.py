@@ -20,8 +20,9 @@ from scipy.interpolate import NdBSpline, make_interp_spline
 
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
+from miurafab.geometry.arrays import Floats
 from miurafab.surfaces.smoothing import continued
-from miurafab.surfaces.surface import Domain, Floats, closest_parameters, tangents, unit
+from miurafab.surfaces.surface import Domain, closest_parameters, tangents, unit
 
 SAMPLES = (17, 33, 65)
 """Samples to a side that are tried in turn, until the spline follows the function."""

@@ -15,9 +15,10 @@ from PIL import Image
 
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
+from miurafab.geometry.arrays import Floats
 from miurafab.surfaces.function import SampledSurface, sample
 from miurafab.surfaces.smoothing import smooth
-from miurafab.surfaces.surface import Domain, Floats
+from miurafab.surfaces.surface import Domain
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp")
 

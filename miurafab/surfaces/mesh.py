@@ -21,9 +21,9 @@ import trimesh
 from scipy.interpolate import NdBSpline
 
 from miurafab.errors import TargetError
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
 from miurafab.surfaces.mesh_repair import (
-    Ints,
     clean,
     doubled_areas,
     edges_of,
@@ -43,7 +43,7 @@ from miurafab.surfaces.placement import (
     turned,
 )
 from miurafab.surfaces.smoothing import Smoothed, continued, smooth
-from miurafab.surfaces.surface import Domain, Floats, tangents, unit
+from miurafab.surfaces.surface import Domain, tangents, unit
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb")
 

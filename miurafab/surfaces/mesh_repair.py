@@ -11,13 +11,10 @@ import math
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from miurafab.errors import TargetError
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.surfaces.parameterise import border_loops
-from miurafab.surfaces.surface import Floats
-
-Ints = NDArray[np.int64]
 
 SMALL_HOLE = 0.15
 """Holes are filled up to this part of the length of the border."""

@@ -19,11 +19,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial import ConvexHull
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs
+from miurafab.geometry.sparse import factor_symmetric
+
 Complexes = NDArray[np.complex128]
 
 RIGID_ROUNDS = 60
@@ -59,10 +59,10 @@ def _upright(z: Complexes) -> Floats:
     return np.stack([z.real, z.imag], axis=1)
 
 
-def turned_over(z: Complexes, faces: Ints) -> NDArray[np.bool_]:
+def turned_over(z: Complexes, faces: Ints) -> Bools:
     """(F,) which triangles of the layout ``z`` (V,) have no area or the wrong orientation."""
     e1, e2 = z[faces[:, 1]] - z[faces[:, 0]], z[faces[:, 2]] - z[faces[:, 0]]
-    turned: NDArray[np.bool_] = (e1.conj() * e2).imag <= 0
+    turned: Bools = (e1.conj() * e2).imag <= 0
     return turned
 
 
@@ -97,7 +97,7 @@ def conformal(vertices: Floats, faces: Ints) -> Complexes:
     # as real and imaginary parts: SuperLU is an order faster on real matrices of twice the size
     real = sparse.block_array([[normal.real, -normal.imag], [normal.imag, normal.real]]).tocsc()
     right = a.conj().T @ b
-    parts = _factor(real).solve(np.concatenate([right.real, right.imag]))
+    parts = factor_symmetric(real).solve(np.concatenate([right.real, right.imag]))
     z[free] = parts[: len(free)] + 1j * parts[len(free) :]
     e1, e2 = z[faces[:, 1]] - z[faces[:, 0]], z[faces[:, 2]] - z[faces[:, 0]]
     laid = float((e1.conj() * e2).imag.sum())
@@ -105,16 +105,6 @@ def conformal(vertices: Floats, faces: Ints) -> Complexes:
         z, laid = z.conj(), -laid
     scaled: Complexes = z * np.sqrt(area.sum() / max(laid, 1e-300))
     return scaled
-
-
-def _factor(matrix: sparse.csc_array) -> SuperLU:
-    """The factor of a symmetric positive definite ``matrix``, which needs no pivoting."""
-    return splu(
-        matrix,
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
 
 
 def _far_apart(vertices: Floats) -> Ints:
@@ -140,7 +130,7 @@ def tutte(vertices: Floats, faces: Ints) -> Complexes:
         degree = np.asarray(graph.sum(axis=1), dtype=np.float64).ravel()[free]
         matrix = (sparse.diags_array(degree) - graph[free][:, free]).tocsc()
         right = graph[free][:, loop] @ z[loop]
-        factor = _factor(matrix)
+        factor = factor_symmetric(matrix)
         z[free] = factor.solve(right.real) + 1j * factor.solve(right.imag)
     return z
 
@@ -179,7 +169,7 @@ def _rigid(z: Complexes, local: Complexes, faces: Ints) -> Complexes:
         (np.concatenate([w, w, -w, -w]), (rows, columns)), shape=(count, count)
     ).tocsc()
     matrix = matrix + sparse.coo_array(([w.mean()], ([0], [0])), shape=(count, count)).tocsc()
-    factor = _factor(matrix)
+    factor = factor_symmetric(matrix)
     best = z
     energy = np.inf
     for _ in range(RIGID_ROUNDS):
@@ -227,8 +217,7 @@ def locate(flat: Floats, faces: Ints, points: Floats) -> tuple[Ints, Floats]:
         triangle = np.repeat(block, counts)
         if not len(triangle):
             continue
-        within = np.arange(len(triangle)) - np.repeat(np.cumsum(counts) - counts, counts)
-        point = order[first[triangle] + within]
+        point = order[first[triangle] + places_in_runs(counts)]
         y = points[point, 1]
         close = (y >= low[triangle, 1] - margin) & (y <= high[triangle, 1] + margin)
         triangle, point = triangle[close], point[close]

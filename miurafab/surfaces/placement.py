@@ -11,14 +11,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import UnitError
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.surfaces.parameterise import locate
-from miurafab.surfaces.surface import Domain, Floats
+from miurafab.surfaces.surface import Domain
 from miurafab.units import parse_length
-
-Ints = NDArray[np.int64]
 
 ANGLES = np.radians(np.arange(-45, 45, 7.5))
 _LATTICE = 81
@@ -146,7 +144,7 @@ def largest_rectangle(frame: Floats, faces: Ints) -> Domain | None:
     return Domain(x[i0], x[i1], y[j0], y[j1])
 
 
-def _largest_block(covered: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+def _largest_block(covered: Bools) -> tuple[int, int, int, int]:
     """Column and row range of the largest rectangle of lattice points that are all covered.
 
     Row by row with the histogram of covered runs above (the stack algorithm).

@@ -15,14 +15,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline, NdBSpline
-from scipy.sparse.linalg import splu
 
+from miurafab.geometry.arrays import Floats
+from miurafab.geometry.sparse import factor_symmetric
 from miurafab.surfaces.surface import Domain
-
-Floats = NDArray[np.float64]
 
 _DEGREE = 3
 _PROBES = 8
@@ -72,9 +70,7 @@ def smooth(
     for factor in tried.tolist():
         matrix = (gram + factor * unit * penalty).tocsc()
         matrix = matrix + sparse.diags_array(np.full(matrix.shape[0], 1e-13)).tocsc()
-        solved = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(
-            right
-        )
+        solved = factor_symmetric(matrix).solve(right)
         c = solved[:, :3]
         residual = float(np.sum((basis @ c - points) ** 2))
         trace = float(np.einsum("np,np->", signs, basis @ solved[:, 3:])) / _PROBES

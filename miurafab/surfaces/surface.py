@@ -12,10 +12,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-Floats = NDArray[np.float64]
+from miurafab.geometry.arrays import Floats
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from miurafab.geometry.arrays import places_in_runs
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_text
 from miurafab.workflow.picture_svg import svg_text
@@ -139,7 +140,7 @@ def _along(start: _Points, end: _Points, radius: int, dash: tuple[float, float] 
     start, end = start + (end - start) * cap, end + (start - end) * cap
     count = np.ceil(length * _FINE).astype(np.int64) + 1
     line = np.repeat(np.arange(len(start)), count)
-    place = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
+    place = places_in_runs(count)
     part = place / np.maximum(count - 1, 1)[line]
     if dash is not None:
         drawn = np.mod(part * length[line], sum(dash)) < dash[0]

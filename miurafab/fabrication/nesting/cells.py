@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from miurafab.fabrication.nesting.problem import SheetKind, buffered, turned
+from miurafab.geometry.arrays import places_in_runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +136,7 @@ def _scan(rings: list[NDArray[np.float64]], count: NDArray[np.int64]) -> NDArray
         first = np.ceil(low - 0.5).clip(0, count[1]).astype(np.int64)
         last = np.ceil(high - 0.5).clip(0, count[1]).astype(np.int64)
         side = np.repeat(np.arange(len(a)), last - first)
-        row = np.arange(len(side)) - np.repeat(np.cumsum(last - first) - last, last - first)
+        row = first[side] + places_in_runs(last - first)
         part = (row + 0.5 - a[side, 1]) / (b[side, 1] - a[side, 1])
         x = a[side, 0] + part * (b[side, 0] - a[side, 0])
         np.add.at(flips, (np.ceil(x - 0.5).clip(0, count[0]).astype(np.int64), row), 1)

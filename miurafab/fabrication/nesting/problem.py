@@ -23,6 +23,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from miurafab.geometry.shapes import common_area
+
 TOLERANCE = 1e-6
 """How far, in mm, a placement may be off by rounding."""
 
@@ -240,7 +242,7 @@ def layout_faults(problem: Problem, slots: Sequence[Slot]) -> list[str]:
         low, wide, high = -TOLERANCE, kind.width + TOLERANCE, kind.height + TOLERANCE
         if low_x < low or low_y < low or high_x > wide or high_y > high:
             faults.append(f"patch {name} lies outside the usable bed")
-        if kind.defects and _common(shape, kind.flaws) > TOLERANCE * shape.length:
+        if kind.defects and common_area(shape, kind.flaws) > TOLERANCE * shape.length:
             faults.append(f"patch {name} lies on a defect")
     faults += _stock_faults(slots, stock)
     # Sheets are laid side by side, so that only what lies on the same one is near.
@@ -257,7 +259,7 @@ def layout_faults(problem: Problem, slots: Sequence[Slot]) -> list[str]:
         if stock.gap > TOLERANCE:
             gap = f"{stock.gap:g} mm"
             faults.append(f"patches {names[one]} and {names[other]} are nearer than {gap}")
-        elif _common(shapes[one], shapes[other]) > TOLERANCE * shapes[one].length:
+        elif common_area(shapes[one], shapes[other]) > TOLERANCE * shapes[one].length:
             faults.append(f"patches {names[one]} and {names[other]} overlap")
     return faults
 
@@ -276,8 +278,3 @@ def _stock_faults(slots: Sequence[Slot], stock: Stock) -> list[str]:
         for count, kind in zip(taken, stock.kinds, strict=True)
         if kind.quantity is not None and count > kind.quantity
     ]
-
-
-def _common(one: BaseGeometry, other: BaseGeometry) -> float:
-    # Without a grid, GEOS 3.14 can return a whole polygon that only touches the other one.
-    return float(shapely.area(shapely.intersection(one, other, grid_size=1e-9)))

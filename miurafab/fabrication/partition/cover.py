@@ -26,6 +26,7 @@ import scipy.spatial
 from numpy.typing import NDArray
 
 from miurafab.fabrication.partition.fit_box import boxes_at
+from miurafab.geometry.polygons import principal_axes
 
 _NEAR = 4
 """Frames that are tried for each facet."""
@@ -70,9 +71,7 @@ def brickwork(shapes: NDArray[np.float64], size: tuple[float, float]) -> list[ND
     """
     centres = shapes.mean(axis=1)
     middle = centres.mean(axis=0)
-    _, axes = np.linalg.eigh((centres - middle).T @ (centres - middle))
-    # The sign of an eigenvector is arbitrary; the larger component is made positive.
-    long = axes[:, 1] * np.sign(axes[np.abs(axes[:, 1]).argmax(), 1])
+    long = principal_axes(centres)[:, 1]
     turn = np.stack([long, [-long[1], long[0]]])
     angle = float(np.arctan2(long[1], long[0]))
     placed = (shapes - middle) @ turn.T

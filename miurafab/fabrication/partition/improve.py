@@ -21,6 +21,7 @@ from miurafab.fabrication.partition.cover import brickwork, excess, frame_of, ne
 from miurafab.fabrication.partition.cover_search import CoverSearch
 from miurafab.fabrication.partition.min_cut import Recut
 from miurafab.fabrication.tabs import TabRegions
+from miurafab.geometry.polygons import edge_lengths, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -104,8 +105,7 @@ def improved(
 def _seam_mm(pattern: CreasePattern, patch: NDArray[np.int64]) -> float:
     pair = pattern.edges_faces
     seam = (pair >= 0).all(axis=1) & (patch[pair[:, 0]] != patch[pair[:, 1]])
-    ends = pattern.vertices_coords[pattern.edges_vertices[seam]]
-    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+    return float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices[seam]).sum())
 
 
 def _frames(
@@ -135,7 +135,7 @@ def _fewer(
     small = (size[0] - depth + _LENIENT_MM, size[1] - depth + _LENIENT_MM)
     if min(small) <= 0:
         return
-    area = _areas(shapes[:, : pattern.faces_vertices.shape[1]])
+    area = np.abs(signed_areas(shapes[:, : pattern.faces_vertices.shape[1]]))
     chains = []
     for name in np.unique(part).tolist():
         facets = np.flatnonzero(part == name)
@@ -214,12 +214,4 @@ def _without_rim(
         off = ((found[face, slot] - ends[:, 0]) * inwards).sum(axis=1)
         push = np.clip(np.minimum(depth, far / 2) - off, 0.0, None)
         np.add.at(found, (face, slot), push[:, None] * inwards)
-    return found
-
-
-def _areas(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(F,) the areas of facets with corners ``points`` (F, k, 2), in mm²."""
-    x, y = (points - points[:, :1]).transpose(2, 0, 1)
-    doubled = (x[:, :-1] * y[:, 1:] - x[:, 1:] * y[:, :-1]).sum(axis=1)
-    found: NDArray[np.float64] = np.abs(doubled) / 2
     return found

@@ -21,6 +21,7 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.fit_box import Space
 from miurafab.fabrication.partition.split import Boundary, boundaries, split
 from miurafab.fabrication.tabs import TabRegions, choose_tabs
+from miurafab.geometry.shapes import common_area
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -140,16 +141,11 @@ def _without_collisions(
         taken: BaseGeometry = shapely.Polygon(pattern.vertices_coords[around[patch].vertices])
         for tab in standing[patch].tolist():
             shape = shapely.Polygon(tabs.polygon(tab))
-            if _common_area(taken, shape) < 1e-6 and _meets_in_base(taken, shape):
+            if common_area(taken, shape) < 1e-6 and _meets_in_base(taken, shape):
                 taken = shapely.union(taken, shape, grid_size=1e-9)
             else:
                 kept[tab] = False
     return kept
-
-
-def _common_area(one: BaseGeometry, other: BaseGeometry) -> float:
-    # Without a grid, GEOS 3.14 can return a whole polygon that only touches the other one.
-    return float(shapely.area(shapely.intersection(one, other, grid_size=1e-9)))
 
 
 def _meets_in_base(taken: BaseGeometry, tab: shapely.Polygon) -> bool:

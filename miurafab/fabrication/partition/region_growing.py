@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.fabrication.partition.fit_box import Space
+from miurafab.geometry.polygons import facet_means, principal_axes
 from miurafab.origami.crease_pattern import CreasePattern
 
 
@@ -113,13 +114,8 @@ def grow_patches(
 
 def _ranks(pattern: CreasePattern, space: Space) -> NDArray[np.float64]:
     """(F, 2) facet centres in the pattern's principal axes, in units of the bed's sides."""
-    real = pattern.faces_vertices >= 0
-    corners = np.where(real[..., None], pattern.vertices_coords[pattern.faces_vertices], 0.0)
-    centres = corners.sum(axis=1) / real.sum(axis=1)[:, None]
-    centred = centres - centres.mean(axis=0)
-    _, axes = np.linalg.eigh(centred.T @ centred)
-    # The sign of an eigenvector is arbitrary; the larger component is made positive.
-    axes = axes * np.sign(axes[np.abs(axes).argmax(axis=0), [0, 1]])
+    centres = facet_means(pattern.vertices_coords, pattern.faces_vertices)
+    centred, axes = centres - centres.mean(axis=0), principal_axes(centres)
     sides = max(space.width, space.height), min(space.width, space.height)
     ranks: NDArray[np.float64] = (centred @ axes[:, ::-1]) / sides
     return ranks

@@ -25,6 +25,7 @@ from miurafab.fabrication.partition.improve import improved
 from miurafab.fabrication.partition.region_growing import grow_patches, is_disk
 from miurafab.fabrication.seams import inner_seams
 from miurafab.fabrication.tabs import TabRegions, choose_tabs, ring_tabs, tab_regions
+from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -231,9 +232,7 @@ def check_facets(pattern: CreasePattern) -> None:
     for corners in np.unique(count):
         faces = np.flatnonzero(count == corners)
         points = pattern.vertices_coords[pattern.faces_vertices[faces, :corners]]
-        x, y = points[..., 0], points[..., 1]
-        doubled = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
-        bad = doubled <= 0
+        bad = signed_areas(points) <= 0
         if corners >= 3:
             bad |= ~shapely.is_valid(shapely.polygons(points))
         if bad.any():

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from miurafab.fabrication.route.postman import Route, find_route
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.geometry.arrays import places_in_runs
 from miurafab.profiles import OPERATIONS, MachineProfile, Material
 
 HOLE = 0
@@ -138,7 +139,7 @@ def _unrolled(
     begin: NDArray[np.int64], count: NDArray[np.int64], backwards: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """The members of runs, each run forwards or backwards."""
-    step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    step = places_in_runs(count)
     back = np.repeat(backwards, count)
     return np.repeat(begin, count) + np.where(back, np.repeat(count, count) - 1 - step, step)
 

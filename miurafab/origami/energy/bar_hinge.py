@@ -22,15 +22,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.hinges import hinge_angles
-from miurafab.origami.invariants import edge_lengths
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 POISSON_RATIO = 0.3
 """Of a material that gives only its modulus; D changes by 4 % between 0.25 and 0.35."""
@@ -110,7 +107,7 @@ def sheet_model(
         raise PatternError(
             "The pattern has facets of more than four corners; split them into triangles or quads."
         )
-    unit = float(edge_lengths(pattern, pattern.folded_coords).mean())
+    unit = float(edge_lengths(pattern.folded_coords, pattern.edges_vertices).mean())
     points = pattern.folded_coords / unit
     facets = _diagonals(points, pattern.faces_vertices)
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
@@ -127,7 +124,7 @@ def sheet_model(
         hinges = np.concatenate([bending, creases])
         weights = np.concatenate([weights, np.full(len(creases), crease_ratio)])
         rest = np.concatenate([rest, hinge_angles(points, creases)])
-    along = _lengths(points, hinges[:, :2])
+    along = edge_lengths(points, hinges[:, :2])
     unit_joule = None
     if paper is not None:
         slender = float(np.cbrt(unit / paper.thickness_mm))
@@ -137,7 +134,7 @@ def sheet_model(
     return BarHingeModel(
         points=points,
         bars=bars,
-        lengths=_lengths(points, bars),
+        lengths=edge_lengths(points, bars),
         compliance=np.zeros(len(bars)),
         hinges=hinges,
         stiffness=weights * along,
@@ -150,7 +147,7 @@ def sheet_model(
 
 
 def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:
-    short = np.flatnonzero(_lengths(points, edges) < DEGENERATE)
+    short = np.flatnonzero(edge_lengths(points, edges) < DEGENERATE)
     if len(short):
         raise PatternError(f"Edge {short[0]} has no length, so its facets cannot bend about it.")
     base = points[hinges[:, 1]] - points[hinges[:, 0]]
@@ -160,11 +157,6 @@ def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:
         thin = np.flatnonzero(area < DEGENERATE * np.linalg.norm(base, axis=1))
         if len(thin):
             raise PatternError(f"A facet at vertex {hinges[thin[0], wing]} has no width.")
-
-
-def _lengths(points: Floats, pairs: Ints) -> Floats:
-    length: Floats = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)
-    return length
 
 
 def _diagonals(points: Floats, faces: Ints) -> Ints:
@@ -183,7 +175,7 @@ def _diagonals(points: Floats, faces: Ints) -> Ints:
         [np.cross(p[:, k] - p[:, k - 1], p[:, (k + 1) % 4] - p[:, k]) for k in range(4)], axis=1
     )
     reflex = np.einsum("qck,qk->qc", turn, normal) < 0
-    first, second = _lengths(points, q[:, [0, 2]]), _lengths(points, q[:, [1, 3]])
+    first, second = edge_lengths(points, q[:, [0, 2]]), edge_lengths(points, q[:, [1, 3]])
     across = np.where(reflex.any(axis=1), reflex[:, 1] | reflex[:, 3], second < first)
     # the corner after v is on the left of u -> v
     hinges[quads] = np.where(across[:, None], q[:, [1, 3, 0, 2]], q[:, [0, 2, 3, 1]])

@@ -30,13 +30,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
 
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.sparse import Factor, factor_symmetric, minimum_degree
 from miurafab.origami.energy.bar_hinge import BarHingeModel
 from miurafab.origami.energy.hinges import hinge_angles, hinge_derivatives, hinge_gradients
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 TOLERANCE = 1e-11
 """On every component of F (forces over the stiffest hinge, if that is over 1): convergence is
@@ -82,7 +80,7 @@ class Residual(NamedTuple):
 class Factored(NamedTuple):
     """K factored, with the ``bars`` gradients n (B, 3), their weights W (B,) and grad d."""
 
-    lu: SuperLU
+    k: Factor
     bars: Floats
     weights: Floats
     drive: Floats
@@ -149,7 +147,7 @@ class Driven:
         return float(np.max([force, strain, abs(residual.miss)]))
 
     def factor(self, state: EquilibriumState) -> Factored:
-        """K at ``state``. Raises ``RuntimeError`` (SuperLU's) where it is singular."""
+        """K at ``state``. Raises ``RuntimeError`` where it is singular."""
         model, points = self.model, state.points
         angle, gradient, hessian = hinge_derivatives(points, model.hinges)
         k = model.stiffness[:, None, None, None, None]
@@ -167,13 +165,7 @@ class Driven:
         data = np.bincount(place, np.concatenate([v.ravel() for v in values]), len(rows) + 1)[1:]
         size = len(starts) - 1
         matrix = sparse.csc_array((data, rows, starts), shape=(size, size))
-        lu = splu(
-            matrix,
-            permc_spec="NATURAL",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-        return Factored(lu, bars, weights, drive)
+        return Factored(factor_symmetric(matrix, reorder=False), bars, weights, drive)
 
     def step(self, factored: Factored, residual: Residual) -> EquilibriumState:
         """The Newton step (dx, dn) for ``residual`` with K as ``factored``."""
@@ -182,7 +174,7 @@ class Driven:
         none = np.zeros((len(self.model.hinges), 4, 3))
         right = residual.force + self._gather(none, pull, residual.miss / EPS * drive)
         coordinates = np.zeros(self.model.points.size)
-        coordinates[self._free] = -factored.lu.solve(right)
+        coordinates[self._free] = -factored.k.solve(right)
         dx: Floats = coordinates.reshape(-1, 3)
         first, second = self.model.bars.T
         stretch = np.einsum("bk,bk->b", bars, dx[second] - dx[first])
@@ -263,13 +255,7 @@ class Driven:
         graph = sparse.coo_array((ones, (rows, columns)), shape=(count, count)).tocsc()
         graph.data[:] = -1.0
         graph.setdiag(np.diff(graph.indptr) + 1.0)  # diagonally dominant: factored as it stands
-        lu = splu(
-            graph,
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-        return np.argsort(lu.perm_c).astype(np.int64)
+        return minimum_degree(graph)
 
     @cached_property
     def _sparsity(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Ints]:

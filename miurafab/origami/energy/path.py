@@ -18,16 +18,14 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import InputError, PatternError
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
 from miurafab.origami.energy.equilibrium import Driven, EquilibriumState, Factored, solve
 from miurafab.origami.energy.hinges import hinge_angles
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Progress = Callable[[float, str], None]
 
 NEARLY_FLAT = math.radians(2.5)

@@ -19,14 +19,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from miurafab.geometry.angles import sector_angles, sectors
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.quads import QuadGrid
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def flat_foldability(points: Floats, grid: QuadGrid) -> Floats:

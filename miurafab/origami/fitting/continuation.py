@@ -10,16 +10,14 @@ import itertools
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.fitting.prolongation import from_local, refined, to_local
 from miurafab.origami.fitting.reduction import Unknowns
 from miurafab.origami.fitting.seed import Corrugation, seed
 from miurafab.origami.fitting.solver import Projection, project
 from miurafab.origami.tessellation import Tessellation
 from miurafab.surfaces.surface import Bent, TargetSurface
-
-Floats = NDArray[np.float64]
 
 COARSEST = 12
 """Grids of more vertices than this a side can be begun coarser."""

@@ -14,18 +14,14 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from miurafab.geometry.angles import sectors
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.fitting.reduction import Unknowns
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.origami.verify import EXACT
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,9 @@ This module knows nothing of origami.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-Ints = NDArray[np.int64]
+from miurafab.geometry.arrays import Ints
 
 LEAF = 24
 """Sets of at most this many rows are not cut further."""

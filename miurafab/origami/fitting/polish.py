@@ -21,9 +21,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.fitting.reduction import Unknowns
 from miurafab.origami.fitting.solver import (
@@ -34,9 +34,6 @@ from miurafab.origami.fitting.solver import (
     project,
 )
 from miurafab.surfaces.surface import TargetSurface
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 Follow = Literal["middle", "top", "bottom"]
 

@@ -9,13 +9,11 @@ smooth function of the place, in proportion to the spacing.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.tessellation import Tessellation
 from miurafab.surfaces.surface import TargetSurface, tangents
-
-Floats = NDArray[np.float64]
 
 
 def to_local(surface: TargetSurface, uv: Floats, points: Floats) -> Floats:

@@ -19,16 +19,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.fitting.constraints import OrigamiConstraints
 from miurafab.origami.fitting.solver import Constraints
 from miurafab.origami.tessellation import Tessellation
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-import numpy as np
-
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.fitting.request import INTERRUPTED, FitRequest, FitResult
 
 COARSEST = 4
@@ -120,9 +119,8 @@ def _too_fine(request: FitRequest, result: FitResult) -> bool:
     """Whether even the mean edge is too short, so that finer sheets are pointless."""
     if result.pattern is None or request.min_edge_mm is None:
         return False
-    ends = result.pattern.vertices_coords[result.pattern.edges_vertices]
-    mean = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
-    return mean < request.min_edge_mm
+    lengths = edge_lengths(result.pattern.vertices_coords, result.pattern.edges_vertices)
+    return float(lengths.mean()) < request.min_edge_mm
 
 
 def _deviation(result: FitResult) -> float:

@@ -29,12 +29,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.tessellation import Tessellation
 from miurafab.surfaces.surface import TargetSurface, curvature_along_u, tangents, unit
-
-Floats = NDArray[np.float64]
 
 MAX_TAN_PSI = math.tan(math.radians(60))
 

@@ -21,15 +21,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, SuperLU, cg, splu
+from scipy.sparse.linalg import LinearOperator, cg
 
+from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.sparse import Factor, factor_symmetric
 from miurafab.origami.fitting.nested_dissection import boxes_of_rows, nested_dissection
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 Constraints = Callable[[Floats], tuple[Floats, sparse.csr_array]]
 
 REGULARISATION = 1e-12
@@ -59,7 +57,7 @@ class GramFactor:
     """A factor of J J^T with its rows in the elimination order ``order`` (m,)."""
 
     order: Ints
-    lu: SuperLU
+    factor: Factor
 
     @classmethod
     def of(cls, jacobian: sparse.csr_array, order: Ints) -> GramFactor | None:
@@ -68,20 +66,15 @@ class GramFactor:
         gram = (ordered @ ordered.T.tocsr()).tocsc()
         gram.setdiag(gram.diagonal() * (1 + REGULARISATION) + 1e-300)
         try:
-            lu = splu(
-                gram,
-                permc_spec="NATURAL",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
+            factor = factor_symmetric(gram, reorder=False)
         except RuntimeError:
             return None
-        return cls(order, lu)
+        return cls(order, factor)
 
     def solve(self, right: Floats) -> Floats:
         """The solution (m,) of J J^T mu = ``right`` (m,)."""
         solution = np.empty_like(right)
-        solution[self.order] = self.lu.solve(right[self.order])
+        solution[self.order] = self.factor.solve(right[self.order])
         return solution
 
     def refine(self, jacobian: sparse.csr_array, right: Floats) -> Floats | None:

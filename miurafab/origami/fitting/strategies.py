@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cylinder import cylinder_on
 from miurafab.origami.fitting.constraints import flat_foldability
@@ -32,8 +32,6 @@ from miurafab.origami.verify import DEGENERATE, EXACT, Measurements, measure
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution, revolution
 from miurafab.surfaces.mesh import MeshSurface
 from miurafab.surfaces.surface import Swapped, TargetSurface
-
-Floats = NDArray[np.float64]
 
 STRETCHES = ((1.3, 1.3), (1.15, 1.6), (1.6, 1.3), (1.3, 1.6), (2.0, 1.3), (2.6, 1.3), (1.15, 2.0))
 """The stretches along and across the rows that are tried in turn. Strong curvature along the rows
@@ -368,11 +366,7 @@ def _faults(
         )
     if measured.overlaps:
         yield f"{measured.overlaps} pairs of facets overlap in the flat pattern; lower --zigzag."
-    mean = float(
-        np.linalg.norm(
-            np.diff(pattern.vertices_coords[pattern.edges_vertices], axis=1), axis=2
-        ).mean()
-    )
+    mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
     wanted = request.min_edge_mm or DEGENERATE * mean
     if measured.min_edge_mm < wanted:
         yield (

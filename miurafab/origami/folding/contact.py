@@ -16,14 +16,11 @@ without an order of layers that counts as meeting.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs, run_starts
 from miurafab.geometry.boxes import meeting_pairs
+from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 IN_PLANE = 1e-9
 """Corners nearer to a plane than this part of the mean triangle side lie in it."""
@@ -64,7 +61,7 @@ def _meeting_facets(pattern: CreasePattern, points: Floats) -> Ints:
     shapes = _Triangles.of(points, triangles)
     order = np.argsort(owner, kind="stable")
     counts = np.bincount(owner, minlength=len(faces))
-    start = np.cumsum(counts) - counts
+    start = run_starts(counts)
     found = []
     first, second = meeting_pairs(low, high)
     for begin in range(0, len(first), _CHUNK):
@@ -72,7 +69,7 @@ def _meeting_facets(pattern: CreasePattern, points: Floats) -> Ints:
         # every triangle of one facet against every triangle of the other
         each = counts[a] * counts[b]
         pair = np.repeat(np.arange(len(a)), each)
-        within = np.arange(len(pair)) - np.repeat(np.cumsum(each) - each, each)
+        within = places_in_runs(each)
         one = order[start[a[pair]] + within // counts[b[pair]]]
         other = order[start[b[pair]] + within % counts[b[pair]]]
         hit = np.unique(pair[shapes.meet(one, other)])
@@ -196,8 +193,8 @@ def triangulate(faces: Ints, flat: Floats | None = None) -> tuple[Ints, Ints]:
     triangles, owner = triangles[real], owner[real]
     if flat is None or k <= 4:
         return triangles, owner
-    turned = np.sign(doubled_areas(flat, triangles))
-    whole = np.sign(np.bincount(owner, doubled_areas(flat, triangles), minlength=len(faces)))
+    turned = np.sign(signed_areas(flat[triangles]))
+    whole = np.sign(np.bincount(owner, signed_areas(flat[triangles]), minlength=len(faces)))
     dented = np.unique(owner[turned * whole[owner] < 0])
     kept = ~np.isin(owner, dented)
     pieces, owners = [triangles[kept]], [owner[kept]]
@@ -208,22 +205,14 @@ def triangulate(faces: Ints, flat: Floats | None = None) -> tuple[Ints, Ints]:
     return np.concatenate(pieces), np.concatenate(owners)
 
 
-def doubled_areas(flat: Floats, triangles: Ints) -> Floats:
-    """(T,) twice the signed areas of ``triangles`` (T, 3) in ``flat`` (V, 2)."""
-    a, b, c = (flat[triangles[:, n]] for n in range(3))
-    ab, ac = b - a, c - a
-    areas: Floats = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    return areas
-
-
 def _fannable(faces: Ints, flat: Floats) -> Ints:
     """Quads turned by one corner where only their second diagonal lies inside."""
     quads = (faces >= 0).sum(axis=1) == 4
     if not quads.any():
         return faces
     q = faces[quads][:, :4]
-    first = doubled_areas(flat, q[:, [0, 1, 2]]) * doubled_areas(flat, q[:, [0, 2, 3]])
-    second = doubled_areas(flat, q[:, [1, 2, 3]]) * doubled_areas(flat, q[:, [1, 3, 0]])
+    first = signed_areas(flat[q[:, [0, 1, 2]]]) * signed_areas(flat[q[:, [0, 2, 3]]])
+    second = signed_areas(flat[q[:, [1, 2, 3]]]) * signed_areas(flat[q[:, [1, 3, 0]]])
     turned = faces.copy()
     q = np.where(((first <= 0) & (second > 0))[:, None], np.roll(q, -1, axis=1), q)
     turned[np.flatnonzero(quads)[:, None], np.arange(4)] = q
@@ -232,21 +221,17 @@ def _fannable(faces: Ints, flat: Floats) -> Ints:
 
 def _ears(polygon: list[int], flat: Floats) -> list[list[int]]:
     """The polygon cut ear by ear: a convex corner whose triangle holds no other corner."""
-    points = flat[polygon]
-    following = np.roll(points, -1, axis=0)
-    area = float((points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]).sum())
+    area = float(signed_areas(flat[polygon][None])[0])
     rest, ears = list(polygon), []
     while len(rest) > 3:
         for n in range(len(rest)):
             ear = [rest[n - 1], rest[n], rest[(n + 1) % len(rest)]]
             others = np.array([v for v in rest if v not in ear], dtype=np.int64)
-            corners = np.array(ear)
             turns = [
-                doubled_areas(flat, np.stack([np.full(len(others), s), np.full(len(others), e),
-                                              others], axis=1)) * np.sign(area)
-                for s, e in zip(corners, np.roll(corners, -1), strict=True)
-            ]  # fmt: skip
-            convex = float(doubled_areas(flat, corners[None])[0]) * area > 0
+                signed_areas(flat[np.stack(np.broadcast_arrays(s, e, others), axis=1)]) * area
+                for s, e in zip(ear, [*ear[1:], ear[0]], strict=True)
+            ]
+            convex = float(signed_areas(flat[ear][None])[0]) * area > 0
             if convex and not (np.min(turns, axis=0) >= 0).any():
                 break
         else:

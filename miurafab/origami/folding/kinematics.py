@@ -16,17 +16,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import shortest_path
 
 from miurafab.errors import PatternError
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import edge_lengths, facet_means
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.multipliers import fold_speeds
-from miurafab.origami.invariants import edge_lengths
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 RIGID = 1e-6
 """The loop mismatch, in mean edges, up to which a sheet is said to fold rigidly."""
@@ -193,7 +191,7 @@ def loop_mismatch(pattern: CreasePattern, placement: FacetPlacement) -> Floats:
     flat = pattern.vertices_coords[ends]
     left, right = (np.repeat(pattern.edges_faces[joined, side], 2) for side in (0, 1))
     gap = placement.points(flat, left) - placement.points(flat, right)
-    mean = float(edge_lengths(pattern, pattern.vertices_coords).mean())
+    mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
     worst: Floats = np.linalg.norm(gap, axis=2).max(axis=1, initial=0.0) / mean
     return worst
 
@@ -205,7 +203,7 @@ def facet_strain(pattern: CreasePattern, frames: Floats) -> Floats:
     shorter diagonal. Lengths count from a hundredth of the mean edge.
     """
     faces = pattern.faces_vertices
-    least = 0.01 * float(edge_lengths(pattern, pattern.vertices_coords).mean())
+    least = 0.01 * float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
     worst = np.zeros((len(frames), len(faces)))
     for one in range(faces.shape[1]):
         for other in range(one + 1, faces.shape[1]):
@@ -239,7 +237,7 @@ def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
     """
     facets = len(pattern.faces_vertices)
     joined = _joined(pattern)
-    lengths = edge_lengths(pattern, pattern.vertices_coords)
+    lengths = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
     joined = joined[lengths[joined] > _POINT * lengths.mean()]
     left, right = pattern.edges_faces[joined].T
     graph = coo_array((np.ones(len(joined)), (left, right)), shape=(facets, facets)).tocsr()
@@ -267,10 +265,7 @@ def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
 
 def _middle(pattern: CreasePattern) -> int:
     """The facet whose corners' mean lies nearest to the middle of the flat pattern."""
-    faces = pattern.faces_vertices
-    real = faces >= 0
-    corners = np.where(real[..., None], pattern.vertices_coords[faces], 0.0)
-    means = corners.sum(axis=1) / real.sum(axis=1)[:, None]
+    means = facet_means(pattern.vertices_coords, pattern.faces_vertices)
     return int(np.argmin(np.linalg.norm(means - means.mean(axis=0), axis=1)))
 
 

@@ -14,17 +14,14 @@ once. They are consistent only where the sheet folds rigidly: the loop mismatch 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
 from miurafab.errors import PatternError
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import corner_ring, interior_vertices
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def fold_speeds(pattern: CreasePattern) -> Floats:

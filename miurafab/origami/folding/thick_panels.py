@@ -26,13 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.angles_csv import ON_EACH_OTHER
 from miurafab.origami.folding.contact import self_intersections, triangulate
 from miurafab.origami.folding.kinematics import fold_angles_at, place, rigid_motion
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SIDES = ("top", "bottom")
 STATES = (0.05, 0.35, 0.7, 0.999)

@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import filled, signed_areas
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.formats.planar_graph import faces_of_plane_graph
@@ -82,7 +84,7 @@ def fold_text(pattern: CreasePattern, title: str = "", motion: FoldingMotion | N
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def _folded_frame(points: NDArray[np.float64]) -> dict[str, Any]:
+def _folded_frame(points: Floats) -> dict[str, Any]:
     return {
         "frame_classes": ["foldedForm"],
         "frame_attributes": ["3D"],
@@ -93,7 +95,7 @@ def _folded_frame(points: NDArray[np.float64]) -> dict[str, Any]:
     }
 
 
-def _polygons(faces: NDArray[np.int64]) -> list[list[int]]:
+def _polygons(faces: Ints) -> list[list[int]]:
     if (faces >= 0).all():
         whole: list[list[int]] = faces.tolist()
         return whole
@@ -201,18 +203,16 @@ def _unit(frame: Mapping[str, Any], default: float) -> float:
     return _UNITS_MM.get(unit, default) if isinstance(unit, str) else default
 
 
-def _counter_clockwise(flat: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def _counter_clockwise(flat: Floats, faces: Ints) -> Ints:
     """``faces`` with the corners of those that run clockwise in reverse order."""
-    whole = np.where(faces >= 0, faces, faces[:, :1])
-    x, y = np.moveaxis(flat[whole], -1, 0)
-    clockwise = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) < 0
+    clockwise = signed_areas(flat[filled(faces)]) < 0
     size = (faces >= 0).sum(axis=1)[:, None]
     slot = np.arange(faces.shape[1])[None, :]
     back = np.take_along_axis(faces, np.where(slot < size, size - 1 - slot, slot), axis=1)
     return np.where(clockwise[:, None], back, faces)
 
 
-def _walked(flat: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.int64]:
+def _walked(flat: Floats, edges: Ints) -> Ints:
     """The facets that ``edges`` enclose, for a file that lists none."""
     if edges.max() >= len(flat):
         raise PatternError("'edges_vertices' refers to a vertex that does not exist.")
@@ -229,7 +229,7 @@ def _array(document: Mapping[str, Any], key: str) -> list[Any]:
     return value
 
 
-def _coordinates(document: Mapping[str, Any], key: str) -> NDArray[np.float64]:
+def _coordinates(document: Mapping[str, Any], key: str) -> Floats:
     try:
         points = np.array(_array(document, key), dtype=np.float64)
     except (ValueError, TypeError):
@@ -239,7 +239,7 @@ def _coordinates(document: Mapping[str, Any], key: str) -> NDArray[np.float64]:
     return points
 
 
-def _indices(document: Mapping[str, Any], key: str, width: int) -> NDArray[np.int64]:
+def _indices(document: Mapping[str, Any], key: str, width: int) -> Ints:
     try:
         found = np.array(_array(document, key))
     except ValueError:
@@ -251,7 +251,7 @@ def _indices(document: Mapping[str, Any], key: str, width: int) -> NDArray[np.in
     return found.astype(np.int64)
 
 
-def _face_indices(document: Mapping[str, Any]) -> NDArray[np.int64]:
+def _face_indices(document: Mapping[str, Any]) -> Ints:
     faces = _array(document, "faces_vertices")
     sizes = {len(face) if isinstance(face, list) else 0 for face in faces}
     if min(sizes) < 3:
@@ -277,7 +277,7 @@ def _assignments(document: Mapping[str, Any], edges: int) -> NDArray[np.str_]:
     return np.array(given, dtype="U1")
 
 
-def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> NDArray[np.float64]:
+def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> Floats:
     """Given angles in radians; without them a mountain is -pi and a valley pi (flat-folded)."""
     flat_folded = np.select([assignment == "M", assignment == "V"], [-180.0, 180.0], 0.0)
     given = document.get("edges_foldAngle")
@@ -292,13 +292,11 @@ def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> N
     return np.radians(np.where(np.isnan(angles), flat_folded, angles))
 
 
-def _folded(
-    frames: list[Mapping[str, Any]], vertices: int, factor: float
-) -> NDArray[np.float64] | None:
+def _folded(frames: list[Mapping[str, Any]], vertices: int, factor: float) -> Floats | None:
     """The folded form (V, 3), mm, in the first of ``frames`` that says that it is one."""
     for frame in frames:
         if "foldedForm" in _classes(frame):
-            points: NDArray[np.float64] = _coordinates(frame, "vertices_coords")
+            points: Floats = _coordinates(frame, "vertices_coords")
             points = points * _unit(frame, factor)
             if points.shape[1] == 2:
                 points = np.concatenate([points, np.zeros((len(points), 1))], axis=1)

@@ -17,10 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.version import __version__
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 FRONT, BACK = (0.90, 0.81, 0.62), (0.21, 0.40, 0.55)
 """The colours of the two sides of the paper, linear RGB in 0..1."""

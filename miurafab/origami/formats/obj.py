@@ -10,15 +10,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.folding.contact import doubled_areas, triangulate
+from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.unfold import with_angles_of_the_folded_form
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
@@ -41,7 +39,7 @@ def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
     # the two axes in the order that keeps the view from the positive side of the third
     plane = np.ascontiguousarray(points[:, [(across + 1) % 3, (across + 2) % 3]])
     triangles, owner = triangulate(faces, plane)
-    areas = np.bincount(owner, doubled_areas(plane, triangles), minlength=len(faces))
+    areas = np.bincount(owner, signed_areas(plane[triangles]), minlength=len(faces))
     if areas.sum() < 0:
         faces = _reversed(faces)
     edges = _edges(faces)

@@ -16,10 +16,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from miurafab.errors import PatternError
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 TOLERANCE = 1e-4
 """How near ends count as met, as a part of the median line."""
@@ -206,7 +204,7 @@ def _merged(loose: Floats, near: float) -> tuple[Ints, Floats]:
     return np.asarray(vertex, dtype=np.int64), loose[first]
 
 
-def _lies_on(points: Floats, ends: Floats, near: float) -> NDArray[np.bool_]:
+def _lies_on(points: Floats, ends: Floats, near: float) -> Bools:
     """Whether each point lies within ``near`` of its line, between the line's ends."""
     along = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(along, axis=1)

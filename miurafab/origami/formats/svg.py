@@ -18,9 +18,9 @@ from xml.etree.ElementTree import Element
 from xml.sax.saxutils import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import ASSIGNMENTS
 from miurafab.origami.formats.lines import xml_root
 from miurafab.origami.formats.planar_graph import CreaseLines
@@ -42,7 +42,7 @@ _SHORTEST = 10.0
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _PATH = re.compile(r"([MmLlHhVvZzCcSsQqTtAa])|(" + _NUMBER.pattern + ")")
 
-Matrix = NDArray[np.float64]
+Matrix = Floats
 
 
 def svg_text(lines: CreaseLines, title: str = "") -> str:

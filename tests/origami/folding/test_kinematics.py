@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from problems import CELL, fitted, regular
 
 from miurafab.errors import PatternError
-from miurafab.geometry.angles import facet_normals, fold_angles
+from miurafab.geometry.angles import fold_angles
+from miurafab.geometry.polygons import facet_normals
 from miurafab.origami.folding.kinematics import (
     RIGID,
     FoldingMotion,

@@ -1,0 +1,24 @@
+"""Array types, and runs of different lengths laid end to end in one array.
+
+``counts`` (n,) are the lengths of the runs: counts 2, 0, 3 describe five items, of which the first
+two belong to run 0 and the last three to run 2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+def run_starts(counts: Ints) -> Ints:
+    """(n,) the index of the first item of each run: 0, 2, 2 for counts 2, 0, 3."""
+    return np.cumsum(counts) - counts
+
+
+def places_in_runs(counts: Ints) -> Ints:
+    """(sum of counts,) the place of each item in its own run: 0, 1, 0, 1, 2 for counts 2, 0, 3."""
+    return np.arange(counts.sum()) - np.repeat(run_starts(counts), counts)

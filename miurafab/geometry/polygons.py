@@ -1,0 +1,63 @@
+"""Polygons for many at once: corners, means, normals and areas; lengths of edges; main axes.
+
+``faces`` (F, k) are indices of corners, counter-clockwise, filled up with -1 where a face has fewer
+than k corners. ``points`` are (V, 2) or (V, 3).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from miurafab.geometry.arrays import Floats, Ints
+
+
+def filled(faces: Ints) -> Ints:
+    """``faces`` (F, k) with the first corner of each face in place of -1."""
+    return np.where(faces >= 0, faces, faces[:, :1])
+
+
+def facet_means(points: Floats, faces: Ints) -> Floats:
+    """(F, d) the mean of the corners of each of ``faces`` (F, k) in ``points`` (V, d)."""
+    real = faces >= 0
+    corners = np.where(real[..., None], points[faces], 0.0)
+    return np.asarray(corners.sum(axis=1) / real.sum(axis=1)[:, None])
+
+
+def facet_normals(points: Floats, faces: Ints) -> Floats:
+    """(F, 3) unit normals of ``faces`` (F, k) in ``points`` (V, 3); NaN for a face without area.
+
+    The direction is that of the area vector, sum (p_i - p_0) x (p_i+1 - p_0) over the corners. With
+    up to four corners the sum is the cross product of the diagonals, (p_2 - p_0) x (p_3 - p_1).
+    """
+    corners = points[filled(faces)]
+    if corners.shape[1] == 4:
+        normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    else:
+        spokes = corners - corners[:, :1]
+        normal = np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+
+
+def edge_lengths(points: Floats, edges: Ints) -> Floats:
+    """(E,) the lengths of ``edges`` (E, 2) in ``points`` (V, d)."""
+    return np.asarray(np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1))
+
+
+def signed_areas(polygons: Floats) -> Floats:
+    """(n,) the areas of ``polygons`` (n, k, 2), negative for those that run clockwise.
+
+    A polygon of fewer than k corners repeats its first corner at the end.
+    """
+    x, y = (polygons - polygons[:, :1]).transpose(2, 0, 1)
+    return np.asarray((x[:, :-1] * y[:, 1:] - x[:, 1:] * y[:, :-1]).sum(axis=1) / 2)
+
+
+def principal_axes(points: Floats) -> Floats:
+    """(2, 2) the principal axes of ``points`` (n, 2) as columns, that of the least spread first.
+
+    The sign of an eigenvector is arbitrary: its larger component is made positive.
+    """
+    centred = points - points.mean(axis=0)
+    _, axes = np.linalg.eigh(centred.T @ centred)
+    return np.asarray(axes * np.sign(axes[np.abs(axes).argmax(axis=0), [0, 1]]))
