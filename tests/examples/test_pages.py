@@ -1,0 +1,118 @@
+"""Every example in print is run: each block of each page, in the order of the page."""
+
+import contextlib
+import re
+import shutil
+import sys
+import tomllib
+
+import pytest
+from commands import run_line
+from pages import PAGES, ROOT, blocks_of, indented_code
+
+BLOCKS = [block for page in PAGES for block in blocks_of(page)]
+
+NOT_RUN = {"README.md": 1, "studio.md": 1}
+"""Blocks that no test can run, by page, and how many: the reason stands in the page."""
+
+LANGUAGES = {"sh", "python", "toml", "usage", "text", "powershell"}
+
+
+class Page:
+    """A page as a reader works through it: one folder, one namespace, block after block.
+
+    Mutable: a block leaves files and names for the next.
+    """
+
+    def __init__(self, page, folder):
+        self.blocks = blocks_of(page)
+        self.folder = folder
+        self.names = {}
+        self.faults = {}
+        for shipped in ("patterns", "materials", "firmware_profiles"):
+            shutil.copytree(ROOT / shipped, folder / shipped)
+
+    def run(self, block):
+        """Run whatever stands before ``block``, and it; raise what a block raised."""
+        for each in self.blocks:
+            if each.line <= block.line and each.line not in self.faults:
+                try:
+                    self._run(each)
+                finally:
+                    self.faults[each.line] = sys.exception()
+        if self.faults[block.line] is not None:
+            raise self.faults[block.line]
+
+    def _run(self, block):
+        if "not run" in block.directives:
+            return
+        if "file" in block.directives:
+            path = self.folder / block.directives["file"]
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(block.text, encoding="utf-8")
+        if block.language == "sh":
+            self._run_commands(block)
+        elif block.language == "python":
+            code = compile("\n" * (block.line - 1) + block.text, block.page, "exec")
+            with contextlib.chdir(self.folder):
+                exec(code, self.names)
+        elif block.language == "toml":
+            tomllib.loads(block.text)
+
+    def _run_commands(self, block):
+        printed = ""
+        expected = int(block.directives.get("exit", 0))
+        for line in block.text.replace("\\\n", " ").splitlines():
+            if line.split("#")[0].strip():
+                printed = run_line(line, self.folder, expected)
+        if block.shown is not None:
+            assert matches(block.shown, printed), f"shown:\n{block.shown}\nprinted:\n{printed}"
+
+
+def matches(shown, printed):
+    """Whether ``printed`` is as ``shown``, where ``...`` stands for any text."""
+    parts = [re.escape(part) for part in _plain(shown).split("...")]
+    return re.fullmatch(".*?".join(parts), _plain(printed), re.DOTALL) is not None
+
+
+def _plain(text):
+    return "\n".join(line.rstrip() for line in text.strip().splitlines())
+
+
+@pytest.fixture(scope="session")
+def pages(tmp_path_factory):
+    """Pages that are being read, by file."""
+    return {page: Page(page, tmp_path_factory.mktemp(page.stem)) for page in PAGES}
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        pytest.param(b, marks=pytest.mark.xdist_group(f"page {b.page.stem}"), id=str(b))
+        for b in BLOCKS
+    ],
+)
+def test_the_block_runs(pages, block):
+    pages[block.page].run(block)
+
+
+def test_what_is_shown_can_differ():
+    assert matches("a ... c\n", "a b\nb c  \n")
+    assert not matches("a ... c\n", "a b d\n")
+    assert not matches("a\n", "a\nb\n")
+
+
+def test_few_blocks_are_not_run():
+    left_out = {}
+    for block in BLOCKS:
+        assert block.directives.get("not run", "a reason") != ""
+        if "not run" in block.directives:
+            name = block.page.name
+            left_out[name] = left_out.get(name, 0) + 1
+    assert left_out == NOT_RUN
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_code_is_fenced_and_its_language_known(page):
+    assert indented_code(page) == []
+    assert {block.language for block in blocks_of(page)} <= LANGUAGES
