@@ -35,7 +35,7 @@ from pathlib import Path
 import numpy as np
 import serial
 
-from miurafab.gcode.job import Job, prepare, prepare_lines
+from miurafab.gcode.job import Job
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import Progress, stream_plan
 from miurafab.machine.virtual_server import PtyWire
@@ -175,7 +175,11 @@ def ideal(latency: float) -> float:
     device = VirtualGrbl(virtual_settings(machine), baud=machine.controller.baud)
     device.advance(1.0)
     device.take_output()
-    lines, unanswered, room = deque(prepare(micro_job())), deque[int](), machine.controller.rx_bytes
+    lines, unanswered, room = (
+        deque(micro_job().send_lines()),
+        deque[int](),
+        machine.controller.rx_bytes,
+    )
     look_at, said = device.now, b""
     while lines or unanswered:
         while lines and len(lines[0].data) < room:
@@ -197,7 +201,7 @@ def check_mode(lines: int, speed: float) -> tuple[float, float]:
     """The share of the wire that is used, and the MB that streaming adds."""
     text = "G1F3000\n" + "".join(f"X{n % 300}.{n % 997:03d}Y{n % 211}.5\n" for n in range(lines))
     job = Job("wire.nc", text)
-    size = sum(len(line.data) + 1 for line in prepare_lines(job.name, job.iter_lines()))
+    size = sum(len(line.data) + 1 for line in job.send_lines())
     peaks: list[int] = []
 
     def note(progress: Progress) -> None:

@@ -166,7 +166,7 @@ def test_the_preview_says_that_moves_are_relative() -> None:
     path = perforation(200, 0.3, 0.2)
     with always_chained():
         job = post(path, LASER, CARD)
-    number = next(n for n, line in enumerate(job.lines, 1) if line.startswith("G91"))
+    number = next(n for n, line in enumerate(job.iter_lines(), 1) if line.startswith("G91"))
     seen = dry_run("sheet-01", job, LASER, (300.0, 300.0))
     assert [w for w in seen.warnings if "relative" in w] == [
         f"Moves are relative from line {number} on (G91), as they are posted where the wire is too "

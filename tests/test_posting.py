@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from miurafab.errors import LayoutError, ProfileError
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.interpreter import parse_program
-from miurafab.gcode.job import prepare
 from miurafab.gcode.program import strokes
 from miurafab.posting import LINE_CHARS, NO_PATCH, post
 from miurafab.profiles import OPERATIONS, MachineProfile, Material, load_machine, load_material
@@ -184,7 +183,7 @@ def test_every_line_is_short_plain_and_needed(path: Toolpath) -> None:
     assert text.isascii()
     lines = text.splitlines()
     assert max(map(len, lines)) <= LINE_CHARS
-    assert prepare(post(path, LASER, CARD))
+    assert [*post(path, LASER, CARD).send_lines()]
     assert re.search(r"-", re.sub(r"\(.*\)", "", text)) is None
     for number in re.findall(r"[XYSF]([^ \n]+)", re.sub(r"\(.*\)", "", text)):
         assert re.fullmatch(r"(0|[1-9]\d*)(\.\d{0,2}[1-9])?", number)

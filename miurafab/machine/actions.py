@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TypedDict, Unpack
 
 from miurafab.errors import ControllerError, GcodeError, InputError, JobStopped, ProfileError
-from miurafab.gcode.job import prepare_lines
+from miurafab.gcode.job import Job
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Options, StatusReport, Version
 from miurafab.grbl.settings import Settings, parse_dump
@@ -211,7 +211,7 @@ def talk(
                     session.write(session.connection.send_realtime(_REALTIME[text]))
                     session.pause(_POLL_S)
                 elif text:
-                    bare = next(prepare_lines("The console", [text]), None)
+                    bare = next(Job("The console", text).send_lines(), None)
                     if bare is not None:
                         session.command(bare.data.decode("ascii"), HOMING_S)
             except (ControllerError, GcodeError) as error:

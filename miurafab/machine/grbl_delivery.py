@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 
 from miurafab.errors import ControllerError, MiurafabError
-from miurafab.gcode.job import prepare_lines
 from miurafab.gcode.program import BEAM_M3
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Error, Ok, Options, StatusReport
@@ -54,7 +53,7 @@ class GrblDelivery(Delivery):
         self._streamer = Streamer(
             self._session.connection,
             plan.job.name,
-            prepare_lines(plan.job.name, plan.job.iter_lines(), controller.line_chars),
+            plan.job.send_lines(controller.line_chars),
             send_response=controller.streaming == "send-response",
             collect_refusals=plan.check_mode,
         )

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from miurafab.errors import ControllerError, MiurafabError, PortError
-from miurafab.gcode.job import SendLine, prepare_lines
+from miurafab.gcode.job import SendLine
 from miurafab.machine.delivery import Delivery, Errand
 from miurafab.machine.planning import longest_line
 from miurafab.machine.session import ANSWER_S, BANNER_S, HOMING_S
@@ -74,7 +74,7 @@ class MarlinDelivery(Delivery):
 
     def _lines(self) -> Iterator[SendLine]:
         job = self.plan.job
-        return prepare_lines(job.name, job.iter_lines(), longest_line(self.plan.machine))
+        return job.send_lines(longest_line(self.plan.machine))
 
     def meet(self) -> tuple[str, ...]:
         """See :class:`~miurafab.machine.delivery.Delivery`."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from miurafab.errors import GcodeError, InputError
-from miurafab.gcode.job import Job, prepare_lines
+from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
 from miurafab.gcode.reading import read_program
 from miurafab.machine.preflight import (
@@ -119,7 +119,7 @@ def examine_job(
     """
     count, findings = 0, list[Finding]()
     if machine.dialect != "hpgl":
-        lines = prepare_lines(job.name, job.iter_lines(), longest_line(machine))
+        lines = job.send_lines(longest_line(machine))
         count, findings = check_lines(job.name, lines, machine, allow_m3=allow_m3 or check_mode)
     try:
         program = read_program(job, machine) if program is None else program

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -173,7 +174,9 @@ def _rest(job: Job, line: int) -> tuple[Job, int]:
     if len(modes) >= line:
         return job, 1
     blank = [""] * (line - 1 - len(modes))
-    return Job(job.name, "\n".join([*modes, *blank, *job.lines[line - 1 :], ""])), line
+    return Job(
+        job.name, "\n".join([*modes, *blank, *islice(job.iter_lines(), line - 1, None), ""])
+    ), line
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from miurafab.errors import GcodeError
 from miurafab.gcode import interpreter as reader
 from miurafab.gcode.interpreter import parse_program
-from miurafab.gcode.job import Job, prepare
+from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
 from miurafab.profiles import load_machine
 from miurafab.simulate.beam import BeamSegment
@@ -60,7 +60,7 @@ def run(text: str) -> tuple[list[BeamSegment], int | None]:
     device = VirtualGrbl(LASER)
     device.advance(0.5)
     device.take_output()
-    for line in prepare(Job("fuzz.nc", text)):
+    for line in Job("fuzz.nc", text).send_lines():
         device.receive(line.data + b"\n")
         said = b""
         while b"\n" not in said:

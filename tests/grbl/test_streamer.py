@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miurafab.errors import ControllerError, GcodeError
-from miurafab.gcode.job import Job, SendLine, prepare
+from miurafab.gcode.job import Job, SendLine
 from miurafab.grbl.connection import Connection, writes_eeprom
 from miurafab.grbl.streamer import LineRefused, Streamer
 
@@ -65,7 +65,7 @@ def test_a_line_that_no_buffer_holds_is_named() -> None:
 
 def test_a_refused_line_is_named_with_its_text_and_reason() -> None:
     connection = greeted()
-    streamer = Streamer(connection, "job.nc", prepare(Job("job.nc", "G21\n\n(cut)\nG1 X5\n")))
+    streamer = Streamer(connection, "job.nc", Job("job.nc", "G21\n\n(cut)\nG1 X5\n").send_lines())
     streamer.pull()
     with pytest.raises(LineRefused) as caught:
         hear(connection, streamer, b"ok\r\nerror:22\r\n")
@@ -105,7 +105,7 @@ def test_what_ends_a_job(said: bytes, sentence: str) -> None:
 
 def test_dwell_in_flight_is_known() -> None:
     connection = greeted()
-    streamer = Streamer(connection, "job", prepare(Job("job", "G4 P2\nG1X1\nG4P0.5\n")))
+    streamer = Streamer(connection, "job", Job("job", "G4 P2\nG1X1\nG4P0.5\n").send_lines())
     streamer.pull()
     assert streamer.dwell_in_flight == 2.5
     hear(connection, streamer, b"ok\r\n")

@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from wires import FakeWire
 
 from miurafab.errors import JobStopped, MiurafabError
-from miurafab.gcode.job import Job, prepare
+from miurafab.gcode.job import Job
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import Progress, deliver
@@ -41,7 +41,7 @@ JOB = Job(
     + "".join(f"G0 X5 Y{n}\nG1 X15 S500 F3000\n" for n in range(STROKES))
     + "M5\nG0 X0 Y0\n",
 )
-LINES = prepare(JOB)
+LINES = tuple(JOB.send_lines())
 SECONDS = 8.0  # a little longer than the job takes
 NO_SHRINKING = (Phase.explicit, Phase.generate)  # it would take minutes, and the faults are short
 REALTIME = bytes(DIALECTS["grbl-1.1"].realtime)

@@ -176,7 +176,7 @@ def test_the_modes_are_those_of_the_whole(tmp_path: Path) -> None:
 
 
 def record(job: Job, **changes: object) -> JournalRun:
-    made = JournalRun(job.name, job_digest(job), MACHINE.name, "virtual", len(job.lines))
+    made = JournalRun(job.name, job_digest(job), MACHINE.name, "virtual", job.line_count)
     return replace(made, ended="failed", **changes)
 
 

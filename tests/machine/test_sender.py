@@ -18,7 +18,7 @@ from miurafab.errors import (
     MachineError,
     PortError,
 )
-from miurafab.gcode.job import Job, prepare
+from miurafab.gcode.job import Job
 from miurafab.grbl.streamer import LineRefused
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
@@ -92,7 +92,7 @@ def test_every_line_is_acknowledged_once_in_order_and_none_is_lost(
     machine = _with_streaming(streaming)
     seen: list[Progress] = []
     result = send(job, wire, machine=machine, on_progress=seen.append)
-    lines = prepare(job)
+    lines = tuple(job.send_lines())
     assert result.lines == len(lines)
     sent = wire.commands.partition(b"$$\n")[2]
     assert sent == b"".join(line.data + b"\n" for line in lines)
@@ -402,7 +402,7 @@ def test_the_journal_says_what_was_taken(tmp_path: Path) -> None:
     assert failed.ended == "failed"
     assert 0 < failed.taken < 65
     assert "went away" in (failed.why or "")
-    lines = prepare(STOPPED)
+    lines = tuple(STOPPED.send_lines())
     assert failed.line == lines[failed.taken - 1].number
 
 

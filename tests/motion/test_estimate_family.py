@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from miurafab.gcode.interpreter import parse_program
-from miurafab.gcode.job import Job, prepare
+from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
 from miurafab.motion.estimate import Estimate, estimate
 from miurafab.motion.parameters import Link, MotionParameters
@@ -73,7 +73,7 @@ def burnt(device: VirtualGrbl, job: Job, latency: float) -> tuple[float, float]:
     """Seconds from the first beam to the last, and with the beam on, of an ideal sender."""
     device.advance(1.0)
     device.take_output()
-    lines, unanswered, room, said = deque(prepare(job)), deque[int](), 128, b""
+    lines, unanswered, room, said = deque(job.send_lines()), deque[int](), 128, b""
     while lines or unanswered:
         while lines and len(lines[0].data) < room:
             data = lines.popleft().data + b"\n"

@@ -9,7 +9,7 @@ from firmware_jobs import TIMED
 from virtual_player import ready, stream
 
 from miurafab.gcode.interpreter import parse_program
-from miurafab.gcode.job import Job, prepare
+from miurafab.gcode.job import Job
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import MotionParameters
 
@@ -29,7 +29,7 @@ def test_the_estimate_is_within_one_percent(name: str) -> None:
 def test_the_virtual_controller_takes_as_long(name: str) -> None:
     text, settings, seconds, beam_on = TIMED[name]
     device = ready(settings)
-    assert stream(device, [line.data for line in prepare(Job(name, text))]) == pytest.approx(
+    assert stream(device, [line.data for line in Job(name, text).send_lines()]) == pytest.approx(
         seconds, rel=0.01
     )
     burnt = sum(segment.t1 - segment.t0 for segment in device.beam_log)

@@ -11,7 +11,7 @@ import pytest
 from virtual_player import RECORDED, ready, stream, until_answer
 
 from miurafab.gcode.interpreter import parse_program
-from miurafab.gcode.job import Job, prepare
+from miurafab.gcode.job import Job
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import MotionParameters
 from miurafab.simulate.beam import standing_seconds
@@ -65,7 +65,7 @@ def test_it_answers_as_the_firmware_did(case: dict[str, Any]) -> None:
 def test_a_job_takes_as_long_as_it_did(name: str, within: float) -> None:
     job = Job(name, (DATA / name).read_text(encoding="ascii"))
     device = ready(RECORDED)
-    seconds = stream(device, [line.data for line in prepare(job)])
+    seconds = stream(device, [line.data for line in job.send_lines()])
     burnt = sum(segment.t1 - segment.t0 for segment in device.beam_log)
     assert seconds == pytest.approx(MEASURED[name]["seconds"], rel=within)
     assert burnt == pytest.approx(MEASURED[name]["laser_on_seconds"], rel=within)
@@ -90,7 +90,7 @@ MIXED = {
 def test_the_estimate_foretells_the_virtual_run(name: str) -> None:
     job = Job(name, MIXED[name])
     device = ready(RECORDED)
-    seconds = stream(device, [line.data for line in prepare(job)])
+    seconds = stream(device, [line.data for line in job.send_lines()])
     foretold = estimate(parse_program(job), MotionParameters.from_settings(device.settings))
     assert seconds == pytest.approx(foretold.seconds, rel=0.01, abs=0.02)
     burnt = sum(segment.t1 - segment.t0 for segment in device.beam_log)
