@@ -1,1 +1,1 @@
-"""G-code: words, programs, arcs, what a program does; HPGL as well."""
+"""G-code and HPGL: lines to send, the parser, and what a program does."""

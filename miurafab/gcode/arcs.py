@@ -1,8 +1,8 @@
-"""Arcs as the chords that the controller makes of them.
+"""Arcs divided into chords, as the controller divides them.
 
-An arc of angle phi and radius r becomes n chords, n such that the middle of a chord stays within
-the tolerance t of the arc: a chord of angle a leaves it by the sagitta r (1 - cos(a/2)) = t, so
-its half length is sqrt(t (2 r - t)), and n = floor(phi r / 2 / sqrt(t (2 r - t)))
+An arc of angle phi and radius r becomes n chords that stay within the tolerance t of the arc. A
+chord of angle a leaves the arc by the sagitta r (1 - cos(a/2)). With the sagitta equal to t, half a
+chord has the length sqrt(t (2 r - t)), so n = floor(phi r / 2 / sqrt(t (2 r - t)))
 (``motion_control.c``).
 """
 
@@ -14,19 +14,19 @@ from collections.abc import Sequence
 from miurafab.gcode.numbers import to_unsigned
 
 _FULL_TURN_WITHIN = 5e-7
-"""rad; an arc ending this near its start is a full circle (``config.h``)."""
+"""rad; an arc that ends this near its start is a full circle (``config.h``)."""
 
 
 def centre_from_radius(
     x: float, y: float, radius: float, clockwise: bool
 ) -> tuple[float, float] | None:
-    """The centre, seen from the start, of the arc to (``x``, ``y``); None if none has ``radius``.
-
-    Without a chord there is no centre, and the firmware computes with a NaN; so does this.
+    """The centre, relative to the start, of the arc to (``x``, ``y``); None if ``radius`` is too
+    small.
 
     The centre lies on the perpendicular bisector of the chord of length d, at the distance
     h = sqrt(r^2 - d^2/4): centre = (x, y)/2 + h (-y, x)/d for a counterclockwise arc of less
-    than half a turn. A negative radius asks for the longer arc.
+    than half a turn. A negative radius selects the longer arc. For d = 0 the centre is NaN, as in
+    the firmware.
     """
     chord_sqr = x * x + y * y
     height_sqr = 4.0 * radius * radius - chord_sqr
@@ -47,12 +47,11 @@ def arc_chords(
     clockwise: bool,
     tolerance: float,
 ) -> tuple[int, list[list[float]]]:
-    """How many chords the arc has, and their end points in order; the last is ``end`` itself.
+    """The number of chords of the arc, and their end points in order; the last is ``end``.
 
-    An arc too short for a chord counts none, and is the straight line to its end.
-
-    ``centre`` is relative to ``start``; ``plane`` gives the arc's two axes and the axis along
-    which a helix climbs; ``tolerance`` in mm.
+    An arc too short for a chord has the count 0 and becomes the straight line to ``end``.
+    ``centre`` is relative to ``start``; ``plane`` holds the two axes of the arc and the axis of the
+    helix; ``tolerance`` in mm.
     """
     first, second, normal = plane
     x0, y0 = start[first] + centre[first], start[second] + centre[second]
@@ -79,7 +78,7 @@ def arc_chords(
 
 
 def chord_count(angle: float, radius: float, tolerance: float) -> int:
-    """How many chords an arc of ``angle`` (rad) gets, none counting as a single line."""
+    """The number of chords of an arc of ``angle`` (rad); 0 stands for a single line."""
     half_chord_sqr = tolerance * (2.0 * radius - tolerance)
     if not half_chord_sqr > 0.0:
         return 0

@@ -1,6 +1,6 @@
-"""Why a controller refuses a block, as the number that it would answer and a sentence.
+"""The reasons for which a controller refuses a block: an ``error:`` number and a sentence.
 
-The numbers are GRBL's ``error:`` codes (``report.h``); dialects that come from GRBL keep them.
+The numbers are those of GRBL (``report.h``); the dialects that derive from GRBL keep them.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _SENTENCES = {
 
 
 class BlockError(Exception):
-    """A block that the controller would refuse: its error ``code``, and ``what`` is at fault."""
+    """The controller would refuse a block with the error ``code``; ``what`` names the culprit."""
 
     def __init__(self, code: int, what: str) -> None:
         super().__init__(_SENTENCES[code].format(what=what))

@@ -1,6 +1,6 @@
-"""Tables that grow: rows added one at a time or by blocks, held as columns of fixed types.
+"""Growing tables: rows are appended singly or in blocks, and stored as typed columns.
 
-A row of a list of tuples costs some hundred bytes; here it costs what its numbers take.
+A row of a list of tuples takes about a hundred bytes; here it takes the bytes of its numbers.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _FLUSH = 4096  # rows
 
 
 class Columns:
-    """A table whose columns have ``types`` (NumPy's names of them, ``"f8"``)."""
+    """A table whose columns have the NumPy ``types``, such as ``"f8"``."""
 
     def __init__(self, *types: str) -> None:
         self._types = types
@@ -27,13 +27,13 @@ class Columns:
         return self._filed + len(self._rows)
 
     def add(self, *row: float) -> None:
-        """One row."""
+        """Append one row."""
         self._rows.append(row)
         if len(self._rows) >= _FLUSH:
             self._file_rows()
 
     def extend(self, *columns: NDArray[Any] | Sequence[float]) -> None:
-        """A block of rows by their columns, each of the same length."""
+        """Append a block of rows, given as columns of equal length."""
         self._file_rows()
         self._file(columns)
 
@@ -49,7 +49,7 @@ class Columns:
         self._filed += len(columns[0])
 
     def take(self, column: int) -> NDArray[Any]:
-        """The column of this number, once: what it was gathered from is given up."""
+        """Column number ``column`` as one array. Callable once: its memory is released."""
         self._file_rows()
         blocks = self._blocks[column]
         whole = np.concatenate(blocks) if blocks else np.zeros(0, dtype=self._types[column])

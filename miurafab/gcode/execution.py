@@ -1,9 +1,9 @@
-"""What a checked block does, step by step: the actions it asks of the machine, in order.
+"""The execution of a checked block: the actions that it asks of the machine, in order.
 
-The order is that of RS274/NGC section 3.8 as GRBL keeps it (``gcode.c``): feed, spindle speed,
-spindle, coolant, dwell, plane, units, offsets, distance mode, stored positions, motion, stop.
-The modal state changes between the actions, as it does in the firmware, so whoever performs
-them sees it as it is at that moment.
+The order is that of RS274/NGC section 3.8 as GRBL implements it (``gcode.c``): feed, spindle speed,
+spindle, coolant, dwell, plane, units, offsets, distance mode, stored positions, motion, stop. The
+modal state changes between the actions, as in the firmware, so the performer of an action sees the
+state of that moment.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ _CONSTANT_POWER = 3
 class StraightMove:
     """A straight move to ``target`` (machine mm).
 
-    ``speed`` is the S it runs with (0 where laser mode darkens it), ``spindle`` 0, 3 or 4;
-    ``feed`` in mm/min, or in 1/min with ``inverse_time``; unused for a ``rapid``.
-    ``steady``: overrides do not touch its feed.
+    ``speed`` is its S (0 where laser mode turns the beam off) and ``spindle`` 0, 3 or 4. ``feed``
+    is in mm/min, or in 1/min with ``inverse_time``; a ``rapid`` does not use it. Feed overrides do
+    not apply to a ``steady`` move.
     """
 
     target: Sequence[float]
@@ -55,17 +55,17 @@ class StraightMove:
 
 @dataclass(slots=True)
 class Jog:
-    """A jog; whoever performs it says whether it was ``accepted``."""
+    """A jog; its performer sets ``accepted``."""
 
-    line: StraightMove
+    move: StraightMove
     accepted: bool = True
 
 
 @dataclass(slots=True)
 class Probe:
-    """A probing move; whoever performs it sets the state's position afterwards."""
+    """A probing move; its performer sets the position of the state afterwards."""
 
-    line: StraightMove
+    move: StraightMove
     away: bool
     tolerant: bool
 
@@ -94,7 +94,7 @@ class Dwell:
 
 @dataclass(slots=True)
 class OffsetsChanged:
-    """Work offsets are about to be new; wait for all motion to end."""
+    """Wait for all motion to end; the work offsets change."""
 
 
 @dataclass(slots=True)
@@ -112,12 +112,12 @@ class Synchronize:
 
 @dataclass(slots=True)
 class Pause:
-    """Wait for somebody (M0)."""
+    """Wait for a person (M0)."""
 
 
 @dataclass(slots=True)
 class ProgramEnd:
-    """The program is over and the modes are reset (M2, M30)."""
+    """The program ends and the modes are reset (M2, M30)."""
 
 
 Action = (
@@ -127,7 +127,7 @@ Action = (
 
 
 def execute(block: Block, state: ModalState, rules: Rules) -> Iterator[Action]:
-    """The actions of ``block``; ``state`` is updated between them."""
+    """Yield the actions of ``block``; ``state`` is updated between them."""
     if block.jog:
         jog = Jog(
             StraightMove(block.target, False, block.feed, False, state.speed, state.spindle, True)
@@ -165,14 +165,14 @@ def execute(block: Block, state: ModalState, rules: Rules) -> Iterator[Action]:
     state.inches = block.inches
     yield from _offsets(block, state)
     state.distance = block.distance
-    line = StraightMove(
+    move = StraightMove(
         block.target, False, state.feed, bool(state.inverse_time), speed, state.spindle
     )
     if block.action:
-        yield from _non_modal(block, state, line)
+        yield from _non_modal(block, state, move)
     state.motion = block.motion
     if block.claim is Claim.MOTION and block.motion != NO_MOTION:
-        yield from _move(block, state, rules, line)
+        yield from _move(block, state, rules, move)
     if block.stop:
         yield from _stop(block, state)
 
@@ -190,7 +190,7 @@ def _offsets(block: Block, state: ModalState) -> Iterator[Action]:
         yield OffsetsChanged()
 
 
-def _non_modal(block: Block, state: ModalState, line: StraightMove) -> Iterator[Action]:
+def _non_modal(block: Block, state: ModalState, move: StraightMove) -> Iterator[Action]:
     action = block.action
     if action == SET_OFFSET:
         yield Store(block.select, block.stored)
@@ -198,11 +198,11 @@ def _non_modal(block: Block, state: ModalState, line: StraightMove) -> Iterator[
             state.coord_system = list(block.stored)
             yield OffsetsChanged()
     elif action in (GO_G28, GO_G30):
-        line.rapid = True
+        move.rapid = True
         if block.claim is not Claim.NONE:
-            yield line
-        line.target = block.stored
-        yield line
+            yield move
+        move.target = block.stored
+        yield move
         state.position = list(block.stored)
     elif action in (STORE_G28, STORE_G30):
         yield Store(6 if action == STORE_G28 else 7, list(state.position))
@@ -211,25 +211,25 @@ def _non_modal(block: Block, state: ModalState, line: StraightMove) -> Iterator[
         yield OffsetsChanged()
 
 
-def _move(block: Block, state: ModalState, rules: Rules, line: StraightMove) -> Iterator[Action]:
+def _move(block: Block, state: ModalState, rules: Rules, move: StraightMove) -> Iterator[Action]:
     motion = block.motion
-    line.target = block.target
-    line.rapid = motion == SEEK
+    move.target = block.target
+    move.rapid = motion == SEEK
     if motion in PROBES:
-        line.steady = True
+        move.steady = True
         kind = PROBES.index(motion)
-        yield Probe(line, away=kind >= 2, tolerant=kind % 2 == 1)
+        yield Probe(move, away=kind >= 2, tolerant=kind % 2 == 1)
         return
     if motion in (CLOCKWISE, COUNTERCLOCKWISE):
-        yield from _arc(block, state, rules, line)
+        yield from _arc(block, state, rules, move)
     else:
-        yield line
+        yield move
     state.position = list(block.target)
 
 
-def _arc(block: Block, state: ModalState, rules: Rules, line: StraightMove) -> Iterator[Action]:
-    """The chords of an arc. In G93 the firmware multiplies the feed by their number and then
-    takes it for mm/min (``mc_arc``); so does this.
+def _arc(block: Block, state: ModalState, rules: Rules, move: StraightMove) -> Iterator[Action]:
+    """The chords of an arc. In G93 the firmware multiplies the feed by the number of chords and
+    then reads it as mm/min (``mc_arc``); this does the same.
     """
     count, ends = arc_chords(
         state.position,
@@ -240,12 +240,12 @@ def _arc(block: Block, state: ModalState, rules: Rules, line: StraightMove) -> I
         block.motion == CLOCKWISE,
         rules.arc_tolerance,
     )
-    if line.inverse_time and count:
-        line.feed *= count
-        line.inverse_time = False
+    if move.inverse_time and count:
+        move.feed *= count
+        move.inverse_time = False
     for end in ends:
-        line.target = end
-        yield line
+        move.target = end
+        yield move
 
 
 def _stop(block: Block, state: ModalState) -> Iterator[Action]:

@@ -1,9 +1,9 @@
-"""A plotter's HPGL file read back to a :class:`~miurafab.gcode.program.Program`.
+"""The HPGL reader: a plotter's file becomes a :class:`~miurafab.gcode.program.Program`.
 
-Read is what a cutter needs of HP-GL: ``IN``, ``PA``, ``PR``, ``PU``, ``PD``, ``SP``, ``VS`` and
-``FS``. A plotter unit is 0.025 mm, ``VS`` is in cm/s, and the pen's number says which operation a
-stroke belongs to, as in the files written here (HP-GL reference, "plotter units" and "velocity
-select"). Anything else is refused by name, since what it draws would be left out of the picture.
+It reads the instructions that a cutter needs: ``IN``, ``PA``, ``PR``, ``PU``, ``PD``, ``SP``,
+``VS`` and ``FS``. A plotter unit is 0.025 mm and ``VS`` is in cm/s (HP-GL reference, "plotter
+units" and "velocity select"). As in the files that miurafab writes, the pen's number names the
+operation. Other instructions are refused by name, because the picture would lack what they draw.
 """
 
 from __future__ import annotations
@@ -11,35 +11,32 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-import numpy as np
-
 from miurafab.errors import GcodeError
-from miurafab.gcode.columns import Columns
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import BEAM_M3, FEED, RAPID, Context, Program
+from miurafab.gcode.program import BEAM_M3, BEAM_OFF, FEED, RAPID, Context, Program, ProgramBuilder
 from miurafab.profiles import OPERATIONS
 
 MM_PER_UNIT = 0.025
 _MM_MIN_PER_CM_S = 600.0
-_SPEED = 40.0  # cm/s, before any VS; that of common cutters
+_SPEED = 40.0  # cm/s, before any VS; common cutters have it
 _INSTRUCTION = re.compile(r"\s*([A-Za-z]{2})([-+0-9.,\s]*);?\s*")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
 
 
 def parse_hpgl(job: Job) -> Program:
-    """Read ``job`` back as the plotter would draw it, from the origin, the pen up.
+    """Read ``job`` as the plotter would draw it, from the origin with the pen up.
 
-    The power of a move is the force last set by ``FS`` (1 if none was) with the pen down, 0 with
-    it up. Raises :class:`~miurafab.errors.GcodeError` naming the line for an instruction that is
-    not read, or coordinates that do not come in pairs.
+    With the pen down the power of a move is the force of the last ``FS`` (1 before any), with the
+    pen up 0. Raises :class:`~miurafab.errors.GcodeError`, naming the line, for an unknown
+    instruction or an odd number of coordinates.
     """
     return _HpglReader(job.name).read(job)
 
 
 def instructions(name: str, number: int, line: str) -> Iterator[tuple[str, str]]:
-    """The instructions of one line of the file ``name``: two letters, and what follows them.
+    """Yield the instructions of a line of the file ``name``: two letters and their parameters.
 
-    Raises :class:`~miurafab.errors.GcodeError` for what is none.
+    Raises :class:`~miurafab.errors.GcodeError` for text that is no instruction.
     """
     place = 0
     while place < len(line):
@@ -60,18 +57,16 @@ class _HpglReader:
         self.down = self.relative = False
         self.force = 1.0
         self.feed = _SPEED * _MM_MIN_PER_CM_S
-        self.contexts: dict[Context, int] = {Context(): 0}
         self.context = 0
-        self.moves = Columns("f8", "f8", "i1", "f8", "f8", "i4", "i4")
-        self.sent = Columns("i4", "i4")
+        self.made = ProgramBuilder(name)
 
     def read(self, job: Job) -> Program:
         for number, line in enumerate(job.iter_lines(), 1):
             if line.strip():
-                self.sent.add(number, len(line) + 1)
+                self.made.sent.add(number, len(line) + 1, 0, 0)
                 for name, parameters in instructions(self.name, number, line):
                     self._do(number, name, [*map(float, _NUMBER.findall(parameters))])
-        return self._program()
+        return self.made.program()
 
     def _do(self, number: int, name: str, values: list[float]) -> None:
         if name == "IN":
@@ -85,8 +80,7 @@ class _HpglReader:
         elif name == "SP":
             pen = int(values[0]) if values else 0
             operation = OPERATIONS[pen - 1] if 1 <= pen <= len(OPERATIONS) else ""
-            context = Context(operation=operation)
-            self.context = self.contexts.setdefault(context, len(self.contexts))
+            self.context = self.made.number_of(Context(operation=operation))
         elif name == "VS":
             self.feed = (values[0] if values else _SPEED) * _MM_MIN_PER_CM_S
         elif name == "FS":
@@ -107,38 +101,10 @@ class _HpglReader:
             begin = self.at if self.relative else (0.0, 0.0)
             target = (begin[0] + x * MM_PER_UNIT, begin[1] + y * MM_PER_UNIT)
             if target != self.at:
-                motion, feed, power = (
-                    (FEED, self.feed, self.force) if self.down else (RAPID, 0.0, 0.0)
+                tool = (
+                    (FEED, self.feed, self.force, BEAM_M3)
+                    if self.down
+                    else (RAPID, 0.0, 0.0, BEAM_OFF)
                 )
-                self.moves.add(*target, motion, feed, power, number, self.context)
+                self.made.moves.add(*target, 0.0, *tool, number, self.context)
             self.at = target
-
-    def _program(self) -> Program:
-        moves, sent = self.moves, self.sent
-        places = np.zeros((len(moves) + 1, 3))
-        for axis in range(2):
-            places[1:, axis] = moves.take(axis)
-        power = moves.take(4)
-        number = sent.take(0)
-        none = np.zeros(0)
-        return Program(
-            name=self.name,
-            start=places[:-1],
-            end=places[1:],
-            motion=moves.take(2),
-            feed_mm_min=moves.take(3),
-            power=power,
-            spindle=np.where(power > 0, BEAM_M3, 0).astype(np.int8),
-            line=moves.take(5),
-            context=moves.take(6),
-            contexts=tuple(self.contexts),
-            event_move=none.astype(np.int64),
-            event_kind=none.astype(np.int8),
-            event_seconds=none,
-            event_power=none,
-            event_line=none.astype(np.int32),
-            line_number=number,
-            line_bytes=sent.take(1),
-            line_words=np.zeros(len(number), dtype=np.int32),
-            line_points=np.zeros(len(number), dtype=np.int32),
-        )

@@ -1,9 +1,8 @@
-"""A line for Marlin in the words that GRBL has for the same, or why Marlin would not do it.
+"""Marlin's lines translated to GRBL's words.
 
-Marlin reads one command a line, and each line has one: a bare ``X10`` moves nothing. It takes
-the laser's power with the moves after ``M3 I`` or ``M4 I``, as GRBL does in laser mode, and ``G4``
-waits P milliseconds or S seconds. (MarlinFirmware/Marlin ``gcode/parser.cpp``,
-``control/M3-M5.cpp``, ``motion/G4.cpp``.)
+Marlin reads exactly one command per line: a bare ``X10`` moves nothing. After ``M3 I`` or ``M4 I``
+the laser power goes with the moves, as in GRBL's laser mode. ``G4`` waits P milliseconds or S
+seconds. (MarlinFirmware/Marlin ``gcode/parser.cpp``, ``control/M3-M5.cpp``, ``motion/G4.cpp``.)
 """
 
 from __future__ import annotations
@@ -14,16 +13,16 @@ COMMANDS = frozenset(
     [f"G{number}" for number in (0, 1, 2, 3, 4, 20, 21, 28, 90, 91, 92)]
     + [f"M{number}" for number in (0, 1, 3, 4, 5, 8, 9)],
 )
-"""What a job for Marlin may say."""
+"""The commands that a job for Marlin may hold."""
 _COMMAND = re.compile(r"([GM])0*(\d+(?:\.\d*[1-9])?)\.?0*")
 _INLINE = re.compile(r"I0*(?![\d.])")
 _DWELL = re.compile(r"([PS])([\d.]+)")
 
 
 def grbl_words(code: str) -> str:
-    """``code`` (no blanks, upper case) as GRBL would say it.
+    """``code`` (no blanks, upper case) in GRBL's words.
 
-    Raises :class:`ValueError` with a clause about what Marlin would not do.
+    Raises :class:`ValueError` with a clause that says why Marlin would not run the line.
     """
     match = _COMMAND.match(code)
     if match is None:

@@ -1,8 +1,8 @@
-"""Numbers as the firmware reads and keeps them: 32-bit floats from at most eight digits.
+"""Numbers as the firmware reads and stores them: 32-bit floats of at most eight digits.
 
-An 8-bit controller takes the digits of a word as one integer, drops what comes after the eighth,
-and scales by hundredths and tenths in single precision (``nuts_bolts.c``). The virtual
-controller must round as it does; a program that is only read back uses plain ``float``.
+An 8-bit controller reads the first eight digits of a word as one integer and scales it by
+hundredths and tenths in single precision (``nuts_bolts.c``). The simulator must round the same way;
+a program that is only read back uses ``float``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _pack, _unpack = Struct("=f").pack, Struct("=f").unpack
 
 
 def single(value: float) -> float:
-    """``value`` rounded to the nearest 32-bit float; beyond the range, infinity."""
+    """``value`` rounded to the nearest 32-bit float; infinity beyond its range."""
     try:
         rounded: float = _unpack(_pack(value))[0]
     except OverflowError:
@@ -41,12 +41,12 @@ def read_single(text: str) -> float:
 
 
 def whole_byte(value: float) -> int:
-    """What is left when the firmware puts ``trunc(value)`` into one byte."""
+    """``trunc(value)`` stored in one byte, as the firmware does."""
     return to_unsigned(value) & 0xFF
 
 
 def to_unsigned(value: float) -> int:
-    """``value`` cast to 32 unsigned bits: negative numbers wrap, what does not fit gives 0.
+    """``value`` cast to 32 unsigned bits: negative numbers wrap, larger magnitudes give 0.
 
     Source: avr-libc ``fixunssfsi``.
     """

@@ -1,8 +1,7 @@
-"""One line of G-code, checked against the state of the machine: the block it means, or its fault.
+"""The G-code parser: one line, checked against the modal state, becomes a block or an error.
 
-The checks are GRBL's, in GRBL's order (``gcode.c``): first word by word as they are read, then
-the block as a whole. A block that fails leaves the state as it was. What a sound block does is
-told by :mod:`miurafab.gcode.execution`.
+The checks are GRBL's, in GRBL's order (``gcode.c``): first each word, then the block as a whole. A
+refused block leaves the state unchanged. :mod:`miurafab.gcode.execution` executes a block.
 
 Legend: positions and offsets in mm, feeds in mm/min (or 1/min with ``inverse_time``), axes as
 indices 0, 1, 2 for X, Y, Z.
@@ -12,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from miurafab.gcode import block_errors
@@ -55,7 +55,7 @@ StoredOffsets = Callable[[int], Sequence[float]]
 
 
 class Rules(Protocol):
-    """What of the firmware's build and settings the parser depends on."""
+    """The build options and settings of the firmware that the parser depends on."""
 
     @property
     def laser(self) -> bool:
@@ -63,19 +63,29 @@ class Rules(Protocol):
 
     @property
     def arc_tolerance(self) -> float:
-        """How far a chord may leave its arc, $12, mm."""
+        """The largest distance between a chord and its arc, $12, mm."""
 
     @property
     def mist(self) -> bool:
-        """Whether M7 exists in this build."""
+        """Whether this build has M7."""
 
     @property
     def single_precision(self) -> bool:
-        """Whether to round as the firmware's 32-bit floats do."""
+        """Whether to round to 32-bit floats, as the firmware does."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReaderRules:
+    """The :class:`Rules` for reading a file: every word is known, numbers are not rounded."""
+
+    laser: bool = True
+    arc_tolerance: float = 0.002
+    mist: bool = True
+    single_precision: bool = False
 
 
 class ModalState:
-    """The modes and values that last from line to line; all zero is the state at power-up."""
+    """The modes and values that persist from line to line; at power-up all are zero."""
 
     __slots__ = (
         "coolant", "coord_offset", "coord_system", "distance", "feed", "inches", "inverse_time",
@@ -93,10 +103,10 @@ class ModalState:
 
 
 class Block:
-    """One checked line: the modes it leaves, and what it does.
+    """One checked line: the modes after it, and what it does.
 
-    ``target`` is where its motion ends, or the new G92 shift; ``stored`` the G10 offset, or the
-    stored position that G28 and G30 end at; ``centre`` from the start to an arc's centre.
+    ``target`` is the end of its motion, or the new G92 shift; ``stored`` the G10 offset, or the
+    stored position of G28 or G30; ``centre`` the vector from the start to an arc's centre.
     """
 
     __slots__ = (
@@ -131,9 +141,9 @@ class Block:
 def parse_block(
     line: str, state: ModalState, stored: StoredOffsets, rules: Rules, *, jog: bool = False
 ) -> Block:
-    """The block that ``line`` means in ``state``; ``line`` is bare upper-case words.
+    """Parse ``line``, bare upper-case words, in ``state``.
 
-    ``jog``: the line is what follows ``$J=``. Raises :class:`BlockError`.
+    With ``jog`` the line is the text after ``$J=``. Raises :class:`BlockError`.
     """
     block = Block(state, jog)
     _read_words(line, block, rules)
@@ -206,7 +216,7 @@ def _read_words(line: str, block: Block, rules: Rules) -> None:
 
 
 def _set_feed(block: Block, state: ModalState) -> None:
-    """F lasts in G94; in G93 each feed move needs its own, and a change to G94 forgets it."""
+    """F persists in G94; in G93 each feed move needs an F, and a change to G94 clears it."""
     feed = block.words.get("F")
     if block.jog:
         if feed is None:
@@ -226,7 +236,7 @@ def _set_feed(block: Block, state: ModalState) -> None:
 
 
 def _set_target(block: Block, state: ModalState, stored: StoredOffsets, left: set[str]) -> None:
-    """Where the axis words lead: an offset (G10, G92) or a position in machine coordinates."""
+    """The meaning of the axis words: an offset (G10, G92) or a position in machine coordinates."""
     words, position = block.words, state.position
     if block.action == SET_OFFSET:
         _set_offset(block, state, stored, left)

@@ -1,4 +1,4 @@
-"""A job read back as one machine would run it, in the dialect that the machine speaks."""
+"""A job read back in the dialect of its machine."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _STOCK_ARC_TOLERANCE = 0.002  # mm (``defaults.h``)
 def read_program(job: Job, machine: MachineProfile) -> Program:
     """``job`` as ``machine`` would run it.
 
-    What a pen or knife does while it is up has no power, whatever S holds it up. Raises
-    :class:`~miurafab.errors.GcodeError`, naming the line, for what the machine would refuse.
+    The moves of a raised pen or knife get power 0, whatever S holds it up. Raises
+    :class:`~miurafab.errors.GcodeError`, naming the line, if the machine would refuse a line.
     """
     if machine.dialect == "hpgl":
         return parse_hpgl(job)
@@ -36,7 +36,7 @@ def read_program(job: Job, machine: MachineProfile) -> Program:
 
 
 def has_laser_mode(machine: MachineProfile) -> bool:
-    """Whether the controller darkens the beam in ``G0`` (GRBL 1.1 and later with ``$32=1``)."""
+    """Whether the controller turns the beam off in ``G0`` (GRBL 1.1 and later with ``$32=1``)."""
     return (
         machine.tool.kind == "laser"
         and machine.dialect != "grbl-0.9"

@@ -1,13 +1,13 @@
-"""Lines that are nothing but ``G0`` and ``G1`` moves, read by the ten thousand.
+"""The fast path of the interpreter: lines with only ``G0`` and ``G1`` moves, read as arrays.
 
-Nearly every line of a long job is *regular*: words of G (0 or 1), X, Y, S and F, each once at most,
-with a place to go to. Such lines are read as one array of bytes, without a loop over them: letters
-part the words, the digits of a word add up to an integer v with k decimals, and the value is
-v / 10^k. Both are exact below 2^53, so the quotient is the double nearest to the decimal, the
-same that ``float`` reads. What a mode was before is filled forward.
+Nearly every line of a long job is *regular*: words of G (0 or 1), X, Y, S and F, each at most once,
+with X or Y. Regular lines are read as one array of bytes without a Python loop. Letters separate
+the words. The digits of a word form an integer v with k decimals, and the value is v / 10^k. Both
+are exact below 2^53, so the quotient is the double nearest to the decimal, equal to ``float``.
+Missing words take the value of the line before.
 
-Any other line (a comment, an arc, a fault) is left to the word parser, which is the reference: a
-line counts as regular only where both give the same.
+The word parser is the reference and reads all other lines (comments, arcs, errors). A line counts
+as regular only if both readers agree.
 
 Legend: L lines of a chunk, W words in it, r lines of a run.
 """
@@ -23,7 +23,7 @@ from miurafab.gcode.parser import ModalState
 from miurafab.gcode.words import LINEAR, SEEK
 
 LEAST_RUN = 48
-"""Regular lines in a row that are worth an array; fewer go to the word parser."""
+"""The shortest run of regular lines read as an array; shorter runs go to the word parser."""
 
 _OTHER, _BLANK, _DIGIT, _POINT, _SIGN, _LETTER, _END = range(7)
 _KIND = np.zeros(256, dtype=np.uint8)
@@ -48,27 +48,25 @@ class TextLines:
     """The lines of a chunk of text.
 
     ``bounds`` (L + 1,) int64: line i is ``text[bounds[i]:bounds[i + 1] - 1]``. ``values`` (5, L)
-    float64: its G, X, Y, S and F, NaN where it has none; ``regular`` (L,) bool, and ``empty`` (L,)
-    bool, blanks only. ``size``, ``words`` and ``points`` (L,) int64: its characters without
-    blanks, its words, its decimal points; they hold for regular lines.
+    float64: its G, X, Y, S and F, or NaN. ``regular`` (L,) bool. For regular lines only, (L,)
+    int64: ``size``, the characters without blanks, ``words``, and ``points``, the decimal points.
     """
 
     bounds: NDArray[np.int64]
     values: NDArray[np.float64]
     regular: NDArray[np.bool_]
-    empty: NDArray[np.bool_]
     size: NDArray[np.int64]
     words: NDArray[np.int64]
     points: NDArray[np.int64]
 
     @property
     def commanded(self) -> NDArray[np.bool_]:
-        """(L,) whether a line says G0 or G1 itself."""
+        """(L,) whether a line holds G0 or G1."""
         return np.asarray(~np.isnan(self.values[_G]))
 
 
 def read_lines(text: str) -> TextLines:
-    """``text``, whole lines that each end in a newline, split into words where regular."""
+    """Split ``text``, whole lines that each end in a newline; read the regular lines."""
     raw = np.frombuffer(text.encode("ascii", "replace"), dtype=np.uint8)
     kind = _KIND[raw]
     bounds = np.concatenate([[0], np.flatnonzero(kind == _END) + 1])
@@ -81,9 +79,7 @@ def read_lines(text: str) -> TextLines:
 
     bad = np.zeros(count, dtype=bool)
     bad[line[kind == _OTHER]] = True
-    begins = kind[starts]
-    empty = begins == _END
-    bad |= ~empty & (begins != _LETTER)
+    bad |= kind[starts] != _LETTER
 
     letters = np.flatnonzero(kind == _LETTER)
     after = np.flatnonzero((kind == _LETTER) | (kind == _END))
@@ -106,7 +102,6 @@ def read_lines(text: str) -> TextLines:
         bounds=bounds,
         values=values,
         regular=moves & ~bad,
-        empty=empty,
         size=ends - starts,
         words=np.bincount(of_line, minlength=count),
         points=dots[ends] - dots[starts],
@@ -119,7 +114,7 @@ def _numbers(
     letters: NDArray[np.int64],
     stops: NDArray[np.int64],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """(W,) the number between each letter and its stop, and whether it is one."""
+    """(W,) the number between each letter and its stop, and whether it is well formed."""
     digits = np.concatenate([[0], np.cumsum(kind == _DIGIT)])
     points = np.concatenate([[0], np.cumsum(kind == _POINT)])
     signs = np.concatenate([[0], np.cumsum(kind == _SIGN)])
@@ -139,7 +134,7 @@ def _numbers(
     whole = np.zeros(len(letters), dtype=np.int64)
     if len(at):
         sums = np.concatenate([[0], np.cumsum((raw[at] - ord("0")) * _WHOLE_TENS[place])])
-        # Where a digit stands outside of a word its line is not regular, whatever this makes of it.
+        # A digit outside a word makes its line irregular, so its sum here does not matter.
         first = np.searchsorted(at, letters)
         whole = sums[np.searchsorted(at, stops)] - sums[first]
     decimals = np.zeros(len(letters), dtype=np.int64)
@@ -154,9 +149,8 @@ def _numbers(
 
 @dataclass(frozen=True, eq=False)
 class RegularMoves:
-    """What r regular lines ask for: ``target`` (r, 3) float64 mm, ``rapid`` (r,) bool, ``feed``
-    in mm/min and ``speed`` in S words (r,) float64; ``changes`` (r,) bool, whether that is a new
-    speed.
+    """The moves of r regular lines: ``target`` (r, 3) float64 mm, ``rapid`` (r,) bool, ``feed`` in
+    mm/min and ``speed`` in S words (r,) float64; ``changes`` (r,) bool marks each new speed.
     """
 
     target: NDArray[np.float64]
@@ -169,10 +163,10 @@ class RegularMoves:
 def regular_moves(
     lines: TextLines, first: int, stop: int, state: ModalState
 ) -> RegularMoves | None:
-    """The regular lines from ``first`` to before ``stop``, taken up in ``state``; updates it.
+    """The moves of the regular lines ``first`` to ``stop`` (exclusive); updates ``state``.
 
-    None, and ``state`` as it was, if that state gives such lines another meaning, or one of
-    them is at fault in it.
+    Returns None and leaves ``state`` alone if the state gives such lines another meaning, or if a
+    line is an error in it.
     """
     if state.inches or state.distance or state.inverse_time:
         return None
@@ -196,7 +190,7 @@ def regular_moves(
 
 
 def _filled(values: NDArray[np.float64], before: float) -> NDArray[np.float64]:
-    """``values`` with each NaN replaced by the last number before it, ``before`` at the start."""
+    """Replace each NaN of ``values`` by the last number before it, at the start by ``before``."""
     index = np.where(np.isnan(values), -1, np.arange(len(values)))
     index = np.maximum.accumulate(index)
     return np.where(index < 0, before, values[index])

@@ -1,4 +1,4 @@
-"""A line split into words, and the table of the G and M words that GRBL knows."""
+"""A line split into words, and the table of GRBL's G and M words."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ _LINE = re.compile(rf"(?:[A-Z]{_NUMBER})*", re.ASCII)
 
 
 def split_words(line: str) -> Iterator[tuple[str, str]]:
-    """The (letter, number) pairs of ``line``, which has no comments, blanks or lower case.
+    """Yield the (letter, number) pairs of ``line``, which has no comments, blanks or lower case.
 
-    Raises :class:`BlockError` where the line stops being words, after the words before it.
+    Raises :class:`BlockError` at the first character that is not part of a word, after the words
+    before it.
     """
     if _LINE.fullmatch(line):
         yield from _WORD.findall(line)
@@ -36,7 +37,7 @@ def split_words(line: str) -> Iterator[tuple[str, str]]:
 
 
 class Group(IntEnum):
-    """The modal groups (NIST RS274/NGC, table 4): one word of each in a line."""
+    """The modal groups (NIST RS274/NGC, table 4): a line may hold one word of each."""
 
     NON_MODAL = 0
     MOTION = 1
@@ -55,7 +56,7 @@ class Group(IntEnum):
 
 
 class Claim(IntEnum):
-    """What a command wants the axis words for."""
+    """The purpose for which a command claims the axis words."""
 
     NONE = 0
     NON_MODAL = 1
@@ -65,7 +66,7 @@ class Claim(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A G or M word: the mode it sets (``slot`` to ``value``; no slot: no effect) and its claim."""
+    """A G or M word: it sets ``slot`` to ``value`` (without a slot it has no effect); its claim."""
 
     group: Group
     slot: str = ""
@@ -129,9 +130,9 @@ _M = {
     9: Command(Group.COOLANT, "coolant", 0),
 }
 _CLAIMING = {0, 1, 2, 3, 38, 43, 49}
-"""G words that claim the axis words whatever stands after their point."""
+"""G words that claim the axis words with any decimals."""
 _POINTED = {28, 30, 38, 43, 61, 90, 91, 92}
-"""G words some of whose pointed forms exist, so that the others are unknown and not fractions."""
+"""G words with decimals in use; other decimals are unknown words instead of bad fractions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +146,9 @@ class Spelling:
 
 @lru_cache(maxsize=4096)
 def look_up(letter: str, number: str, mist: bool) -> Spelling:
-    """What the word means; M7 exists only if the firmware has ``mist`` compiled in.
+    """The meaning of a word; M7 exists only in firmware compiled with ``mist``.
 
-    The fraction is taken in hundredths as the firmware does, in single precision (``gcode.c``).
+    The fraction is read in hundredths in single precision, as in ``gcode.c``.
     """
     value = read_single(number)
     whole = to_unsigned(value) & 0xFF

@@ -28,7 +28,7 @@ from miurafab.errors import GcodeError, InputError
 from miurafab.gcode.execution import Jog, OffsetsChanged, Probe, Store, execute
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job, bare_code
-from miurafab.gcode.parser import ModalState, parse_block
+from miurafab.gcode.parser import ModalState, ReaderRules, parse_block
 from miurafab.gcode.program import Program, strokes
 from miurafab.gcode.reading import read_program
 from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST, NO_MOTION
@@ -179,17 +179,9 @@ def _rest(job: Job, line: int) -> tuple[Job, int]:
     ), line
 
 
-@dataclass(frozen=True, slots=True)
-class _Rules:
-    laser: bool = True
-    arc_tolerance: float = 0.002
-    mist: bool = True
-    single_precision: bool = False
-
-
 def _state_before(job: Job, line: int) -> ModalState:
     """The modes before ``line``; raises ``InputError`` for what no preamble can bring back."""
-    state, rules = ModalState(), _Rules()
+    state, rules = ModalState(), ReaderRules()
     for number, text in zip(range(1, line), job.iter_lines(), strict=False):
         code = bare_code(job.name, number, text).upper().replace("/", "")
         if not code:

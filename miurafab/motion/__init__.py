@@ -1,1 +1,1 @@
-"""The motion planner of the firmware, for time estimates and the simulators."""
+"""The firmware's motion planner, for time estimates and for the simulators."""

@@ -1,10 +1,10 @@
-"""How long a program takes: the firmware's own main loop, run over it without the bytes.
+"""The time estimate of a program: the firmware's main loop, run without the bytes.
 
-The same planner, segment generator and stepper that move the virtual controller are driven here
-line by line: a line arrives when the wire and the receive buffer let it, is parsed, its moves are
-planned when there is room, segments are prepared whenever the main program gets to it, and a
-synchronisation waits for all motion to end. So the estimate knows what makes short dashes slow:
-the processor, the wire, and each stop.
+The planner, segment generator and stepper of the simulator are driven line by line. A line arrives
+when the wire and the receive buffer allow it and is parsed; its moves are planned when there is
+room; segments are prepared when the main program gets to them; a synchronisation waits for all
+motion to end. So the estimate includes what makes short dashes slow: the processor, the wire and
+each stop.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from miurafab.motion.stepper import Processor, Stepper
 
 _OK_BYTES = 4
 _FOREVER = 1 << 62
-_BLOCK = 4096  # lines at a time that stand as Python's objects
+_BLOCK = 4096  # lines held as Python objects at a time
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """``seconds`` from the first step (or dwell) to the end of the last move or dwell;
-    ``beam_on_seconds`` with the beam on, moving or not; ``start`` and ``end`` (n,) float64, when
-    each move of the program is made, in s from the same beginning.
+    ``beam_on_seconds`` of them with the beam on, moving or standing; ``start`` and ``end`` (n,)
+    float64, the times of each move in s since the first step.
     """
 
     seconds: float
@@ -45,9 +45,9 @@ class Estimate:
 
 
 def estimate(program: Program, parameters: MotionParameters, link: Link | None = None) -> Estimate:
-    """The time that ``program`` takes on a machine with ``parameters`` behind ``link``.
+    """Estimate the time of ``program`` on a machine with ``parameters`` behind ``link``.
 
-    ``link`` None is GRBL's usual one: 115200 baud, 1 ms, 128 bytes.
+    ``link`` None is the usual link of GRBL: 115200 baud, 1 ms, 128 bytes.
     """
     run = _Run(program, parameters, link or Link())
     run.lines()
@@ -55,7 +55,7 @@ def estimate(program: Program, parameters: MotionParameters, link: Link | None =
 
 
 class _Wire:
-    """When each line has arrived, under character counting (without a buffer: one by one)."""
+    """The arrival times of the lines under character counting; without a buffer, one by one."""
 
     def __init__(self, link: Link) -> None:
         self.byte = 10.0 * cpu.CLOCK / link.baud
@@ -67,7 +67,7 @@ class _Wire:
         self.out_free = 0.0
 
     def arrival(self, size: int) -> int:
-        """The cycle at which the next line's last byte is in, its ``size`` counted."""
+        """The cycle at which the last byte of the next line, of ``size`` bytes, arrives."""
         start = self.free
         while self.room < size and self.unanswered:
             freed, seen = self.unanswered.popleft()
@@ -78,7 +78,7 @@ class _Wire:
         return math.ceil(self.free)
 
     def answer(self, now: int, size: int) -> None:
-        """The line of ``size`` bytes was answered at ``now``."""
+        """The controller answers a line of ``size`` bytes at ``now``."""
         self.out_free = max(self.out_free, now) + _OK_BYTES * self.byte
         self.unanswered.append((size, self.out_free + self.latency))
 
@@ -135,7 +135,8 @@ class _Run:
 
     def _receive(self, size: int) -> None:
         arrival = self.wire.arrival(size)
-        if arrival <= self.now + (size - 1) * cpu.CHARACTER:  # the last comes while others are read
+        # The last byte may arrive while the bytes before it are read.
+        if arrival <= self.now + (size - 1) * cpu.CHARACTER:
             self._work(size * cpu.CHARACTER)
             return
         while True:
@@ -214,7 +215,7 @@ class _Run:
             self.now = max(self.now, until)
 
     def _work(self, cycles: int) -> None:
-        """Do ``cycles`` of work, and what planner and generator had to do since last time."""
+        """Do ``cycles`` of work, and the pending work of planner and generator."""
         cycles += self.planner.cycles + self.generator.cycles
         self.planner.cycles = self.generator.cycles = 0
         if cycles and self.slow:
@@ -235,7 +236,7 @@ class _Run:
         self._beam(now, segment.power > 0)
 
     def _settled(self, now: int) -> None:
-        """Power that follows the speed is off at rest; constant power stays on."""
+        """At rest the beam of M4 goes off; the constant power of M3 stays on."""
         if self.follows:
             self._beam(now, False)
 
@@ -252,7 +253,7 @@ class _Run:
         end = np.array(self.ended, dtype=np.float64)
         made = start >= 0.0
         first = float(self.first or 0)
-        # A move too short for a motor step takes no time: it happens where the one before ended.
+        # A move shorter than a motor step takes no time and happens at the end of the move before.
         before = np.maximum.accumulate(np.where(made, end, first))
         start = np.where(made, start, before)
         end = np.where(made, end, before)
@@ -273,7 +274,7 @@ _Event = tuple[int, float, float]
 
 
 class _Sent(NamedTuple):
-    """A line sent: its bytes, words and points, and what it does, in order."""
+    """A line sent: its bytes, words and decimal points, and its actions in order."""
 
     size: int
     words: int
@@ -282,7 +283,7 @@ class _Sent(NamedTuple):
 
 
 def _lines(program: Program) -> Iterator[_Sent]:
-    """The lines of ``program`` one after another, a block at a time taken out of its arrays."""
+    """Yield the lines of ``program``, read from its arrays in blocks."""
     for first in range(0, len(program.line_number), _BLOCK):
         block = slice(first, first + _BLOCK)
         numbers = program.line_number[block]

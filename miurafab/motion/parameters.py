@@ -1,4 +1,4 @@
-"""What the motion of a machine depends on: its axes, its controller, and the wire to it."""
+"""The parameters of motion: the machine's axes, its controller, and the link to it."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from miurafab.profiles import MachineProfile
 
 _NEEDED = (1, 11, 12, 30, 31, 32, 100, 101, 102, 110, 111, 112, 120, 121, 122)
 _COUNT_AND_CHECKSUM = len("N12345 *123")
-"""What Marlin's lines have besides their code, mostly."""
+"""The usual addition to a line for Marlin."""
 Triple = tuple[float, float, float]
 _EIGHT_BIT = ("grbl-1.1", "grbl-0.9")
 """Dialects that run on an ATmega328P."""
 COMMON_STEPS = 80.0
-"""What a profile that gives no ``$100`` is taken to have: steps/mm of a belt with 2 mm pitch, 20
-teeth and 1/16 steps, the usual laser frame."""
+"""The steps/mm of a profile without ``$100``: a belt of 2 mm pitch, 20 teeth and 1/16 steps, as in
+the usual laser frame."""
 
 
 @dataclass(frozen=True)
 class MotionParameters:
-    """The settings that shape motion, by axis X, Y, Z where there are three.
+    """The settings that shape motion; triples are for the axes X, Y, Z.
 
     ``steps_per_mm`` ($100-$102); ``max_rate_mm_min`` ($110-$112); ``acceleration`` in mm/s²
-    ($120-$122); ``junction_deviation`` and ``arc_tolerance`` in mm ($11, $12); ``idle_lock`` in s,
-    how long the motors are held after each stop before the controller goes on, or None if they
-    are held for ever without waiting ($1); ``laser`` mode ($32); ``s_max``, ``s_min`` ($30, $31).
-    ``planner_blocks`` moves are looked ahead; ``slow_processor``: the work of parsing and
-    planning takes the time of GRBL's 8-bit one, else none.
+    ($120-$122); ``junction_deviation`` and ``arc_tolerance`` in mm ($11, $12); ``idle_lock`` in s:
+    after each stop the controller holds the motors for this time before it goes on; None: it holds
+    them forever and does not wait ($1); ``laser`` mode ($32); ``s_max``, ``s_min`` ($30, $31).
+    ``planner_blocks`` is the depth of the look-ahead. With ``slow_processor`` parsing and planning
+    take the time of GRBL's 8-bit processor, else no time.
     """
 
     steps_per_mm: Triple
@@ -45,9 +45,9 @@ class MotionParameters:
 
     @classmethod
     def from_settings(cls, settings: Mapping[int, float]) -> MotionParameters:
-        """The parameters among all ``$`` settings.
+        """The parameters in a full set of ``$`` settings.
 
-        Raises :class:`~miurafab.errors.ProfileError` naming one that is missing.
+        Raises :class:`~miurafab.errors.ProfileError`, naming the first missing setting.
         """
         missing = [number for number in _NEEDED if number not in settings]
         if missing:
@@ -66,9 +66,9 @@ class MotionParameters:
 
     @classmethod
     def from_profile(cls, profile: MachineProfile) -> MotionParameters:
-        """The parameters of a machine profile; its ``settings`` win over its motion table.
+        """The parameters of a machine profile; its ``settings`` override its motion table.
 
-        A profile says nothing of Z, which a sheet does not need: Z is taken as X.
+        A profile has no values for Z, because a sheet needs none: Z gets those of X.
         """
         motion = profile.motion
         rate_x, rate_y = motion.max_rate_mm_min
@@ -88,9 +88,9 @@ class MotionParameters:
 
 @dataclass(frozen=True)
 class Link:
-    """The wire: ``baud`` (10 bits a byte), the host's ``latency`` in s from the controller's
-    answer to its next byte, the controller's ``rx_bytes`` (0: one line at a time), and
-    ``line_overhead``, the bytes that the dialect adds to each line.
+    """The serial link: ``baud`` (10 bits a byte); the host's ``latency`` in s from the controller's
+    answer to the next byte sent; the controller's receive buffer ``rx_bytes`` (0: one line at a
+    time); ``line_overhead``, the bytes that the dialect adds to each line.
     """
 
     baud: int = 115_200
@@ -100,7 +100,7 @@ class Link:
 
     @classmethod
     def from_profile(cls, profile: MachineProfile) -> Link:
-        """How jobs are sent to the machine of ``profile``."""
+        """The link to the machine of ``profile``."""
         controller = profile.controller
         one_by_one = controller.streaming == "send-response" and profile.dialect != "hpgl"
         return cls(

@@ -1,17 +1,17 @@
-"""The look-ahead: how fast each of the next moves may be entered, fifteen of them on GRBL.
+"""The look-ahead planner: the entry speed of each queued move (fifteen moves on GRBL).
 
-Between two moves of unit directions u and v the speed is bounded by a circle through the corner
-that leaves it by the junction deviation d: with t the angle between -u and v,
-w^2 = a d sin(t/2) / (1 - sin(t/2)) (``planner.c``; S. K. Jeon's cornering note of 2011). Under
-that bound, entry speeds e_i obey, with a_i and l_i the moves' accelerations and lengths,
+At the corner of two moves with unit directions u and v the speed w is bounded by a circle that
+misses the corner by the junction deviation d. With t the angle between -u and v,
+w^2 = a d sin(t/2) / (1 - sin(t/2)) (``planner.c``; S. K. Jeon's cornering note of 2011). Below this
+bound the entry speeds e_i obey, with a_i and l_i the accelerations and lengths of the moves,
 
-    backward   e_i^2 <= e_{i+1}^2 + 2 a_i l_i      (every move can still brake, the last to a stop)
-    forward    e_{i+1}^2 <= e_i^2 + 2 a_i l_i      (no move can speed up more than it has room for)
+    backward   e_i^2 <= e_{i+1}^2 + 2 a_i l_i      (each move can brake, the last one to a stop)
+    forward    e_{i+1}^2 <= e_i^2 + 2 a_i l_i      (no move accelerates beyond its length)
 
-A new move only touches what the last passes left open, which :attr:`Planner.planned` marks.
+Speeds before :attr:`Planner.planned` are final; a new move changes only the later ones.
 
-All is kept in single precision, in the firmware's units and order of operations: the last bit
-decides whether a hold that ends on a whole motor step goes on to the next.
+All values have single precision, with the firmware's units and order of operations: the last bit
+decides whether a hold that ends on a whole motor step takes one step more.
 
 Legend: speeds in mm/min, ``_sqr`` their squares, accelerations in mm/min², lengths in mm, counts in
 motor steps.
@@ -29,27 +29,27 @@ from miurafab.motion import cpu
 from miurafab.motion.parameters import MotionParameters
 
 single = cast("Callable[[float], float]", np.float32)
-"""Round to single precision; what is calculated with the result stays in it."""
+"""Round to single precision; arithmetic with the result keeps it."""
 
 _STRAIGHT = 0.999999
 _PERCENT = single(0.01)
 _UNLIMITED = 1e38
 _MOST_STEPS = 2.0**31 - 1.0
 _FARTHEST = 1e30
-"""mm; what is farther would not fit into single precision."""
+"""mm; farther targets do not fit into single precision."""
 _SLOWEST = 1.0
-"""mm/min; no move is planned slower (``config.h``)."""
+"""mm/min; the lowest planned speed (``config.h``)."""
 _LEAST_ACCELERATION = 3.6e-3
-"""mm/min²; the firmware divides by a zero $120, this keeps the arithmetic finite."""
+"""mm/min²; the firmware divides by a $120 of zero, this bound keeps the arithmetic finite."""
 
 
 class Move:
-    """One planned line.
+    """One planned straight move.
 
-    ``origin`` and ``steps`` (signed) per axis in motor steps, ``events`` the largest of them;
-    ``length`` is what of it is still to be prepared; ``rate`` the programmed speed and
-    ``rapid_rate`` the fastest in this direction; ``speed_word`` and ``spindle`` are its S and its
-    0, 3 or 4; ``steady`` moves ignore the feed override; ``tag`` is the caller's.
+    ``origin`` and signed ``steps`` per axis in motor steps, ``events`` the largest step count;
+    ``length`` is the part not prepared yet; ``rate`` the programmed speed and ``rapid_rate`` the
+    fastest in its direction; ``speed_word`` is its S and ``spindle`` 0, 3 or 4; ``steady`` moves
+    ignore the feed override; ``tag`` belongs to the caller.
     """
 
     __slots__ = (
@@ -67,10 +67,10 @@ class Move:
 
 
 class Planner:
-    """The queue of planned moves and the speeds at their joints.
+    """The queue of planned moves and the speeds at their junctions.
 
-    ``position`` is where the last move ends, in motor steps. ``on_replan`` is called when the
-    move being executed gets a new exit speed. ``cycles`` adds up the processor's work.
+    ``position`` is the end of the last move, in motor steps. ``on_replan`` is called when the move
+    in execution gets a new exit speed. ``cycles`` accumulates the processor's work.
     """
 
     def __init__(self, parameters: MotionParameters) -> None:
@@ -82,7 +82,7 @@ class Planner:
         self.reset((0, 0, 0))
 
     def configure(self, parameters: MotionParameters) -> None:
-        """Take other settings, for the moves to come."""
+        """Apply other settings to later moves."""
         self.parameters = parameters
         self._steps_per_mm = tuple(map(single, parameters.steps_per_mm))
         self._max_rate = tuple(map(single, parameters.max_rate_mm_min))
@@ -90,7 +90,7 @@ class Planner:
         self._deviation = single(parameters.junction_deviation)
 
     def reset(self, position: Sequence[int]) -> None:
-        """Forget all moves and stand at ``position`` (motor steps)."""
+        """Drop all moves and set ``position`` (motor steps)."""
         self.moves: list[Move] = []
         self.planned = 0
         self.position: tuple[int, ...] = tuple(position)
@@ -99,11 +99,11 @@ class Planner:
 
     @property
     def full(self) -> bool:
-        """Whether no further move fits."""
+        """Whether the queue has no room."""
         return len(self.moves) >= self.parameters.planner_blocks
 
     def nominal_speed(self, move: Move) -> float:
-        """The speed ``move`` is meant to have under the overrides."""
+        """The programmed speed of ``move`` under the overrides."""
         speed = move.rate
         if move.rapid:
             speed *= _PERCENT * self.rapid_override
@@ -125,8 +125,8 @@ class Planner:
     ) -> tuple[Move, tuple[float, float, float], tuple[int, ...]] | None:
         """A move to ``target`` (mm) at ``feed`` (mm/min, or 1/min), its direction and its end.
 
-        None if it is shorter than half a motor step. ``origin`` other than :attr:`position` is
-        for the system's own motion.
+        None if it is shorter than half a motor step. System motion gives an ``origin`` other than
+        :attr:`position`.
         """
         start = self.position if origin is None else tuple(origin)
         kx, ky, kz = self._steps_per_mm
@@ -170,7 +170,7 @@ class Planner:
     ) -> Move | None:
         """Plan a line to ``target`` (mm) at ``feed`` (mm/min, or 1/min with ``inverse_time``).
 
-        Returns None if it is shorter than half a motor step. There must be room for it.
+        Returns None if it is shorter than half a motor step. The queue must have room.
         """
         made = self.make(target, feed, rapid=rapid, inverse_time=inverse_time, steady=steady)
         if made is None:
@@ -189,19 +189,19 @@ class Planner:
         return move
 
     def discard(self) -> None:
-        """The first move is fully prepared and leaves the queue."""
+        """Remove the first move, which is fully prepared, from the queue."""
         del self.moves[0]
         if self.planned:
             self.planned -= 1
 
     def restart(self) -> None:
-        """Plan all moves anew from the speed that the first has now (after a stop, an override)."""
+        """Replan all moves from the present speed of the first (after a stop or an override)."""
         self.on_replan()
         self.planned = 0
         self._plan()
 
     def override(self, feed: int, rapid: int) -> None:
-        """Take new overrides in percent for all moves, and plan anew."""
+        """Apply new overrides in percent to all moves, and replan."""
         self.feed_override, self.rapid_override = feed, rapid
         last = _UNLIMITED
         for move in self.moves:
@@ -269,7 +269,7 @@ class Planner:
 
 
 def to_steps(value: float, steps_per_mm: float) -> int:
-    """``value`` in mm as motor steps, rounded half away from zero, within 32 bits; NaN is 0."""
+    """``value`` mm in motor steps, rounded half away from zero, clipped to 32 bits; NaN gives 0."""
     steps = float(single(min(max(value, -_FARTHEST), _FARTHEST)) * steps_per_mm)
     if not -_MOST_STEPS <= steps <= _MOST_STEPS:
         return 0 if steps != steps else int(math.copysign(_MOST_STEPS, steps))

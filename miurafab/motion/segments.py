@@ -1,14 +1,14 @@
-"""The segment generator: planned moves cut into bits of constant speed, ten milliseconds each.
+"""The segment generator: planned moves are divided into segments of constant speed, 10 ms each.
 
 The controller follows the speed profile of a move in segments of 10 ms, each a whole number of
 motor steps at one rate (``stepper.c``). A segment ends early at the end of its move, and lasts
-longer where 10 ms would hold no step. Steps are whole and distances are not, so the time of the
-step begun is carried into the next segment, and the sum is exact to one step. Short dashes are a
-segment or two each, and this is where their time is made.
+longer if 10 ms would hold no step. Distances are not whole steps, so the time of a step begun is
+carried into the next segment, and the sum is exact to one step. A short dash has one or two
+segments, which determine its time.
 
 Within a move the speed rises from ``speed`` to ``top`` until ``rise_end``, holds until
-``fall_start``, and falls to ``exit`` at ``goal``; distances in mm, counted from the move's end
-backwards.
+``fall_start``, and falls to ``exit`` at ``goal``. Distances are in mm, measured backwards from the
+end of the move.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from miurafab.motion.planner import Move, Planner, single
 SEGMENT_TIME = single(1.0 / 6000.0)
 """Minutes."""
 QUEUE = 5
-"""Segments that can wait, the running one included: 6 slots of which one stays free."""
+"""The longest segment queue, including the running segment: 6 slots, one of them free."""
 _LEAST_STEPS = 1.25
 _SLOWEST_PERIOD = 0xFFFF
 _SMOOTHING = (2000, 4000, 8000)
-"""Cycles a step from which the stepper divides each step in 2, 4, 8 ticks (AMASS)."""
+"""From these cycles per step on, the stepper divides each step into 2, 4, 8 ticks (AMASS)."""
 MICRO = 8
-"""The finest division of a step; progress within a move is counted in these."""
+"""Micro-steps per step; progress within a move is counted in micro-steps."""
 
 RISE, HOLD, FALL, FALL_TO_TOP = range(4)
 
 
 class Segment:
-    """``ticks`` interrupts, ``period`` cycles apart, each ``stride`` micro-steps of ``move``;
-    ``cycles`` in all.
+    """``ticks`` interrupts, ``period`` cycles apart, of ``stride`` micro-steps of ``move`` each;
+    ``cycles`` in total.
 
-    ``done`` is the progress before it in micro-steps; ``power`` the PWM value while it runs;
+    ``done`` is the progress before the segment in micro-steps; ``power`` its PWM value;
     ``follows`` whether the power follows the speed; ``last`` whether it completes its move;
-    ``tick`` how many cycles each interrupt takes.
+    ``tick`` the cycles of each interrupt.
     """
 
     __slots__ = (
@@ -59,10 +59,10 @@ class Segment:
 
 
 class SegmentGenerator:
-    """Cuts the first planned move into segments, one a call of :meth:`next`.
+    """Divides the first planned move into segments, one per call of :meth:`next`.
 
-    ``to_pwm`` turns an S value, or None for a spindle that is off, into the PWM value 0..255.
-    ``cycles`` adds up the processor's work.
+    ``to_pwm`` converts an S value, or None for a spindle that is off, to the PWM value 0..255.
+    ``cycles`` accumulates the processor's work.
     """
 
     def __init__(self, planner: Planner, to_pwm: Callable[[float | None], int]) -> None:
@@ -73,7 +73,7 @@ class SegmentGenerator:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the move in hand; all flags clear."""
+        """Drop the current move and clear all flags."""
         self.move: Move | None = None
         self.system_move: Move | None = None
         self.holding = False
@@ -92,25 +92,25 @@ class SegmentGenerator:
         self.exit = self.top = self.rise_end = self.fall_start = self.goal = 0.0
 
     def resume(self) -> None:
-        """Leave hold and system motion; go on with the planner's moves."""
+        """End a hold or a system motion; continue with the planner's moves."""
         self.holding = self.finished = False
         self.system_move = None
 
     def replan(self) -> None:
-        """The move in hand has a new plan: take up its profile anew from the speed reached."""
+        """The current move has a new plan: compute its profile again from the present speed."""
         if self.move is not None:
             self._recalculate = True
             self.move.entry_sqr = self.speed * self.speed
             self.move = None
 
     def hold(self) -> None:
-        """Brake to a stop from now on, whatever the plan says."""
+        """Brake to a stop from now on, regardless of the plan."""
         self.replan()
         self.holding = True
         self.refresh_power = False
 
     def next(self) -> Segment | None:
-        """The next segment; None if there is no more motion to prepare."""
+        """The next segment; None if no motion is left to prepare."""
         if self.finished:
             return None
         move = self.move or self._take_up()
@@ -175,7 +175,7 @@ class SegmentGenerator:
             self.cycles += cpu.LOAD_RATE
 
     def _lay_profile(self, move: Move) -> None:
-        """Choose among the seven shapes that rise, hold and fall can make of what is left."""
+        """Choose one of the seven combinations of rise, hold and fall for the rest of the move."""
         self.cycles += cpu.PROFILE
         length, entry_sqr, twice = move.length, move.entry_sqr, 2.0 * move.acceleration
         per_speed_sqr = 0.5 / move.acceleration
@@ -224,7 +224,7 @@ class SegmentGenerator:
                     self.rise_end -= per_speed_sqr * (nominal_sqr - entry_sqr)
 
     def _travel(self, move: Move) -> tuple[float, float, int]:
-        """Follow the profile for a segment: what is left of the move, the time, the rounds."""
+        """Follow the profile for one segment: the length left, the time, the loop rounds."""
         length = move.length
         acceleration = move.acceleration
         enough = max(length - _LEAST_STEPS / self._steps_per_mm, 0.0)
@@ -296,7 +296,7 @@ class SegmentGenerator:
         self._power = self.to_pwm(word)
 
     def _cut(self, segment: Segment, length: float, duration: float) -> bool:
-        """Give ``segment`` its whole steps and their rate; False if a hold leaves it none."""
+        """Give ``segment`` its whole steps and their rate; False if a hold leaves no step."""
         left = self._steps_per_mm * length
         whole = math.ceil(left)
         steps = self._steps_left - whole

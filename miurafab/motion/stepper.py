@@ -1,9 +1,9 @@
-"""The stepper interrupt in time, and the main program that it steals time from.
+"""The timing of the stepper interrupt and of the main program that it slows down.
 
-Time is counted in processor cycles. Segments run one after another; while one runs, each of its
-ticks takes some 340 cycles from the main program, so that work of w cycles lasts
-w / (1 - tick / period). When the queue runs dry the interrupt stops the motors and holds them for
-the idle lock time before it returns: the main program stands still for that long at every stop
+Times are in processor cycles. Segments run one after another. While a segment runs, each of its
+ticks takes about 340 cycles from the main program, so work of w cycles lasts
+w / (1 - tick / period). When the queue is empty, the interrupt stops the motors and holds them for
+the idle lock time before it returns: the main program waits for that time at each stop
 (``st_go_idle`` in ``stepper.c``).
 """
 
@@ -16,16 +16,16 @@ from miurafab.motion.planner import Move
 from miurafab.motion.segments import MICRO, QUEUE, Segment
 
 _LEAST_SHARE = 0.05
-"""Of the processor, left to the main program however fast the steps come."""
+"""The fraction of the processor left to the main program at any step rate."""
 
 
 class Stepper:
     """The running segments.
 
-    ``queue`` holds them, the running one first; ``began`` is the cycle at which it began. After
-    the last one the stepper is ``settling`` until the cycle given there, and then ``stopped``
-    until somebody takes note and clears it. ``on_segment`` is told each segment as it begins,
-    ``on_end`` the end of the last, ``on_settled`` the end of settling; each with its cycle.
+    ``queue`` holds them, the running segment first; it began at the cycle ``began``. After the last
+    segment the stepper is ``settling`` until that cycle, then ``stopped`` until a caller clears the
+    flag. ``on_segment`` is called at the begin of each segment, ``on_end`` at the end of the last,
+    ``on_settled`` at the end of settling; each with its cycle.
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class Stepper:
         self.halt()
 
     def halt(self) -> None:
-        """Stop dead and forget all segments."""
+        """Stop at once and drop all segments."""
         self.queue: list[Segment] = []
         self.running = False
         self.settling: int | None = None
@@ -47,11 +47,11 @@ class Stepper:
 
     @property
     def room(self) -> bool:
-        """Whether another segment fits."""
+        """Whether the queue has room."""
         return len(self.queue) < QUEUE
 
     def wake(self, now: int) -> None:
-        """Start stepping at ``now`` unless it is under way."""
+        """Start stepping at ``now`` unless it already runs."""
         if not self.running:
             self.running, self.settling = True, None
             self._begin(now)
@@ -61,7 +61,7 @@ class Stepper:
         return self._change
 
     def run_to(self, now: int) -> None:
-        """Let everything end that ends by ``now``."""
+        """Run the segments and the settling that end by ``now``."""
         while self.running:
             assert self._change is not None
             if self._change > now:
@@ -87,7 +87,7 @@ class Stepper:
             self.on_end(now)
 
     def progress(self, now: int) -> tuple[Move, int] | None:
-        """The move being stepped at ``now`` and how far it is, in micro-steps; None at rest."""
+        """The move in execution at ``now`` and its progress in micro-steps; None at rest."""
         if not self.running:
             return None
         segment = self.queue[0]
@@ -96,7 +96,7 @@ class Stepper:
 
 
 class Processor:
-    """Work of the main program under way beside a :class:`Stepper`."""
+    """The work of the main program beside a :class:`Stepper`."""
 
     def __init__(self, stepper: Stepper) -> None:
         self.stepper = stepper
@@ -104,26 +104,26 @@ class Processor:
         self._since = 0
 
     def start(self, now: int, cycles: float) -> None:
-        """Begin work of ``cycles`` at ``now``."""
+        """Start work of ``cycles`` at ``now``."""
         self._left, self._since = cycles, now
 
     def finish(self) -> int | None:
-        """When it is done if the stepper changes nothing before; None while it stands still."""
+        """The cycle of completion if the stepper does not change before; None while it waits."""
         share = self.stepper.share
         if share == 1.0:
             return self._since + math.ceil(self._left)
         return self._since + math.ceil(self._left / share) if share else None
 
     def note(self, now: int) -> None:
-        """Account for the work done by ``now``; to be called just before the stepper changes."""
+        """Account for the work done by ``now``; call it just before the stepper changes."""
         self._left = max(self._left - (now - self._since) * self.stepper.share, 0.0)
         self._since = now
 
     def run(self, now: int, cycles: float) -> int:
-        """Do work of ``cycles`` from ``now``, stepping on beside it: when it is done."""
+        """Do work of ``cycles`` from ``now`` while the stepper runs; returns the end."""
         stepper = self.stepper
         share = stepper.share
-        if share:  # mostly nothing changes meanwhile
+        if share:  # usually the stepper does not change meanwhile
             done_at = now + math.ceil(cycles / share)
             change = stepper.next_change()
             if change is None or done_at < change:
@@ -139,10 +139,10 @@ class Processor:
 
 
 def steps_taken(move: Move, micro: int) -> tuple[int, ...]:
-    """The motor position on ``move`` after ``micro`` micro-steps: Bresenham's line, closed.
+    """The motor position on ``move`` after ``micro`` micro-steps: Bresenham's line in closed form.
 
-    Each axis adds its steps to a counter that starts at half the largest count and steps when
-    it passes the whole, so after m ticks it made ceil((events/2 + m steps / 8) / events) - 1.
+    Each axis adds its steps to a counter that starts at events/2, and makes a step when the counter
+    passes events. So after m micro-steps it made ceil((events/2 + m steps / 8) / events) - 1 steps.
     """
     whole = 2 * MICRO * move.events
     return tuple(

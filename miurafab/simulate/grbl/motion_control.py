@@ -81,7 +81,7 @@ def offsets_changed(machine: Machine) -> Routine:
 def _perform(machine: Machine, action: Action) -> Routine:
     checking = machine.state is FirmwareState.CHECK
     if isinstance(action, StraightMove):
-        yield from line(machine, action)
+        yield from plan_move(machine, action)
     elif isinstance(action, Jog):
         yield from _jog(machine, action)
     elif isinstance(action, Probe):
@@ -113,8 +113,8 @@ def _perform(machine: Machine, action: Action) -> Routine:
         yield from _end_program(machine)
 
 
-def line(machine: Machine, move: StraightMove) -> Routine:
-    """Plan a line as soon as there is room."""
+def plan_move(machine: Machine, move: StraightMove) -> Routine:
+    """Plan a move as soon as the planner has room."""
     if machine.settings.values[20] and machine.state is not FirmwareState.JOG:
         yield from _check_soft_limits(machine, move)
     if machine.state is FirmwareState.CHECK:
@@ -172,11 +172,11 @@ def _until_idle(machine: Machine) -> Routine:
 
 def _jog(machine: Machine, jog: Jog) -> Routine:
     settings = machine.settings
-    if settings.values[20] and settings.beyond_travel(jog.line.target):
+    if settings.values[20] and settings.beyond_travel(jog.move.target):
         jog.accepted = False
         machine.answer = _TRAVEL_EXCEEDED
         return
-    yield from line(machine, jog.line)
+    yield from plan_move(machine, jog.move)
     if machine.state is FirmwareState.IDLE and machine.planner.moves:
         machine.state = FirmwareState.JOG
         yield from prepare(machine)
@@ -186,7 +186,7 @@ def _jog(machine: Machine, jog: Jog) -> Routine:
 def _probe(machine: Machine, probe: Probe) -> Routine:
     """Move until the probe changes (``mc_probe_cycle``), and leave the parser where that is."""
     if machine.is_in(FirmwareState.CHECK):
-        machine.parser.position = list(probe.line.target)
+        machine.parser.position = list(probe.move.target)
         return
     yield from synchronize(machine)
     if machine.abort:
@@ -198,7 +198,7 @@ def _probe(machine: Machine, probe: Probe) -> Routine:
         yield from realtime(machine)
         machine.probe_away = False
         return
-    yield from line(machine, probe.line)
+    yield from plan_move(machine, probe.move)
     machine.watch_probe()
     machine.requests.add(RealtimeRequest.START)
     yield from _until_idle(machine)
@@ -222,7 +222,7 @@ def _end_probe(machine: Machine, probe: Probe) -> Routine:
     if machine.probe_succeeded:
         sync_positions(machine)
     else:
-        machine.parser.position = list(probe.line.target)
+        machine.parser.position = list(probe.move.target)
 
 
 def _end_program(machine: Machine) -> Routine:

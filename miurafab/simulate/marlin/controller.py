@@ -13,12 +13,11 @@ import math
 import re
 from collections import deque
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
 
 from miurafab.gcode.block_errors import BlockError
 from miurafab.gcode.execution import StraightMove, execute
 from miurafab.gcode.marlin import grbl_words
-from miurafab.gcode.parser import ModalState, parse_block
+from miurafab.gcode.parser import ModalState, ReaderRules, parse_block
 from miurafab.marlin.connection import checksum
 from miurafab.motion.parameters import MotionParameters
 from miurafab.simulate.beam import BeamSegment
@@ -38,14 +37,6 @@ _CUTTER = re.compile(r"M0*([345])(I?)(?:S([\d.]+))?(I?)$")
 
 CommandRoutine = Generator[Callable[[], bool], None, None]
 """A command under way: it yields what must be true before it goes on."""
-
-
-@dataclass(frozen=True, slots=True)
-class _MarlinRules:
-    laser: bool = True
-    arc_tolerance: float = 0.1
-    mist: bool = True
-    single_precision: bool = False
 
 
 class VirtualMarlin:
@@ -330,7 +321,7 @@ class VirtualMarlin:
         except ValueError:
             self._say(f'echo:Unknown command: "{code}"')
             return
-        state, rules = self._state, _MarlinRules()
+        state, rules = self._state, ReaderRules(arc_tolerance=0.1)
         state.feed = state.feed or _STOCK_FEED
         try:
             block = parse_block(code, state, lambda index: (0.0, 0.0, 0.0), rules)
