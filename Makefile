@@ -7,6 +7,7 @@ BIN := .venv/bin
 
 demo: .venv/installed
 	$(BIN)/miurafab cut patterns/hypar.toml --port virtual
+	@echo "How to glue it: jobs/hypar/assembly.pdf. Pictures of the sheets: $(BIN)/miurafab preview jobs/hypar"
 
 test: .venv/installed-dev
 	$(BIN)/python -m pytest -n 2
@@ -21,11 +22,13 @@ lint: .venv/installed-dev
 	$(BIN)/lint-imports
 
 .venv/installed: pyproject.toml
+	@echo "Installing miurafab and its libraries into .venv. This takes a minute."
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --editable .
 	touch $@
 
 .venv/installed-dev: pyproject.toml
+	@echo "Installing miurafab and its development tools into .venv. This takes a minute or two."
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --editable ".[dev]"
 	touch $@
