@@ -1,10 +1,10 @@
 """Distances from points to triangle meshes, exactly, for many points at once.
 
-A triangle is no nearer than its centre's distance minus its radius. So the nearest few centres give
-an upper bound, triangles that cannot beat it are left out, and where the few were too few to be
-sure, more are looked up until they suffice: the result is exact and not a guess. Triangles are
-sorted into classes by radius, each with its own tree, so that a few large ones do not spoil the
-bound of all the others.
+A triangle is no nearer than the distance to its centre minus its radius. The triangles with the
+nearest few centres give an upper bound, and triangles that cannot beat the bound are left out.
+Where the few cannot prove the bound, more centres are looked up: the result is exact. Triangles are
+sorted into classes by radius, each with its own tree, so that a few large triangles do not weaken
+the bound for all others.
 """
 
 from __future__ import annotations
@@ -64,18 +64,19 @@ def _nearer_in_class(
     tree = cKDTree(centres)
     largest = float(radii.max())
     active = np.arange(len(points))
-    few, known = 1, 0
+    few = 1
     while len(active):
         few = min(few, len(triangles))
-        found = tree.query(points[active], k=np.arange(known + 1, few + 1))
-        gaps, near = np.asarray(found[0]), np.asarray(found[1])
+        # All few again, not the new ones alone: the tree may list equal distances in another order.
+        nearest = tree.query(points[active], k=np.arange(1, few + 1))
+        gaps, near = np.asarray(nearest[0]), np.asarray(nearest[1])
         promising = gaps - radii[near] < bound[active][:, None]
         row, column = np.nonzero(promising)
         _keep_nearest(points, triangles, active[row], near[row, column], best, bound)
         if few == len(triangles):
             return
         active = active[gaps[:, -1] - largest < bound[active]]
-        few, known = 4 * few + 6, few
+        few = 4 * few + 6
 
 
 def _keep_nearest(

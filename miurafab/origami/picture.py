@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.polygons import facet_normals, filled
 from miurafab.origami.crease_pattern import CreasePattern
 
 AZIMUTH, ELEVATION = math.radians(-55), math.radians(30)
@@ -74,10 +75,8 @@ def project(
     """``points`` (V, 3) and ``faces`` (F, k), filled with -1, seen from a direction in radians."""
     screen = axes(azimuth, elevation)
     seen = points @ screen.T
-    corners = seen[np.where(faces >= 0, faces, faces[:, :1])]
-    spokes = corners - corners[:, :1]
-    normal = np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    corners = seen[filled(faces)]
+    normal = np.nan_to_num(facet_normals(seen, faces))
     front = normal[:, 2] > 0
     facing = np.where(front[:, None], normal, -normal)
     key = np.maximum(facing @ (_KEY / np.linalg.norm(_KEY)), 0.0)

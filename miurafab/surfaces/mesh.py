@@ -8,6 +8,7 @@ spline has smoothed it. Distances are measured to the triangles themselves, not 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import math
@@ -58,6 +59,9 @@ ROUGH = 0.03
 MARGIN = 0.12
 """The spline also follows the mesh this part of the rectangle beyond it, where there is any."""
 
+FEWEST = 4
+"""A rectangle with fewer vertices of the mesh is refused."""
+
 SMOOTHER = 0.03
 """The stiffness of the alternative that irons out what a scan's noise may have left."""
 
@@ -81,7 +85,11 @@ class MeshChart:
     name: str
 
     def surface(self, placement: GridPlacement, stiffness: float = 0.0) -> MeshSurface:
-        """The target over ``placement``, the spline as stiff as the data ask, or ``stiffness``."""
+        """The target over ``placement``; the spline is as stiff as the data ask, or ``stiffness``.
+
+        Raises :class:`~miurafab.errors.TargetError` if the rectangle reaches beyond the mesh, or
+        holds too few vertices for a spline.
+        """
         frame = turned(self.flat, placement.angle)
         domain = placement.domain
         if not covered(frame, self.faces, domain):
@@ -94,6 +102,11 @@ class MeshChart:
             domain.v1 + MARGIN * domain.height,
         )
         places, points = _within(frame[: self.known], self.vertices[: self.known], wide)
+        if len(points) < FEWEST:
+            raise TargetError(
+                f"{self.name}: only {len(points)} vertices of the mesh lie on the rectangle of the "
+                f"sheet, and {FEWEST} are needed; subdivide the triangles of the mesh."
+            )
         smoothed = smooth(places, points, wide, _spans(wide, edge, _SPANS), stiffness)
         triangles = even_triangles(self.vertices, self.faces[: self.real])
         return MeshSurface(smoothed.spline, domain, triangles, placement, stiffness, self)
@@ -160,26 +173,34 @@ class MeshSurface:
         }
 
     def alternatives(self) -> Iterator[tuple[str, MeshSurface]]:
-        """Other ways to lay a sheet on the same mesh, each with a word on it, the gentlest first:
-        smoother, the grid turned, smaller parts of the same rectangle. A rectangle that the user
-        asked for stays where it is.
+        """Other targets on the same mesh, each with its description.
+
+        First the mesh smoothed more if it is rough, then the grid turned, then smaller parts of
+        the rectangle. A rectangle that the user asked for stays where it is. A placement that the
+        mesh cannot serve is left out.
         """
+        for description, placement, stiffness in self._elsewhere():
+            with contextlib.suppress(TargetError):
+                yield description, self.layout.surface(placement, stiffness)
+
+    def _elsewhere(self) -> Iterator[tuple[str, GridPlacement, float]]:
+        """The description, placement and stiffness of each alternative."""
         if self.layout.rough:
-            yield "the mesh smoothed more", self.layout.surface(self.placement, SMOOTHER)
+            yield "the mesh smoothed more", self.placement, SMOOTHER
         if not self.free:
             return
-        others = placements(self.layout.vertices, self.layout.flat, self.layout.faces)
         kept = [self.placement.angle]
-        for _, other in others:
+        for _, other in placements(self.layout.vertices, self.layout.flat, self.layout.faces):
+            # angles are the same grid when they differ by a right angle
             apart = [abs((other.angle - angle + math.pi / 4) % (math.pi / 2) - math.pi / 4)
                      for angle in kept]  # fmt: skip
             if min(apart) > math.radians(20) and len(kept) < 3:
                 kept.append(other.angle)
                 degrees = math.degrees(other.angle - self.placement.angle)
-                yield f"the grid turned by {degrees:.0f} degrees", self.layout.surface(other)
+                yield f"the grid turned by {degrees:.0f} degrees", other, 0.0
         for part in (0.85, 0.7, 0.55):
-            smaller = self.layout.surface(self.placement.shrunk(part))
-            yield f"the middle {100 * part:.0f} % of the rectangle", smaller
+            shrunk = self.placement.shrunk(part)
+            yield f"the middle {100 * part:.0f} % of the rectangle", shrunk, 0.0
 
 
 def load_mesh(

@@ -18,13 +18,31 @@ def test_the_nearest_of_all_triangles(seed, count, spread):
         size=(count, 3, 3)
     ) * random.lognormal(-1, spread, (count, 1, 1))
     triangles[random.random(count) < 0.1, 2] = triangles[0, 0]
-    points = random.normal(scale=2, size=(30, 3))
-    found = closest_on_mesh(points, triangles)
+    assert_nearest(random.normal(scale=2, size=(30, 3)), triangles)
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 6))
+def test_the_two_triangles_of_a_square_share_their_centre(seed, side):
+    """The boxes of both have one centre, so that a tree of centres lists them in any order."""
+    x, y = np.divmod(np.arange(side * side), side)
+    low = np.stack([x, y, 0 * x], axis=1)[:, None]
+    triangles = np.concatenate(
+        [low + [[0, 0, 0], [1, 0, 0], [1, 1, 0]], low + [[0, 0, 0], [1, 1, 0], [0, 1, 0]]]
+    ).astype(float)
+    random = np.random.default_rng(seed)
+    points = random.uniform([-1, -1, -1], [side + 1, side + 1, 1], (30, 3))
+    assert_nearest(points, triangles)
+
+
+def assert_nearest(points, triangles):
+    nearest = closest_on_mesh(points, triangles)
     each = np.stack(
-        [closest_on_triangle(points, np.repeat(t[None], 30, axis=0)) for t in triangles]
+        [closest_on_triangle(points, np.repeat(t[None], len(points), axis=0)) for t in triangles]
     )
     best = np.linalg.norm(each - points, axis=2).min(axis=0)
-    np.testing.assert_allclose(np.linalg.norm(found - points, axis=1), best, rtol=1e-12, atol=1e-12)
+    gap = np.linalg.norm(nearest - points, axis=1)
+    np.testing.assert_allclose(gap, best, rtol=1e-12, atol=1e-12)
 
 
 @settings(max_examples=60)

@@ -11,7 +11,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from miurafab.origami.fitting import strategies as attempts
+from miurafab.errors import TargetError
+from miurafab.origami.fitting import strategies
 from miurafab.origami.fitting.fit import fit
 from miurafab.origami.fitting.request import Attempt, FitRequest
 from miurafab.surfaces.mesh import mesh_surface
@@ -54,14 +55,14 @@ def test_nine_in_ten_of_all_are_fitted_and_the_others_say_why():
 
 def test_where_no_sheet_is_found_a_smaller_part_is_taken_and_said(monkeypatch):
     """All attempts fail by force but those on the last resort."""
-    run = attempts.Strategy.run
+    run = strategies.Strategy.run
 
     def fail_before(plan, request):
         if plan.place.startswith("the middle"):
             return run(plan, request)
         return Attempt(plan.way, plan.rows_along, plan.corrugation, 1.0, 0, "by force", plan.place)
 
-    monkeypatch.setattr(attempts.Strategy, "run", fail_before)
+    monkeypatch.setattr(strategies.Strategy, "run", fail_before)
     surface = mesh_surface(*benchmark().meshes()["saddle-disc"])
     result = fit(FitRequest(surface=surface, facets=(6, 6), target=surface.description))
     assert result.status == "converged"
@@ -77,3 +78,27 @@ def test_a_rectangle_that_was_asked_for_stays():
     for name, others in (("saddle-disc", []), ("saddle-noisy", ["the mesh smoothed more"])):
         surface = replace(mesh_surface(*benchmark().meshes()[name]), free=False)
         assert [place for place, _ in surface.alternatives()] == others
+
+
+def square_of_two_triangles():
+    vertices = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 10.0, 0.0], [0.0, 10.0, 0.0]])
+    return vertices, np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def test_a_square_of_two_triangles_is_fitted_at_once():
+    result = fit(FitRequest(surface=mesh_surface(*square_of_two_triangles()), facets=(4, 4)))
+    assert result.status == "converged"
+    assert len(result.attempts) == 1
+    assert result.deviation_mm < 1e-9
+
+
+def test_a_placement_without_vertices_is_left_out_and_does_not_end_the_search():
+    """Turned by 30 degrees the square holds a rectangle, but none of its four corners is on it."""
+    surface = mesh_surface(*square_of_two_triangles())
+    assert [place for place, _ in surface.alternatives()] == ["the middle 85 % of the rectangle"]
+
+
+def test_a_mesh_too_small_for_a_rectangle_of_vertices_is_refused_in_a_sentence():
+    vertices, _ = square_of_two_triangles()
+    with pytest.raises(TargetError, match="only 0 vertices of the mesh lie on the rectangle"):
+        mesh_surface(vertices[[0, 1, 3]], np.array([[0, 1, 2]]), "tri.obj")
