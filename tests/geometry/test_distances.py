@@ -26,10 +26,9 @@ def test_the_nearest_of_all_triangles(seed, count, spread):
 def test_the_two_triangles_of_a_square_share_their_centre(seed, side):
     """The boxes of both have one centre, so that a tree of centres lists them in any order."""
     x, y = np.divmod(np.arange(side * side), side)
-    low = np.stack([x, y, 0 * x], axis=1)[:, None]
-    triangles = np.concatenate(
-        [low + [[0, 0, 0], [1, 0, 0], [1, 1, 0]], low + [[0, 0, 0], [1, 1, 0], [0, 1, 0]]]
-    ).astype(float)
+    halves = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]])
+    low = np.stack([x, y, 0 * x], axis=1)[:, None, None]
+    triangles = (low + halves).reshape(-1, 3, 3).astype(float)
     random = np.random.default_rng(seed)
     points = random.uniform([-1, -1, -1], [side + 1, side + 1, 1], (30, 3))
     assert_nearest(points, triangles)
