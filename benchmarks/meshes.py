@@ -23,7 +23,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from miurafab.errors import TargetError
 from miurafab.origami.fitting.fit import FitRequest, fit
-from miurafab.origami.fitting.request import FacetCounts
+from miurafab.origami.fitting.request import FACETS
 from miurafab.surfaces.mesh import mesh_surface
 
 Array = np.ndarray
@@ -293,7 +293,7 @@ def main() -> None:
     print(f"{'mesh':14} {'fitted':6} {'residual':>9} {'deviation':>9} {'tries':>5} {'s':>6}  how")
     answers = []
     for name, mesh in chosen.items():
-        a = trial(name, mesh, FacetCounts().read(asked.facets))
+        a = trial(name, mesh, FACETS.read(asked.facets))
         answers.append(a)
         print(
             f"{name:14} {'yes' if a['fitted'] else 'no':6} {a.get('residual', np.nan):9.1e} "

@@ -14,25 +14,26 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
-from miurafab.errors import InputError, OptionError, UnitError
+from miurafab.errors import OptionError, UnitError
 from miurafab.units import parse_angle, parse_feed, parse_length
 
 _KEY = "miurafab.option"
 
 
 class Kind:
-    """How values of an option are written and read.
+    """How values of an option are written and read; ``unit`` follows a number that is shown."""
 
-    ``metavar`` stands for a value in help; ``unit`` follows a number that is shown.
-    """
-
-    metavar = "TEXT"
     unit = ""
+
+    @property
+    def metavar(self) -> str:
+        """What stands for a value in help."""
+        return "TEXT"
 
     def read(self, value: object) -> Any:
         """The value inside. Raises ``ValueError`` with the rest of a sentence, ``is 3; ...``."""
@@ -93,6 +94,8 @@ class Quantity(Kind):
     @property
     def accepts(self) -> str:
         low, high = (f"{limit:g}{self.unit}" for limit in (self.low, self.high))
+        if math.isinf(self.low):
+            return "a finite number"
         if math.isinf(self.high):
             return f"greater than {low}" if self.above else f"{low} or more"
         return (
@@ -115,6 +118,11 @@ def feed(low: float = 1.0, high: float = 1e6) -> Quantity:
     return Quantity(parse_feed, "a feed", "FEED", " mm/min", low=low, high=high)
 
 
+def percent(low: float = 0.0, high: float = 100.0) -> Quantity:
+    """A share, written in percent and from 0 to 1 inside."""
+    return Quantity(_share, "a percentage", "PERCENT", " %", 0.01, low, high)
+
+
 def number(
     low: float = -math.inf, high: float = math.inf, *, above: bool = False, unit: str = ""
 ) -> Quantity:
@@ -127,6 +135,10 @@ def _plain_number(text: str | float) -> float:
         return float(text)
     except ValueError:
         raise UnitError(f"{text!r} is not a number.") from None
+
+
+def _share(text: str | float) -> float:
+    return _plain_number(text.removesuffix("%") if isinstance(text, str) else text) / 100
 
 
 @dataclass(frozen=True)
@@ -165,7 +177,7 @@ class Choice(Kind):
     names: tuple[str, ...]
 
     @property
-    def metavar(self) -> str:  # type: ignore[override]
+    def metavar(self) -> str:
         return "|".join(self.names)
 
     def read(self, value: object) -> str:
@@ -220,9 +232,93 @@ class File(Kind):
 
     def read(self, value: object) -> Path:
         try:
-            return Path(value)  # type: ignore[arg-type]
+            path = Path(value)  # type: ignore[arg-type]
         except TypeError:
             raise ValueError(f"is {value!r}, not a path") from None
+        if value == "":
+            raise ValueError("is empty, not a path")
+        return path
+
+
+@dataclass(frozen=True)
+class Pair(Kind):
+    """Two values of one ``kind``, with ``separator`` between or as a list.
+
+    ``collect`` makes the value inside, such as a pair with the longer side first.
+    """
+
+    kind: Kind
+    metavar: str = "A,B"
+    example: str = "0,0"
+    separator: str = ","
+    collect: Callable[[tuple[Any, Any]], tuple[Any, Any]] = tuple
+
+    def read(self, value: object) -> tuple[Any, Any]:
+        parts: Any = value
+        if isinstance(value, str):
+            parts = value.lower().replace("×", "x").split(self.separator)
+        try:
+            first, second = parts
+        except (TypeError, ValueError):
+            raise ValueError(f"is {value!r}; write {self.metavar} such as {self.example}") from None
+        return self.collect((_part(self.kind, first, value), _part(self.kind, second, value)))
+
+    def check(self, inside: tuple[Any, Any]) -> None:
+        for part in inside:
+            _check_part(self, part, inside)
+
+    def show(self, inside: tuple[Any, Any]) -> str:
+        return self.separator.join(self.kind.show(part) for part in inside)
+
+
+@dataclass(frozen=True)
+class Several(Kind):
+    """Any number of values of one ``kind``, with commas between or as a list.
+
+    ``collect`` makes the value inside, such as :func:`distinct`.
+    """
+
+    kind: Kind
+    collect: Callable[[Iterable[Any]], Any] = tuple
+
+    @property
+    def metavar(self) -> str:
+        return f"{self.kind.metavar},..."
+
+    def read(self, value: object) -> Any:
+        if isinstance(value, str):
+            parts: list[object] = [*value.split(",")]
+        else:
+            parts = list(value) if isinstance(value, Iterable) else [value]
+        return self.collect(_part(self.kind, part, value) for part in parts)
+
+    def check(self, inside: Any) -> None:
+        for part in inside:
+            _check_part(self, part, inside)
+
+    def show(self, inside: Any) -> str:
+        return ",".join(self.kind.show(part) for part in inside)
+
+
+def distinct(values: Iterable[Any]) -> tuple[Any, ...]:
+    """The values in order, each once."""
+    return tuple(sorted(set(values)))
+
+
+def _check_part(whole: Pair | Several, part: Any, inside: Any) -> None:
+    try:
+        whole.kind.check(part)
+    except ValueError as fault:
+        raise ValueError(f"is {whole.show(inside)}, of which a part {fault}") from None
+
+
+def _part(kind: Kind, part: object, whole: object) -> Any:
+    """``part`` of what is written as ``whole``, read by ``kind``."""
+    try:
+        return kind.read(part.strip() if isinstance(part, str) else part)
+    except ValueError as fault:
+        shown = f"'{whole}'" if isinstance(whole, str) else whole
+        raise ValueError(f"is {shown}, of which a part {fault}") from None
 
 
 @dataclass(frozen=True)
@@ -292,7 +388,7 @@ def option(
     """
     shown = default_text
     if shown is None:
-        absent = default is None or default is False or default == ()
+        absent = default is None or default is False or default in ((), frozenset())
         shown = "" if absent else kind.show(default)
     metadata = {_KEY: (kind, help, group, shown, page)}
     return dataclasses.field(default=default, metadata=metadata)
@@ -318,7 +414,12 @@ T = TypeVar("T")
 
 
 def read_options(
-    cls: type[T], given: Mapping[str, object], *, where: str = "", folder: Path = Path()
+    cls: type[T],
+    given: Mapping[str, object],
+    *,
+    where: str = "",
+    folder: Path = Path(),
+    over: Mapping[str, object] | None = None,
 ) -> T:
     """The options ``given`` as a value of ``cls``; None leaves an option as it is by default.
 
@@ -330,43 +431,57 @@ def read_options(
         Values as a person writes them, by the names outside: text with a unit, or plain numbers in
         millimetres and degrees.
     where : str
-        The file or table, for messages.
+        The file or table of ``given``, for messages.
     folder : Path
-        Where the files that an option names are looked for.
+        Where the files that ``given`` names are looked for.
+    over : mapping, optional
+        Values that win over those ``given``, such as those of the command line over a file's.
 
     Raises
     ------
     OptionError
         For a name that is no option, and for a value that cannot be taken; it names the option.
     """
+    over = {name: value for name, value in (over or {}).items() if value is not None}
+
+    def place(name: str | None) -> str:
+        return "" if name in over else where
+
     known = declared(cls)
-    for name in given:
+    for name in (*given, *over):
         if name not in known:
-            raise OptionError(None, f"'{name}' is not an option; {_nearest(name, known)}", where)
-    return _read(cls, given, where, folder)
+            noun = "a known key" if place(name) else "an option"
+            complaint = f"'{name}' is not {noun}; {_nearest(name, known)}"
+            raise OptionError(None, complaint, place(name))
+    inside: dict[str, Any] = {}
+    for name, value in {**given, **over}.items():
+        if value is None:
+            continue
+        kind = known[name].kind
+        try:
+            inside[name] = kind.read(value)
+        except ValueError as fault:
+            raise OptionError(name, str(fault), place(name)) from None
+        if isinstance(kind, File) and name not in over:
+            inside[name] = folder / inside[name]
+    try:
+        return _made(cls, inside)
+    except OptionError as fault:
+        raise OptionError(fault.option, fault.complaint, place(fault.option)) from None
 
 
-def _read(cls: type[T], given: Mapping[str, object], where: str, folder: Path) -> T:
+def _made(cls: type[T], inside: Mapping[str, Any]) -> T:
+    """A value of ``cls`` of the values ``inside``, by the names outside."""
     hints = get_type_hints(cls)
     values: dict[str, Any] = {}
     for entry in fields(cls):  # type: ignore[arg-type]
         if _KEY in entry.metadata:
             name = entry.name.removesuffix("_mm")
-            if given.get(name) is not None:
-                kind: Kind = entry.metadata[_KEY][0]
-                try:
-                    inside = kind.read(given[name])
-                except ValueError as fault:
-                    raise OptionError(name, str(fault), where) from None
-                values[entry.name] = folder / inside if isinstance(kind, File) else inside
+            if name in inside:
+                values[entry.name] = inside[name]
         elif isinstance(hints[entry.name], type) and is_dataclass(hints[entry.name]):
-            values[entry.name] = _read(hints[entry.name], given, where, folder)
-    try:
-        return cls(**values)
-    except OptionError as fault:
-        raise OptionError(fault.option, fault.complaint, where or fault.where) from None
-    except InputError as fault:
-        raise OptionError(None, fault.sentence, where) from None
+            values[entry.name] = _made(hints[entry.name], inside)
+    return cls(**values)
 
 
 def check_options(value: Any) -> None:

@@ -184,8 +184,8 @@ def lay_out(
             tuple(patch.outline_mm for patch in patches),
             tuple(patch.label for patch in patches),
             stock.kinds,
-            wanted.seconds,
-            wanted.seed,
+            wanted.nesting_time,
+            wanted.nesting_seed,
         ),
         wanted.engine,
     )

@@ -27,7 +27,7 @@ from urllib.parse import unquote
 import miurafab
 from miurafab.errors import MiurafabError
 from miurafab.fabrication.options import TAB_SIDES
-from miurafab.origami.fitting.request import DEFAULT_FACETS, DEFAULT_SIZE_MM, FacetCounts
+from miurafab.origami.fitting.request import DEFAULT_FACETS, DEFAULT_SIZE_MM, FACETS
 from miurafab.profiles import load_machine, load_material, shipped_names
 from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
@@ -124,7 +124,7 @@ def _catalogue() -> dict[str, Any]:
         "file_suffixes": (*MESH_SUFFIXES, PATTERN_SUFFIX),
         "file_limit": FILE_LIMIT,
         "defaults": {
-            "facets": FacetCounts().show(DEFAULT_FACETS),
+            "facets": FACETS.show(DEFAULT_FACETS),
             "size": f"{DEFAULT_SIZE_MM:g}mm",
             "machine": miurafab.DEFAULT_MACHINE,
             "material": miurafab.DEFAULT_MATERIAL,

@@ -6,6 +6,7 @@ each go beside it, and by its journal a sheet that was interrupted goes on.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,8 +22,9 @@ from miurafab.machine.preflight import Finding
 from miurafab.machine.resume import resume
 from miurafab.machine.sender import Progress as StreamProgress
 from miurafab.machine.sender import StreamResult, stream_plan
-from miurafab.machine.trace_box import frame_job
+from miurafab.machine.trace_box import MOST_POINTER, frame_job
 from miurafab.machine.transport import VIRTUAL
+from miurafab.options import Flag, Pair, Several, Text, check_options, length, option, percent
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.dry_run import SheetPreview
@@ -58,21 +60,54 @@ class SheetProgress:
 
 @dataclass(frozen=True)
 class CutOptions:
-    """How sheets are sent; see :func:`~miurafab.machine.planning.plan_job`.
+    """How sheets are sent; ``at`` is X, Y in mm, ``pointer`` a fraction of full power.
 
-    ``resume`` goes on with what was interrupted; ``frame`` traces the box around each sheet
-    before it, with the ``pointer`` power (a fraction of full power, 0: dark), and waits.
+    ``virtual_speed`` is how much faster than real time the virtual machine runs.
     """
 
-    force: frozenset[str] = frozenset()
-    allow_m3: bool = False
-    check_mode: bool = False
-    home: bool = False
-    at: tuple[float, float] | None = None
-    resume: bool = False
-    frame: bool = False
-    pointer: float = 0.0
+    check_mode: bool = option(
+        Flag(), "Let the controller only read the job ($C).", default=False, group="Safety"
+    )
+    resume: bool = option(
+        Flag(),
+        "Go on with what was interrupted; needs home or at, once stopped.",
+        default=False,
+        group="Start",
+    )
+    home: bool = option(Flag(), "Home the machine first.", default=False, group="Start")
+    at: tuple[float, float] | None = option(
+        Pair(length(-math.inf), "X,Y", "0,0 or 10mm,5mm"),
+        "Where the head stands, in the job's coordinates: 0,0 is its origin.",
+        group="Start",
+    )
+    frame: bool = option(
+        Flag(),
+        "Trace the box around each sheet before it, then wait.",
+        default=False,
+        group="Start",
+    )
+    pointer: float = option(
+        percent(0, 100 * MOST_POINTER),
+        "Power of the frame in percent; 0 keeps it dark.",
+        default=0.0,
+        group="Start",
+    )
+    allow_m3: bool = option(
+        Flag(),
+        "Cut with M3, which burns on if the link is lost.",
+        default=False,
+        group="Safety",
+    )
+    force: frozenset[str] = option(
+        Several(Text("CODE"), frozenset),
+        "Override the pre-flight checks of these codes.",
+        default=frozenset(),
+        group="Safety",
+    )
     virtual_speed: float | None = None
+
+    def __post_init__(self) -> None:
+        check_options(self)
 
 
 DEFAULT_OPTIONS = CutOptions()

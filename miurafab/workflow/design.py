@@ -15,7 +15,6 @@ from typing import Any
 
 from miurafab.errors import OptionError, PatternError, TargetError
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.options import read_options as read_layout_options
 from miurafab.options import read_options
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitOptions, FitRequest
@@ -70,18 +69,16 @@ def _from_file(path: Path, options: Mapping[str, object]) -> Design:
     layout = table.table("layout", {})
     machine = layout.text("machine") if layout.has("machine") else None
     material = layout.text("material") if layout.has("material") else None
-    sheets = read_layout_options(layout, path.parent)
-    layout.finish()
-    given = {name: value for name, value in options.items() if value is not None}
+    sheets = read_options(LayoutOptions, layout.rest(), where=layout.where, folder=path.parent)
+    asked = read_options(FitOptions, table.rest(), where=path.name, over=options)
     try:
-        asked = read_options(FitOptions, table.rest() | given)
         if target.has("mesh"):
             design = _on_mesh(path.parent / target.text("mesh"), asked, title)
             target.finish()
         else:
             design = _on_surface(target.text("surface"), target.rest(), asked, title)
     except OptionError as fault:
-        where = "" if fault.option in given else path.name
+        where = "" if options.get(fault.option or "") is not None else path.name
         raise OptionError(fault.option, fault.complaint, where) from None
     return replace(design, machine=machine, material=material, layout=sheets)
 

@@ -19,9 +19,10 @@ from miurafab.errors import InputError, LayoutError
 from miurafab.fabrication.drawing.assembly_guide import assembly_guide
 from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.layout import read_layout, write_layout
-from miurafab.fabrication.options import LayoutOptions, read_options
+from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import Layout, lay_out
 from miurafab.gcode.job import Job
+from miurafab.options import read_options
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.fold import fold_text, read_fold
 from miurafab.posting import post
@@ -71,17 +72,13 @@ def layout_options(given: Mapping[str, Any], design_file: Path | None = None) ->
 
     Raises :class:`~miurafab.errors.InputError` naming the key.
     """
-    values: dict[str, Any] = {}
-    if design_file is not None:
-        values = _layout_table(design_file).rest()
-        for key in ("machine", "material"):
-            values.pop(key, None)
-        if isinstance(values.get("stock"), str):
-            values["stock"] = str(design_file.parent / values["stock"])
-    table = Table(values | dict(given), "The layout options", InputError)
-    options = read_options(table)
-    table.finish()
-    return options
+    if design_file is None:
+        return read_options(LayoutOptions, given)
+    table = _layout_table(design_file)
+    for key in ("machine", "material"):
+        table.text(key, "")
+    written, folder = table.rest(), design_file.parent
+    return read_options(LayoutOptions, written, where=table.where, folder=folder, over=given)
 
 
 def design_profiles(design_file: Path) -> tuple[str | None, str | None]:

@@ -184,7 +184,7 @@ def test_copies_repeat_every_patch_and_every_stroke():
 def test_the_layout_file_tells_stock_copies_and_what_nested_it(tmp_path):
     file = written(tmp_path, WHOLE)
     wanted = LayoutOptions(
-        max_patch_mm=(90.0, 60.0), nesting=NestingOptions(stock=file, quantity=2, seed=7)
+        max_patch_mm=(90.0, 60.0), nesting=NestingOptions(stock=file, quantity=2, nesting_seed=7)
     )
     layout = lay_out(miura(8, 8), bed(260.0, 200.0), card(), options=wanted)
     text = write_layout(layout, "x.fold", "0" * 64)

@@ -11,6 +11,7 @@ from miurafab.errors import OptionError, UnitError
 from miurafab.options import (
     Choice,
     Kind,
+    Pair,
     Whole,
     Written,
     angle,
@@ -32,30 +33,7 @@ DEFAULT_FACETS = (20, 20)
 DEFAULT_SIZE_MM = 200.0
 """The longest side of a named surface's folded form; a mesh keeps the size of its file."""
 CLOSINGS = ("sector", "open", "seam")
-
-
-class FacetCounts(Kind):
-    """Columns and rows of facets, ``20x20`` or a pair of whole numbers."""
-
-    metavar = "COLSxROWS"
-
-    def read(self, value: object) -> tuple[int, int]:
-        parts = value.lower().replace("×", "x").split("x") if isinstance(value, str) else value
-        try:
-            columns, rows = (Whole().read(part) for part in parts)  # type: ignore[attr-defined]
-        except (TypeError, ValueError):
-            raise ValueError(
-                f"is {value!r}; write columns x rows, such as {self.show(DEFAULT_FACETS)}"
-            ) from None
-        self.check((columns, rows))
-        return columns, rows
-
-    def check(self, inside: tuple[int, int]) -> None:
-        if min(inside) < 2:
-            raise ValueError(f"is {self.show(inside)}; a sheet that folds has 2x2 facets or more")
-
-    def show(self, inside: tuple[int, int]) -> str:
-        return f"{inside[0]}x{inside[1]}"
+FACETS = Pair(Whole(2), "COLSxROWS", "20x20", "x")
 
 
 class FlatFoldability(Kind):
@@ -65,7 +43,9 @@ class FlatFoldability(Kind):
     carry its unit.
     """
 
-    metavar = "exact|off|ANGLE"
+    @property
+    def metavar(self) -> str:
+        return "exact|off|ANGLE"
 
     def read(self, value: object) -> float | None:
         if value == "exact":
@@ -109,10 +89,10 @@ class FitOptions:
     """The options of a fit. Inside, lengths are in mm and angles in radians."""
 
     facets: tuple[int, int] | None = option(
-        FacetCounts(),
+        FACETS,
         "Columns and rows of facets.",
         group="Sheet",
-        default_text=f"{FacetCounts().show(DEFAULT_FACETS)}; with both max-deviation and min-edge, "
+        default_text=f"{FACETS.show(DEFAULT_FACETS)}; with both max-deviation and min-edge, "
         "the coarsest sheet that meets them",
     )
     size_mm: float | None = option(
