@@ -1,7 +1,7 @@
-"""What the numbers of GRBL mean, in words, read from the tables beside this module.
+"""The error, alarm and setting codes of GRBL, read from the tables beside this module.
 
-The numbers, units and stock values are those of GRBL 1.1h (``report.h``, ``settings.h``,
-``defaults.h`` of the firmware); the words are ours.
+Numbers, units and stock values are those of GRBL 1.1h (``report.h``, ``settings.h``,
+``defaults.h``); the texts are miurafab's own.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from importlib.resources import files
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """An error or an alarm: its ``number``, a ``name`` of a few words, and what it says."""
+    """An error or an alarm: its ``number``, its short ``name``, and its meaning as ``text``."""
 
     number: int
     name: str
@@ -24,8 +24,8 @@ class Code:
 
 @dataclass(frozen=True, slots=True)
 class SettingCode:
-    """A ``$`` setting: ``unit`` is empty for plain numbers, ``decimals`` are what the firmware
-    prints, ``stock`` is the value that it is born with.
+    """A ``$`` setting: its ``unit`` (empty for plain numbers), the ``decimals`` that the firmware
+    prints, and its default value ``stock``.
     """
 
     number: int
@@ -38,19 +38,13 @@ class SettingCode:
 @cache
 def error_codes() -> Mapping[int, Code]:
     """The ``error:`` codes by number."""
-    return {
-        int(row["code"]): Code(int(row["code"]), row["name"], row["text"])
-        for row in _rows("errors")
-    }
+    return _codes("errors")
 
 
 @cache
 def alarm_codes() -> Mapping[int, Code]:
     """The ``ALARM:`` codes by number."""
-    return {
-        int(row["code"]): Code(int(row["code"]), row["name"], row["text"])
-        for row in _rows("alarms")
-    }
+    return _codes("alarms")
 
 
 @cache
@@ -62,6 +56,11 @@ def setting_codes() -> Mapping[int, SettingCode]:
         )
         for row in _rows("settings")
     }
+
+
+def _codes(table: str) -> dict[int, Code]:
+    codes = (Code(int(row["code"]), row["name"], row["text"]) for row in _rows(table))
+    return {code.number: code for code in codes}
 
 
 def _rows(table: str) -> Iterator[dict[str, str]]:

@@ -1,14 +1,14 @@
-"""The sending side of a GRBL wire, without the wire: bytes in, events out, and the books kept.
+"""The GRBL connection without I/O: bytes in, events out, and the accounting of bytes in flight.
 
-:class:`Connection` is given what arrives and says what may be sent. It does no input or output
-and knows no clock, so the same object serves a serial port, a socket, a controller in memory
-and a test that cuts the stream into single bytes.
+:class:`Connection` takes the bytes that arrive and says which bytes may be sent. It does no I/O and
+has no clock, so it serves a serial port, a socket, a simulator, and a test that splits the stream
+into single bytes.
 
-The books: a line sent counts its bytes and its newline until the controller answers it. The sum
-never exceeds the controller's receive buffer: the profile's figure or, if smaller, the one in
-the controller's own ``[OPT:...]``. Realtime bytes are taken out of the stream by the receiving
-interrupt and never count. A line that makes the controller write its EEPROM travels alone,
-because the firmware loses what arrives while it writes (``eeprom.c`` blocks the interrupts).
+Byte accounting: a sent line counts its bytes and its newline until the controller answers it. The
+sum never exceeds the controller's receive buffer, which is the smaller of the profile's value and
+the value in the controller's ``[OPT:...]``. Realtime bytes never count, because the receive
+interrupt takes them out of the stream. A line that writes the EEPROM is sent alone, because the
+firmware loses bytes that arrive during the write (``eeprom.c`` blocks the interrupts).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _DWELL_SECONDS = re.compile(rb"P([-+]?[\d.]+)", re.IGNORECASE)
 
 
 class ProtocolMisuse(RuntimeError):
-    """The program sent what the state of the connection does not allow: a fault of ours."""
+    """The program sent something that the state of the connection forbids: a defect of miurafab."""
 
 
 def writes_eeprom(data: bytes) -> bool:
@@ -58,7 +58,7 @@ def writes_eeprom(data: bytes) -> bool:
 
 
 def dwell_seconds(data: bytes) -> float:
-    """How long a line (blanks removed) makes the controller wait: the P of a G4, or 0."""
+    """The seconds that a line (blanks removed) makes the controller wait: the P of a G4, or 0."""
     if _DWELL.search(data) is None:
         return 0.0
     match = _DWELL_SECONDS.search(data)
@@ -69,7 +69,7 @@ def dwell_seconds(data: bytes) -> float:
 
 
 class Connection:
-    """The state of one wire. ``rx_bytes`` is the usable receive buffer by the machine profile."""
+    """The state of one connection. ``rx_bytes`` is the receive buffer of the machine profile."""
 
     def __init__(self, rx_bytes: int = 128) -> None:
         self.rx_bytes = rx_bytes
@@ -79,10 +79,10 @@ class Connection:
         self._lines = LineReader()
         self._events: deque[Event] = deque()
 
-    # What we send
+    # Sending
 
     def may_send(self, line: SendLine) -> bool:
-        """Whether ``line`` may go now: allowed by the state, room for it, no EEPROM in the way."""
+        """Whether the state, the free bytes and the EEPROM rule allow ``line`` to be sent now."""
         return (
             _kind(line.data) in TRANSITIONS[self.state]
             and self.in_flight_bytes + len(line.data) + 1 <= self.rx_bytes
@@ -91,7 +91,7 @@ class Connection:
 
     @property
     def writing_eeprom(self) -> bool:
-        """Whether a line in flight makes the controller deaf; send no byte now but a reset."""
+        """Whether a line in flight writes the EEPROM; send nothing but a reset meanwhile."""
         return len(self.in_flight) == 1 and writes_eeprom(self.in_flight[0].data)
 
     def send_line(self, line: SendLine) -> bytes:
@@ -119,7 +119,7 @@ class Connection:
         self._enter(Input.RESET if byte == SOFT_RESET else Input.REALTIME)
         return byte
 
-    # What arrives
+    # Receiving
 
     def receive_data(self, data: bytes) -> None:
         """Take bytes as they came, in any chunks; ``b""`` says that the wire has ended.
@@ -162,7 +162,7 @@ class Connection:
 
 
 def _kind(data: bytes) -> Input:
-    """Whether a line is motion or a system command; a jog moves."""
+    """Whether a line is motion or a system command; a jog is motion."""
     if data.startswith(b"$") and data[1:2].upper() != b"J":
         return Input.SYSTEM
     return Input.MOTION

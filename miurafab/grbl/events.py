@@ -1,11 +1,11 @@
-"""What a GRBL controller can say, one frozen value a line.
+"""The events of a GRBL controller: one frozen value per line that it sends.
 
-The names of the fields are those of GRBL 1.1's interface description (``doc/markdown/
-interface.md`` of the firmware); positions are in the controller's reporting unit as it stands
-(millimetres unless ``$13=1``), feeds in mm/min, spindle speeds in S words.
+The field names follow GRBL 1.1's interface description (``doc/markdown/interface.md`` of the
+firmware). Positions are in the controller's reporting unit (millimetres unless ``$13=1``), feeds in
+mm/min, spindle speeds in S words.
 
-:mod:`miurafab.grbl.replies` turns a line into one of these; the connection fills in which sent
-line an :class:`Ok` or :class:`Error` answers.
+:mod:`miurafab.grbl.replies` parses a line to an event; the connection adds the sent line that an
+:class:`Ok` or :class:`Error` answers.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from miurafab.gcode.job import SendLine
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something the controller said."""
+    """A line from the controller."""
 
 
 @dataclass(frozen=True, slots=True)
 class Banner(Event):
-    """``Grbl 1.1h ['$' for help]``: the controller has just started, whatever was before."""
+    """``Grbl 1.1h ['$' for help]``: the controller has just started."""
 
     firmware: str
     version: str
@@ -30,17 +30,16 @@ class Banner(Event):
 
 @dataclass(frozen=True, slots=True)
 class Ok(Event):
-    """``ok``: the oldest unanswered line was taken; ``line`` is that line, None for a stray."""
+    """``ok``: the controller took the oldest unanswered ``line``, None if there was none."""
 
     line: SendLine | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Error(Event):
-    """``error:20``: the oldest unanswered line was refused; ``line`` is None for a stray.
+    """``error:20``: the controller refused the oldest unanswered ``line`` (None if there was none).
 
-    ``code`` is None where the firmware writes words instead (GRBL 0.9); ``text`` is what stood
-    behind the colon.
+    ``text`` is the text after the colon; ``code`` is None if it holds words (GRBL 0.9).
     """
 
     code: int | None
@@ -50,7 +49,7 @@ class Error(Event):
 
 @dataclass(frozen=True, slots=True)
 class Alarm(Event):
-    """``ALARM:1``: the controller stopped and will do nothing more until reset or unlocked."""
+    """``ALARM:1``: the controller stopped and does nothing until it is reset or unlocked."""
 
     code: int | None
     text: str
@@ -58,11 +57,11 @@ class Alarm(Event):
 
 @dataclass(frozen=True, slots=True)
 class StatusReport(Event):
-    """``<Idle|MPos:0.000,0.000,0.000|FS:0,0>``; a field the report did not hold is None.
+    """``<Idle|MPos:0.000,0.000,0.000|FS:0,0>``; a field that is missing in the report is None.
 
     ``substate`` is the digit of ``Hold:0`` and ``Door:1``; ``planner_free`` and ``rx_free`` are
-    the two numbers of ``Bf``; ``overrides`` feed, rapid and spindle in percent; ``pins`` and
-    ``accessories`` the letters of ``Pn`` and ``A``.
+    the two numbers of ``Bf``; ``overrides`` are feed, rapid and spindle in percent; ``pins`` and
+    ``accessories`` are the letters of ``Pn`` and ``A``.
     """
 
     state: str
@@ -81,22 +80,22 @@ class StatusReport(Event):
 
     @property
     def beam_on(self) -> bool:
-        """Whether the report says that the beam is driven: S is above 0 or a spindle is on."""
+        """Whether the report says that the beam is on: S is above 0 or a spindle is on."""
         spindle_on = self.accessories is not None and bool(set("SC") & set(self.accessories))
         return spindle_on or (self.speed is not None and self.speed > 0)
 
     @property
     def beam_off(self) -> bool:
-        """Whether the report says that nothing drives the beam.
+        """Whether the report says that the beam is off.
 
-        One without any S (``F:`` alone: no variable spindle, GRBL 0.9) says neither.
+        Without S (``F:`` alone: no variable spindle, GRBL 0.9) this and ``beam_on`` are False.
         """
         return self.speed is not None and not self.beam_on
 
 
 @dataclass(frozen=True, slots=True)
 class Setting(Event):
-    """``$110=6000.000``, one line of ``$$``; ``text`` is the value as the controller wrote it."""
+    """``$110=6000.000``, one line of ``$$``; ``text`` is the value as written."""
 
     number: int
     text: str
@@ -112,21 +111,21 @@ class StartupLine(Event):
 
 @dataclass(frozen=True, slots=True)
 class StartupResult(Event):
-    """``>G54:ok``: a startup line was run at the start, before anybody asked."""
+    """``>G54:ok``: the controller ran a startup line after a reset."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Feedback(Event):
-    """``[MSG:Caution: Unlocked]``."""
+    """``[MSG:Caution: Unlocked]``: a message."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Version(Event):
-    """``[VER:1.1h.20190830:]``: the build's version and the owner's own text (``$I=``)."""
+    """``[VER:1.1h.20190830:]``: the version and the owner's text (``$I=``)."""
 
     version: str
     text: str
@@ -134,9 +133,8 @@ class Version(Event):
 
 @dataclass(frozen=True, slots=True)
 class Options(Event):
-    """``[OPT:V,15,128]``: compiled options, usable planner blocks and receive bytes.
-
-    A number that the firmware does not report is None.
+    """``[OPT:V,15,128]``: compiled options, usable planner blocks and receive bytes; a number that
+    the firmware does not report is None.
     """
 
     flags: str
@@ -162,11 +160,11 @@ class ParameterReply(Event):
 
 @dataclass(frozen=True, slots=True)
 class Unknown(Event):
-    """A line that is none of the above: noise, or a firmware that speaks otherwise."""
+    """Any other line: noise, or a message of another firmware."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Closed(Event):
-    """The wire has ended; nothing will come any more."""
+    """The connection has ended."""

@@ -1,10 +1,9 @@
-"""One line of a controller's talk, parsed to one event; what cannot be read is ``Unknown``.
+"""The reply parser: a line from the controller becomes an event.
 
-Parsing never raises: a line is believed only if the whole of it has the form, so that noise on
-the wire (``o\\x80k``, half a status report) becomes an :class:`~miurafab.grbl.events.Unknown`
-and can never pass for an ``ok``.
+Parsing never raises. A line must match a form as a whole; any other line (``o\\x80k``, half a
+status report) becomes :class:`~miurafab.grbl.events.Unknown`, so noise never passes for an ``ok``.
 
-The forms are those of GRBL 1.1 (``report.c``), which grblHAL and FluidNC keep and add to. The
+The forms are those of GRBL 1.1 (``report.c``); grblHAL and FluidNC keep and extend them. The
 comma-separated status report of GRBL 0.9 (``<Idle,MPos:...,WPos:...>``) is read too.
 """
 
@@ -45,7 +44,7 @@ _PARAMETERS |= {"G59.1", "G59.2", "G59.3"}
 
 
 def parse_reply(text: str) -> Event:
-    """The event that one line says, its line end removed; never raises."""
+    """The event of a line, which has no line end; never raises."""
     if text == "ok":
         return Ok()
     for form, read in _FORMS:

@@ -1,17 +1,17 @@
-"""The ``$`` settings of a controller: what ``$$`` says, a saved dump, two sets compared.
+"""The ``$`` settings of a controller: reading ``$$`` or a saved dump, and comparing two sets.
 
-Names and units are those of GRBL 1.1 (:mod:`miurafab.grbl.codes`); other firmware keeps these
-numbers and adds its own, which are carried without a name.
+Names and units are those of GRBL 1.1 (:mod:`miurafab.grbl.codes`). Other firmware keeps these
+numbers and adds its own, which have no name here.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from miurafab.errors import ProfileError
+from miurafab.gcode.job import Job
 from miurafab.grbl.codes import setting_codes
 from miurafab.grbl.events import Setting
 from miurafab.grbl.replies import parse_reply
@@ -21,10 +21,10 @@ _LASER_MODE_IS_32 = ("grbl-1.1", "grblhal")
 
 
 def profile_settings(machine: MachineProfile) -> dict[int, float]:
-    """What a job for ``machine`` expects of its controller.
+    """The settings that a job for ``machine`` expects of the controller.
 
-    The profile's own ``settings``, and what its tool implies where the firmware keeps the S
-    range in ``$30`` and ``$31`` and laser mode in ``$32`` (GRBL 1.1, grblHAL).
+    These are the profile's ``settings`` and, for firmware with the S range in ``$30`` and ``$31``
+    and laser mode in ``$32`` (GRBL 1.1, grblHAL), the values that the tool implies.
     """
     implied: dict[int, float] = {}
     if machine.dialect in _LASER_MODE_IS_32:
@@ -34,14 +34,14 @@ def profile_settings(machine: MachineProfile) -> dict[int, float]:
 
 
 def describe(number: int) -> str:
-    """``$110 (X maximum rate)``, or the bare number of a setting that GRBL 1.1 does not know."""
+    """``$110 (X maximum rate)``, or the number alone if GRBL 1.1 has no such setting."""
     code = setting_codes().get(number)
     return f"${number}" if code is None else f"${number} ({code.name})"
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """One setting that is not what was expected; ``actual`` is None if it was not reported."""
+    """A setting that differs from the expected value; ``actual`` is None if it was not reported."""
 
     number: int
     expected: float
@@ -50,13 +50,13 @@ class Difference:
     def __str__(self) -> str:
         code = setting_codes().get(self.number)
         tail = f" {code.unit}" if code is not None and code.unit else ""
-        found = "missing" if self.actual is None else f"{self.actual:g}{tail}"
-        return f"{describe(self.number)} is {found} instead of {self.expected:g}{tail}"
+        actual = "missing" if self.actual is None else f"{self.actual:g}{tail}"
+        return f"{describe(self.number)} is {actual} instead of {self.expected:g}{tail}"
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What ``$$`` reported: ``texts`` as the controller wrote them, in its order."""
+    """The answer to ``$$``: ``texts`` as the controller wrote them, in its order."""
 
     texts: Mapping[int, str]
 
@@ -72,15 +72,15 @@ class Settings:
         return {number: value for number, value in numbers.items() if value is not None}
 
     def differences(self, expected: Mapping[int, float]) -> tuple[Difference, ...]:
-        """Where these settings are not as ``expected``, by number.
+        """The settings that differ from ``expected``, by number.
 
-        Equal means equal as the controller prints it: with three decimals (``report.c``).
+        Values are compared as the controller prints them, with three decimals (``report.c``).
         """
         values = self.values
         return tuple(
-            Difference(number, want, values.get(number))
-            for number, want in sorted(expected.items())
-            if number not in values or abs(values[number] - want) > 5e-4
+            Difference(number, value, values.get(number))
+            for number, value in sorted(expected.items())
+            if number not in values or abs(values[number] - value) > 5e-4
         )
 
     def dump(self) -> str:
@@ -89,12 +89,13 @@ class Settings:
 
 
 def parse_dump(text: str, name: str) -> Settings:
-    """Read a saved ``$$`` dump; blank lines, comments (``;``) and the final ``ok`` are passed over.
+    """Read a saved ``$$`` dump without its blank lines, comments (``;``) and final ``ok``.
 
-    Raises :class:`~miurafab.errors.ProfileError` naming ``name`` and the line that is no setting.
+    Raises :class:`~miurafab.errors.ProfileError`, naming ``name`` and the line, for a line that is
+    no setting.
     """
     texts: dict[int, str] = {}
-    for number, line in enumerate(re.split(r"\r\n|\n|\r", text), 1):
+    for number, line in enumerate(Job(name, text).iter_lines(), 1):
         code = line.partition(";")[0].strip()
         if code in ("", "ok"):
             continue

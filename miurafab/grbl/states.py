@@ -1,33 +1,32 @@
-"""What the sending side knows about the controller, as one table.
+"""The state table of the connection: how much the sender knows about the controller.
 
 Theory
 ------
-The wire carries two kinds of replies: answers (``ok``, ``error:``), exactly one a line sent and
-in the order sent, and everything else, which may come at any time. Character counting rests on
-the first kind alone: it is right as long as we know which lines are still unanswered, and worth
-nothing once we do not. So the states say *how much of that knowledge is left*:
+The controller sends two kinds of replies. Answers (``ok``, ``error:``) come once per line sent and
+in the order sent. All other replies may come at any time. Character counting needs the answers
+alone: it is correct while the sender knows which lines are unanswered, and useless afterwards. So
+the states describe this knowledge:
 
-``OPENING``    the wire is open and nothing was heard; answers may be leftovers of somebody else.
-``GREETED``    a banner came and no line was sent since: all buffers over there are empty.
+``OPENING``    the port is open and silent; answers may belong to another program's lines.
+``GREETED``    a banner came and no line was sent since: all buffers of the controller are empty.
 ``READY``      the lines in flight are known exactly.
 ``LOCKED``     as READY, but the controller refuses motion until it is unlocked or homed.
-``ALARMED``    an alarm came. Some firmware answers the lines it held, some forgets them, so the
-               accounting is void and only a reset can make it good.
-``UNSYNCED``   the accounting broke: a banner that nobody asked for (what was in flight is lost,
-               and half a line may still arrive there), or an answer to nothing.
-``RESETTING``  we sent a soft reset; whatever still comes was said before it, up to the banner.
-``CLOSED``     the wire is gone.
+``ALARMED``    an alarm came. Some firmware answers the lines that it held, some drops them, so the
+               accounting is void until a reset.
+``UNSYNCED``   the accounting broke: by an unexpected banner (the lines in flight are lost, and half
+               a line may still arrive at the controller), or by an answer without a line in flight.
+``RESETTING``  a soft reset was sent; replies before the banner belong to the time before the reset.
+``CLOSED``     the connection has ended.
 
-Three rules that the table keeps, and that its tests state for every state and input:
+The table keeps three rules, which its tests check for every state and input:
 
-* every reply has a successor in every state: no byte from a controller can break the program;
-* a soft reset is allowed in every state but CLOSED, so that the way out is always open;
-* motion may be sent only from GREETED and READY, and no reply leads from ALARMED, UNSYNCED or
-  LOCKED back to motion except what a human's unlock, homing or reset brings about: nothing here
-  unlocks or sends again by itself.
+* each reply has a successor in each state: no byte from a controller can break the program;
+* a soft reset is allowed in each state except CLOSED: the way out is always open;
+* motion may be sent only from GREETED and READY. From ALARMED, UNSYNCED or LOCKED only a person's
+  unlock, homing or reset leads back there: nothing here unlocks or resends by itself.
 
-A second banner right after the first (two resets in a row) leaves GREETED as it is. In LOCKED it
-leads back to GREETED: no motion can be in flight there.
+A second banner right after the first (two resets in a row) leaves GREETED unchanged. In LOCKED a
+banner leads back to GREETED, because no motion can be in flight there.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from types import MappingProxyType
 
 
 class State(Enum):
-    """How much we know about what the controller holds."""
+    """The sender's knowledge about the lines that the controller holds."""
 
     OPENING = auto()
     GREETED = auto()
@@ -50,7 +49,7 @@ class State(Enum):
 
 
 class Input(Enum):
-    """What can happen: the first group comes from the controller, the second from us."""
+    """The inputs: the first group comes from the controller, the second from the sender."""
 
     BANNER = auto()
     ANSWER = auto()  # ok or error with a line in flight
@@ -59,7 +58,7 @@ class Input(Enum):
     LOCK = auto()  # [MSG:'$H'|'$X' to unlock], or a status report of state Alarm
     UNLOCK = auto()  # [MSG:Caution: Unlocked], or a status report of state Idle
     SLEEP = auto()  # [MSG:Sleeping]
-    RESTART = auto()  # it says what it always follows with a reset of its own
+    RESTART = auto()  # a message that the controller always follows with a reset of its own
     TALK = auto()  # any other reply
     END = auto()
 
@@ -70,13 +69,13 @@ class Input(Enum):
 
 
 SENT = frozenset({Input.MOTION, Input.SYSTEM, Input.RESET, Input.REALTIME})
-"""The inputs that are ours; one that a state does not list is refused there."""
+"""The inputs of the sender; a state refuses those that it does not list."""
 
 _S, _I = State, Input
 
 
 def _row(stay: State, changes: dict[Input, State], *refused: Input) -> dict[Input, State]:
-    """All inputs lead to ``stay`` but the ``changes``, the ``refused``, and those common to all."""
+    """All inputs lead to ``stay``, except ``changes``, the ``refused``, RESET and END."""
     common = {_I.RESET: _S.RESETTING, _I.END: _S.CLOSED}
     row = dict.fromkeys(Input, stay) | common | changes
     return {item: state for item, state in row.items() if item not in refused}
@@ -130,7 +129,7 @@ TRANSITIONS = MappingProxyType(
         _S.CLOSED: _row(_S.CLOSED, {}, *SENT),
     }
 )
-"""``TRANSITIONS[state][input]`` is the next state; a sent input that is absent is refused."""
+"""``TRANSITIONS[state][input]`` is the next state; an absent input is refused."""
 
 KEEPS_ACCOUNT = frozenset({State.READY, State.LOCKED})
-"""In all other states nothing is in flight as far as anybody can know."""
+"""The states that count bytes in flight; in all others the count is zero."""

@@ -1,13 +1,13 @@
-"""Which line of a job goes when, and what the controller's answers mean for the job.
+"""The streamer: it decides when each line of a job is sent, and what the answers mean for the job.
 
-Two ways to stream. *Character counting* fills the controller's receive buffer with whole lines,
-as many as the books of the :class:`~miurafab.grbl.connection.Connection` allow, so that the
-planner never waits for the wire. *Send-response* sends one line and waits for its answer: slow
-on a link with latency, and right for firmware whose buffer is not to be trusted.
+There are two streaming modes. *Character counting* fills the controller's receive buffer with as
+many whole lines as the byte accounting of the :class:`~miurafab.grbl.connection.Connection` allows,
+so the planner never waits for the wire. *Send-response* sends one line and waits for its answer; it
+is slow on a link with latency, and safe for firmware with an unreliable buffer.
 
-A job lives only while every answer is an ``ok`` and the controller is in a state to take motion.
-Anything else ends it with the one sentence that says what happened; what to send then (hold,
-reset) is the session's business, for this module knows neither wire nor clock.
+A job continues only while every answer is ``ok`` and the controller accepts motion. Any other reply
+ends the job with one sentence. The session then decides what to send (hold, reset), because this
+module has no I/O and no clock.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from miurafab.grbl.states import State
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A line that the controller answered with ``error:``; ``reason`` says what that means."""
+    """A line that the controller answered with ``error:``, and the ``reason`` in words."""
 
     line: SendLine
     reason: str
@@ -35,14 +35,14 @@ class Refusal:
 
 
 class LineRefused(ControllerError):
-    """The controller refused a line of a running job; what it holds behind it must not run."""
+    """The controller refused a line of a running job; the lines behind it must not run."""
 
 
 class Streamer:
-    """The lines of one job on their way through ``connection``.
+    """Sends the lines of one job through ``connection``.
 
-    ``name`` is how messages call the job. With ``collect_refusals`` (check mode, where nothing
-    moves) refused lines are gathered in ``refusals`` and do not end the job.
+    ``name`` stands for the job in messages. With ``collect_refusals`` (check mode, where nothing
+    moves) refused lines are collected in ``refusals`` and do not end the job.
     """
 
     def __init__(
@@ -71,13 +71,13 @@ class Streamer:
 
     @property
     def dwell_in_flight(self) -> float:
-        """Seconds of G4 in the unanswered lines: so long may the controller idle unanswered."""
+        """Seconds of G4 in the unanswered lines: the controller may be silent for this time."""
         return sum(dwell_seconds(line.data) for line in self._connection.in_flight)
 
     def pull(self) -> bytes:
-        """All that may be sent now, entered in the books; empty if answers must come first.
+        """The bytes that may be sent now; they are then in flight. Empty while answers are due.
 
-        Raises :class:`~miurafab.errors.GcodeError` for a line that no buffer can ever hold.
+        Raises :class:`~miurafab.errors.GcodeError` for a line longer than the receive buffer.
         """
         data = bytearray()
         connection = self._connection
@@ -95,11 +95,11 @@ class Streamer:
         return bytes(data)
 
     def take(self, event: Event) -> None:
-        """Note what ``event`` means for the job.
+        """Apply ``event`` to the job.
 
-        Raises :class:`~miurafab.errors.ControllerError` when it ends the job:
-        :class:`LineRefused` for an ``error:``, else an alarm, a reset or a sleep that nobody
-        asked for, or an answer to nothing.
+        Raises :class:`~miurafab.errors.ControllerError` if it ends the job: :class:`LineRefused`
+        for an ``error:``; else for an alarm, an unexpected reset or sleep, or an answer without a
+        line in flight.
         """
         if isinstance(event, Ok | Error) and event.line is not None:
             self.acknowledged += 1
@@ -129,19 +129,19 @@ class Streamer:
 
     @property
     def where(self) -> str:
-        """Where the job is, as the tail of a sentence."""
+        """The position in the job, as the end of a sentence."""
         if self.last is None:
             return f"before it took a line of {self._name}"
         return f"after it took line {self.last.number} of {self._name}"
 
 
 def error_words(event: Error) -> str:
-    """``error:22, a feed move comes before ...``, or the firmware's own words."""
+    """``error:22, a feed move comes before ...``, or the text of the firmware."""
     return _words("error:", event.code, event.text, error_codes())
 
 
 def alarm_words(event: Alarm) -> str:
-    """``ALARM:1, a limit switch was hit; ...``, or the firmware's own words."""
+    """``ALARM:1, a limit switch was hit; ...``, or the text of the firmware."""
     return _words("ALARM:", event.code, event.text, alarm_codes())
 
 

@@ -1,12 +1,12 @@
-"""The sending side of a Marlin wire, without the wire: bytes in, replies out, one line in flight.
+"""The Marlin connection without I/O: bytes in, replies out, one line in flight.
 
-Each line goes out as ``N<count><code>*<checksum>``, the checksum being the exclusive or of all
-bytes before the ``*``. So a line that came damaged, twice, or not at all is noticed by the
-controller, which asks for it by its number; and a line may be sent again without harm whenever its
-answer is missing: if the controller had taken it, it says so by asking for the next one.
+Each line is sent as ``N<number> <code>*<checksum>``; the checksum is the exclusive or of all bytes
+before the ``*``. So the controller notices a line that is damaged, repeated or lost, and asks for
+it by its number. A line without an answer may be resent safely: if the controller had taken it, it
+asks for the next number.
 
-Only the bytes of :data:`EMERGENCY` go past the count: the controller acts on them as soon as it
-reads them, between two commands, or at once if it was built with ``EMERGENCY_PARSER``.
+:data:`EMERGENCY` has no line number: the controller acts on it as soon as it reads it, between two
+commands, or at once if it was built with ``EMERGENCY_PARSER``.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from miurafab.marlin.replies import MarlinError, MarlinOk, Reply, Resend, Starte
 from miurafab.wire.line_reader import LineReader
 
 EMERGENCY = b"\nM112\n"
-"""Halt: motors and laser off until a reset. The newline ends what may have been begun."""
+"""Halt: motors and laser off until a reset. The newline ends a line that was begun."""
 
 FRAME = len("N99999999*255")
-"""Characters that the count and the checksum add to a line at most."""
+"""The most characters that line number and checksum add to a line."""
 MOST_TRIES = 5
-"""How often a line is sent before the wire is given up."""
+"""The most times that a line is sent before the job fails."""
 
 
 class MarlinConnection:
-    """The state of one wire: what is in flight, and how far the count is."""
+    """The state of one connection: the line in flight and its number."""
 
     def __init__(self) -> None:
         self.in_flight: SendLine | None = None
@@ -46,12 +46,12 @@ class MarlinConnection:
         return self.in_flight is None
 
     def restart_count(self) -> bytes:
-        """The line that sets the controller's count to ours, which begins anew."""
+        """The line that restarts the line numbers on both sides."""
         self._number = -1
         return self.send_line(SendLine(0, b"M110N0"))
 
     def send_line(self, line: SendLine) -> bytes:
-        """The bytes of ``line``; it is then in flight. There must be none."""
+        """The bytes of ``line``; it is then in flight. No other line may be in flight."""
         assert self.in_flight is None
         self._number += 1
         self.in_flight = line
@@ -60,9 +60,9 @@ class MarlinConnection:
         return self._sent
 
     def send_again(self) -> bytes:
-        """The line in flight once more, after a newline that ends whatever is left of it.
+        """The line in flight again, after a newline that ends a damaged rest of it.
 
-        Empty if nothing is in flight or it was tried :data:`MOST_TRIES` times.
+        Empty if no line is in flight or it was sent :data:`MOST_TRIES` times.
         """
         if self.in_flight is None or self._tries >= MOST_TRIES:
             return b""
@@ -72,23 +72,23 @@ class MarlinConnection:
 
     @property
     def wants_again(self) -> bool:
-        """Whether the controller asked for the line in flight and waits for it."""
+        """Whether the controller asked for the line in flight again and is ready for it."""
         return self._again and self._taken
 
     def receive_data(self, data: bytes) -> None:
-        """Take bytes as they came, in any chunks; the replies are then had from :meth:`replies`."""
+        """Take received bytes, in any chunks; :meth:`replies` then returns the replies."""
         for text in self._lines.take(data):
             self._take(parse_reply(text))
 
     def replies(self) -> Iterator[Reply]:
-        """The replies that have become complete since the last call, in order."""
+        """Yield the replies completed since the last call, in order."""
         while self._replies:
             yield self._replies.popleft()
 
     def _take(self, reply: Reply) -> None:
         if isinstance(reply, MarlinOk):
             if self._again:
-                self._taken = True  # the wire is free for the line that it wants
+                self._taken = True  # the controller is ready for the line again
                 return
             line, self.in_flight = self.in_flight, None
             reply = MarlinOk(reply.text, line)
@@ -103,7 +103,7 @@ class MarlinConnection:
 
 
 def framed(number: int, code: bytes) -> bytes:
-    """``code`` with its count and checksum, as it goes down the wire."""
+    """``code`` with its line number and checksum, as sent."""
     body = b"N%d " % number + code
     return body + b"*%d\n" % checksum(body)
 

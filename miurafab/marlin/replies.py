@@ -1,10 +1,10 @@
-"""What a Marlin controller can say, one frozen value a line.
+"""The replies of a Marlin controller: one frozen value per line that it sends.
 
-Every command is answered by ``ok``, after whatever it has to say; ``Resend: N`` asks for a line
-again and is followed by the ``ok`` that frees the wire for it; ``echo:busy: processing`` says every
-two seconds that a command takes long. Sources of the facts: MarlinFirmware/Marlin,
-``src/gcode/queue.cpp``, ``src/core/language.h``, ``src/gcode/gcode.cpp`` (host keepalive), and
-marlinfw.org, "Serial protocol".
+Each command is answered by ``ok``, after its other output. ``Resend: N`` asks for a line again; the
+``ok`` after it says that the controller is ready for the line. ``echo:busy: processing`` comes
+every two seconds during a long command. Sources: MarlinFirmware/Marlin, ``src/gcode/queue.cpp``,
+``src/core/language.h``, ``src/gcode/gcode.cpp`` (host keepalive), and marlinfw.org, "Serial
+protocol".
 """
 
 from __future__ import annotations
@@ -17,43 +17,43 @@ from miurafab.gcode.job import SendLine
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """Something the controller said; ``text`` is the line."""
+    """A line from the controller, as ``text``."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class MarlinOk(Reply):
-    """``ok``: the line in flight was taken; ``line`` is that line, None for one of our own."""
+    """``ok``: the controller took the ``line`` in flight, None if there was none."""
 
     line: SendLine | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Resend(Reply):
-    """``Resend: 12``: it wants line ``number`` (our count, not the file's)."""
+    """``Resend: 12``: the controller asks for the line ``number`` (not the number in the file)."""
 
     number: int
 
 
 @dataclass(frozen=True, slots=True)
 class Busy(Reply):
-    """``echo:busy: processing``: it is alive and at work."""
+    """``echo:busy: processing``: the controller is alive and at work."""
 
 
 @dataclass(frozen=True, slots=True)
 class Started(Reply):
-    """``start``: it has just started, whatever was before."""
+    """``start``: the controller has just started."""
 
 
 @dataclass(frozen=True, slots=True)
 class Killed(Reply):
-    """``Error:Printer halted. kill() called!``: motors and laser are off until it is reset."""
+    """``Error:Printer halted. kill() called!``: motors and laser are off until a reset."""
 
 
 @dataclass(frozen=True, slots=True)
 class MarlinError(Reply):
-    """It did not do what the line in flight says, or has stopped."""
+    """The controller did not execute the line in flight, or has stopped."""
 
 
 _RESEND = re.compile(r"(?:Resend|rs)\s*:?\s*N?(\d+)", re.IGNORECASE)
@@ -67,7 +67,7 @@ _FAULT = re.compile(
 
 
 def parse_reply(text: str) -> Reply:
-    """The meaning of one line, without its end. What it does not know is a plain :class:`Reply`."""
+    """The reply of a line, which has no line end; an unknown line is a plain :class:`Reply`."""
     if _OK.match(text):
         return MarlinOk(text)
     resend = _RESEND.match(text)
@@ -79,7 +79,7 @@ def parse_reply(text: str) -> Reply:
         return Started(text)
     if _KILLED.match(text):
         return Killed(text)
-    # A line that came damaged is asked for again in the next words.
+    # A damaged line is not an error yet: the controller asks for it again in its next line.
     if _FAULT.match(text) and not _WANTS_AGAIN.search(text):
         return MarlinError(text)
     return Reply(text)

@@ -1,1 +1,1 @@
-"""Bytes on a cable: what a controller says, split into lines."""
+"""Bytes from a controller, split into lines."""

@@ -1,21 +1,21 @@
-"""Lines out of bytes that arrive in any chunks, and out of noise that never ends a line."""
+"""The line reader: bytes arrive in any chunks and leave as lines."""
 
 from __future__ import annotations
 
 MOST_BYTES = 1024
-"""Bytes without a line end after which the stream is taken for noise; GRBL's longest report has
-about 160."""
+"""After this many bytes without a line end the reader gives them out as a line, because they are
+noise; GRBL's longest report has about 160 bytes."""
 
 
 class LineReader:
-    """Takes bytes and gives the lines that are whole, without the ``edges`` around them."""
+    """Takes bytes and returns complete lines, stripped of the ``edges`` characters."""
 
     def __init__(self, edges: bytes = b"\r\0") -> None:
         self._edges = edges
         self._rest = bytearray()
 
     def take(self, data: bytes) -> list[str]:
-        """The lines that end in ``data``, but for empty ones; bytes from 0x80 stand as escapes."""
+        """The non-empty lines that end in ``data``; bytes from 0x80 up become escapes."""
         self._rest += data
         *lines, rest = self._rest.split(b"\n")
         if len(rest) > MOST_BYTES:

@@ -1,4 +1,4 @@
-"""The books of the connection, against a model that keeps them the plain way."""
+"""The byte accounting of the connection, against a simple model of it."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def test_dwell(text: str, seconds: float) -> None:
     ("said", "state"),
     [(BANNER, State.UNSYNCED), (b"ALARM:1\r\n", State.ALARMED), (b"", State.CLOSED)],
 )
-def test_what_voids_the_books(said: bytes, state: State) -> None:
+def test_what_clears_the_byte_accounting(said: bytes, state: State) -> None:
     connection = greeted()
     connection.send_line(line("G1X1"))
     hear(connection, said)
@@ -147,13 +147,14 @@ def test_what_voids_the_books(said: bytes, state: State) -> None:
     assert not connection.may_send(line("$X"))
 
 
-def test_an_answer_to_nothing_breaks_the_books() -> None:
+def test_an_answer_without_a_line_breaks_the_byte_accounting() -> None:
     connection = greeted()
     assert hear(connection, b"ok\r\n") == [Ok(None)]
     assert connection.state is State.UNSYNCED
 
 
-def test_after_a_reset_of_ours_leftovers_are_strays_until_the_banner() -> None:
+@pytest.mark.parametrize("unlocked", ["[MSG:Caution: Unlocked]", "<Idle|MPos:0,0,0|FS:0,0>"])
+def test_after_a_reset_of_ours_leftovers_are_strays_until_the_banner(unlocked: str) -> None:
     connection = greeted()
     connection.send_line(line("G1X1"))
     connection.send_realtime(SOFT_RESET)
@@ -164,15 +165,20 @@ def test_after_a_reset_of_ours_leftovers_are_strays_until_the_banner() -> None:
     assert not connection.may_send(line("G1X1"))
     assert not connection.may_send(line("$J=G91X1F100"))
     connection.send_line(line("$X"))
-    hear(connection, b"[MSG:Caution: Unlocked]\r\nok\r\n")
+    hear(connection, f"{unlocked}\r\nok\r\n".encode())
     assert connection.state is State.READY
     assert connection.may_send(line("G1X1"))
 
 
-def test_leaving_check_mode_is_a_restart_that_was_asked_for() -> None:
+@pytest.mark.parametrize(
+    ("text", "said"), [("$C", "[MSG:Disabled]"), ("$RST=*", "[MSG:Restoring defaults]")]
+)
+def test_leaving_check_mode_and_restoring_are_restarts_that_were_asked_for(
+    text: str, said: str
+) -> None:
     connection = greeted()
-    connection.send_line(line("$C"))
-    hear(connection, b"[MSG:Disabled]\r\nok\r\n")
+    connection.send_line(line(text))
+    hear(connection, f"{said}\r\nok\r\n".encode())
     assert connection.state is State.RESETTING
     hear(connection, BANNER)
     assert connection.state is State.GREETED
@@ -195,8 +201,8 @@ def test_a_stream_without_line_ends_takes_no_memory() -> None:
     assert hear(connection, b"\r\nok\r\n")[-1] == Ok(None)
 
 
-class Books(RuleBasedStateMachine):
-    """Any order of lines, replies, realtime bytes and resets: the books stay right."""
+class Accounting(RuleBasedStateMachine):
+    """The byte accounting holds in any order of lines, replies, realtime bytes and resets."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -253,7 +259,7 @@ class Books(RuleBasedStateMachine):
             self.sent.clear()
 
     @invariant()
-    def the_books_are_those_of_the_model(self) -> None:
+    def the_accounts_of_connection_and_model_agree(self) -> None:
         connection = self.connection
         assert list(connection.in_flight) == self.sent
         assert connection.in_flight_bytes == sum(len(item.data) + 1 for item in self.sent)
@@ -265,5 +271,5 @@ class Books(RuleBasedStateMachine):
             assert len(self.sent) == 1
 
 
-TestBooks = Books.TestCase
-TestBooks.settings = settings(max_examples=100, stateful_step_count=40)
+TestAccounting = Accounting.TestCase
+TestAccounting.settings = settings(max_examples=100, stateful_step_count=40)

@@ -23,9 +23,32 @@ def test_the_way_out_is_always_open(state: State) -> None:
         assert TRANSITIONS[state][Input.RESET] is State.RESETTING
 
 
-def test_motion_is_sent_only_where_the_books_are_right() -> None:
+OPENING, GREETED, READY, LOCKED = State.OPENING, State.GREETED, State.READY, State.LOCKED
+ALARMED, UNSYNCED, RESETTING = State.ALARMED, State.UNSYNCED, State.RESETTING
+
+
+@pytest.mark.parametrize(
+    ("item", "before", "after"),
+    [
+        (Input.ALARM, {OPENING, GREETED, READY, LOCKED, UNSYNCED, ALARMED}, ALARMED),
+        (Input.SLEEP, {OPENING, GREETED, READY, LOCKED, ALARMED}, ALARMED),
+        (Input.STRAY, {GREETED, READY, LOCKED, UNSYNCED}, UNSYNCED),
+        (Input.LOCK, {GREETED, READY, LOCKED}, LOCKED),
+        (Input.UNLOCK, {READY, LOCKED}, READY),
+        (Input.RESTART, {READY, RESETTING}, RESETTING),
+        (Input.BANNER, {OPENING, GREETED, LOCKED, ALARMED, RESETTING}, GREETED),
+        (Input.BANNER, {READY, UNSYNCED}, UNSYNCED),
+    ],
+)
+def test_what_a_reply_leads_to(item: Input, before: set[State], after: State) -> None:
+    assert {state for state in State if TRANSITIONS[state][item] is after} == before
+
+
+def test_motion_is_sent_only_where_the_account_is_right() -> None:
     may_move = {state for state in State if Input.MOTION in TRANSITIONS[state]}
-    assert may_move == {State.GREETED, State.READY}
+    assert may_move == {GREETED, READY}
+    may_command = {state for state in State if Input.SYSTEM in TRANSITIONS[state]}
+    assert may_command == {GREETED, READY, LOCKED}
 
 
 def test_closed_is_final_and_the_end_always_closes() -> None:

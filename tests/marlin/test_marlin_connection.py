@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miurafab.gcode.job import SendLine
-from miurafab.marlin.connection import MOST_TRIES, MarlinConnection, framed
+from miurafab.marlin.connection import EMERGENCY, MOST_TRIES, MarlinConnection, framed
 from miurafab.marlin.replies import (
     Busy,
     Killed,
@@ -18,8 +18,12 @@ from miurafab.marlin.replies import (
     Started,
     parse_reply,
 )
+from miurafab.motion.parameters import MotionParameters
+from miurafab.profiles import load_machine
+from miurafab.simulate.marlin.controller import VirtualMarlin
 
 LINE = SendLine(7, b"G1X10")
+PARAMETERS = MotionParameters.from_profile(load_machine("marlin-laser-220"))
 
 
 @pytest.mark.parametrize(
@@ -103,8 +107,26 @@ def test_a_line_of_long_ago_is_a_fault_and_tries_are_counted() -> None:
     assert connection.send_again() == b""
 
 
+def test_only_one_line_is_in_flight_and_a_restart_drops_it() -> None:
+    connection = MarlinConnection()
+    connection.send_line(LINE)
+    with pytest.raises(AssertionError):
+        connection.send_line(LINE)
+    assert heard(connection, "start\n") == [Started("start")]
+    assert connection.idle
+    assert connection.send_again() == b""
+
+
+def test_the_emergency_stop_is_read_behind_half_a_line() -> None:
+    for emergency_parser in (True, False):
+        device = VirtualMarlin(PARAMETERS, emergency_parser=emergency_parser)
+        device.receive(b"N1 G1 X50 F6" + EMERGENCY)
+        device.advance(1.0)
+        assert device.killed
+
+
 @given(st.binary(max_size=300), st.integers(1, 20))
-def test_noise_in_any_chunks_never_breaks_the_books(noise: bytes, size: int) -> None:
+def test_noise_in_any_chunks_never_breaks_the_connection(noise: bytes, size: int) -> None:
     connection = MarlinConnection()
     connection.send_line(LINE)
     for begin in range(0, len(noise), size):

@@ -48,6 +48,21 @@ def test_constant_power_burns_until_it_is_told() -> None:
     assert not device.beam_on
 
 
+def test_following_power_is_dark_while_nothing_moves() -> None:
+    """The firmware's rule: in laser mode M4 sets the speed 0 at rest (``spindle_set_state`` of
+    ``spindle_control.c``). A spindle override in Idle sets the spindle again (``protocol.c``), and
+    so does M4 after a G1: both must leave the beam off. M3 burns.
+    """
+    for spindle in ("M4", "M3"):
+        device = ready(LASER)
+        play(device, f"{spindle}S500", b"\x9a", 0.5)
+        assert device.beam_on is (spindle == "M3")
+        play(device, "M5", "G1X1F3000", 0.5, f"{spindle}S500", 0.5)
+        assert device.beam_on is (spindle == "M3")
+        assert (standing_seconds(device.beam_log) > 0.9) is (spindle == "M3")
+        assert spindle == "M3" or device.beam_log == []
+
+
 def test_power_words_change_in_motion_without_a_stop() -> None:
     device = ready(RECORDED)
     play(device, "M3", *[f"G1X{x}F3000S{100 * x}" for x in range(1, 6)], "M5", 1.0)
