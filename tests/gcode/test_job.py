@@ -32,7 +32,7 @@ def test_what_is_sent_is_what_the_firmware_would_keep(text: str) -> None:
     kept = [(n, firmware_filter(line)) for n, line in enumerate(job.iter_lines(), 1)]
     kept = [(n, code) for n, code in kept if code]
     if any(set(code) & set("!é") for _, code in kept):
-        with pytest.raises(GcodeError):
+        with pytest.raises(GcodeError, match=r"line \d+"):
             list(job.send_lines())
     else:
         assert [*job.send_lines()] == [SendLine(n, code.encode()) for n, code in kept]
@@ -79,5 +79,5 @@ def test_the_line_buffer_counts_code_only() -> None:
 def test_lines_are_prepared_as_they_are_asked_for() -> None:
     lines = Job("j", "G1 X0\nG1 X1\n!\n").send_lines()
     assert [next(lines).data, next(lines).data] == [b"G1X0", b"G1X1"]
-    with pytest.raises(GcodeError):
+    with pytest.raises(GcodeError, match=r"line 3\b"):
         next(lines)

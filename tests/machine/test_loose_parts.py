@@ -139,7 +139,7 @@ def test_each_is_refused_by_its_name_and_forced_by_it(check: str, made: Job) -> 
         plan_job(made, MACHINE)
     assert caught.value.exit_code == 2
     assert len(plan_job(made, MACHINE, force=frozenset({check})).remarks) == 1
-    with pytest.raises(GcodeError):
+    with pytest.raises(GcodeError, match=f"--force {check} "):
         plan_job(made, MACHINE, force=frozenset(CHECKS) - {check})
 
 

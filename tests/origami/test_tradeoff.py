@@ -145,7 +145,7 @@ def test_one_sentence_for_each_mistake(arguments, words):
 
 
 def test_a_target_that_is_none():
-    with pytest.raises(TargetError):
+    with pytest.raises(TargetError, match=r"'hyper'.*did you mean 'hypar'"):
         miurafab.tradeoff("hyper")
 
 

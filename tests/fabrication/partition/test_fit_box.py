@@ -60,10 +60,17 @@ def test_support_values_of_a_union_are_maxima_and_never_invent_a_fit(one, other,
 
     union = np.concatenate([one, other])
     np.testing.assert_array_equal(np.maximum(values(one), values(other)), values(union))
+    tried = extents(union, np.radians(np.arange(30) * 3))
+
+    def inside(room):
+        limits = np.array([width, height]) + room
+        along, across = (tried <= limits).all(axis=1), (tried[:, ::-1] <= limits).all(axis=1)
+        return (along | across).any()
+
     if fits(values(union), width, height):
-        assert best_turn(union, width, height) is not None or (
-            best_turn(union, height, width) is not None
-        )
+        assert inside(1e-6)
+    else:
+        assert not inside(-0.01)
 
 
 def test_an_absent_polygon_is_neutral_in_a_union():
