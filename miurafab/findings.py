@@ -39,7 +39,7 @@ RULES = {
     "sampling": Rule("warning", "a function that turns faster than its samples show"),
     # A job, judged without a machine (miurafab.machine.judge_job)
     "lines": Rule("refusal", "a line too long for the controller, or not printable ASCII"),
-    "program": _check("a program that GRBL 1.1 would answer with an error, by line and code"),
+    "program": _check("a program that GRBL 1.1 would answer with an error"),
     "m3": _check("`M3`: the beam stays on wherever motion stops"),
     "bounds": _check("a move off the bed"),
     "islands": _check("a stroke inside an outline that is cut through already"),
@@ -54,12 +54,21 @@ RULES = {
     "characters": Rule("warning", "a character in a comment that other senders pass on"),
     "nothing-burnt": Rule("warning", "a job that burns nothing"),
     "relative": Rule("note", "relative moves (`G91`)"),
+    # A job that is previewed (miurafab.workflow.preview)
+    "assumed-machine": Rule("note", "no machine is named, so a common machine is assumed"),
+    "pattern-changed": Rule("warning", "the pattern of the job has changed since"),
+    "pattern-missing": Rule("note", "the pattern of the job is not there"),
     # The controller, before a line of the job is sent (miurafab.machine.preflight)
     "idle": _check("a controller that is not idle"),
     "beam": _check("a beam that is on already"),
     "s-range": _check("an S range (`$30`, `$31`) that is not the profile's"),
     "settings": _check("another `$` setting that is not the profile's"),
     "travel": _check("a move beyond the soft limits, from where the machine stands"),
+    # A job that was sent (miurafab.machine.sender)
+    "no-emergency-parser": Rule("warning", "a Marlin that obeys a stop only between two commands"),
+    "records": Rule("warning", "a journal or a transcript that could not be finished"),
+    "no-answer": Rule("note", "a cutter that answers nothing"),
+    "resumed": Rule("note", "where an interrupted job goes on, and what may be burnt twice"),
 }
 """Every code, in the order of the work."""
 

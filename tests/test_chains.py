@@ -168,9 +168,9 @@ def test_the_preview_says_that_moves_are_relative() -> None:
         job = post(path, LASER, CARD)
     number = next(n for n, line in enumerate(job.iter_lines(), 1) if line.startswith("G91"))
     seen = dry_run("sheet-01", job, LASER, (300.0, 300.0))
-    assert [w for w in seen.warnings if "relative" in w] == [
-        f"Moves are relative from line {number} on (G91), as they are posted where the wire is too "
-        "slow for absolute ones."
-    ]
+    (finding,) = seen.findings
+    assert (finding.code, finding.severity) == ("relative", "note")
+    assert finding.where == f"{job.name}:{number}"
+    assert f"line {number} begins relative moves (G91)" in finding.sentence
     plain = Job("a", "(G91)\nG1 F9 X1 ; G91\nG91.1\nG90\n")
     assert not any("relative" in w for w in dry_run("a", plain, LASER, (300.0, 300.0)).warnings)

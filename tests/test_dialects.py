@@ -102,8 +102,7 @@ def test_the_preview_finds_no_hazard(name, pattern) -> None:
     path = sheet(pattern, machine)
     seen = dry_run("sheet-01", post(path, machine, CARD), machine, (path.width_mm, path.height_mm))
     if machine.dialect == "grbl-0.9":  # which has no beam that goes dark by itself
-        assert len(seen.warnings) == 1
-        assert seen.warnings[0].startswith("M3 ")
+        assert [finding.code for finding in seen.findings] == ["m3"]
     else:
         assert seen.warnings == ()
     assert seen.seconds > seen.beam_on_seconds > 0, (seen.seconds, seen.beam_on_seconds)

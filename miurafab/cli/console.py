@@ -7,7 +7,7 @@ other. Progress and remarks go to standard error, so that standard output is the
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal
 
@@ -17,12 +17,19 @@ import rich.progress
 import rich.table
 import typer
 
+from miurafab.errors import spell_options
+from miurafab.findings import Finding
 from miurafab.workflow.json_text import json_text
 
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="Print no progress and no remarks.")]
+
+
+def spelled(sentence: str) -> str:
+    """``sentence`` with the options that it names as the command line writes them."""
+    return spell_options(sentence, lambda name: "--" + name.replace("_", "-"))
 
 
 class Console:
@@ -73,10 +80,16 @@ class Console:
         """One line of the readable answer."""
         self._out.print(text, markup=False)
 
+    def findings(self, findings: Iterable[Finding]) -> None:
+        """One line of the readable answer each; a finding that is no note says what it is."""
+        for finding in findings:
+            weight = "" if finding.severity == "note" else f"{finding.severity} ({finding.code}): "
+            self.line(f"{weight}{spelled(finding.sentence)}")
+
     def remark(self, text: str) -> None:
         """One line on standard error, unless silent."""
         if not self.silent:
-            self._err.print(text, markup=False, style="dim")
+            self._err.print(spelled(text), markup=False, style="dim")
 
     @contextmanager
     def progress(self, label: str) -> Iterator[Callable[[float, str], None]]:

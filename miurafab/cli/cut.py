@@ -14,6 +14,7 @@ import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
 from miurafab.cli.sheets import MachineOption, MaterialOption
 from miurafab.errors import InputError, MachineError
+from miurafab.findings import as_json, refusals
 from miurafab.units import parse_length
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def cut(
     if prepared.refusal is not None:
         _refuse(console, prepared)
     if dry_run:
-        _report_dry_run(console, prepared, allow_m3)
+        _report_dry_run(console, prepared, options)
         return
     assert port is not None
     if len(port) > 1:
@@ -146,7 +147,7 @@ def cut(
                 keys=keys,
                 before_sheet=before,
                 after_frame=after_frame,
-                on_resume=console.remark,
+                on_resume=lambda finding: console.remark(finding.sentence),
                 on_progress=show_progress,
             )
     _report(console, prepared, done, port[0])
@@ -190,21 +191,21 @@ def _share(
         raise typer.Exit(3)
 
 
-def _report_dry_run(console: Console, prepared: Prepared, allow_m3: bool) -> None:
+def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -> None:
     """What would be cut, and what the pre-flight checks say; exit code 1 if they refuse it."""
-    from miurafab.workflow.cut_sheets import findings
+    from miurafab.machine.preflight import require_known
 
-    found = findings(prepared, allow_m3=allow_m3)
+    require_known(options.force)
+    found = [finding for sheet in prepared.dry_runs for finding in sheet.findings]
+    passed = options.force | ({"m3"} if options.allow_m3 else set())
+    refused = any(finding.code not in passed for finding in refusals(found))
     answer = {
-        "status": "refused" if found else "ready",
+        "status": "refused" if refused else "ready",
         "job": prepared.name,
         "machine": prepared.machine.name,
         "seconds": round(sum(sheet.seconds for sheet in prepared.dry_runs), 3),
         "sheets": [sheet.figures() for sheet in prepared.dry_runs],
-        "findings": [
-            {"sheet": sheet, "check": finding.name, "why": str(finding.error)}
-            for sheet, finding in found
-        ],
+        "findings": as_json(found),
     }
 
     def show() -> None:
@@ -222,14 +223,10 @@ def _report_dry_run(console: Console, prepared: Prepared, allow_m3: bool) -> Non
             ],
             title=f"{prepared.name} on {prepared.machine.title}; no port was opened",
         )
-        for each in prepared.dry_runs:
-            for warning in each.warnings:
-                console.line(f"{each.name}: {warning}")
-        for sheet, finding in found:
-            console.line(f"{sheet}: refused by the check '{finding.name}': {finding.error}.")
+        console.findings(found)
 
     console.answer(answer, show)
-    if found:
+    if refused:
         raise typer.Exit(1)
 
 
@@ -284,8 +281,7 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
             "estimated_s": float(each.estimated_s),
             "seconds": each.result.seconds,
             "refused_lines": len(each.result.errors),
-            "remarks": list(each.result.remarks),
-            "resumed": each.resumed,
+            "findings": as_json(each.findings),
         }
         for each in done
     ]
@@ -307,10 +303,7 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
             ],
         )
         for each in done:
-            for remark in each.result.remarks:
-                console.line(f"{each.name}: {remark}")
-            if each.resumed is not None:
-                console.line(each.resumed)
+            console.findings(each.findings)
 
     console.answer(answer, show)
     if any(each.result.errors for each in done):

@@ -51,11 +51,9 @@ def preview(
             [_row(sheet) for sheet in seen.sheets],
             title=f"{seen.name} on {seen.machine.title}",
         )
-        for remark in seen.remarks:
-            console.line(remark)
+        console.findings(seen.findings)
         for sheet in seen.sheets:
-            for warning in sheet.warnings:
-                console.line(f"{sheet.name}: {warning}")
+            console.findings(sheet.findings)
         console.line(f"Open {page} in a browser; pictures are beside it.")
 
     console.answer(answer, show)

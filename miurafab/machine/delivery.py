@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from miurafab.errors import JobStopped, MachineError, MiurafabError
+from miurafab.findings import Finding
 from miurafab.grbl.streamer import Refusal
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import ABORT, HOLD, Keys, keys_of
@@ -65,16 +66,16 @@ class Delivery(ABC):
 
     # What each dialect says
 
-    def meet(self) -> tuple[str, ...]:
-        """Greet the machine and make all checks that need it; what was forced, and remarks."""
+    def meet(self) -> tuple[Finding, ...]:
+        """Greet the machine and make all checks that need it; returns what did not stop the job."""
         return ()
 
     @abstractmethod
     def stream(self) -> None:
         """Send the job until the machine has done it, and attend meanwhile; raises what ends it."""
 
-    def part(self) -> tuple[str, ...]:
-        """Leave the machine dark after a job that is done; remarks on that."""
+    def part(self) -> tuple[Finding, ...]:
+        """Leave the machine dark after a job that is done."""
         return ()
 
     @abstractmethod
@@ -109,17 +110,17 @@ class Delivery(ABC):
 
     def run(self) -> StreamResult:
         """The whole way through; raises what ends it."""
-        remarks = self.plan.remarks + self.meet()
+        findings = self.plan.forced + self.meet()
         self.at_risk = True
         self._begin = self._tell_at = self._errand.transport.now()
         self.stream()
         seconds = self._seconds
-        remarks += self.part()
+        findings += self.part()
         self.at_risk = False
         if self.journal is not None:
             self.journal.ended("done", f"{self.acknowledged} lines {self.taken}")
-        remarks += self._close_records()
-        return StreamResult(self.acknowledged, seconds, tuple(self.refusals), remarks)
+        findings += self._close_records()
+        return StreamResult(self.acknowledged, seconds, tuple(self.refusals), findings)
 
     @property
     def _seconds(self) -> float:
@@ -172,22 +173,22 @@ class Delivery(ABC):
                 )
             )
 
-    def _close_records(self) -> tuple[str, ...]:
-        """Finish the files; a fault now does not undo the job, so it is a remark."""
-        remarks = []
+    def _close_records(self) -> tuple[Finding, ...]:
+        """Finish the files; a fault now does not undo the job, so it is a warning."""
+        findings = []
         for record in self._records:
             record.close()
             try:
                 record.check()
             except MachineError as error:
-                remarks.append(str(error))
-        return tuple(remarks)
+                findings.append(Finding("records", error.sentence))
+        return tuple(findings)
 
     # The other ways out
 
     def end(self, error: MiurafabError) -> NoReturn:
         """Stop the machine if it is at risk, and raise ``error`` with what became of it."""
-        sentence = str(error)
+        sentence = error.sentence
         if self.at_risk:
             outcome = self.stop(error)
             self.at_risk = False

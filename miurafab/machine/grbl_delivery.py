@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 
 from miurafab.errors import ControllerError, MiurafabError
+from miurafab.findings import Finding
 from miurafab.gcode.program import BEAM_M3
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Error, Ok, Options, StatusReport
@@ -34,6 +35,8 @@ NOT_CONFIRMED = (
     "the controller did not confirm that the beam is off, so switch the laser off at the machine"
 )
 """What became of the machine, as a clause."""
+
+_WAS_ARMED = Finding("armed", "The job ended with the laser armed, so the controller was reset.")
 
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # and when only the last moves are awaited
@@ -71,7 +74,7 @@ class GrblDelivery(Delivery):
 
     # The way through
 
-    def meet(self) -> tuple[str, ...]:
+    def meet(self) -> tuple[Finding, ...]:
         """See :class:`Delivery`."""
         plan, session = self.plan, self._session
         session.greet()
@@ -81,7 +84,7 @@ class GrblDelivery(Delivery):
             self.at_risk = False
         if plan.at is not None:
             session.command("G92X{:.3f}Y{:.3f}".format(*plan.at))
-        remarks = raise_findings(check_status(session.wait_status()), plan.force)
+        forced = raise_findings(check_status(session.wait_status()), plan.force, ControllerError)
         options = (event for event in session.command("$I") if isinstance(event, Options))
         for option in options:
             if self.journal is not None and option.planner_blocks is not None:
@@ -90,11 +93,11 @@ class GrblDelivery(Delivery):
         findings = list(check_settings(plan.machine, settings))
         if plan.program is not None:
             findings.extend(check_travel(plan.program, settings, session.work_offset))
-        remarks += raise_findings(findings, plan.force)
+        forced += raise_findings(findings, plan.force, ControllerError)
         if plan.check_mode:
             self.at_risk = True
             session.command("$C")
-        return remarks
+        return forced
 
     def stream(self) -> None:
         """See :class:`Delivery`."""
@@ -144,14 +147,14 @@ class GrblDelivery(Delivery):
                 self._session.write(self._session.connection.send_realtime(order))
             self.orders.clear()
 
-    def part(self) -> tuple[str, ...]:
+    def part(self) -> tuple[Finding, ...]:
         """See :class:`Delivery`."""
         session = self._session
         if self.plan.check_mode:
             session.stop()
         elif self.plan.machine.tool.kind == "laser" and session.wait_status().beam_on:
             session.stop()
-            return ("The job ended with the laser armed, so the controller was reset.",)
+            return (_WAS_ARMED,)
         return ()
 
     def _watch_for_loss(self, report: StatusReport, answered: float) -> None:

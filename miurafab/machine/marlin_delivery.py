@@ -17,9 +17,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from miurafab.errors import ControllerError, MiurafabError, PortError
+from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
 from miurafab.machine.delivery import Delivery, Errand
-from miurafab.machine.planning import longest_line
+from miurafab.machine.judge_job import longest_line
 from miurafab.machine.session import ANSWER_S, BANNER_S, HOMING_S
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
@@ -34,9 +35,10 @@ _LOOK_S = 0.05  # between two looks at the keys
 _SILENCES = 3  # the line is sent again after each but the last
 _KILL_S = 0.8  # from M112 to its answer
 _KILLS = 3
-_NO_PARSER = (
+_NO_PARSER = Finding(
+    "no-emergency-parser",
     "The controller was built without EMERGENCY_PARSER: it obeys a stop only between two commands, "
-    "so keep a switch for the laser in reach."
+    "so keep a switch for the laser in reach.",
 )
 
 
@@ -76,7 +78,7 @@ class MarlinDelivery(Delivery):
         job = self.plan.job
         return job.send_lines(longest_line(self.plan.machine))
 
-    def meet(self) -> tuple[str, ...]:
+    def meet(self) -> tuple[Finding, ...]:
         """See :class:`~miurafab.machine.delivery.Delivery`."""
         plan, wire = self.plan, self._wire
         wire.greet()

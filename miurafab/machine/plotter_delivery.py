@@ -9,15 +9,17 @@ holds unless it knows ``ESC.K`` (:mod:`miurafab.plotter.stream`).
 from __future__ import annotations
 
 from miurafab.errors import MiurafabError, PortError
+from miurafab.findings import Finding
 from miurafab.machine.delivery import Delivery, Errand
 from miurafab.machine.transport import FlowTransport
 from miurafab.plotter.stream import PlotterStream
 
 PEN_SENT_UP = "the cutter was told to lift its tool, after what it still holds"
 NOT_TOLD = "the cutter could not be told to lift its tool, so lift it at the machine"
-_GONE_ON = (
+_GONE_ON = Finding(
+    "no-answer",
     "The cutter has been given everything; it answers nothing, so wait until it has cut what it "
-    "holds."
+    "holds.",
 )
 _PIECE = 64
 _MOST_WAITING = 128
@@ -69,7 +71,7 @@ class PlotterDelivery(Delivery):
             self._listen(_LOOK_S)
             self.attend_and_tell()
 
-    def part(self) -> tuple[str, ...]:
+    def part(self) -> tuple[Finding, ...]:
         """See :class:`~miurafab.machine.delivery.Delivery`."""
         return (_GONE_ON,)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from miurafab.errors import JobStopped
+from miurafab.findings import Finding
 from miurafab.grbl.streamer import Refusal
 
 
@@ -30,14 +31,14 @@ class StreamResult:
     """A job that is done: every line acknowledged, the machine idle.
 
     ``seconds`` on the wire's clock from the first line to Idle; ``errors`` the refused lines of a
-    run in check mode (a real run ends at the first); ``remarks`` what was forced, and what went
-    wrong without harm.
+    run in check mode (a real run ends at the first); ``findings`` the refusals that were forced,
+    and what went wrong without harm.
     """
 
     lines: int
     seconds: float
     errors: tuple[Refusal, ...]
-    remarks: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
 
 class JobAborted(JobStopped):

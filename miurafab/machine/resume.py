@@ -25,6 +25,7 @@ from itertools import islice
 import numpy as np
 
 from miurafab.errors import GcodeError, InputError
+from miurafab.findings import Finding
 from miurafab.gcode.execution import Jog, OffsetsChanged, Probe, Store, execute
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job, bare_code
@@ -63,15 +64,15 @@ class Resumption:
     strokes: int
 
     @property
-    def sentence(self) -> str:
-        """What will be done, for the user."""
+    def finding(self) -> Finding:
+        """Where the job goes on, and what may be burnt twice."""
         start = f"{self.job.name} goes on at stroke {self.stroke + 1} of {self.strokes}"
         if self.new_stroke <= self.stroke:
-            return f"{start} (line {self.line}); no stroke is burnt twice."
-        return (
-            f"{start} (line {self.line}); strokes {self.stroke + 1} to {self.new_stroke} may be "
-            "burnt twice."
-        )
+            twice = "no stroke is burnt twice"
+        else:
+            twice = f"strokes {self.stroke + 1} to {self.new_stroke} may be burnt twice"
+        place = f"{self.job.name}:{self.line}"
+        return Finding("resumed", f"{start} (line {self.line}); {twice}.", place)
 
 
 def resume(job: Job, machine: MachineProfile, runs: Sequence[JournalRun]) -> Resumption:

@@ -68,7 +68,8 @@ def calibrate(machine: str, material: str, directory: Path) -> Calibration:
     job = post_sections(sheet.sections, profile, patch_labels=sheet.labels)
     with job_files(directory) as staging:
         keep_profiles(machine, material, directory, staging)
-        timed = dry_run(SHEET, job, profile, (sheet.width_mm, sheet.height_mm))
+        size = (sheet.width_mm, sheet.height_mm)
+        timed = dry_run(SHEET, job, profile, size, stock.max_power)
         write_text(staging / f"{SHEET}{profile.job_suffix}", job.text)
         write_text(staging / f"{SHEET}.svg", sheet_svg(toolpath))
         guide = calibration_guide(sheet, profile, stock, directory.name or str(directory))
@@ -104,7 +105,8 @@ def calibrate(machine: str, material: str, directory: Path) -> Calibration:
         )
         digest = hashlib.sha256(coupon.encode("utf-8")).hexdigest()
         write_text(staging / LAYOUT, write_layout(layout, _COUPON, digest))
-    return Calibration(JobDirectory(directory, layout, profile, (job,), (timed,)), sheet)
+    made = JobDirectory(directory, layout, profile, stock.max_power, (job,), (timed,))
+    return Calibration(made, sheet)
 
 
 def add_material(

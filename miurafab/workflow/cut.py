@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from miurafab.gcode.job import Job
-from miurafab.profiles import MachineProfile, load_machine, load_material
+from miurafab.profiles import MachineProfile, load_machine
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 from miurafab.workflow.preview import ASSUMED_MACHINE, assumed_machine, named_machine
 
@@ -48,10 +48,7 @@ class Prepared:
     @property
     def most_power(self) -> float:
         """The material's ``max_power``, 1 where no material is known."""
-        if self.directory is None:
-            return 1.0
-        own = self.directory.path / f"{self.directory.layout.material}.toml"
-        return load_material(own if own.is_file() else self.directory.layout.material).max_power
+        return 1.0 if self.directory is None else self.directory.most_power
 
 
 def prepare(
@@ -78,7 +75,7 @@ def prepare(
         profile = job.machine if machine is None else load_machine(machine)
         dry_runs = job.dry_runs
         if machine is not None:
-            dry_runs = tuple(_dry_run(each, profile) for each in job.jobs)
+            dry_runs = tuple(_dry_run(each, profile, job.most_power) for each in job.jobs)
         return Prepared(path.resolve().name, profile, job.jobs, dry_runs, job, path)
     if path.suffix.lower() in GCODE_SUFFIXES:
         gcode = read_gcode(path)
@@ -165,6 +162,6 @@ def _from_pattern(
     )
 
 
-def _dry_run(job: Job, machine: MachineProfile) -> SheetPreview:
+def _dry_run(job: Job, machine: MachineProfile, most_power: float = 1.0) -> SheetPreview:
     bed = (machine.bed.width_mm, machine.bed.height_mm)
-    return dry_run(Path(job.name).stem, job, machine, bed)
+    return dry_run(Path(job.name).stem, job, machine, bed, most_power)

@@ -13,12 +13,12 @@ from functools import partial
 from pathlib import Path
 
 from miurafab.errors import InputError
+from miurafab.findings import Finding
 from miurafab.gcode.job import Job
 from miurafab.machine.job_process import stream_apart
 from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import Keys
-from miurafab.machine.planning import JobPlan, examine_job, plan_job
-from miurafab.machine.preflight import Finding
+from miurafab.machine.planning import JobPlan, plan_job
 from miurafab.machine.resume import resume
 from miurafab.machine.sender import Progress as StreamProgress
 from miurafab.machine.sender import StreamResult, stream_plan
@@ -35,7 +35,8 @@ from miurafab.workflow.timeline import Timeline
 class CutSheet:
     """One sheet that was cut: ``estimated_s`` before, and what the sender says after.
 
-    ``resumed`` says where a sheet that had been interrupted went on, None for one cut whole.
+    ``findings`` are those of the job and of the machine that did not stop it; one with the code
+    ``resumed`` says where an interrupted sheet went on.
     """
 
     name: str
@@ -44,7 +45,7 @@ class CutSheet:
     travel_mm: float
     estimated_s: float
     result: StreamResult
-    resumed: str | None = None
+    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +123,7 @@ def cut(
     keys: Keys | None = None,
     before_sheet: Callable[[int, int], None] | None = None,
     after_frame: Callable[[int], None] | None = None,
-    on_resume: Callable[[str], None] | None = None,
+    on_resume: Callable[[Finding], None] | None = None,
     on_progress: Callable[[SheetProgress], None] | None = None,
 ) -> tuple[CutSheet, ...]:
     """Stream the sheets of ``prepared`` (or those numbered in ``sheets``, from 1) to ``port``.
@@ -141,7 +142,7 @@ def cut(
         if before_sheet is not None:
             before_sheet(number, len(prepared.jobs))
         if plan.resumption is not None and on_resume is not None:
-            on_resume(plan.resumption.sentence)
+            on_resume(plan.resumption.finding)
         if options.frame:
             frame(prepared, number, port=port, options=replace(options, at=at))
             if after_frame is not None:
@@ -178,7 +179,11 @@ def cut_sheet(
         expected.travel_mm,
         expected.seconds,
         result,
-        None if plan.resumption is None else plan.resumption.sentence,
+        (
+            *(found for found in expected.findings if found.severity != "refusal"),
+            *result.findings,
+            *(() if plan.resumption is None else (plan.resumption.finding,)),
+        ),
     )
 
 
@@ -237,13 +242,13 @@ def plan_sheets(
             at=options.at,
             resumption=resumption,
             most_power=prepared.most_power,
-            program=prepared.dry_runs[number - 1].program,
+            judged=prepared.dry_runs[number - 1].judged,
         )
         plans.append((number, plan))
     if options.resume and not any(plan.resumption for _, plan in plans):
         raise InputError(
             f"No sheet of {prepared.name} was interrupted, by the journals beside it; leave "
-            "--resume out to cut."
+            "`resume` out to cut."
         )
     return plans
 
@@ -266,21 +271,6 @@ def frame(
     )
     plan = plan_job(box, prepared.machine, force=options.force, home=options.home, at=options.at)
     return _stream(port)(plan, port, virtual_speed=options.virtual_speed)
-
-
-def findings(prepared: Prepared, *, allow_m3: bool = False) -> list[tuple[str, Finding]]:
-    """All that speaks against starting each sheet, by the checks that need no machine."""
-    return [
-        (expected.name, finding)
-        for job, expected in zip(prepared.jobs, prepared.dry_runs, strict=True)
-        for finding in examine_job(
-            job,
-            prepared.machine,
-            allow_m3=allow_m3,
-            most_power=prepared.most_power,
-            program=expected.program,
-        )[2]
-    ]
 
 
 def _placed(

@@ -1,7 +1,6 @@
 """The dry run of one G-code file: what it would do on a machine, move by move, and for how long.
 
-Everything is computed from the text itself, not from what made it, so that the figures of a
-foreign file are worth as much as those of our own.
+All figures come from the text alone, so they hold for a foreign file as well as for our own.
 """
 
 from __future__ import annotations
@@ -14,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
+from miurafab.findings import Finding, as_json
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program, strokes
 from miurafab.gcode.reading import read_program
+from miurafab.machine.judge_job import JudgedJob, judge_program
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.profiles import OPERATIONS, MachineProfile
-from miurafab.workflow.hazards import hazards
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,8 @@ class SheetPreview:
     """One G-code file, dry-run.
 
     ``lines`` of the file; ``seconds`` in all and with the beam on; ``cut_mm`` burnt and
-    ``travel_mm`` dark; ``bounds_mm`` (x0, y0, x1, y1) of what is burnt, None if nothing is.
+    ``travel_mm`` dark; ``bounds_mm`` (x0, y0, x1, y1) of the burnt strokes, None without any;
+    ``findings`` of :func:`~miurafab.machine.judge_job.judge_job`.
     Per move of ``program``: ``layer`` (n,) int8, into :data:`LAYERS`, and ``end_seconds`` (n,)
     float64, when it ends. ``layer_mm`` and ``layer_strokes``: length and number, by layer.
     ``paper_mm`` is the sheet, or the bed where no sheet is known; ``view_mm`` (x0, y0, x1, y1) the
@@ -62,7 +63,7 @@ class SheetPreview:
     cut_mm: float
     travel_mm: float
     bounds_mm: tuple[float, float, float, float] | None
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
     program: Program
     layer: NDArray[np.int8]
     end_seconds: NDArray[np.float64]
@@ -70,6 +71,16 @@ class SheetPreview:
     layer_strokes: tuple[int, ...]
     paper_mm: tuple[float, float]
     view_mm: tuple[float, float, float, float]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The sentences of the findings."""
+        return tuple(map(str, self.findings))
+
+    @property
+    def judged(self) -> JudgedJob:
+        """What :func:`~miurafab.machine.planning.plan_job` would read again."""
+        return JudgedJob(len(self.program.line_number), self.program, self.findings)
 
     def figures(self) -> dict[str, Any]:
         """The figures as ``preview --json`` gives them."""
@@ -82,13 +93,21 @@ class SheetPreview:
             "travel_mm": round(self.travel_mm, 3),
             "bounds_mm": None if self.bounds_mm is None else list(self.bounds_mm),
             "warnings": list(self.warnings),
+            "findings": as_json(self.findings),
         }
 
 
 def dry_run(
-    name: str, job: Job, machine: MachineProfile, paper_mm: tuple[float, float]
+    name: str,
+    job: Job,
+    machine: MachineProfile,
+    paper_mm: tuple[float, float],
+    most_power: float = 1.0,
 ) -> SheetPreview:
-    """Read ``job`` back and time it on ``machine``. ``paper_mm`` is the size of its sheet.
+    """Read ``job`` back, time it on ``machine`` and judge it.
+
+    ``paper_mm`` is the size of its sheet; ``most_power`` the most that the material takes, as a
+    fraction of full power.
 
     Raises :class:`~miurafab.errors.GcodeError`, naming the line, for a program that the
     controller would refuse.
@@ -109,7 +128,7 @@ def dry_run(
         cut_mm=float(lengths[burning].sum()),
         travel_mm=float(lengths[~burning].sum()),
         bounds_mm=_box(burnt.points) if len(burnt) else None,
-        warnings=hazards(job, program, machine),
+        findings=tuple(judge_program(job, program, machine, most_power=most_power)),
         program=program,
         layer=layer,
         end_seconds=times.end,

@@ -35,7 +35,13 @@ from miurafab.profiles import (
 )
 from miurafab.workflow.drawings import drawings, read_formats
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
-from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
+from miurafab.workflow.job_files import (
+    LAYOUT,
+    job_files,
+    job_machine,
+    job_material,
+    keep_profiles,
+)
 
 GUIDE = "assembly.pdf"
 OPENED = "-opened"
@@ -45,13 +51,14 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class JobDirectory:
-    """A job on disk: its layout, its machine, and the jobs of its sheets in order, with what the
-    dry run says of each.
+    """A job on disk: its layout, its machine, the largest power of its material as a fraction of
+    full power, and the jobs of its sheets in order with their dry runs.
     """
 
     path: Path
     layout: Layout
     machine: MachineProfile
+    most_power: float
     jobs: tuple[Job, ...]
     dry_runs: tuple[SheetPreview, ...]
 
@@ -132,7 +139,7 @@ def write_job(
             job = post(toolpath, profile, stock, patch_labels=labels)
             jobs.append(job)
             size = (toolpath.width_mm, toolpath.height_mm)
-            dry_runs.append(dry_run(toolpath.sheet, job, profile, size))
+            dry_runs.append(dry_run(toolpath.sheet, job, profile, size, stock.max_power))
             write_text(staging / f"{toolpath.sheet}{profile.job_suffix}", job.text)
             write_text(staging / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
         for name, content in drawings(layout, pattern, wanted, pattern_file.stem):
@@ -152,7 +159,7 @@ def write_job(
         digest = hashlib.sha256(used.read_bytes()).hexdigest()
         write_text(staging / LAYOUT, write_layout(layout, name, digest))
     tell(1.0, "done")
-    return JobDirectory(directory, layout, profile, tuple(jobs), tuple(dry_runs))
+    return JobDirectory(directory, layout, profile, stock.max_power, tuple(jobs), tuple(dry_runs))
 
 
 def read_job(directory: Path) -> JobDirectory:
@@ -169,8 +176,8 @@ def read_job(directory: Path) -> JobDirectory:
         layout = read_layout(path.read_text(encoding="utf-8"))
     except LayoutError as fault:
         raise InputError(f"{path}: {fault}") from None
-    own = directory / f"{layout.machine}.toml"
-    machine = load_machine(own if own.is_file() else layout.machine)
+    machine = job_machine(layout.machine, directory)
+    most_power = job_material(layout.material, directory).max_power
     made = [(name, sheet) for sheet in layout.sheets for name in sheet.passes]
     jobs = []
     for name, _ in made:
@@ -179,10 +186,10 @@ def read_job(directory: Path) -> JobDirectory:
             raise InputError(f"{file} is missing; make the job again with 'miurafab sheets'.")
         jobs.append(read_gcode(file))
     dry_runs = (
-        dry_run(name, job, machine, (sheet.width_mm, sheet.height_mm))
+        dry_run(name, job, machine, (sheet.width_mm, sheet.height_mm), most_power)
         for (name, sheet), job in zip(made, jobs, strict=True)
     )
-    return JobDirectory(directory, layout, machine, tuple(jobs), tuple(dry_runs))
+    return JobDirectory(directory, layout, machine, most_power, tuple(jobs), tuple(dry_runs))
 
 
 def write_text(path: Path, text: str) -> None:

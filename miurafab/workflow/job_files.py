@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from miurafab.errors import InputError
-from miurafab.profiles import find_file
+from miurafab.profiles import MachineProfile, Material, find_file, load_machine, load_material
 from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.drawings import ENDINGS, PICTURE
 
@@ -114,6 +114,21 @@ def _put_in_place(staging: Path, directory: Path, drawn: set[str], copies: set[s
         (directory / name).unlink(missing_ok=True)
     for name in fresh:
         (staging / name).replace(directory / name)
+
+
+def job_machine(name: str, folder: Path | None) -> MachineProfile:
+    """The machine that a job names: the user's own profile beside the job, else a known one."""
+    return load_machine(_beside(name, folder))
+
+
+def job_material(name: str, folder: Path | None) -> Material:
+    """The material that a job names: the user's own beside the job, else a known one."""
+    return load_material(_beside(name, folder))
+
+
+def _beside(name: str, folder: Path | None) -> str | Path:
+    own = None if folder is None else folder / f"{name}.toml"
+    return own if own is not None and own.is_file() else name
 
 
 def keep_profiles(machine: str, material: str, directory: Path, staging: Path) -> None:

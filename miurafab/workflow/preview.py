@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError
+from miurafab.findings import Finding, as_json
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import parse_dump
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, load_machine
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
+from miurafab.workflow.job_files import job_machine, job_material
 
 ASSUMED_MACHINE = "grbl-laser-400"
 """The machine assumed for a G-code file that names none; the preview says so."""
@@ -27,14 +29,14 @@ _MACHINE = re.compile(r"^\(machine ([^()]+)\)$", re.MULTILINE)
 class Preview:
     """A whole job, dry-run on ``machine``; ``pattern`` is what its sheets fold into, if known.
 
-    ``remarks`` are sentences about the job as a whole.
+    ``findings`` are about the job as a whole; each sheet has its own.
     """
 
     name: str
     machine: MachineProfile
     sheets: tuple[SheetPreview, ...]
     pattern: CreasePattern | None
-    remarks: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
     @property
     def seconds(self) -> float:
@@ -48,7 +50,7 @@ class Preview:
             "machine": self.machine.name,
             "seconds": round(self.seconds, 3),
             "sheets": [sheet.figures() for sheet in self.sheets],
-            "remarks": list(self.remarks),
+            "findings": as_json(self.findings),
         }
 
 
@@ -75,24 +77,25 @@ def preview(
     layout = _read_layout(path / "layout.json") if path.is_dir() else None
     files = _job_files(path, layout)
     jobs = [read_gcode(file) for file in files]
-    remarks: list[str] = []
+    findings: list[Finding] = []
     if machine is None:
-        machine = _made_for(path, layout, jobs[0], remarks)
+        machine = _made_for(path, layout, jobs[0], findings)
     if settings_dump is not None:
         machine = with_settings(machine, Path(settings_dump))
     bed = (machine.bed.width_mm, machine.bed.height_mm)
     papers = {} if layout is None else layout.papers
+    most_power = 1.0 if layout is None else job_material(layout.material, path).max_power
     sheets = []
     for number, (file, job) in enumerate(zip(files, jobs, strict=True)):
         if on_progress is not None:
             on_progress(number / len(files), file.name)
-        sheets.append(dry_run(file.stem, job, machine, papers.get(file.stem, bed)))
+        sheets.append(dry_run(file.stem, job, machine, papers.get(file.stem, bed), most_power))
     return Preview(
         name=path.resolve().name,
         machine=machine,
         sheets=tuple(sheets),
-        pattern=None if layout is None else _pattern(path, layout, remarks),
-        remarks=tuple(remarks),
+        pattern=None if layout is None else _pattern(path, layout, findings),
+        findings=tuple(findings),
     )
 
 
@@ -133,6 +136,7 @@ class _Layout:
     """What the preview takes from ``layout.json``: ``papers`` are sheet sizes by name."""
 
     machine: str
+    material: str
     pattern_file: str
     pattern_sha256: str
     papers: dict[str, tuple[float, float]]
@@ -145,6 +149,7 @@ def _read_layout(path: Path) -> _Layout | None:
         layout = json.loads(path.read_text(encoding="utf-8"))
         return _Layout(
             machine=str(layout["machine"]),
+            material=str(layout["material"]),
             pattern_file=str(layout["pattern"]["file"]),
             pattern_sha256=str(layout["pattern"]["sha256"]),
             papers={
@@ -166,7 +171,7 @@ def _job_files(path: Path, layout: _Layout | None) -> list[Path]:
     if layout is None:
         files = sorted(path.glob("*.nc"))
     else:
-        suffix = _own_or_shipped(layout.machine, path).job_suffix
+        suffix = job_machine(layout.machine, path).job_suffix
         files = [path / f"{name}{suffix}" for name in layout.papers]
     if not files:
         raise InputError(f"{path} holds no G-code (*.nc); make it with 'miurafab sheets'.")
@@ -179,26 +184,27 @@ def named_machine(job: Job, folder: Path | None = None) -> MachineProfile | None
     A profile of that name in ``folder`` is a user's own, and comes before the shipped ones.
     """
     comment = _MACHINE.search(job.text)
-    return None if comment is None else _own_or_shipped(comment[1], folder)
+    return None if comment is None else job_machine(comment[1], folder)
 
 
-def _own_or_shipped(name: str, folder: Path | None) -> MachineProfile:
-    own = None if folder is None else folder / f"{name}.toml"
-    return load_machine(own if own is not None and own.is_file() else name)
-
-
-def _made_for(path: Path, layout: _Layout | None, job: Job, remarks: list[str]) -> MachineProfile:
-    """The machine that the job was made for, or the assumed one, which is then remarked upon."""
+def _made_for(
+    path: Path, layout: _Layout | None, job: Job, findings: list[Finding]
+) -> MachineProfile:
+    """The machine that the job was made for, or the assumed machine and a note."""
     folder = path if path.is_dir() else path.parent
     if layout is not None:
-        return _own_or_shipped(layout.machine, folder)
+        return job_machine(layout.machine, folder)
     named = named_machine(job, folder)
     if named is not None:
         return named
     assumed = assumed_machine(path)
-    remarks.append(
-        f"No machine is named, so times and limits hold for {assumed.name}; give --machine or "
-        "--settings for another."
+    findings.append(
+        Finding(
+            "assumed-machine",
+            f"No machine is named, so times and limits hold for {assumed.name}; give `machine` or "
+            "`settings` for another.",
+            path.name,
+        )
     )
     return assumed
 
@@ -208,7 +214,7 @@ def assumed_machine(path: Path) -> MachineProfile:
     return load_machine(_ASSUMED_CUTTER if path.suffix.lower() == ".plt" else ASSUMED_MACHINE)
 
 
-def _pattern(path: Path, layout: _Layout, remarks: list[str]) -> CreasePattern | None:
+def _pattern(path: Path, layout: _Layout, findings: list[Finding]) -> CreasePattern | None:
     """The pattern that the sheets fold into, if its file is where the layout says, unchanged."""
     for folder in (path, Path()):
         file = folder / layout.pattern_file
@@ -217,7 +223,9 @@ def _pattern(path: Path, layout: _Layout, remarks: list[str]) -> CreasePattern |
                 from miurafab.origami.formats.fold import read_fold  # slow to load, seldom needed
 
                 return read_fold(file)
-            remarks.append(f"{file} has changed since the sheets were made, so it is not shown.")
+            says = f"{file} has changed since the sheets were made, so it is not shown."
+            findings.append(Finding("pattern-changed", says, str(file)))
             return None
-    remarks.append(f"The pattern {layout.pattern_file} is not there, so its fold is not shown.")
+    says = f"The pattern {layout.pattern_file} is not there, so its fold is not shown."
+    findings.append(Finding("pattern-missing", says, layout.pattern_file))
     return None

@@ -20,7 +20,7 @@ def test_the_sheet_is_a_job_that_can_be_previewed_and_cut(run, sheet, tmp_path):
     assert seen.returncode == 0, seen.stderr
     (figures,) = json.loads(seen.stdout)["sheets"]
     assert figures["warnings"] == []
-    assert json.loads(seen.stdout)["remarks"] == []
+    assert json.loads(seen.stdout)["findings"] == []
     assert figures["seconds"] == pytest.approx(sheet["seconds"], abs=0.1)
     assert (tmp_path / "trial" / "calibration.pdf").read_bytes().startswith(b"%PDF")
     layout = json.loads((tmp_path / "trial" / "layout.json").read_text())

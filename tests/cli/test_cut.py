@@ -172,7 +172,7 @@ def test_a_dry_run_opens_no_port_and_names_what_it_refuses(run, job, tmp_path):
     (tmp_path / "bad.nc").write_text("G1 F600 X1\nM3 S1200\nG4 P1\nG1 X900\nM5\n")
     done = run("cut", "bad.nc", "--dry-run", "--json")
     assert done.returncode == 1
-    named = [finding["check"] for finding in json.loads(done.stdout)["findings"]]
+    named = [finding["code"] for finding in json.loads(done.stdout)["findings"]]
     assert named == ["m3", "bounds", "dwell", "power"]
     assert "--dry-run" in sentence(run("cut", "job", "--quiet"), 2)
 
@@ -193,8 +193,10 @@ def test_an_interrupted_sheet_is_resumed_from_its_journal(run, job):
     done = run(*arguments, "--at", "0,0", "--json")
     assert done.returncode == 0, done.stderr
     (sheet,) = json.loads(done.stdout)["sheets"]
-    assert "goes on at stroke" in sheet["resumed"]
-    assert "may be burnt twice" in sheet["resumed"]
+    (finding,) = sheet["findings"]
+    assert finding["code"] == "resumed"
+    assert "goes on at stroke" in finding["sentence"]
+    assert "may be burnt twice" in finding["sentence"]
     assert 0 < sheet["seconds"] < whole["sheets"][0]["seconds"]
 
 

@@ -1,9 +1,12 @@
 """``miurafab preview``: what it prints, what it writes, and what it says to bad input."""
 
 import json
+from pathlib import Path
 
 import pytest
 from command_line import sentence
+
+DATA = Path(__file__).parent.parent / "data" / "gcode"
 
 GCODE = """(machine grbl-laser-400)
 (operation cut)
@@ -48,9 +51,48 @@ def test_people_get_a_table_and_every_warning(run, file, tmp_path):
     done = run("preview", file, "-o", "seen")
     assert done.returncode == 0
     assert "400 mm" in done.stdout
-    assert "plate: 1 move goes outside the 400 x 400 mm bed" in done.stdout
-    assert "plate: M3 (line 5)" in done.stdout
+    assert "refusal (bounds): plate.nc, line 7 moves to X410 Y10, off the bed" in done.stdout
+    assert "refusal (m3): plate.nc, line 5 arms the laser with M3" in done.stdout
     assert (tmp_path / "seen" / "preview.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("name", "codes"), [("edge.nc", ["bounds"]), ("bad.nc", ["bounds", "power"])]
+)
+def test_a_preview_and_a_dry_run_judge_in_the_same_words(run, name, codes):
+    where = (str(DATA / name), "--machine", "grbl-laser-400")
+    seen = json.loads(run("preview", *where, "-o", "seen", "--json").stdout)["sheets"][0]
+    told = run("cut", *where, "--dry-run", "--json")
+    assert told.returncode == 1
+    answer = json.loads(told.stdout)
+    assert answer["status"] == "refused"
+    assert answer["findings"] == seen["findings"]
+    assert [finding["code"] for finding in seen["findings"]] == codes
+    assert {finding["severity"] for finding in seen["findings"]} == {"refusal"}
+    assert [finding["sentence"] for finding in seen["findings"]] == seen["warnings"]
+    # the pre-flight of a real cut, which refuses with the first of them
+    refused = sentence(run("cut", *where, "--port", "virtual", "--quiet"), 2)
+    first = seen["findings"][0]["sentence"].rstrip(".")
+    assert refused == f"miurafab: {first} (--force {codes[0]} overrides this check)."
+    # and the words that people read
+    shown = run("preview", *where, "-o", "seen").stdout + run("cut", *where, "--dry-run").stdout
+    for finding in seen["findings"]:
+        assert shown.count(f"refusal ({finding['code']}): {finding['sentence']}") == 2
+    forced = [word for code in codes for word in ("--force", code)]
+    assert (
+        json.loads(run("cut", *where, "--dry-run", *forced, "--json").stdout)["status"] == "ready"
+    )
+
+
+def test_what_cannot_be_forced_says_so(run, file):
+    for code, words in (
+        ("lines", "cannot be forced"),
+        ("rate", "is a warning and stops nothing"),
+        ("everything", "is not a check that can be forced; program, m3, bounds"),
+    ):
+        for arguments in (("--dry-run",), ("--port", "virtual")):
+            refused = run("cut", file, *arguments, "--force", code, "--quiet")
+            assert words in sentence(refused, 2)
 
 
 def test_a_dump_says_how_fast_the_machine_is(run, file, tmp_path):

@@ -39,7 +39,7 @@ CONTROLLERS = {
 
 
 def test_every_check_is_tried_here() -> None:
-    assert JOBS.keys() | CONTROLLERS.keys() == CHECKS.keys()
+    assert JOBS.keys() | CONTROLLERS.keys() == set(CHECKS)
 
 
 def attempt(name: str, force: frozenset[str]) -> FakeWire:
@@ -73,11 +73,11 @@ def test_a_check_fires_and_only_its_own_name_overrides_it(name: str) -> None:
     for force in (frozenset(), frozenset(CHECKS) - {name}):
         with pytest.raises(MiurafabError) as caught:
             attempt(name, force)
-        assert str(caught.value).endswith(f" (--force {name} overrides this check).")
+        assert str(caught.value).endswith(f" ('force' {name} overrides this check).")
         assert caught.value.exit_code == (2 if name in JOBS else 3)
     if name in ("idle", "program", "travel"):
         with pytest.raises(MiurafabError, match=r"locked|refused|ALARM|into Alarm") as caught:
             attempt(name, frozenset({name}))  # what the controller says to it then
-        assert "--force" not in str(caught.value)
+        assert "'force'" not in str(caught.value)
     else:
         assert attempt(name, frozenset({name})).device.state == "Idle"

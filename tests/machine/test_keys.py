@@ -159,7 +159,7 @@ def test_a_dwell_with_the_beam_on_is_refused(text: str, burns: bool) -> None:
     if not burns:
         plan_job(job, MACHINE, allow_m3=True)
         return
-    with pytest.raises(GcodeError, match=r"waits with the beam on at S500.*--force dwell"):
+    with pytest.raises(GcodeError, match=r"waits with the beam on at S500.*'force' dwell"):
         plan_job(job, MACHINE, allow_m3=True)
     # The virtual controller agrees: there is a standing beam.
     wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
@@ -171,7 +171,7 @@ def test_a_dwell_with_the_beam_on_is_refused(text: str, burns: bool) -> None:
 def test_more_than_the_material_takes_is_refused() -> None:
     job = Job("hot.nc", "M4 S950\nG1 X5 F600\nM5\n")
     plan_job(job, MACHINE)
-    with pytest.raises(GcodeError, match=r"S950, more than the S900 .*--force material"):
+    with pytest.raises(GcodeError, match=r"S950, more than the S900 .*'force' material"):
         plan_job(job, MACHINE, most_power=0.9)
 
 

@@ -135,15 +135,15 @@ def test_any_nest_of_squares(placed: list[tuple[int, int, int]], random: object)
     ],
 )
 def test_each_is_refused_by_its_name_and_forced_by_it(check: str, made: Job) -> None:
-    with pytest.raises(GcodeError, match=rf"pieces\.nc, line \d+ .*--force {check} ") as caught:
+    with pytest.raises(GcodeError, match=rf"pieces\.nc, line \d+ .*'force' {check} ") as caught:
         plan_job(made, MACHINE)
     assert caught.value.exit_code == 2
-    assert len(plan_job(made, MACHINE, force=frozenset({check})).remarks) == 1
-    with pytest.raises(GcodeError, match=f"--force {check} "):
+    assert len(plan_job(made, MACHINE, force=frozenset({check})).forced) == 1
+    with pytest.raises(GcodeError, match=f"'force' {check} "):
         plan_job(made, MACHINE, force=frozenset(CHECKS) - {check})
 
 
 def test_where_no_operation_is_said_nothing_is_refused() -> None:
     made = job(("", BIG), ("", HOLE))
-    assert plan_job(made, MACHINE).remarks == ()
+    assert plan_job(made, MACHINE).forced == ()
     assert islands(made) != []

@@ -116,7 +116,7 @@ def test_a_job_is_burnt_whole_and_ends_dark(tmp_path: Path) -> None:
     assert burnt(device) == WHOLE
     assert {round(s.power * 255) for s in device.beam_log} == {200}
     assert result.lines == 7 + 2 * DASHES == seen[-1].lines_total
-    assert result.remarks == ()
+    assert result.findings == ()
     assert [p.lines_acknowledged for p in seen] == sorted(p.lines_acknowledged for p in seen)
     assert (run := read_journal(journal)[-1]).ended == "done"
     assert run.taken == result.lines
@@ -199,8 +199,9 @@ def test_ctrl_c_halts_and_the_halt_is_confirmed(emergency_parser: bool) -> None:
 
 
 def test_without_an_emergency_parser_the_user_is_told() -> None:
-    (remark,) = send(dashes(2), Wire(new_device(emergency_parser=False))).remarks
-    assert "built without EMERGENCY_PARSER" in remark
+    (finding,) = send(dashes(2), Wire(new_device(emergency_parser=False))).findings
+    assert finding.code == "no-emergency-parser"
+    assert "built without EMERGENCY_PARSER" in finding.sentence
 
 
 def test_a_restart_ends_the_job() -> None:

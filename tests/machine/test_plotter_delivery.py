@@ -66,7 +66,7 @@ def test_every_stroke_is_cut_though_the_cutter_is_slower_than_the_wire(tmp_path:
     assert device.lost_bytes == 0
     assert not device.pen_down
     assert device.pen == 0
-    assert "wait until it has cut what it holds" in result.remarks[-1]
+    assert "wait until it has cut what it holds" in result.findings[-1].sentence
     run = read_journal(journal)[-1]
     assert (run.ended, run.why) == ("done", f"{result.lines} lines handed over")
     assert run.taken == run.lines == result.lines == ROWS + 3

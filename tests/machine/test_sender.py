@@ -348,13 +348,13 @@ def test_what_does_not_speak_grbl_is_told(said: bytes) -> None:
 def test_each_check_of_a_job_has_a_name_that_forces_it(text: str, name: str, sentence: str) -> None:
     with pytest.raises(GcodeError, match=sentence) as caught:
         plan_job(Job("job.nc", text), MACHINE)
-    assert f"--force {name}" in str(caught.value)
+    assert f"'force' {name}" in str(caught.value)
     plan = plan_job(Job("job.nc", text), MACHINE, force=frozenset({name}))
-    assert len(plan.remarks) == 1
+    assert len(plan.forced) == 1
 
 
 def test_m3_may_be_allowed() -> None:
-    assert plan_job(Job("a", "M3 S1\nG1X1F9\n"), MACHINE, allow_m3=True).remarks == ()
+    assert plan_job(Job("a", "M3 S1\nG1X1F9\n"), MACHINE, allow_m3=True).forced == ()
 
 
 @pytest.mark.parametrize(
@@ -372,10 +372,10 @@ def test_each_check_of_the_controller_has_a_name_that_forces_it(
     wire = FakeWire(new_device(**changes))
     with pytest.raises(ControllerError, match=sentence) as caught:
         send(job, wire)
-    assert f"--force {name}" in str(caught.value)
+    assert f"'force' {name}" in str(caught.value)
     assert b"G0X5" not in wire.bytes_written
     result = send(job, FakeWire(new_device(**changes)), force=frozenset({name}))
-    assert len(result.remarks) == 1
+    assert len(result.findings) == 1
 
 
 def test_an_unknown_name_to_force_is_refused() -> None:
@@ -470,7 +470,9 @@ def test_a_job_that_leaves_the_laser_burning_is_ended_by_a_reset() -> None:
         FakeWire(device),
         StopSignals(),
     )
-    assert result.remarks == ("The job ended with the laser armed, so the controller was reset.",)
+    (finding,) = result.findings
+    assert finding.code == "armed"
+    assert str(finding) == "The job ended with the laser armed, so the controller was reset."
     device.advance(1)
     assert not device.beam_on
 
@@ -481,7 +483,7 @@ def test_a_machine_with_homing_is_homed_first_if_asked() -> None:
     job = Job("job.nc", "G90\nG53 G0 X-5\n")
     wire = FakeWire(new_device(**homing))
     force = frozenset({"bounds", "program"})
-    with pytest.raises(ControllerError, match=r"in state Alarm, not Idle.*--force idle"):
+    with pytest.raises(ControllerError, match=r"in state Alarm, not Idle.*'force' idle"):
         send(job, wire, force=force)
     assert b"$X" not in wire.bytes_written
     assert b"$H" not in wire.bytes_written
@@ -496,7 +498,7 @@ def test_soft_limits_are_checked_from_where_the_machine_stands() -> None:
     device = new_device(s20=1, s22=1, s24=500, s25=3000)
     wire = FakeWire(device)
     job = Job("job.nc", "G0 X10\n")
-    with pytest.raises(ControllerError, match=r"past its soft limits.*--force travel"):
+    with pytest.raises(ControllerError, match=r"past its soft limits.*'force' travel"):
         deliver(plan_job(job, MACHINE, home=True), wire, StopSignals())
     assert b"G0X10" not in wire.bytes_written
     device = new_device(s20=1, s22=1, s24=500, s25=3000)

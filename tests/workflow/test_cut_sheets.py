@@ -6,9 +6,9 @@ import pytest
 from small_jobs import dashes, known_toolpath, write_nc
 
 import miurafab
-from miurafab.errors import InputError
+from miurafab.errors import GcodeError, InputError
 from miurafab.machine.journal import read_journal
-from miurafab.workflow.cut_sheets import CutOptions, findings, frame
+from miurafab.workflow.cut_sheets import CutOptions, frame
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +83,8 @@ def test_only_what_was_interrupted_or_never_begun_is_resumed(folder):
     options = CutOptions(resume=True, at=(0.0, 0.0))
     done = miurafab.cut(prepared, port="virtual", options=options)
     assert [sheet.name for sheet in done] == ["sheet-02", "sheet-03"]
-    assert done[0].resumed
-    assert done[1].resumed is None
+    assert [finding.code for finding in done[0].findings] == ["resumed"]
+    assert done[1].findings == ()
     with pytest.raises(InputError, match="was interrupted"):
         miurafab.cut(prepared, port="virtual", options=options)
 
@@ -92,9 +92,13 @@ def test_only_what_was_interrupted_or_never_begun_is_resumed(folder):
 def test_what_the_material_does_not_take_is_found(folder):
     file = folder / "sheet-01.nc"
     file.write_text(file.read_text() + "M4 S950\nG1 X9 F600\nM5\n", newline="\n")
-    found = findings(miurafab.prepare(str(folder)))
-    assert [(sheet, finding.name) for sheet, finding in found] == [("sheet-01", "material")]
-    assert "S900" in str(found[0][1].error)
+    prepared = miurafab.prepare(str(folder))
+    (finding,) = [each for sheet in prepared.dry_runs for each in sheet.findings]
+    assert (finding.code, finding.where.split(":")[0]) == ("material", "sheet-01.nc")
+    assert "S900" in finding.sentence
+    assert miurafab.preview(folder).sheets[0].findings == (finding,)
+    with pytest.raises(GcodeError, match="S900"):
+        miurafab.cut(prepared, port="virtual")
 
 
 def test_a_frame_burns_nothing(tmp_path):

@@ -16,6 +16,7 @@ from problems import regular
 from small_jobs import LASER, dashes, write_folder, write_nc
 
 from miurafab.errors import InputError
+from miurafab.findings import Finding
 from miurafab.gcode.job import Job
 from miurafab.workflow.dry_run import LAYERS, dry_run
 from miurafab.workflow.page import Slider, page_text, write_page
@@ -166,9 +167,11 @@ def test_nothing_between_flat_and_folded_unless_it_is_given():
 @pytest.mark.parametrize("name", ["</script><b>", "<!--", "a&b", '"x"', "@data@"])
 def test_no_name_breaks_out_of_its_place(name):
     sheet = dry_run(name, Job(name, "(sheet x)\nG0 X1\n"), LASER, (400, 400))
-    text = page_text(name, Preview(name, LASER, (sheet,), None, (name,)))
+    text = page_text(
+        name, Preview(name, LASER, (sheet,), None, (Finding("pattern-missing", name),))
+    )
     assert data_of(text)["sheets"][0]["name"] == name
-    assert data_of(text)["remarks"] == [name]
+    assert data_of(text)["findings"] == [name]
     tags = [tag for tag, _ in Parts(text).tags]
     assert tags.count("script") == 2
     assert "b" not in tags

@@ -63,22 +63,24 @@ CLEAN = "(operation cut)\nM5\nG21\nG90\nM4 S0\nG0 X10 Y10\nG1 X20 S500 F900\nM5\
 @pytest.mark.parametrize(
     ("before", "after", "warning"),
     [
-        ("X20", "X400.01", r"1 move goes outside the 400 x 400 mm bed, the first in line 7"),
-        ("X10 Y10", "X10 Y-2", r"2 moves go outside .* in line 6 to X 10\.000 Y -2\.000"),
-        ("S500", "S1001", r"S1001 \(line 7\) is above the machine's full power S1000"),
-        ("F900", "F6001", r"F6001 \(line 7\) is faster than the machine's largest rate"),
-        ("M4", "M3", r"M3 \(line 5\) keeps the beam burning"),
-        ("M4", "m3", r"M3 \(line 5\) keeps the beam burning"),
-        ("M4", "M03.0", r"M3 \(line 5\) keeps the beam burning"),
-        ("M5\nM2", "", r"The job ends with M4 in force"),
-        ("G1 X20 S500", "M3\nG1 X20 S500", r"M3 \(line 7\)"),
-        ("(operation cut)", "(stop!)", r"Line 1 holds '!' in a comment"),
-        ("(operation cut)", "; größer", r"Line 1 holds 'ö' in a comment"),
-        ("S500", "S0", r"The job burns nothing"),
-        ("F900", "F900." + "0" * 80, r"Line 7 has \d+ characters .* controller's 79"),
+        ("X20", "X400.01", r"line 7 moves to X400\.01 Y10, off the bed .*\(400 x 400 mm\)"),
+        ("X20", "X400.0008", r"line 7 moves to X400\.0008 Y10, off the bed"),
+        ("X10 Y10", "X10 Y-2", r"line 6 \(the first of 2\) moves to X10 Y-2, off the bed"),
+        ("S500", "S1001", r"line 7 asks for S1001, more than the 1000 that is full power"),
+        ("F900", "F6001", r"line 7 asks for F6001, above the largest rate"),
+        ("M4", "M3", r"line 5 arms the laser with M3, which keeps the beam on"),
+        ("M4", "m3", r"line 5 arms the laser with M3, which keeps the beam on"),
+        ("M4", "M03.0", r"line 5 arms the laser with M3, which keeps the beam on"),
+        ("M4", "M (x)/+0 3", r"line 5 arms the laser with M3, which keeps the beam on"),
+        ("M5\nM2", "", r"ends with M4 in force"),
+        ("G1 X20 S500", "M3\nG1 X20 S500", r"line 7 arms the laser with M3"),
+        ("(operation cut)", "(stop!)", r"line 1 holds '!' in a comment"),
+        ("(operation cut)", "; größer", r"line 1 holds 'ö' in a comment"),
+        ("S500", "S0", r"job\.nc burns nothing"),
+        ("F900", "F900." + "0" * 80, r"line 7 has \d+ characters .* controller's 79"),
     ],
 )
-def test_each_warning_is_earned(before, after, warning):
+def test_each_finding_is_earned(before, after, warning):
     assert run(CLEAN).warnings == ()
     assert before in CLEAN
     found = run(CLEAN.replace(before, after)).warnings
@@ -86,12 +88,22 @@ def test_each_warning_is_earned(before, after, warning):
     assert len(found) == 1
 
 
+def test_the_last_half_micron_of_the_bed_is_the_bed():
+    assert run(CLEAN.replace("X20", "X400.0004")).findings == ()
+    assert run(CLEAN.replace("X10 Y10", "X10 Y-0.0004")).findings == ()
+    assert [f.code for f in run(CLEAN.replace("X10 Y10", "X10 Y-0.0006")).findings] == ["bounds"]
+
+
+def codes(text, machine=LASER):
+    return [finding.code for finding in run(text, machine).findings]
+
+
 def test_a_dwell_under_a_constant_beam_burns_in_place():
     text = CLEAN.replace("M4", "M3").replace("F900\n", "F900\nG4 P0.5\nG4P1\n")
-    assert "The beam burns in place during 2 dwells, the first in line 8." in run(text).warnings
-    assert not any("in place" in warning for warning in run(text.replace("M3", "M4")).warnings)
+    assert "line 8 (the first of 2) waits with the beam on at S500" in " ".join(run(text).warnings)
+    assert "dwell" not in codes(text.replace("M3", "M4"))
     dark = text.replace("G4 P0.5\nG4P1\n", "M5\nG4 P0.5\n")
-    assert not any("in place" in warning for warning in run(dark).warnings)
+    assert "dwell" not in codes(dark)
 
 
 def test_m2_disarms_and_g40_is_no_dwell():
@@ -101,7 +113,7 @@ def test_m2_disarms_and_g40_is_no_dwell():
 
 def test_laser_mode_off_is_a_hazard_for_lasers_only():
     off = replace(LASER, settings={**LASER.settings, 32: 0.0})
-    assert any("Laser mode is off" in warning for warning in run(CLEAN, off).warnings)
+    assert codes(CLEAN, off) == ["laser-mode"]
     pen = replace(off, tool=replace(off.tool, kind="pen"))
     assert run(CLEAN.replace("M4", "M3"), pen).warnings == ()
 
@@ -130,8 +142,8 @@ def test_a_dump_wins_over_the_profile(tmp_path):
     assert seen.machine.bed.height_mm == 120
     assert seen.sheets[0].seconds > 2 * preview(path).sheets[0].seconds
     warnings = " ".join(seen.sheets[0].warnings)
-    assert "400 x 120 mm bed" in warnings
-    assert "above the machine's full power S300" in warnings
+    assert "off the bed of grbl-laser-400 (400 x 120 mm)" in warnings
+    assert "more than the 300 that is full power" in warnings
     dump.write_text("hello\n")
     with pytest.raises(ProfileError, match=r"mine\.txt"):
         with_settings(LASER, dump)
@@ -141,11 +153,12 @@ def test_a_dump_wins_over_the_profile(tmp_path):
 
 def test_the_machine_is_the_one_that_the_job_names(tmp_path):
     path = write_nc(tmp_path, known_toolpath())
-    assert preview(path).remarks == ()
+    assert preview(path).findings == ()
     path.write_text(path.read_text().replace("(machine grbl-laser-400)\n", ""))
     seen = preview(path)
     assert seen.machine == LASER
-    assert "No machine is named" in seen.remarks[0]
+    assert seen.findings[0].code == "assumed-machine"
+    assert "No machine is named" in seen.findings[0].sentence
     path.write_text("(machine mine)\n" + path.read_text())
     with pytest.raises(ProfileError, match="mine"):
         preview(path)
@@ -163,7 +176,7 @@ def test_a_job_directory_with_its_pattern(tmp_path):
     assert [sheet.name for sheet in seen.sheets] == ["sheet-01", "sheet-02"]
     assert seen.sheets[0].paper_mm == (380.0, 300.0)
     assert seen.seconds == pytest.approx(2 * seen.sheets[0].seconds)
-    assert seen.remarks == ()
+    assert seen.findings == ()
     assert seen.pattern is not None
     assert np.array_equal(seen.pattern.vertices_coords, pattern.vertices_coords)
     answer = json.loads(json.dumps(seen.as_dict()))
@@ -179,9 +192,9 @@ def test_a_pattern_that_is_not_the_same_is_not_shown(tmp_path):
     fold.write_text(fold.read_text() + "\n")
     seen = preview(folder)
     assert seen.pattern is None
-    assert "has changed" in seen.remarks[0]
+    assert "has changed" in seen.findings[0].sentence
     fold.unlink()
-    assert "is not there" in preview(folder).remarks[0]
+    assert "is not there" in preview(folder).findings[0].sentence
 
 
 def test_a_folder_of_plain_gcode_is_a_job_too(tmp_path):

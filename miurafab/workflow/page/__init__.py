@@ -122,7 +122,7 @@ def _data(
     return {
         "machine": None if preview is None else preview.machine.title,
         "facts": facts,
-        "remarks": [] if preview is None else preview.remarks,
+        "findings": [] if preview is None else [str(finding) for finding in preview.findings],
         "layers": [
             {"name": layer.title, "colour": layer.colour, "travel": layer.name == "travel"}
             for layer in LAYERS

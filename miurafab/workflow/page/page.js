@@ -1,12 +1,12 @@
 // Fill the page from its data: the figures first, so that they stand even where no drawing can.
 
-function figures({ facts, machine, remarks, sheets, made_by: maker }) {
+function figures({ facts, machine, findings, sheets, made_by: maker }) {
   byId("made-for").textContent = machine ? `Dry run for ${machine}` : "";
   byId("totals").append(...Object.entries(facts).map(([name, value]) => (
     element("div", {}, element("dt", { textContent: name }), element("dd", { textContent: value }))
   )));
   const warnings = [
-    ...remarks, ...sheets.flatMap((sheet) => sheet.warnings.map((text) => `${sheet.name}: ${text}`)),
+    ...findings, ...sheets.flatMap((sheet) => sheet.warnings),
   ];
   byId("warnings").hidden = warnings.length === 0;
   byId("warnings").firstElementChild.append(...warnings.map((text) => element("li", { textContent: text })));
