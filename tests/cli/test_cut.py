@@ -280,7 +280,7 @@ def test_a_frame_is_traced(run, job):
     assert len(json.loads(done.stdout)["bounds_mm"]) == 4
     assert json.loads(done.stdout)["ports"] == ["virtual"]
     refused = run("machine", "frame", "job", "--port", "virtual", "--pointer", "9", "--quiet")
-    assert "could burn" in sentence(refused, 2)
+    assert "it must be between 0 % and 5 %" in sentence(refused, 2)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
