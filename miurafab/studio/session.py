@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from miurafab.errors import InputError
+from miurafab.errors import InputError, spell_options
 from miurafab.studio import recipe
 from miurafab.studio.names import safe_stem, suffix_of
 from miurafab.studio.orders import FitOrder, LayoutOrder
@@ -274,7 +274,7 @@ class Bench:
 
     def _plain(self, sentence: str) -> str:
         """``sentence`` with files of the studio's own folder called by their names alone."""
-        return self._own.sub("", sentence)
+        return spell_options(self._own.sub("", sentence), lambda name: f"'{name}'")
 
     def _begin(self, do: str, name: str, **what: Any) -> None:
         number = self._number()

@@ -1,6 +1,6 @@
-"""What makes a grid of points an origami, each condition with its sparse analytic Jacobian.
+"""The conditions that make a grid of points an origami, with their sparse analytic Jacobians.
 
-Notation: x (V, 3) points; L the mean edge length, by which every residual is made dimensionless.
+Notation: x (V, 3) points; L the mean edge length. Every residual is without dimension.
 
 planarity          c_f = det(p1 - p0, p2 - p0, p3 - p0) / L^3                for each facet
 developability     c_v = a0 + a1 + a2 + a3 - 2 pi                            interior vertices
@@ -29,16 +29,15 @@ from miurafab.geometry.quads import QuadGrid
 def flat_foldability(points: Floats, grid: QuadGrid) -> Floats:
     """(I,) Kawasaki residual a0 + a2 - pi at each interior vertex, radians."""
     angles = sector_angles(points, grid.interior_vertices, grid.interior_neighbours)
-    residual: Floats = angles[:, 0] + angles[:, 2] - np.pi
-    return residual
+    return angles[:, 0] + angles[:, 2] - np.pi
 
 
 @dataclass(frozen=True, eq=False)
 class OrigamiConstraints:
-    """All conditions on one grid stacked into c(x), with Jacobian J; x is (3V,) row-major.
+    """All conditions on one grid, stacked into c(x) with Jacobian J; x is (3V,) row-major.
 
-    ``length`` is the mean edge length, held constant. ``flat_foldable`` adds the Kawasaki rows.
-    Rows: planarity of the facets, developability, then flat-foldability of the interior vertices.
+    ``length`` is the mean edge length, a constant. The rows are planarity of the facets, then
+    developability and, with ``flat_foldable``, flat-foldability of the interior vertices.
     """
 
     grid: QuadGrid
@@ -47,13 +46,13 @@ class OrigamiConstraints:
 
     @cached_property
     def places(self) -> Ints:
-        """(3V, 2) the column and row, in the grid, of the vertex that each unknown belongs to."""
+        """(3V, 2) the column and row in the grid of the vertex of each unknown."""
         vertex = np.arange(self.grid.columns * self.grid.rows, dtype=np.int64).repeat(3)
         return np.stack([vertex % self.grid.columns, vertex // self.grid.columns], axis=1)
 
     @cached_property
     def _pattern(self) -> tuple[Ints, Ints]:
-        """Column indices and row starts of J (CSR): the values are computed row by row."""
+        """Column indices and row starts of J (CSR)."""
         faces = self.grid.faces_vertices
         spokes = np.concatenate(
             [self.grid.interior_vertices[:, None], self.grid.interior_neighbours], axis=1
@@ -90,8 +89,8 @@ class OrigamiConstraints:
         p = points[self.grid.faces_vertices]
         a, b, c = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]
         bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
-        residual: Floats = np.einsum("fk,fk->f", a, bc) / self.length**3
-        gradient: Floats = np.stack([-(bc + ca + ab), bc, ca, ab], axis=1) / self.length**3
+        residual = np.einsum("fk,fk->f", a, bc) / self.length**3
+        gradient = np.stack([-(bc + ca + ab), bc, ca, ab], axis=1) / self.length**3
         return residual, gradient
 
     def _sectors(self, points: Floats) -> tuple[Floats, Floats]:

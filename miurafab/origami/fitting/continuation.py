@@ -1,7 +1,7 @@
-"""The ways to an exact sheet where projecting the seed fails: bend, refine, shake.
+"""Ways to an exact sheet where the projection of the seed fails: bend, refine, shake.
 
-Each begins with a problem that is easier (a target that is flatter, a grid that is coarser) and
-carries its solution along to the one that was asked for, projecting at every step.
+Continuation starts from an easier problem, a flatter target or a coarser grid, and carries its
+solution step by step to the problem that was asked for. Every step ends with a projection.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from miurafab.origami.tessellation import Tessellation
 from miurafab.surfaces.surface import Bent, TargetSurface
 
 COARSEST = 12
-"""Grids of more vertices than this a side can be begun coarser."""
+"""Grids with more vertices a side can start from a coarser grid."""
 BEND_STEPS = 12
 STEP_CAP = 0.25
-"""The farthest that a coordinate moves in one step, in mean edge lengths."""
+"""The largest move of a coordinate in one step, in mean edge lengths."""
 SHAKE = 0.03
-"""The standard deviation of a random attempt's coordinates, in mean edge lengths."""
+"""The standard deviation of the random moves of a coordinate, in mean edge lengths."""
 
 
 def solve(unknowns: Unknowns, x: Floats, flat_foldable: bool) -> Projection:
-    """The projection of ``x`` onto the constraints, the Kawasaki rows among them if asked for."""
+    """The projection of ``x`` onto the constraints, with the Kawasaki rows if asked for."""
     constraints = unknowns.constraints(flat_foldable)
     return project(constraints, x, unknowns.places, cap=STEP_CAP * unknowns.length)
 
@@ -37,8 +37,10 @@ def solve(unknowns: Unknowns, x: Floats, flat_foldable: bool) -> Projection:
 def bend(
     surface: TargetSurface, columns: int, rows: int, corrugation: Corrugation, level: float
 ) -> tuple[Unknowns, Projection]:
-    """From the flat sheet to the full target in equal steps; each starts from the last solution,
-    carried along in the target's own frame (tangents and normal at each vertex).
+    """From the flat sheet to the full target in equal steps.
+
+    Each step starts from the last solution, carried along in the target's own frame (tangents and
+    normal at each vertex).
     """
     uv = surface.domain.lattice(columns, rows)
     bends = np.linspace(0.0, 1.0, BEND_STEPS + 1)
@@ -60,7 +62,7 @@ def bend(
 def refine(
     surface: TargetSurface, columns: int, rows: int, corrugation: Corrugation, level: float
 ) -> tuple[Unknowns, Projection]:
-    """From a coarse sheet, solved from its seed, to twice as fine ones until the grid asked for."""
+    """From the solution on a coarse grid to grids twice as fine, until the grid asked for."""
     iterations = 0
     if min(columns, rows) > COARSEST:
         few, fewer = (max(n // 2, COARSEST // 2) + 1 for n in (columns - 1, rows - 1))
@@ -77,7 +79,7 @@ def refine(
 
 
 def shaken(start: Tessellation, seed_number: int) -> Tessellation:
-    """``start`` with every coordinate moved a little, at random by ``seed_number``."""
+    """``start`` with every coordinate moved a little at random, by the seed ``seed_number``."""
     random = np.random.default_rng(seed_number)
     amount = SHAKE * float(start.edge_lengths.mean())
     return Tessellation(start.points + random.normal(scale=amount, size=start.points.shape))

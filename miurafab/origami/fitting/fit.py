@@ -1,23 +1,21 @@
 """Fitting: from a target to a tessellation that lies on it and folds from one flat sheet.
 
-A fit is a short list of attempts in a fixed order, each a seed and a projection; the first that
-meets everything asked is the answer. The order:
+A fit tries strategies in a fixed order, each a start and a projection. The first sheet that meets
+everything asked is the answer. The order:
 
-1. on a surface of revolution, one period solved and turned about the axis;
-2. straight from the seed, with several stretches along and across the rows, each in both directions
-   of the rows, the one along which the normal turns less first;
-3. the same bent step by step from flat to the full target, carrying the solution along;
-4. the same from a coarse sheet to twice as fine ones;
-5. the seeds shaken a little at random, by the request's ``seed``.
+1. on a surface of revolution, one period is solved and turned about the axis;
+2. the seed is projected as it is, with several stretches along and across the rows, and with the
+   rows in both directions; the direction along which the normal turns less comes first;
+3. the sheet is bent step by step from flat to the full target;
+4. the sheet is refined step by step from a coarse grid;
+5. the seeds are shaken at random, by the request's ``seed``.
 
-On a mesh the sheet may then lie elsewhere: the scan smoothed more, the grid turned, and as the last
-resort a smaller part of the rectangle, each with the seeds and some of the bends. The advice says
-where it lies.
+On a mesh, seeds and bends are then tried with the scan smoothed more, with the grid turned, and
+last on a smaller part of the rectangle. The advice says where the sheet lies.
 
-Exact flat-foldability is appended to a developable solution. Where a limit is not met, and wherever
-flat-foldability is asked for, the sheet is then polished: brought as close to the target as its
-constraints and limits allow. Whatever happens, the result says what was tried and, if nothing
-served, what to change.
+Exact flat-foldability starts from the developable solution. The sheet is then polished where a
+limit is not met or flat-foldability is asked for: brought as close to the target as constraints and
+limits allow. The result says what was tried and, without a sheet, what to change.
 """
 
 from __future__ import annotations
@@ -28,10 +26,10 @@ from collections.abc import Callable
 
 from miurafab.origami.fitting.request import INTERRUPTED, Attempt, FitRequest, FitResult
 from miurafab.origami.fitting.search import coarsest
-from miurafab.origami.fitting.strategies import Candidate, plans
+from miurafab.origami.fitting.strategies import Candidate, strategies_for
 
 LAST_RESORTS = ("bent", "refined", "shaken")
-"""The ways to a sheet where the seed alone finds none."""
+"""The strategies for targets on which the seed alone finds no sheet."""
 
 __all__ = ["Attempt", "FitRequest", "FitResult", "fit"]
 
@@ -40,15 +38,14 @@ def fit(
     request: FitRequest,
     on_progress: Callable[[float, str], None] | None = None,
 ) -> FitResult:
-    """The tessellation asked for; ``on_progress`` gets a fraction and a word on what is tried.
+    """Fit a sheet to the target of ``request``.
 
-    Non-convergence is a result with advice. Ctrl-C ends the attempts: the result is then the best
-    exact sheet so far, with status ``interrupted``, and ``KeyboardInterrupt`` is raised only where
-    there is none. Raises :class:`~miurafab.errors.InputError` only for a
-    request that makes no sense.
+    ``on_progress`` gets the fraction done and a description of the strategy. A fit without a sheet
+    is a result with advice. Ctrl-C ends the attempts: the result is then the best exact sheet so
+    far, with status ``interrupted``; ``KeyboardInterrupt`` is raised only if there is none.
     """
     if request.search:
-        return coarsest(request, lambda one, attempts: _fit(one, None, attempts), on_progress)
+        return coarsest(request, lambda size, attempts: _fit(size, None, attempts), on_progress)
     return _fit(request, on_progress)
 
 
@@ -57,19 +54,19 @@ def _fit(
     on_progress: Callable[[float, str], None] | None,
     attempts: int | None = None,
 ) -> FitResult:
-    """One size, in at most ``attempts`` attempts."""
+    """The fit at one number of facets, in at most ``attempts`` attempts."""
     started = time.perf_counter()
     made: list[Attempt] = []
     best: Candidate | None = None
     interrupted = False
     try:
-        for number, plan in enumerate(itertools.islice(plans(request), attempts)):
-            if best is not None and best.settles and plan.way in LAST_RESORTS:
+        for number, strategy in enumerate(itertools.islice(strategies_for(request), attempts)):
+            if best is not None and best.settles and strategy.way in LAST_RESORTS:
                 break
             if on_progress is not None:
-                # how many attempts it takes is not known; most sheets need one or two
-                on_progress(1 - 0.9**number, plan.describe())
-            outcome = plan.run(request)
+                # the number of attempts is not known beforehand; most sheets need one or two
+                on_progress(1 - 0.9**number, strategy.describe())
+            outcome = strategy.run(request)
             if isinstance(outcome, Attempt):
                 made.append(outcome)
                 continue
@@ -94,7 +91,7 @@ def _fit(
     stopped = [INTERRUPTED] if interrupted else []
     remarks = [f"On the whole rectangle no sheet was found; this one has {place}."] if place else []
     if best.rank[1]:
-        remarks.append("The mid-surface lies far from the target; ask for more --facets.")
+        remarks.append("The mid-surface lies far from the target; ask for more `facets`.")
     return FitResult(
         status,
         " ".join((*stopped, *best.faults, *remarks)),
@@ -113,6 +110,6 @@ def _advice_when_stalled(attempts: list[Attempt]) -> str:
     residual = min(a.residual for a in attempts)
     return (
         f"No exact sheet was found in {len(attempts)} attempts (best residual {residual:.1e}): "
-        "the target bends too much for one sheet of this pattern. Ask for more --facets, raise "
-        "--zigzag and --amplitude, drop --flat-foldable, or take a smaller part of the target."
+        "the target bends too much for one sheet of this pattern. Ask for more `facets`, raise "
+        "`zigzag` and `amplitude`, drop `flat_foldable`, or take a smaller part of the target."
     )

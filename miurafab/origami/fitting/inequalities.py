@@ -1,11 +1,11 @@
-"""What a sheet must not fall below: inequalities g(x) >= 0, each with its sparse gradient.
+"""The limits of a sheet as inequalities g(x) >= 0, each with its sparse gradient.
 
     edge       |e| - s                               each edge, s the shortest allowed
     angle      alpha - low  and  high - alpha        each corner of each facet
     aspect     A |e| - |e'|                          each ordered pair of sides of one facet
     kawasaki   eps -+ (a0 + a2 - pi)                 each interior vertex
 
-Lengths are divided by the mean edge length L, so that all are of one size.
+Lengths are divided by the mean edge length L, so that all values have the same scale.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from miurafab.origami.verify import EXACT
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """The bounds on one grid; None leaves one out. x is (3V,) row-major.
+    """The bounds on one grid; None is no bound. x is (3V,) row-major.
 
     ``min_edge`` in the unit of x, ``angles`` the least and greatest sector angle in radians,
     ``aspect`` the greatest ratio of two sides of a facet, ``kawasaki`` the greatest
@@ -54,7 +54,7 @@ class Bounds:
         return any(limit is not None for limit in limits)
 
     def count(self, held: Bools) -> dict[str, int]:
-        """How many of each kind are among ``held`` (p,)."""
+        """The number of inequalities of each kind among ``held`` (p,)."""
         faces = (self.grid.columns - 1) * (self.grid.rows - 1)
         interior = (self.grid.columns - 2) * (self.grid.rows - 2)
         sizes = {
@@ -94,23 +94,24 @@ class Bounds:
 
     def _kawasaki(self, points: Floats) -> tuple[Floats, sparse.csr_array]:
         centre, ring = self.grid.interior_vertices, self.grid.interior_neighbours
-        first, rows = _angles(points, np.stack([centre, ring[:, 0], ring[:, 1]], axis=1))
-        third, others = _angles(points, np.stack([centre, ring[:, 2], ring[:, 3]], axis=1))
-        return first + third - np.pi, rows + others
+        first, by_first = _angles(points, np.stack([centre, ring[:, 0], ring[:, 1]], axis=1))
+        third, by_third = _angles(points, np.stack([centre, ring[:, 2], ring[:, 3]], axis=1))
+        return first + third - np.pi, by_first + by_third
 
     def _aspect(self, points: Floats, limit: float) -> tuple[Floats, sparse.csr_array]:
         faces = self.grid.faces_vertices
         sides = [_lengths(points, faces[:, [k, (k + 1) % 4]]) for k in range(4)]
         values, rows = [], []
-        for one, other in itertools.permutations(range(4), 2):
-            values.append((limit * sides[one][0] - sides[other][0]) / self.length)
-            rows.append((limit * sides[one][1] - sides[other][1]) / self.length)
+        for (short, by_short), (long, by_long) in itertools.permutations(sides, 2):
+            values.append((limit * short - long) / self.length)
+            rows.append((limit * by_short - by_long) / self.length)
         return np.concatenate(values), _stacked(rows)
 
 
 def limits(options: FitOptions, unknowns: Unknowns, scale: float, margin: float = 0.0) -> Bounds:
-    """The limits among ``options`` in the target's own unit, which is ``scale`` mm long, tightened
-    by the part ``margin``.
+    """The limits among ``options``, tightened by the part ``margin``.
+
+    Lengths are in the target's own unit, which is ``scale`` mm long.
     """
     tighter, looser = 1 + margin, 1 - margin
     bounded = options.min_angle is not None or options.max_angle is not None

@@ -1,10 +1,10 @@
 """Nested dissection: an elimination order that keeps the factor of a planar problem sparse.
 
-Each row of a sparse matrix touches unknowns that have places in the plane, and so covers a box. A
-straight cut between two lines of places parts the rows into those wholly on one side, those wholly
-on the other, and the few that straddle it. Numbering the straddling rows last leaves the two sides
-independent; each is cut again across its longer side. The factor of the Gram matrix of n rows then
-has O(n log n) entries and takes O(n^1.5) operations (A. George, SIAM J. Numer. Anal. 10 (1973)).
+Each row of a sparse matrix touches unknowns that have places in the plane; the row covers the box
+around them. A straight cut parts the rows into two sides and the few rows that straddle the cut.
+The straddling rows are numbered last, so the two sides are independent. Each side is cut again
+across its longer extent. The factor of the Gram matrix of n rows then has O(n log n) entries and
+takes O(n^1.5) operations (A. George, SIAM J. Numer. Anal. 10 (1973)).
 This module knows nothing of origami.
 """
 
@@ -16,7 +16,7 @@ from scipy import sparse
 from miurafab.geometry.arrays import Ints
 
 LEAF = 24
-"""Sets of at most this many rows are not cut further."""
+"""Sets of up to this many rows are not cut further."""
 
 
 def boxes_of_rows(matrix: sparse.csr_array, places: Ints) -> tuple[Ints, Ints]:
@@ -32,7 +32,7 @@ def boxes_of_rows(matrix: sparse.csr_array, places: Ints) -> tuple[Ints, Ints]:
 def nested_dissection(low: Ints, high: Ints) -> Ints:
     """(m,) the order in which to eliminate rows that cover the boxes ``low`` to ``high`` (m, 2)."""
     ordered: list[Ints] = []
-    # depth first, each separator pushed before its two sides so that it comes out after them
+    # depth first; a separator is pushed before its two sides, so that it is popped after them
     waiting: list[tuple[Ints, bool]] = [(np.arange(len(low), dtype=np.int64), False)]
     while waiting:
         rows, separator = waiting.pop()
@@ -46,7 +46,7 @@ def nested_dissection(low: Ints, high: Ints) -> Ints:
 
 
 def _cut(rows: Ints, low: Ints, high: Ints) -> tuple[Ints, Ints, Ints] | None:
-    """The rows before, after and across a cut through the middle; None if a side is empty."""
+    """The rows before, after and across the cut through the middle; None if a side is empty."""
     start, end = low.min(axis=0), high.max(axis=0)
     axis = int(np.argmax(end - start))
     middle = (start[axis] + end[axis] + 1) // 2

@@ -1,17 +1,17 @@
-"""Polishing: of all exact sheets near a solution, the one that follows the target most closely.
+"""Polishing: the exact sheet near a solution that follows the target most closely.
 
-The points m_k that are to lie on the target are the means of the facets (the middle of the sheet),
-or the vertices of the upper or of the lower rows. With f_k the nearest point of the target to m_k,
-n_k the normal there, and u = x - x0 the way from the first solution, each round minimises
+The points m_k of the sheet that follow the target are the means of the facets (the middle of the
+sheet), or the vertices of the upper or of the lower rows. With f_k the point of the target nearest
+to m_k, n_k the normal there, and u = x - x0 the displacement from the first solution, each round
+minimises
 
     1/2 sum_k (n_k . (m_k - f_k))^2  +  w/2 sum_edges |u_a - u_b|^2
 
 linearised (Gauss-Newton), over the steps that keep the constraints and held bounds to first order.
-That is a quadratic problem in the null space of J, solved by projected conjugate gradients whose
+This is a quadratic problem in the null space of J. Projected conjugate gradients solve it; the
 projection I - J^T (J J^T)^-1 J uses the solver's own factor (Gould, Hribar and Nocedal, SIAM J.
-Sci. Comput. 23 (2001), algorithm 6.2); no KKT matrix is ever formed. The solver then takes the
-sheet back onto the constraints exactly; a round that brought it no closer is taken back and tried
-again shorter.
+Sci. Comput. 23 (2001), algorithm 6.2), and no KKT matrix is formed. The solver then projects the
+sheet onto the constraints exactly. A round without gain is undone and repeated with a shorter step.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from miurafab.surfaces.surface import TargetSurface
 Follow = Literal["middle", "top", "bottom"]
 
 FAIRNESS = 1e-4
-"""w: large enough that no vertex wanders off alone, small enough not to hold the sheet back."""
+"""w: large enough to keep neighbours together, small enough to let the sheet move."""
 ROUNDS = 6
 INNER = 60
 """Conjugate gradient iterations in one round."""
 CAP = 0.25
-"""The farthest that a coordinate moves in one round, in mean edge lengths."""
+"""The largest move of a coordinate in one round, in mean edge lengths."""
 CLOSE = 0.003
 """A sheet this close to the target, in mean edge lengths, is close enough: paper is thicker."""
 ENOUGH = 0.98
@@ -51,9 +51,9 @@ ENOUGH = 0.98
 
 
 def followers(grid: QuadGrid, follow: Follow, first_row: int = 0) -> sparse.csr_array:
-    """(K, V) the matrix of weights that takes vertices to the points which follow the target.
+    """(K, V) the weights that make the points which follow the target from the vertices.
 
-    The rows of the sheet with odd index are the upper ones; the grid starts at ``first_row``.
+    Rows of the sheet with odd index are upper rows; the grid starts at row ``first_row``.
     """
     if follow == "middle":
         faces = grid.faces_vertices
@@ -67,7 +67,7 @@ def followers(grid: QuadGrid, follow: Follow, first_row: int = 0) -> sparse.csr_
 
 @dataclass(frozen=True, eq=False)
 class Polish:
-    """The sheet at the end, the solver's last word on it, and the objective before and after."""
+    """The polished sheet as the solver left it, and the objective before and after."""
 
     projection: Projection
     rounds: int
@@ -84,10 +84,9 @@ def polish(
     follow: Follow = "middle",
     bounds: Constraints | None = None,
 ) -> Polish:
-    """Bring the exact sheet ``start`` closer to ``surface``, keeping ``constraints`` exactly and
-    ``bounds``, both functions of ``unknowns``.
+    """Bring the exact sheet ``start`` closer to ``surface``, within ``constraints`` and ``bounds``.
 
-    A sheet that cannot be brought closer comes back as it was.
+    Both are functions of ``unknowns``. A sheet that cannot come closer is returned unchanged.
     """
     places, length = unknowns.places, unknowns.length
     problem = _Objective.of(start.x, surface, unknowns, follow)
@@ -124,8 +123,8 @@ def polish(
 
 @dataclass(frozen=True, eq=False)
 class _Objective:
-    """``points`` (3K, n) takes the unknowns to the points that follow the target, ``differences``
-    (3E, n) to the edges.
+    """``points`` (3K, n) makes the points that follow the target from the unknowns, and
+    ``differences`` (3E, n) the edges.
     """
 
     surface: TargetSurface
@@ -145,8 +144,8 @@ class _Objective:
         )
 
         def of_unknowns(weights: sparse.csr_array) -> sparse.csr_array:
-            each = sparse.kron(weights, np.eye(3), format="csr")
-            return sparse.csr_array(each @ unknowns.substitution)
+            coordinates = sparse.kron(weights, np.eye(3), format="csr")
+            return sparse.csr_array(coordinates @ unknowns.substitution)
 
         points = followers(grid, follow, unknowns.first_row)
         return cls(surface, of_unknowns(points), of_unknowns(ends), x.copy())
@@ -164,7 +163,7 @@ class _Objective:
         gap = np.linalg.norm(offset, axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             direction = offset / gap[:, None]
-        # a point on the surface has no such direction, and nothing to gain either
+        # a point on the surface has no such direction and needs none
         return gap, np.where(gap[:, None] > 0, direction, 0.0)
 
     def step(
@@ -194,7 +193,7 @@ class _Objective:
             jacobian = sparse.vstack([equalities, gradient[held]], format="csr")
         factor = GramFactor.of(jacobian, elimination_order(jacobian, places))
         if factor is not None and len(held):
-            # let go of the bounds that the objective moves away from by itself
+            # release the bounds that the objective moves away from
             pressing = factor.solve(jacobian @ slope)[equalities.shape[0] :] > 0
             if not pressing.all():
                 jacobian = sparse.vstack([equalities, gradient[held[pressing]]], format="csr")
@@ -216,8 +215,8 @@ class _Objective:
 def _conjugate_gradients(
     times: Callable[[Floats], Floats], onto_null_space: Callable[[Floats], Floats], right: Floats
 ) -> Floats:
-    """H d = ``right`` in the null space, to a thousandth or for ``INNER`` iterations."""
-    found = np.zeros_like(right)
+    """The solution d of H d = ``right`` in the null space, to a thousandth."""
+    solution = np.zeros_like(right)
     residual = onto_null_space(onto_null_space(right))
     direction = residual.copy()
     size = first = float(residual @ residual)
@@ -229,9 +228,9 @@ def _conjugate_gradients(
         if curvature <= 0:
             break
         length = size / curvature
-        found += length * direction
+        solution += length * direction
         residual = onto_null_space(residual - length * image)
         following = float(residual @ residual)
         direction = residual + following / size * direction
         size = following
-    return found
+    return solution

@@ -1,9 +1,9 @@
-"""Carrying a sheet to a neighbouring problem: the target bent a little more, or a finer grid.
+"""Prolongation: a sheet carried to a target that bends a little more, or to a finer grid.
 
-A vertex is written in the target's own frame at its place: its offset from the surface in terms of
-the two tangents and the normal. These coordinates hardly change when the target bends, and they are
-self-similar when the grid is refined: among vertices of one parity (i mod 2, j mod 2) they are a
-smooth function of the place, in proportion to the spacing.
+A vertex has local coordinates: its offset from the target at its parameters (u, v), in terms of the
+two tangents and the normal there. Local coordinates hardly change when the target bends. Among
+vertices of one parity (i mod 2, j mod 2) they are a smooth function of (u, v), proportional to the
+spacing of the grid, and can be interpolated.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def to_local(surface: TargetSurface, uv: Floats, points: Floats) -> Floats:
 
 
 def from_local(surface: TargetSurface, uv: Floats, local: Floats) -> Floats:
-    """(..., 3) points with the coordinates ``local``: :func:`to_local` undone."""
+    """(..., 3) points with the coordinates ``local``, the inverse of :func:`to_local`."""
     return np.asarray(surface.point(uv) + (_frame(surface, uv) @ local[..., None])[..., 0])
 
 
@@ -33,7 +33,7 @@ def _frame(surface: TargetSurface, uv: Floats) -> Floats:
 
 
 def refined(surface: TargetSurface, coarse: Tessellation, columns: int, rows: int) -> Tessellation:
-    """``coarse``, of four vertices or more a side, on a grid of ``columns`` x ``rows`` vertices."""
+    """``coarse``, of 4 vertices a side or more, interpolated to ``columns`` x ``rows`` vertices."""
     domain = surface.domain
     old_rows, old_columns = coarse.points.shape[:2]
     old, new = domain.lattice(old_columns, old_rows), domain.lattice(columns, rows)

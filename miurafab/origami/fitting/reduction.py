@@ -1,6 +1,6 @@
-"""What is solved for: the vertices of a whole sheet, or of one period of it.
+"""The unknowns of a fit: the vertices of a whole sheet, or of one period of it.
 
-Conditions are always stated on a grid of vertices. For a whole sheet that is the grid itself. A
+Conditions are stated on a grid of vertices, which for a whole sheet is the sheet's own grid. A
 sheet on a surface of revolution repeats itself after two rows, turned about the axis,
 
     X_{j+2} = R_z(2 beta) X_j,
@@ -9,8 +9,8 @@ so its unknowns are the rows 0 and 1 alone, and the grid has the four rows
 
     R^-1 X_1,  X_0,  X_1,  R X_0.
 
-A constant matrix T takes the unknowns to the grid, and J of the unknowns is J of the grid times T.
-The work does not depend on how far the pattern goes round.
+The grid is T times the unknowns, with a constant matrix T, and the Jacobian by the unknowns is that
+of the grid times T. The number of unknowns does not depend on the number of periods.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from miurafab.origami.tessellation import Tessellation
 class Unknowns:
     """The vertices of a sheet of ``columns`` x ``rows``; x (n,) is row-major.
 
-    ``turn`` is the angle 2 beta of a period, in radians, or None where the whole sheet is solved
-    for; ``length`` is the mean edge length.
+    ``turn`` is the angle 2 beta of a period in radians, or None where the unknowns are the whole
+    sheet; ``length`` is the mean edge length.
     """
 
     columns: int
@@ -53,8 +53,8 @@ class Unknowns:
 
     @cached_property
     def places(self) -> Ints:
-        """(n, 2) the column and row of the vertex that each unknown belongs to; for a period, which
-        is a chain along its columns, the column alone counts.
+        """(n, 2) the column and row of the vertex of each unknown; for a period, which is a chain
+        of columns, the row is 0.
         """
         solved = self.rows if self.turn is None else 2
         vertex = np.arange(self.columns * solved, dtype=np.int64).repeat(3)
@@ -63,7 +63,7 @@ class Unknowns:
 
     @cached_property
     def substitution(self) -> sparse.csr_array:
-        """T, (3V, n) from the unknowns to the coordinates of ``grid``."""
+        """T, (3V, n): the coordinates of ``grid`` are T times the unknowns."""
         if self.turn is None:
             return sparse.csr_array(sparse.eye_array(3 * self.columns * self.rows, format="csr"))
         one = sparse.eye_array(self.columns)
@@ -80,11 +80,11 @@ class Unknowns:
         on_grid = OrigamiConstraints(self.grid, self.length, flat_foldable)
         if self.turn is None:
             return on_grid
-        # the first row of facets repeats the last
+        # the first row of facets repeats the last row
         return self._of_unknowns(on_grid, np.arange(self.columns - 1, on_grid.count))
 
     def on_unknowns(self, on_grid: Constraints) -> Constraints:
-        """Conditions stated on ``grid`` as a function of x."""
+        """Conditions on ``grid`` as a function of x."""
         return on_grid if self.turn is None else self._of_unknowns(on_grid, None)
 
     def _of_unknowns(self, on_grid: Constraints, chosen: Ints | None) -> Constraints:

@@ -1,10 +1,10 @@
-"""Does a sheet exist that is this close to the target, with no edge shorter than that?
+"""The coarsest sheet within a largest deviation and a shortest edge.
 
-More facets bring the sheet closer and make its edges shorter, so the two limits squeeze the number
-of facets from both sides. The search makes the sheet finer by steps until both are met, then halves
-the last step until the coarsest such sheet is found; each size is tried with several corrugations
-and polished. Where no size meets both, the answer says which fails, and by how much, on the sheet
-that comes nearest.
+More facets bring the sheet closer to the target and make its edges shorter, so the two limits bound
+the number of facets from both sides. The search refines the sheet in steps until both limits are
+met, then bisects the last step for the coarsest such sheet. Each size is tried with several
+corrugations and polished. If no size meets both limits, the answer says which limit fails, and by
+how much, on the nearest sheet.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ COARSEST = 4
 FINER = 1.5
 FINEST = 160
 """Facets along the longer side of the finest sheet tried."""
-PLANS = 4
-"""How many attempts are made at each size."""
+ATTEMPTS = 4
+"""Attempts at each size."""
 
 
 def coarsest(
@@ -31,10 +31,10 @@ def coarsest(
     fit: Callable[[FitRequest, int], FitResult],
     on_progress: Callable[[float, str], None] | None = None,
 ) -> FitResult:
-    """The sheet with the fewest facets that meets every limit of ``request``, or the nearest to it.
-    ``fit`` fits one size in at most so many attempts.
+    """The sheet with the fewest facets that meets every limit of ``request``, or the nearest sheet.
 
-    ``request.columns`` and ``rows`` give only the proportion of the sheet.
+    ``fit`` fits one size in at most the given number of attempts. ``request.columns`` and ``rows``
+    give only the proportion of the sheet.
     """
     started = time.perf_counter()
     tried: dict[int, FitResult] = {}
@@ -44,7 +44,7 @@ def coarsest(
             columns, rows = _shape(request, longer)
             if on_progress is not None:
                 on_progress(1 - 0.8 ** len(tried), f"{columns}x{rows} facets")
-            tried[longer] = fit(replace(request, facets=(columns, rows)), PLANS)
+            tried[longer] = fit(replace(request, facets=(columns, rows)), ATTEMPTS)
             if tried[longer].status == "interrupted":
                 raise KeyboardInterrupt
         return tried[longer]
@@ -95,8 +95,8 @@ def _sizes() -> list[int]:
 
 
 def _shape(request: FitRequest, longer: int) -> tuple[int, int]:
-    """Columns and rows with the proportion of the request; rows stay even where they are, for a
-    ring to close.
+    """Columns and rows with the proportion of the request; an even number of rows stays even, so
+    that a ring closes.
     """
     scale = longer / max(request.columns, request.rows)
     even = request.rows % 2 == 0
@@ -105,7 +105,7 @@ def _shape(request: FitRequest, longer: int) -> tuple[int, int]:
 
 
 def _halve(trial: Callable[[int], FitResult], coarse: int, fine: int) -> FitResult:
-    """The result at the least size over ``coarse``, which fails, up to ``fine``, which does not."""
+    """The result at the least size over ``coarse``, which fails, up to ``fine``, which holds."""
     while fine - coarse > 2:
         middle = 2 * round((coarse + fine) / 4)
         if trial(middle).status == "converged":
@@ -116,7 +116,7 @@ def _halve(trial: Callable[[int], FitResult], coarse: int, fine: int) -> FitResu
 
 
 def _too_fine(request: FitRequest, result: FitResult) -> bool:
-    """Whether even the mean edge is too short, so that finer sheets are pointless."""
+    """Whether the mean edge is too short, so that finer sheets cannot succeed."""
     if result.pattern is None or request.min_edge_mm is None:
         return False
     lengths = edge_lengths(result.pattern.vertices_coords, result.pattern.edges_vertices)
@@ -128,7 +128,7 @@ def _deviation(result: FitResult) -> float:
 
 
 def _miss(request: FitRequest) -> Callable[[FitResult], tuple[bool, float]]:
-    """By what factor a result misses its limits at worst; results that cross themselves last."""
+    """The order of results: those without self-crossings first, then by the factor over a limit."""
 
     def miss(result: FitResult) -> tuple[bool, float]:
         m = result.measurements
@@ -169,5 +169,5 @@ def _why(request: FitRequest, results: list[FitResult], best: FitResult) -> str:
             f"facets) is {longest.measurements.min_edge_mm:.3g} mm, "
             f"{edge - longest.measurements.min_edge_mm:.3g} mm under the {edge:.3g} mm asked for"
         )
-    found = "; ".join(parts) or best.advice
-    return f"No sheet meets both limits: {found}. Loosen one of them, or enlarge --size."
+    nearest_sheets = "; ".join(parts) or best.advice
+    return f"No sheet meets both limits: {nearest_sheets}. Loosen one of them, or enlarge `size`."

@@ -1,18 +1,18 @@
-"""The first guess: a Miura corrugation laid on the target, good enough that projection converges.
+"""The seed: a Miura corrugation on the target, near enough to an exact sheet for projection.
 
 Symbols (grid index i along the rows, spacing S; j across, spacing L; H height, V zig-zag):
 
     sigma = H / L,   tau = V / S
     lambda_j^2 = 1 + sigma^2,   lambda_i^2 = 1 + tau^2 sigma^2 / (1 + sigma^2)
 
-are the stretches from the surface to the flat paper. Paper is flat, so lambda_i S and lambda_j L
-are those of a rectangle, or of a fan where the spacing grows to one side: one of them is constant
-over the sheet and the other A (1 + k n), n the grid index across it and k fitted to the spacing
-(constant speed along geodesics from one point: the plane in polar coordinates, flat for every k).
-A is as small as lambda >= c allows.
+are the stretches from the surface to the flat paper. Because paper is flat, lambda_i S and
+lambda_j L are those of a rectangle, or of a fan where the spacing grows to one side. One of them is
+constant over the sheet, the other is A (1 + k n), with n the grid index across and k fitted to the
+spacing (the plane in polar coordinates, which is flat for every k). A is the least value with
+lambda >= c.
 
-Curvature kappa_i along the rows cannot be absorbed within a cell; the upper layer slides over the
-lower one instead, by the angle psi,
+A cell cannot absorb the curvature kappa_i along the rows. Instead the upper layer slides over the
+lower layer by the angle psi,
 
     d(tan psi) / ds = kappa_i lambda_i^2 / (lambda_i^2 - 1),
 
@@ -20,7 +20,7 @@ integrated along i and centred. The vertices are then
 
     X = P(u, v + (i mod 2 - 1/2) V) + (j mod 2 - 1/2) H (N + t tan psi).
 
-The choice of metric and ramp decides whether projection converges; both are this project's own.
+Metric and ramp decide whether the projection converges; both are this project's own.
 """
 
 from __future__ import annotations
@@ -68,11 +68,11 @@ def seed(
     corrugation: Corrugation,
     level: float = 0.0,
 ) -> tuple[Tessellation, float]:
-    """The corrugation on ``surface`` with ``columns`` x ``rows`` vertices, half of them above it
-    and half below; ``level`` lifts the sheet by that part of its height.
+    """The corrugation on ``surface`` with ``columns`` x ``rows`` vertices, half above and half
+    below it; ``level`` lifts the sheet by that part of its height.
 
-    Returns it with the largest |tan psi| that the ramp asked for before it was clipped at
-    tan(60 degrees): above that, the target bends too much along its rows for one sheet.
+    Also returns the largest |tan psi| before the ramp is clipped at tan(60 degrees). A larger value
+    means that the target bends too much along the rows for one sheet.
     """
     domain = surface.domain
     uv = domain.lattice(columns, rows)
@@ -81,7 +81,7 @@ def seed(
     speed_v = np.linalg.norm(across, axis=-1)
     t = unit(along)
     spacing_i = np.linalg.norm(along, axis=-1) * du
-    # the distance between rows, not between neighbours: the parameter lines may be oblique
+    # the distance between rows, not between neighbours: parameter lines may be oblique
     oblique = np.einsum("...k,...k->...", across, t)
     spacing_j = np.sqrt(np.maximum(speed_v**2 - oblique**2, 1e-12 * speed_v**2)) * dv
     fan_i, fan_j = _fans(spacing_i, spacing_j)
@@ -107,10 +107,9 @@ def seed(
 
 
 def _fans(spacing_i: Floats, spacing_j: Floats) -> tuple[Floats, Floats]:
-    """The shapes that lambda_i S and lambda_j L take, each (rows, columns) with mean one.
+    """The shapes of lambda_i S and lambda_j L over the sheet, each (rows, columns) with mean one.
 
-    Only one of them may vary, or the paper would not be flat: the one whose linear trend matters
-    more.
+    Only one of them may vary, for flat paper: the one with the larger linear trend.
     """
     fan_i, trend_i = _trend(spacing_i.mean(axis=1))
     fan_j, trend_j = _trend(spacing_j.mean(axis=0))
@@ -121,8 +120,8 @@ def _fans(spacing_i: Floats, spacing_j: Floats) -> tuple[Floats, Floats]:
 
 
 def _trend(spacing: Floats) -> tuple[Floats, float]:
-    """The straight line nearest to ``spacing`` (n,), over its mean, and its rise from end to end,
-    kept under that from 1/4 to 7/4.
+    """The line fitted to ``spacing`` (n,), over its mean, and its rise from end to end, which is
+    limited to that from 1/4 to 7/4.
     """
     n = np.linspace(-1.0, 1.0, len(spacing))
     slope = float(n @ spacing / (n @ n)) / float(spacing.mean())

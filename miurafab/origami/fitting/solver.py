@@ -1,17 +1,17 @@
-"""Projection onto a constraint manifold: the nearest point, to first order, step by step.
+"""Projection onto a constraint manifold: to first order the nearest point, step by step.
 
 Given c(x) = 0 and its sparse Jacobian J, one step is the least-norm Gauss-Newton correction
 
     (J J^T + eps D) mu = c,   dx = -J^T mu,   D = diag(J J^T)
 
-shortened where a coordinate would move by more than ``cap``. J J^T is symmetric, positive definite
-up to redundant constraints (for which eps is there), and a fifth of the size of the KKT system.
+shortened if a coordinate would move by more than ``cap``. J J^T is symmetric, positive definite up
+to redundant constraints (which eps is for), and a fifth of the size of the KKT system.
 
-Inequalities g(x) >= 0 join by an active set: a row that is violated is held at zero from then on,
-until its multiplier says that the others keep it satisfied.
+Inequalities g(x) >= 0 join by an active set: a violated row is held at zero until its multiplier
+shows that the other rows keep it satisfied.
 
-The rows are eliminated in nested dissection order, found once for each sparsity pattern. Near the
-end J hardly changes any more, so conjugate gradients on the last factor replace a new one.
+The rows are eliminated in nested dissection order, computed once for each sparsity pattern. Near
+the end J hardly changes, so conjugate gradients on the last factor replace a new factor.
 This module knows nothing of origami.
 """
 
@@ -32,16 +32,16 @@ Constraints = Callable[[Floats], tuple[Floats, sparse.csr_array]]
 
 REGULARISATION = 1e-12
 SMALL_STEP = 0.02
-"""After a step under this part of ``cap`` the last factor is tried again."""
+"""After a step shorter than this part of ``cap`` the last factor is used again."""
 REFINEMENTS = 8
-"""Conjugate gradients that cost more iterations than this are dearer than a new factor."""
+"""More conjugate gradient iterations than this cost more than a new factor."""
 
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Where a projection ended: ``x`` (n,), the largest residual there, and how it went.
+    """The last point ``x`` (n,) of a projection, the largest residual there, and the outcome.
 
-    ``active`` (p,) tells which inequalities are held at their bound there.
+    ``active`` (p,) marks the inequalities that are held at their bound.
     """
 
     x: Floats
@@ -54,14 +54,14 @@ class Projection:
 
 @dataclass(frozen=True, eq=False)
 class GramFactor:
-    """A factor of J J^T with its rows in the elimination order ``order`` (m,)."""
+    """A factor of J J^T, whose rows are eliminated in the ``order`` (m,)."""
 
     order: Ints
     factor: Factor
 
     @classmethod
     def of(cls, jacobian: sparse.csr_array, order: Ints) -> GramFactor | None:
-        """None where the matrix is singular to the last digit."""
+        """The factor, or None where the matrix is singular to the last digit."""
         ordered = jacobian[order]
         gram = (ordered @ ordered.T.tocsr()).tocsc()
         gram.setdiag(gram.diagonal() * (1 + REGULARISATION) + 1e-300)
@@ -78,7 +78,7 @@ class GramFactor:
         return solution
 
     def refine(self, jacobian: sparse.csr_array, right: Floats) -> Floats | None:
-        """The same for a slightly different ``jacobian``, or None if that is not quick."""
+        """The solution for a slightly different ``jacobian``; None if that takes too long."""
         size = (len(right), len(right))
         transposed = jacobian.T.tocsr()
         gram = LinearOperator(size, matvec=lambda y: jacobian @ (transposed @ y), dtype=right.dtype)
@@ -88,7 +88,7 @@ class GramFactor:
 
 
 def elimination_order(jacobian: sparse.csr_array, places: Ints) -> Ints:
-    """(m,) nested dissection of the rows of ``jacobian``; ``places`` (n, 2) of its columns."""
+    """(m,) the nested dissection order of the rows; the columns have the ``places`` (n, 2)."""
     return nested_dissection(*boxes_of_rows(jacobian, places))
 
 
@@ -104,9 +104,8 @@ def project(
 ) -> Projection:
     """Move ``x`` onto c(x) = 0, g(x) >= 0 until max|c| and max(-g) are at most ``tolerance``.
 
-    ``places`` (n, 2) are whole-number places of the unknowns in the plane, for the ordering; no
-    coordinate moves by over ``cap`` a step. Failure is a result: ``reason`` then says whether the
-    residual stalled, grew without bound, or the iterations ran out.
+    ``places`` (n, 2) are whole-number places of the unknowns in the plane, for the ordering. No
+    coordinate moves by more than ``cap`` in a step. Failure is a result: ``reason`` says why.
     """
     state = _Rows.at(constraints, inequalities, x, None)
     residual, best, since_best = state.residual, state.residual, 0
@@ -121,7 +120,7 @@ def project(
         values, jacobian = state.values, state.jacobian
         if residual <= tolerance:
             if factor is not None and len(factor.order) == len(values):
-                # one more step on the last factor takes the residual down to rounding
+                # one more step with the last factor lowers the residual to rounding
                 trial = x - jacobian.T @ factor.solve(values)
                 following = _Rows.at(constraints, inequalities, trial, state.held)
                 if following.residual < residual:
@@ -156,8 +155,9 @@ def project(
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """The equalities and the inequalities ``held`` (p,) at one point, stacked; ``residual`` counts
-    an inequality only as far as it is violated.
+    """The equalities and the inequalities ``held`` (p,) at one point, stacked.
+
+    ``residual`` counts an inequality only as far as it is violated.
     """
 
     values: Floats
@@ -190,7 +190,7 @@ class _Rows:
         )
 
     def kept(self, mu: Floats) -> Bools | None:
-        """The held inequalities that the step presses against (mu < 0), to be held further on."""
+        """The held inequalities that the step presses against (mu <= 0): they stay held."""
         if not len(self.held):
             return None
         kept = self.held.copy()

@@ -1,9 +1,9 @@
-"""The attempts of a fit: where the rows run, how strong the corrugation, and what is solved.
+"""The strategies of a fit: direction of the rows, strength of the corrugation, start of the solver.
 
-A plan is one way from the target to an exact sheet: a start (a closed form, a seed on the target,
-one period of a revolution, a seed bent step by step), the projection onto the constraints, then
-flat-foldability if asked for, then polishing where a limit calls for it. What comes of it is a
-candidate with its faults, or a bare record of the attempt.
+A strategy is one way from the target to an exact sheet: a start (a closed form, a seed on the
+target, one period of a revolution, or continuation), the projection onto the constraints, then
+flat-foldability if asked for, then polishing where a limit needs it. It ends in a candidate with
+its faults, or, without an exact sheet, in a record of the attempt.
 """
 
 from __future__ import annotations
@@ -34,31 +34,32 @@ from miurafab.surfaces.mesh import MeshSurface
 from miurafab.surfaces.surface import Swapped, TargetSurface
 
 STRETCHES = ((1.3, 1.3), (1.15, 1.6), (1.6, 1.3), (1.3, 1.6), (2.0, 1.3), (2.6, 1.3), (1.15, 2.0))
-"""The stretches along and across the rows that are tried in turn. Strong curvature along the rows
-wants more of the first, strong twist less of the first and more of the second.
+"""The stretches along and across the rows, in the order in which they are tried. Strong curvature
+along the rows needs more stretch along them; strong twist needs less along and more across.
 """
 MESH_BENDS = 3
 SEEDS_ELSEWHERE = 4
 BENDS_ELSEWHERE = 2
-"""How many of those stretches are tried on meshes, first as they lie, then laid elsewhere: enough
-to find a sheet where there is one, and an answer within a minute where there is none.
+"""How many of the stretches are tried on meshes: bends on the first placement, seeds and bends on
+the others. Enough to find most sheets, and few enough for an answer within a minute.
 """
 FAR = 0.02
-"""A mid-surface farther from the target than this part of the diagonal makes the search go on."""
+"""The search goes on while the mid-surface is farther from the target than this part of the
+diagonal of the sheet."""
 SCALINGS = 4
-"""How often a sheet is polished again because its scale has changed."""
+"""The most rounds of polishing, each at the scale that the last round left."""
 BOUND_MARGIN = 2e-3
-"""Limits are tightened by this part while polishing, since the scale of the sheet still changes."""
+"""Polishing tightens the limits by this part, since the scale of the sheet still changes."""
 KEPT_EDGE = 0.4
-"""Without a shortest edge asked for, polishing leaves every edge this part of what was shortest."""
+"""Polishing keeps every edge above this part of the shortest edge before it, unless `min_edge` is
+given."""
 LEVELS: Mapping[Follow, float] = {"middle": 0.0, "top": -0.5, "bottom": 0.5}
-"""How far the sheet is lifted off the middle for the target to be followed, in parts of its height.
-"""
+"""How far the seed is lifted off the target, in parts of the height of the corrugation."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A tessellation that some attempt produced, in the target's own unit."""
+    """An exact sheet, measured, with the ``faults`` that keep it from being the answer."""
 
     attempt: Attempt
     pattern: CreasePattern
@@ -70,8 +71,8 @@ class Candidate:
 
     @property
     def settles(self) -> bool:
-        """Whether this is a sheet whose only faults are limits, which other ways from the same
-        target will not meet either.
+        """Whether the only faults of this sheet are limits. Other strategies for the same target
+        will not meet them either.
         """
         m = self.measurements
         inexact = max(m.max_planarity or 0.0, m.max_developability or 0.0, m.max_isometry or 0.0)
@@ -79,7 +80,7 @@ class Candidate:
 
     @property
     def rank(self) -> tuple[int, bool]:
-        """The smaller the better: the number of faults, then whether it strays from the target."""
+        """The number of faults, then whether the sheet is far from the target; less is better."""
         assert self.pattern.folded_coords is not None
         extent = np.ptp(self.pattern.folded_coords, axis=0)
         off = min(self.measurements.hausdorff_midsurface_mm or 0.0, self.deviation_mm)
@@ -88,12 +89,20 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Strategy:
+    """One way to a sheet on ``surface``, whose rows run along the request's u or v.
+
+    ``way`` is ``direct``, ``strip``, ``seed``, ``bent``, ``refined`` or ``shaken``. ``place`` and
+    ``layout`` say where on a mesh the sheet lies, if not on the first placement. ``ring`` says that
+    the sheet goes all round an axis and has to stay closed.
+    """
+
     way: str
     surface: TargetSurface
     rows_along: str
     corrugation: Corrugation
     place: str = ""
     layout: dict[str, Any] = field(default_factory=dict)
+    ring: bool = False
 
     def describe(self) -> str:
         how = {
@@ -108,15 +117,13 @@ class Strategy:
         return f"{how[self.way]}, rows along {self.rows_along}{place}"
 
     def run(self, request: FitRequest) -> Candidate | Attempt:
-        """The sheet that this plan leads to, or, where it leads to none, what came of it."""
+        """The sheet of this strategy, or the record of the attempt if there is none."""
         unknowns, solution = self._developable(request)
         iterations = solution.iterations
-        crooked = solution.converged and _worst_kawasaki(unknowns.sheet(solution.x)) > EXACT
-        if request.exactly_flat_foldable and crooked:
-            if unknowns.turn is not None and not (
-                isinstance(self.surface, Revolution) and self.surface.closed
-            ):
-                # a period repeated leaves an open sheet fewer freedoms than it has
+        off = solution.converged and _worst_kawasaki(unknowns.sheet(solution.x)) > EXACT
+        if request.exactly_flat_foldable and off:
+            if unknowns.turn is not None and not self.ring:
+                # an open sheet has more freedom than its repeated period
                 whole = unknowns.sheet(solution.x)
                 solution = replace(solution, x=whole.vertices.ravel())
                 unknowns = Unknowns(unknowns.columns, unknowns.rows, unknowns.length)
@@ -139,27 +146,28 @@ class Strategy:
         if request.is_tube:
             return plain  # polishing would open the seam
         if plain.measurements.overlaps:
-            return plain  # so far from a sheet that polishing it is lost work
+            return plain  # polishing does not mend an overlap
         closer = self._polished(request, unknowns, solution, plain)
         if (closer.rank, closer.deviation_mm) < (plain.rank, plain.deviation_mm):
             return closer
         return plain
 
     def _follow(self, request: FitRequest) -> Follow:
-        """What follows the target in this orientation: the normal turns over with the swap."""
+        """The side that follows the target; with u and v swapped, top and bottom change places."""
         turned: dict[Follow, Follow] = {"middle": "middle", "top": "bottom", "bottom": "top"}
         return request.follow if self.rows_along == "u" else turned[request.follow]
 
     def _developable(self, request: FitRequest) -> tuple[Unknowns, Projection]:
+        """The developable sheet of this strategy, before flat-foldability and polishing."""
         columns, rows = request.columns + 1, request.rows + 1
         level = LEVELS[self._follow(request)]
         if self.way == "direct":
             assert isinstance(self.surface, GeneralizedCylinder)
             c = self.corrugation
             sheet = cylinder_on(self.surface, columns, rows, c.amplitude, c.zigzag, level)
-            nothing = np.zeros(0, dtype=bool)
+            no_bounds = np.zeros(0, dtype=bool)
             unknowns = Unknowns(columns, rows, float(sheet.edge_lengths.mean()))
-            return unknowns, Projection(sheet.vertices.ravel(), 0.0, 0, True, "exact", nothing)
+            return unknowns, Projection(sheet.vertices.ravel(), 0.0, 0, True, "exact", no_bounds)
         if self.way == "bent":
             return bend(self.surface, columns, rows, self.corrugation, level)
         if self.way == "refined":
@@ -177,9 +185,9 @@ class Strategy:
     def _polished(
         self, request: FitRequest, unknowns: Unknowns, solution: Projection, plain: Candidate
     ) -> Candidate:
-        """The sheet ``solution`` brought within the limits and as close to the target as it goes;
-        ``plain`` where that fails. Limits in mm move with the scale, which follows from the sheet:
-        hence the repetition.
+        """The sheet ``solution``, projected into the limits and polished; ``plain`` if that fails.
+
+        Limits in mm depend on the scale, and the scale on the sheet: so the rounds are repeated.
         """
         constraints = unknowns.constraints(request.exactly_flat_foldable)
         found, first, least = plain, solution, request.min_edge_mm
@@ -247,8 +255,8 @@ class Strategy:
         return Candidate(attempt, pattern, measured, faults, deviation)
 
 
-def plans(request: FitRequest) -> Iterator[Strategy]:
-    """The attempts in the order in which they are made, the likeliest first."""
+def strategies_for(request: FitRequest) -> Iterator[Strategy]:
+    """The strategies in the order in which they are tried, the likeliest first."""
     corrugations = _corrugations(request)
     if isinstance(request.surface, GeneralizedCylinder):
         for corrugation in corrugations:
@@ -260,9 +268,9 @@ def plans(request: FitRequest) -> Iterator[Strategy]:
     oriented = _oriented(request.surface)
     if isinstance(request.surface, Revolution):
         for corrugation in corrugations:
-            yield Strategy("strip", request.surface, "u", corrugation)
+            yield Strategy("strip", request.surface, "u", corrugation, ring=request.surface.closed)
         if request.surface.closed:
-            return  # any other way would open the seam
+            return  # any other strategy would open the seam
     fine = min(request.columns, request.rows) >= COARSEST
     for way in ("seed", "bent", *(("refined",) if fine else ()), "shaken"):
         for corrugation in corrugations:
@@ -277,9 +285,7 @@ def _oriented(surface: TargetSurface) -> list[tuple[TargetSurface, str]]:
 
 
 def _on_mesh(surface: MeshSurface, corrugations: list[Corrugation]) -> Iterator[Strategy]:
-    """Seeds and bends on the mesh as it lies, then with the sheet laid elsewhere on it; each
-    layout is made when it is needed.
-    """
+    """Seeds and bends on the first placement, then on the others, which are computed on demand."""
     seeds, bends = len(corrugations), MESH_BENDS
     for place, laid in itertools.chain([("", surface)], surface.alternatives()):
         oriented = _oriented(laid)
@@ -328,8 +334,10 @@ def _worst_kawasaki(sheet: Tessellation) -> float:
 
 
 def _deviation(sheet: Tessellation, surface: TargetSurface, follow: Follow) -> float:
-    """How far the surface that follows the target lies from it at most: its points, the middles of
-    neighbours and of each four, so that a few points on the target do not pass for a close sheet.
+    """The largest distance from the target of the surface that follows it.
+
+    Besides its points it is measured between neighbours and between each four points, so that a few
+    points on the target do not count as a close sheet.
     """
     points = (followers(sheet.grid, follow) @ sheet.vertices).reshape(
         -1, sheet.grid.columns - (follow == "middle"), 3
@@ -349,8 +357,8 @@ def _faults(
     unmeasured: Bounds,
     sheet: Tessellation,
 ) -> Iterator[str]:
-    """What keeps this sheet from being the answer, one sentence of advice each; ``unmeasured``
-    are the limits that the measurements do not show.
+    """The faults of this sheet, a sentence of advice each; ``unmeasured`` are the limits that
+    ``measured`` does not contain.
     """
     residual = max(
         measured.max_planarity or 0.0,
@@ -358,26 +366,26 @@ def _faults(
         measured.max_isometry or 0.0,
     )
     if residual > EXACT:
-        yield f"A residual of {residual:.1e} is left; ask for fewer --facets."
+        yield f"A residual of {residual:.1e} is left; ask for fewer `facets`."
     if measured.self_intersections:
         yield (
             f"{measured.self_intersections} pairs of facets pass through each other; ask for more "
-            "--facets, lower --zigzag or --amplitude, or take a smaller part of the target."
+            "`facets`, lower `zigzag` or `amplitude`, or take a smaller part of the target."
         )
     if measured.overlaps:
-        yield f"{measured.overlaps} pairs of facets overlap in the flat pattern; lower --zigzag."
+        yield f"{measured.overlaps} pairs of facets overlap in the flat pattern; lower `zigzag`."
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
     wanted = request.min_edge_mm or DEGENERATE * mean
     if measured.min_edge_mm < wanted:
         yield (
             f"The shortest edge is {measured.min_edge_mm:.3g} mm, under the {wanted:.3g} mm asked "
-            "for; ask for fewer --facets or a larger --size."
+            "for; ask for fewer `facets` or a larger `size`."
         )
     if request.max_deviation_mm is not None and deviation > request.max_deviation_mm:
         what = "mid-surface" if request.follow == "middle" else request.follow
         yield (
             f"The {what} lies up to {deviation:.3g} mm from the target, over the "
-            f"{request.max_deviation_mm:.3g} mm allowed; ask for more --facets."
+            f"{request.max_deviation_mm:.3g} mm allowed; ask for more `facets`."
         )
     if unmeasured.any:
         broken = unmeasured(sheet.vertices.ravel())[0] < -1e-9
@@ -385,7 +393,7 @@ def _faults(
             if number:
                 yield (
                     f"{number} facet corners or sides break the {kind} limit; loosen it, or ask "
-                    "for other --facets, --amplitude or --zigzag."
+                    "for other `facets`, `amplitude` or `zigzag`."
                 )
     asked = request.flat_foldable
     if asked is not None and (measured.max_flat_foldability or 0.0) > max(asked, EXACT):
