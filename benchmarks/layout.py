@@ -6,10 +6,9 @@ Both patterns lie on beds of 600 x 400 mm with a margin of 5 mm: a curved fan wi
 11 mm and a regular Miura-ori with facets of about 10 mm, in card with tabs of 7 mm.
 
 The bound of the patches is the area of the pattern over that of the usable bed, without tabs. The
-bound of the travel between dashes is that of miurafab/fabrication/travel.py: no order of the dashes
-can do with less. Times are of the processor, so that other work on the machine does not count;
-vpype's are by the clock. With vpype installed, its linesort is given the dashes of as many sheets
-as hold --vpype of them.
+bound of the travel between dashes is that of benchmarks/travel_bound.py. Times are processor times,
+so that other work on the machine does not count; vpype's are by the clock. With vpype installed,
+its linesort is given the dashes of as many sheets as hold --vpype dashes.
 
 ``dashes`` is a case for the order alone, a Miura-ori of 1,984 creases with some 20,000 dashes: the
 travel between creases against the least matching of their odd ends, and the travel between dashes
@@ -33,6 +32,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from travel_bound import only, path_bound
 
 from miurafab.fabrication import sheets
 from miurafab.fabrication.drawing.dxf import sheet_dxf
@@ -40,7 +40,6 @@ from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
 from miurafab.fabrication.route.postman import find_route
 from miurafab.fabrication.toolpath import Toolpath
-from miurafab.fabrication.travel import only, path_bound
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import OPERATIONS, load_machine, load_material

@@ -1,13 +1,11 @@
-"""How many sheets each nesting engine takes, and how well it fills them.
+"""The number of sheets that the nesting takes, and how well it fills them.
 
-    python benchmarks/nesting.py [raster rectpack ...] [--seconds 10 15] [--json FILE]
+    python benchmarks/nesting.py [--json FILE]
 
-Zig-zag patches of many sizes, with a rim of 3 mm as of tabs, on beds of 600 x 400 mm, 2 mm apart,
-at quarter turns: 40 patches with an area of 3.85 beds, and 200 small ones with 5.02. Every layout
-is proven with exact geometry before it is counted. The column `reach` counts a sheet that is not
-filled by the share of it that its patches reach into; `filled` is the area of the patches over that
-of the sheets. Seconds are by the clock, an outside engine's with the start of its process. Engines
-that are not installed are left out.
+Zig-zag patches of many sizes, with a rim of 3 mm for tabs, on beds of 600 x 400 mm, 2 mm apart, at
+quarter turns: 40 patches with an area of 3.85 beds, and 200 small patches with 5.02. `reach` counts
+the least filled sheet by the share of it that its patches reach into; `filled` is the area of the
+patches over the area of the sheets. Seconds are by the clock.
 """
 
 from __future__ import annotations
@@ -21,16 +19,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from miurafab.fabrication.nesting import (
-    ENGINES,
-    Nesting,
-    Problem,
-    SheetKind,
-    Stock,
-    nest,
-    place,
-)
-from miurafab.fabrication.nesting.outside import OUTSIDE, installed
+from miurafab.fabrication.nesting import Nesting, Problem, SheetKind, Stock, nest, place
 
 BED = SheetKind(600.0, 400.0, (0, 90, 180, 270))
 GAP = 2.0
@@ -64,59 +53,49 @@ def patches(count: int, beds: float) -> tuple[np.ndarray, ...]:
     return tuple(outline * scale for outline in outlines)
 
 
-def measure(engine: str, case: str, seconds: float) -> dict[str, Any]:
-    """One engine on one case."""
+def measure(case: str) -> dict[str, Any]:
+    """The sheets and the time of one case."""
     outlines = patches(*CASES[case])
     names = tuple(f"P{number + 1}" for number in range(len(outlines)))
-    problem = Problem(outlines, names, Stock((BED,), GAP), seconds)
+    problem = Problem(outlines, names, Stock((BED,), GAP))
     started = time.perf_counter()
-    found = nest(problem, engine)
-    took = time.perf_counter() - started
+    nesting = nest(problem)
+    seconds = time.perf_counter() - started
     area = sum(shapely.Polygon(outline).area for outline in outlines)
     return {
         "case": case,
-        "engine": found.engine if found.engine == engine else f"{engine} ({found.engine} stands)",
-        "version": found.version,
-        "limit_s": seconds,
-        "seconds": took,
-        "sheets": found.sheets,
-        "bound": found.bound,
-        "reach": reach(problem, found),
-        "filled": area / (found.sheets * BED.width * BED.height),
-        "remarks": found.remarks,
+        "seconds": seconds,
+        "sheets": nesting.sheets,
+        "bound": nesting.bound,
+        "reach": reach(problem, nesting),
+        "filled": area / (nesting.sheets * BED.width * BED.height),
+        "finished": nesting.finished,
     }
 
 
-def reach(problem: Problem, found: Nesting) -> float:
-    """The sheets, the least filled one counted by the share that its patches reach into."""
+def reach(problem: Problem, nesting: Nesting) -> float:
+    """The number of sheets; the least filled counts by the share that its patches reach into."""
     boxes: dict[int, list[np.ndarray]] = {}
-    for outline, slot in zip(problem.outlines, found.slots, strict=True):
+    for outline, slot in zip(problem.outlines, nesting.slots, strict=True):
         boxes.setdefault(slot.sheet, []).append(place(outline, slot))
     size = np.array([BED.width, BED.height])
     shares = [float((np.ptp(np.concatenate(b), axis=0) / size).min()) for b in boxes.values()]
-    return found.sheets - 1 + min(shares)
+    return nesting.sheets - 1 + min(shares)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("engines", nargs="*", metavar="|".join(ENGINES))
-    parser.add_argument("--seconds", type=float, nargs="+", default=[10.0, 15.0])
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    engines = options.engines or ["raster", *(name for name in OUTSIDE if installed(name))]
     rows = []
     for case in CASES:
-        for engine in engines:
-            for seconds in options.seconds:
-                row = measure(engine, case, seconds)
-                rows.append(row)
-                print(
-                    f"{case:20s}{row['engine']:15s}{row['version']:10s} limit {seconds:3.0f} s "
-                    f"{row['seconds']:6.1f} s {row['sheets']:3d} sheets (bound {row['bound']}, "
-                    f"reach {row['reach']:.2f}), {row['filled']:.1%} filled",
-                    *row["remarks"],
-                    flush=True,
-                )
+        rows.append(row := measure(case))
+        print(
+            f"{case:20s}{row['seconds']:6.1f} s {row['sheets']:3d} sheets (bound {row['bound']}, "
+            f"reach {row['reach']:.2f}), {row['filled']:.1%} filled",
+            "" if row["finished"] else "work limit reached",
+            flush=True,
+        )
     if options.json:
         options.json.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
 

@@ -110,16 +110,6 @@ def sheets(
         str | None,
         typer.Option(help="Degrees by which patches may be turned [default: 0,90,180,270]."),
     ] = None,
-    engine: Annotated[
-        str | None,
-        typer.Option(help="Nests the patches: raster, auto, packingsolver, spyrrow, rectpack."),
-    ] = None,
-    nesting_time: Annotated[
-        float | None, typer.Option(help="Seconds that the engine may take [default: 30].")
-    ] = None,
-    nesting_seed: Annotated[
-        int | None, typer.Option(help="Seed of engines that draw lots [default: 0].")
-    ] = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -151,9 +141,6 @@ def sheets(
         "grain": grain,
         "along_grain": along_grain,
         "rotations": rotations,
-        "engine": engine,
-        "nesting_time": nesting_time,
-        "nesting_seed": nesting_seed,
     }
     options = miurafab.layout_options(
         {key: value for key, value in given.items() if value is not None}, design

@@ -1,7 +1,7 @@
 """``layout.json``: a layout written down, and read back, so that others can rely on it.
 
 The schema is ``miurafab-layout/1``: machine, material, sheets with placements, patches with
-outlines and tabs in the patch frame, totals, and what nested the patches. Lengths are mm,
+outlines and tabs in the patch frame, and totals. Lengths are mm,
 rotations degrees, counter-clockwise; lists of points are [[x, y], ...] and closed curves do not
 repeat their first point. Toolpaths are not in it: they are in the drawings and the G-code.
 """
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.partition.patch_frame import Patch
-from miurafab.fabrication.sheets import Layout, NestingRecord, Placement, Sheet, Totals
+from miurafab.fabrication.sheets import Layout, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
 
 SCHEMA = "miurafab-layout/1"
@@ -33,7 +33,6 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
         "sheets": [dataclasses.asdict(sheet) for sheet in layout.sheets],
         "patches": [_patch_table(patch) for patch in layout.patches],
         "totals": dataclasses.asdict(layout.totals),
-        "nesting": dataclasses.asdict(layout.nesting),
         "untabbed": list(layout.untabbed),
         "unlettered": layout.unlettered,
         "remarks": list(layout.remarks),
@@ -60,7 +59,6 @@ def read_layout(text: str) -> Layout:
             patches=tuple(_patch(table) for table in document["patches"]),
             sheets=tuple(_sheet(table) for table in document["sheets"]),
             totals=Totals(**document["totals"]),
-            nesting=NestingRecord(**document.get("nesting", {})),
             untabbed=tuple(document.get("untabbed", ())),
             unlettered=document.get("unlettered", 0),
             remarks=tuple(str(remark) for remark in document.get("remarks", ())),
@@ -128,7 +126,6 @@ def _sheet(table: dict[str, Any]) -> Sheet:
         placements=tuple(Placement(**placement) for placement in table["placements"]),
         back=table.get("back"),
         travel_mm=float(table.get("travel_mm", 0.0)),
-        travel_bound_mm=float(table.get("travel_bound_mm", 0.0)),
         stock=str(table.get("stock", "")),
         grain=str(table.get("grain", "none")),
         defects_mm=tuple(

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from miurafab.errors import OptionError
-from miurafab.fabrication.nesting import ENGINES, RASTER
 from miurafab.options import (
     Choice,
     File,
@@ -22,7 +21,6 @@ from miurafab.options import (
     check_options,
     distinct,
     length,
-    number,
     option,
 )
 from miurafab.profiles import GRAINS
@@ -81,19 +79,6 @@ class NestingOptions:
         default=(0, 90, 180, 270),
         group="Sheets",
         page=False,
-    )
-    engine: str = option(
-        Choice(ENGINES), "What nests the patches.", default=RASTER, group="Sheets", page=False
-    )
-    nesting_time: float = option(
-        number(1, 86_400, unit=" s"),
-        "Seconds that the engine may take.",
-        default=30.0,
-        group="Sheets",
-        page=False,
-    )
-    nesting_seed: int = option(
-        Whole(), "Seed of engines that draw lots.", default=0, group="Sheets", page=False
     )
 
     def __post_init__(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from miurafab.fabrication.labels import Lettering
+from miurafab.fabrication.nesting import Nesting
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_frame import Framed
 from miurafab.fabrication.strokes import Drawn
@@ -19,6 +20,7 @@ _NAMED = 8
 def remarks_on(
     pattern: CreasePattern,
     framed: Framed,
+    nesting: Nesting,
     lettering: Lettering,
     drawn: Drawn,
     material: Material,
@@ -46,6 +48,11 @@ def remarks_on(
         found.append(
             f"{outlines} no room for {options.bridges} holding bridges of "
             f"{options.bridge_mm:g} mm: a side that bears one must be over three times as long."
+        )
+    if not nesting.finished:
+        found.append(
+            "The nesting reached its limit of work before it had tried every order of the patches; "
+            "fewer sheets may be possible. Lay out fewer copies at a time with `quantity`."
         )
     open_folds = int((pattern.edges_assignment == "U").sum())
     if open_folds:

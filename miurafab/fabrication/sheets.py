@@ -17,7 +17,7 @@ import shapely
 from numpy.typing import NDArray
 
 from miurafab.fabrication.labels import Lettering, place_texts
-from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, check_engine, nest, turned
+from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, nest, turned
 from miurafab.fabrication.open_ring import opened
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_frame import DIGITS, Framed, Patch, copied, frame_patches
@@ -28,10 +28,8 @@ from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.stock import LaidStock, lay_stock
 from miurafab.fabrication.strokes import Blank, RigidTransform, sheet_strokes
 from miurafab.fabrication.toolpath import Toolpath
-from miurafab.fabrication.travel import travel_bound
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, Material
-from miurafab.version import __version__
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ class Sheet:
     ``defects_mm`` are closed curves on which nothing lies.
 
     ``back`` is the name of what is made on its back before its front, or None. ``travel_mm`` is
-    what is moved with the beam off, and ``travel_bound_mm`` what no order could do with less than.
+    the length travelled with the beam off.
     """
 
     name: str
@@ -66,7 +64,6 @@ class Sheet:
     placements: tuple[Placement, ...]
     back: str | None = None
     travel_mm: float = 0.0
-    travel_bound_mm: float = 0.0
     stock: str = ""
     grain: str = "none"
     defects_mm: tuple[Ring, ...] = ()
@@ -80,7 +77,8 @@ class Sheet:
 @dataclass(frozen=True)
 class Totals:
     """Sums over a layout. ``seam_mm`` is the length of all seams, ``density`` the area of the
-    patches over that of the usable beds; ``seconds`` is None until somebody estimates it.
+    patches over the usable area of the sheets, ``sheets_bound`` the lower bound of the number of
+    sheets for these patches, ``seconds`` the estimated time, None until it is estimated.
     """
 
     patches: int
@@ -91,19 +89,6 @@ class Totals:
     cut_mm: float
     perforated_mm: float
     travel_mm: float
-    seconds: float | None = None
-
-
-@dataclass(frozen=True)
-class NestingRecord:
-    """What nested the patches: ``engine``, its ``version``, the ``seed``, the ``seconds`` it took
-    (None where the clock had no say in the result, so that the same input gives the same bytes),
-    and the number of sheets below which no layout can go.
-    """
-
-    engine: str = "none"
-    version: str = __version__
-    seed: int = 0
     seconds: float | None = None
     sheets_bound: int | None = None
 
@@ -124,7 +109,6 @@ class Layout:
     patches: tuple[Patch, ...]
     sheets: tuple[Sheet, ...]
     totals: Totals
-    nesting: NestingRecord = NestingRecord()
     untabbed: tuple[int, ...] = ()
     unlettered: int = 0
     remarks: tuple[str, ...] = ()
@@ -163,14 +147,12 @@ def lay_out(
     """The pattern, opened if that is asked, laid out on sheets of the machine's bed as ``options``
     want it.
 
-    Deterministic, unless an outside engine nests or the time for nesting is over. Raises
+    Deterministic. Raises
     :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed, or is not a simple
     polygon, or the material's dashes cannot be drawn, or the stock does not suffice, or an option
     asks for what the pattern or the material does not have.
     """
     options = options or LayoutOptions()
-    wanted = options.nesting
-    check_engine(wanted.engine)
     pattern = opened(pattern, options)
     material = _with_own_tabs(material, options)
     if machine.tool.kind != "laser":
@@ -178,16 +160,13 @@ def lay_out(
     stock = lay_stock(options, machine.bed, material.grain)
     framed = frame_patches(pattern, stock, material, options)
     pieces = framed.pieces
-    patches = copied(framed.patches, wanted.quantity)
+    patches = copied(framed.patches, options.nesting.quantity)
     nesting = nest(
         Problem(
             tuple(patch.outline_mm for patch in patches),
             tuple(patch.label for patch in patches),
             stock.kinds,
-            wanted.nesting_time,
-            wanted.nesting_seed,
-        ),
-        wanted.engine,
+        )
     )
     sheets, placements = _sheets(nesting, patches, stock)
     motion = _motion(patches, placements, nesting.slots)
@@ -212,17 +191,16 @@ def lay_out(
     sheets = tuple(_with_passes(*made) for made in zip(sheets, toolpaths, backs, strict=True))
     behind = tuple(back for back in backs if back is not None)
     usable = sum(stock.kinds.kinds[kind].area for kind in _kinds(nesting))
-    remarks = remarks_on(pattern, framed, lettering, drawn, material, options)
+    remarks = remarks_on(pattern, framed, nesting, lettering, drawn, material, options)
     return Layout(
         machine=machine.name,
         material=material.name,
         patches=patches,
         sheets=sheets,
-        totals=_totals(pattern, pieces, patches, sheets, toolpaths + behind, usable),
-        nesting=_record(nesting),
+        totals=_totals(pattern, pieces, patches, nesting, toolpaths + behind, usable),
         untabbed=tuple(pieces.untabbed.tolist()),
         unlettered=lettering.left_out,
-        remarks=remarks + nesting.remarks,
+        remarks=remarks,
         toolpaths=toolpaths,
         backs=behind,
         pattern=pattern,
@@ -246,23 +224,12 @@ def _lettering(
     return Lettering(texts, left_out, unmarked)
 
 
-def _record(nesting: Nesting) -> NestingRecord:
-    return NestingRecord(
-        engine=nesting.engine,
-        version=nesting.version,
-        seed=nesting.seed,
-        seconds=None if nesting.seconds is None else round(nesting.seconds, 1),
-        sheets_bound=nesting.bound,
-    )
-
-
 def _with_passes(sheet: Sheet, front: Toolpath, back: Toolpath | None) -> Sheet:
     made = [front] if back is None else [back, front]
     return replace(
         sheet,
         back=None if back is None else back.sheet,
         travel_mm=round(sum(each.travel_mm for each in made), 3),
-        travel_bound_mm=round(sum(travel_bound(each) for each in made), 3),
     )
 
 
@@ -336,7 +303,7 @@ def _totals(
     pattern: CreasePattern,
     pieces: Pieces,
     patches: tuple[Patch, ...],
-    sheets: tuple[Sheet, ...],
+    nesting: Nesting,
     toolpaths: tuple[Toolpath, ...],
     usable: float,
 ) -> Totals:
@@ -346,11 +313,12 @@ def _totals(
     copies = len(patches) // len(pieces.pieces)
     return Totals(
         patches=len(patches),
-        sheets=len(sheets),
+        sheets=nesting.sheets,
         seam_mm=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()) * copies,
         tabs=len(pieces.tabs) * copies,
         density=float(area / usable),
         cut_mm=sum(toolpath.length_of("cut") for toolpath in toolpaths),
         perforated_mm=sum(toolpath.length_of("perforate") for toolpath in toolpaths),
         travel_mm=sum(toolpath.travel_mm for toolpath in toolpaths),
+        sheets_bound=nesting.bound,
     )

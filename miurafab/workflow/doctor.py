@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import ProfileError
-from miurafab.fabrication.nesting.outside import OUTSIDE, installed
 from miurafab.machine.transport import list_ports
 from miurafab.profiles import load_machine, load_material, shipped_names
 from miurafab.version import __version__
@@ -60,9 +59,6 @@ def examine() -> Examination:
         except importlib.metadata.PackageNotFoundError:
             versions[name] = "missing"
             problems.append(f"{name} is not installed; run pip install miurafab again.")
-    for name in OUTSIDE:
-        found = installed(name)
-        versions[name] = importlib.metadata.version(name) if found else "not installed, optional"
     ports = tuple(Port(device, text, _trouble(device)) for device, text in list_ports())
     problems.extend(f"{port.device}: {port.trouble}." for port in ports if port.trouble)
     problems.extend(_profile_problems())

@@ -16,6 +16,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from readers import assert_same, read_dxf, read_hpgl, read_pdf, read_svg
 from rings import revolved, tube
+from travel_bound import travel_bound
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.drawing.dxf import VERSIONS, sheet_dxf
@@ -303,7 +304,8 @@ def assert_sheets(machine, options, layout):
             assert all(shape.distance(other) >= options.gap_mm - 1e-4 for other in shapes[:k])
             assert all(shape.intersection(other).area < 1e-6 for other in shapes[:k])
         assert sheet.width_mm <= machine.bed.width_mm + 1e-9
-        assert 0.0 <= sheet.travel_bound_mm <= sheet.travel_mm + 1e-3
+        bound = sum(travel_bound(each) for each in layout.passes if each.sheet in sheet.passes)
+        assert 0.0 <= bound <= sheet.travel_mm + 1e-3
 
 
 def check(pattern, size, material, options):

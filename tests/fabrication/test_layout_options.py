@@ -43,9 +43,6 @@ def test_every_option_is_read():
             "grain": "y",
             "along_grain": "y",
             "rotations": "180, 0",
-            "engine": "rectpack",
-            "nesting_time": 12.5,
-            "nesting_seed": 9,
         }
     )
     assert options == LayoutOptions(
@@ -72,9 +69,6 @@ def test_every_option_is_read():
             grain="y",
             along_grain="y",
             rotations=(0, 180),
-            engine="rectpack",
-            nesting_time=12.5,
-            nesting_seed=9,
         ),
     )
 
@@ -91,8 +85,6 @@ def test_every_option_is_read():
         ({"tab_side": "left"}, "it must be one of lower, upper, alternate"),
         ({"quantity": 0}, "'quantity' is 0; it must be between 1 and 1000"),
         ({"rotations": "0,360"}, "a part is 360; it must be between 0 and 359"),
-        ({"engine": "magic"}, "one of raster, auto, packingsolver, spyrrow, rectpack"),
-        ({"nesting_time": 0}, "'nesting_time' is 0 s; it must be between 1 s and"),
         ({"bridges": 1}, "'bridges' is 1, on which a piece would swing"),
         ({"tab_angle": 200}, "'tab_angle' is 200 deg; it must be between 5 deg and 180 deg"),
         ({"bridge": "1mm"}, "'bridge' is the length of holding bridges, but none are wanted"),

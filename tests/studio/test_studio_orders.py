@@ -84,7 +84,7 @@ def test_targets_that_are_none(target, named):
 
 @pytest.mark.parametrize(
     "options",
-    [{"stock": "/etc/passwd"}, {"engine": "spyrrow"}, {"region": "0,1,0,1"}, {"gap": "3 parsec"},
+    [{"stock": "/etc/passwd"}, {"region": "0,1,0,1"}, {"gap": "3 parsec"},
      {"quantity": "many"}, {"quantity": "0"}, {"bridges": "1"}, {"two_sided": "yes"},
      {"full_facet": 1}, {"gap": ["2mm"]}, {"": ""}],
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Nesting: the outlines of patches placed on few sheets, turned but never overlapping."""
+"""Nesting: placing the outlines of patches on few sheets without overlap."""
 
 from miurafab.fabrication.nesting.problem import (
     Problem,
@@ -10,18 +10,15 @@ from miurafab.fabrication.nesting.problem import (
     place,
     turned,
 )
-from miurafab.fabrication.nesting.run import ENGINES, RASTER, Nesting, check_engine, nest
+from miurafab.fabrication.nesting.raster import Nesting, nest
 
 __all__ = [
-    "ENGINES",
-    "RASTER",
     "Nesting",
     "Problem",
     "Ring",
     "SheetKind",
     "Slot",
     "Stock",
-    "check_engine",
     "layout_faults",
     "nest",
     "place",

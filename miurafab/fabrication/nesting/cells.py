@@ -1,8 +1,8 @@
-"""Outlines and sheets in cells: which a part may touch, and which of a sheet are taken.
+"""Masks of outlines and sheets in cells: the cells that a part may touch, and the marked cells.
 
-A sheet grown by half the gap is divided into cells; an outline grown likewise marks every cell that
-it may touch, so cells that are not shared mean outlines that keep their gap. Around a part lies its
-rim, some cells wide, and around a sheet so many cells that count as taken.
+A sheet grown by half the gap is divided into cells. An outline grown by half the gap marks every
+cell that it may touch, so outlines without a common cell keep their gap. The rim of a part is a
+band of cells around it; a band of the same width around the sheet counts as marked.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from miurafab.geometry.arrays import places_in_runs
 
 @dataclass(frozen=True, eq=False)
 class Mask:
-    """An outline at one rotation: its cells and their transform, and those of its rim."""
+    """The cells of an outline at one rotation, their transform, and the transform of its rim."""
 
     cells: NDArray[np.bool_]
     transform: NDArray[np.complex64]
     rim: NDArray[np.complex64] | None
-    """Scaled so that a rim that is taken all around counts 1."""
+    """Scaled so that a wholly marked rim counts 1."""
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """An outline: its area grown by half the gap, and at each rotation its corners, moved so that
-    their box begins at the origin, and by how much.
+    """An outline, its area grown by half the gap, and for each rotation its corners, moved so that
+    their bounding box begins at the origin, with the shift.
     """
 
     outline: NDArray[np.float64]
@@ -50,14 +50,14 @@ class Part:
 
 
 class Raster:
-    """The cells of one size of sheet, grown by half the gap on all sides and with ``rim`` cells
-    beyond, and the masks of one part on it.
+    """The cells of sheets of one size, grown by half the gap on all sides and by ``rim`` cells, and
+    the masks of one part at a time. ``work`` counts the cells transformed.
     """
 
     def __init__(
         self, kind: SheetKind, gap: float, parts: Sequence[Part], along: int, rim: int
     ) -> None:
-        self.gap, self.parts, self.rim = gap, parts, rim
+        self.gap, self.parts, self.rim, self.work = gap, parts, rim, 0
         size = np.array([kind.width + gap, kind.height + gap])
         least = [max(math.ceil(along * side / size.max()), 16) for side in size]
         self.whole = [int(scipy.fft.next_fast_len(n + 2 * rim, real=True)) for n in least]
@@ -68,7 +68,7 @@ class Raster:
         self._masks: dict[int, Mask] = {}
 
     def reach(self, number: int, rotation: int) -> NDArray[np.int64]:
-        """(2,) how many cells the part takes along both axes."""
+        """(2,) the number of cells of the part along both axes."""
         high = self.parts[number].turned(rotation)[0].max(axis=0)
         count: NDArray[np.int64] = np.ceil((high + self.gap) / self.cell - 1e-7).astype(np.int64)
         return count.clip(1, np.array(self.cells))
@@ -82,7 +82,7 @@ class Raster:
         return self._cells[rotation]
 
     def mask(self, number: int, rotation: int) -> Mask:
-        """The same with their transforms; the part is the one whose masks are kept from now on."""
+        """The cells with their transforms. From now on the masks of this part are kept."""
         if number != self._held:
             self._held, self._cells, self._masks = number, {}, {}
         if rotation not in self._masks:
@@ -100,7 +100,7 @@ class Raster:
         return found
 
     def _grown(self, number: int, rotation: int, more: int) -> NDArray[np.bool_]:
-        """The cells that the part grown by so many ``more`` cells may touch."""
+        """The cells that the part grown by ``more`` cells may touch."""
         points, half = self.parts[number].turned(rotation)[0], self.gap / 2
         # A cell that the grown outline touches has its centre within half a diagonal of it.
         reach = half + np.hypot(*self.cell) / 2 + more * self.cell.min()
@@ -108,7 +108,7 @@ class Raster:
         return self._inside(shape, self.reach(number, rotation) + 2 * more, more)
 
     def blank(self, kind: SheetKind) -> NDArray[np.float32]:
-        """What is taken of an empty sheet: the cells beyond it, and those that touch a defect."""
+        """The marked cells of an empty sheet: the band around it, and cells that touch a defect."""
         taken = np.ones(self.whole, dtype=np.float32)
         inside = taken[self.rim : self.whole[0] - self.rim, self.rim : self.whole[1] - self.rim]
         inside[:] = 0.0
@@ -128,7 +128,7 @@ class Raster:
 
 
 def _scan(rings: list[NDArray[np.float64]], count: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which cells' centres lie inside ``rings`` given in units of cells, by even-odd crossings."""
+    """The cells whose centres lie inside ``rings`` (in units of cells), by the even-odd rule."""
     flips = np.zeros((count[0] + 1, count[1]), dtype=np.int64)
     for ring in rings:
         a, b = ring[:-1], ring[1:]

@@ -1,22 +1,21 @@
-"""The question that nesting answers, what an answer is, and what is wrong with a given one.
+"""The nesting problem, its solution, and the proof of a solution.
 
-Outlines go on sheets of some kinds, at rotations that each kind allows, a gap apart. An answer is
-one :class:`Slot` for each outline. Nobody is believed: :func:`layout_faults` proves every answer
-with exact geometry, whoever proposed it.
+Outlines go on sheets of given kinds, at the rotations that the kind allows, a gap apart. A solution
+is one :class:`Slot` per outline. :func:`layout_faults` checks a solution with exact geometry,
+whatever the search did.
 
-Two outlines keep the gap g when each, grown by g/2, shares no area with the other; an outline
-grown by g/2 lies on a bed grown by g/2 on all sides when the outline itself lies on the bed. So
-engines are given grown outlines (:func:`grown`), grown beds and no gap; they keep half a gap from
-defects that way, which is more than they must: touching a defect is no fault.
+Two outlines keep the gap g if the outlines grown by g/2 share no area. An outline lies on the bed
+if the outline grown by g/2 lies on the bed grown by g/2. So the search works with grown outlines,
+grown beds and no gap. It keeps g/2 from defects, which is more than required: an outline may touch
+a defect.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 import shapely
@@ -26,17 +25,17 @@ from shapely.geometry.base import BaseGeometry
 from miurafab.geometry.shapes import common_area
 
 TOLERANCE = 1e-6
-"""How far, in mm, a placement may be off by rounding."""
+"""Rounding error of a placement that is accepted, in mm."""
 
 Ring = tuple[tuple[float, float], ...]
-"""The corners of a closed curve in mm, the first not repeated."""
+"""The corners of a closed curve in mm; the first corner is not repeated."""
 
 
 @dataclass(frozen=True)
 class SheetKind:
-    """Sheets alike: the usable size in mm, the ``rotations`` in whole degrees from 0 that outlines
-    may have on them, the ``defects``, in the frame of the usable part, which nothing may lie on,
-    and how many there are, None for as many as it takes.
+    """A kind of sheet: its usable ``width`` and ``height`` in mm, the ``rotations`` in whole
+    degrees that outlines may have on it, its ``quantity`` (None: unlimited), and its ``defects``,
+    on which nothing may lie, with coordinates from the corner of the usable part.
     """
 
     width: float
@@ -46,20 +45,20 @@ class SheetKind:
     defects: tuple[Ring, ...] = ()
 
     def fits(self, outline: NDArray[np.float64], rotation: int) -> bool:
-        """Whether the box of ``outline`` (n, 2) at ``rotation`` is no larger than the sheet."""
+        """Whether the bounding box of ``outline`` (n, 2) at ``rotation`` fits the sheet."""
         wide, high = np.ptp(turned(outline, rotation), axis=0)
         return bool(wide <= self.width + TOLERANCE and high <= self.height + TOLERANCE)
 
     @cached_property
     def flaws(self) -> BaseGeometry:
-        """The defects in one shape."""
+        """The union of the defects."""
         shapes = [shapely.Polygon(ring) for ring in self.defects]
         # Snapping to a grid keeps GEOS 3.14 from returning shapes that only touch.
         return shapely.union_all(shapes, grid_size=1e-9)
 
     @property
     def area(self) -> float:
-        """What can be used, in mm²."""
+        """The area without the defects, in mm²."""
         bed = shapely.box(0.0, 0.0, self.width, self.height)
         lost = shapely.intersection(bed, self.flaws, grid_size=1e-9).area
         return float(self.width * self.height - lost)
@@ -67,8 +66,8 @@ class SheetKind:
 
 @dataclass(frozen=True)
 class Stock:
-    """What the outlines go on, in the order in which it is to be used up, and the ``gap`` in mm
-    kept between outlines. Kinds of which there are as many as it takes are begun last.
+    """The kinds of sheet, in the order in which to use them, and the ``gap`` in mm between
+    outlines. Kinds with unlimited quantity are used last.
     """
 
     kinds: tuple[SheetKind, ...]
@@ -76,36 +75,31 @@ class Stock:
 
     @property
     def in_turn(self) -> list[int]:
-        """The numbers of the kinds, those in a given quantity first."""
+        """The indices of the kinds, kinds of limited quantity first."""
         return sorted(range(len(self.kinds)), key=lambda k: self.kinds[k].quantity is None)
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """``outlines`` to nest, closed curves (n, 2) in mm, called ``names``, on ``stock`` within
-    ``seconds`` of time. Engines that draw lots draw them from ``seed``.
-    """
+    """The ``outlines`` to nest, closed curves (n, 2) in mm, their ``names``, and the ``stock``."""
 
     outlines: tuple[NDArray[np.float64], ...]
     names: tuple[str, ...]
     stock: Stock
-    seconds: float
-    seed: int = 0
 
     @cached_property
     def areas(self) -> NDArray[np.float64]:
-        """(N,) the areas of the outlines grown by half the gap, in mm², or a little less."""
+        """(N,) the areas of the outlines grown by half the gap, in mm², at most a little less."""
         shapes = [shapely.Polygon(outline) for outline in self.outlines]
         found: NDArray[np.float64] = shapely.area(shapely.buffer(shapes, self.stock.gap / 2))
         return found
 
     @cached_property
     def bound(self) -> int:
-        """A number of sheets below which no layout can go.
+        """A lower bound of the number of sheets.
 
-        The sheets have at least the area of the outlines, both grown by half the gap, when the
-        largest are used first; and no two outlines share a sheet that each of them fills by more
-        than half.
+        The grown sheets, the largest used first, have at least the area of the grown outlines. And
+        two outlines that each fill more than half of the largest sheet cannot share a sheet.
         """
         kinds, gap = self.stock.kinds, self.stock.gap
         room = [(kind.width + gap) * (kind.height + gap) for kind in kinds]
@@ -122,8 +116,9 @@ class Problem:
 
 @dataclass(frozen=True)
 class Slot:
-    """Where an outline goes: turned counter-clockwise by ``rotation_deg`` about its origin, then
-    moved by (``x_mm``, ``y_mm``) on the usable part of ``sheet``, from 0, which is of ``kind``.
+    """The place of an outline: turned counter-clockwise by ``rotation_deg`` about its origin, then
+    moved by (``x_mm``, ``y_mm``) from the corner of the usable part of ``sheet`` (numbered from 0),
+    a sheet of ``kind``.
     """
 
     sheet: int
@@ -133,20 +128,8 @@ class Slot:
     rotation_deg: int
 
 
-Report = Callable[[list[Slot]], None]
-"""Takes a layout that is better than those before it."""
-
-
-class Engine(Protocol):
-    """What proposes layouts: one after the other, each better, and says whether it ended by itself
-    and not because the time of the problem was over.
-    """
-
-    def __call__(self, problem: Problem, report: Report) -> bool: ...
-
-
 def place(points: NDArray[np.float64], slot: Slot) -> NDArray[np.float64]:
-    """``points`` (n, 2) of an outline, on the usable part of its sheet."""
+    """``points`` (n, 2) of an outline, moved to the usable part of its sheet."""
     shift = np.array([slot.x_mm, slot.y_mm])
     moved: NDArray[np.float64] = turned(points, slot.rotation_deg) + shift
     return moved
@@ -164,56 +147,15 @@ def turned(points: NDArray[np.float64], rotation_deg: float) -> NDArray[np.float
 
 
 def buffered(shape: BaseGeometry, distance: float) -> BaseGeometry:
-    """A shape that holds ``shape`` grown by ``distance`` mm, in spite of the chords that its arcs
-    are drawn with and of the hundredth of the distance that GEOS allows itself.
+    """``shape`` grown by at least ``distance`` mm. The factor 1.015 makes up for the chords of the
+    arcs and for the tolerance of GEOS, a hundredth of the distance.
     """
     return shapely.buffer(shape, distance * 1.015, quad_segs=16)
 
 
-def grown(outline: NDArray[np.float64], gap: float) -> NDArray[np.float64]:
-    """The corners (m, 2) of a shape that holds ``outline`` grown by half of ``gap``, in few
-    corners more than the outline has; counter-clockwise.
-    """
-    slack = 0.02
-    shape = buffered(shapely.Polygon(outline), gap / 2 + slack)
-    ring = shapely.get_exterior_ring(shapely.simplify(shape, slack))
-    corners = shapely.get_coordinates(ring)[:-1]
-    return corners if shapely.is_ccw(ring) else corners[::-1]
-
-
-def clear_rectangle(kind: SheetKind) -> tuple[float, float, float, float]:
-    """The largest rectangle (low x, low y, high x, high y) of a sheet that no box around a defect
-    reaches into, in mm.
-    """
-    boxes = [shapely.Polygon(ring).bounds for ring in kind.defects]
-    best = (0.0, 0.0, 0.0, 0.0)
-    for low in [0.0, *(box[3] for box in boxes)]:
-        for high in [kind.height, *(box[1] for box in boxes)]:
-            between = sorted(box for box in boxes if box[1] < high and box[3] > low)
-            left = 0.0
-            for right, beyond in [*((b[0], b[2]) for b in between), (kind.width, 0.0)]:
-                found = (left, max(low, 0.0), min(right, kind.width), min(high, kind.height))
-                if min(found[2] - left, found[3] - found[1]) > 0 and _size(found) > _size(best):
-                    best = found
-                left = max(left, beyond)
-    return best
-
-
-def _size(box: tuple[float, float, float, float]) -> float:
-    return (box[2] - box[0]) * (box[3] - box[1])
-
-
-def renumbered(slots: Sequence[Slot]) -> list[Slot]:
-    """The same layout with its sheets numbered from 0 without gaps, in their order."""
-    used = {sheet: number for number, sheet in enumerate(sorted({slot.sheet for slot in slots}))}
-    return [
-        Slot(used[slot.sheet], slot.kind, slot.x_mm, slot.y_mm, slot.rotation_deg) for slot in slots
-    ]
-
-
 def cost(slots: Sequence[Slot], stock: Stock) -> tuple[float, float]:
-    """What a layout takes, to be compared: the area of the sheets of which there are as many as it
-    takes, then that of all sheets, in mm².
+    """The cost of a layout, compared in order: the area of the sheets of unlimited kinds, then the
+    area of all sheets, in mm².
     """
     kinds = [stock.kinds[kind] for _, kind in sorted({(slot.sheet, slot.kind) for slot in slots})]
     sizes = [(kind.width * kind.height, kind.quantity is None) for kind in kinds]
@@ -221,7 +163,7 @@ def cost(slots: Sequence[Slot], stock: Stock) -> tuple[float, float]:
 
 
 def layout_faults(problem: Problem, slots: Sequence[Slot]) -> list[str]:
-    """What is wrong with a layout, each as half a sentence; empty if all is well."""
+    """The faults of a layout, each as half a sentence; empty if the layout is valid."""
     outlines, names, stock = problem.outlines, problem.names, problem.stock
     if len(slots) != len(outlines):
         return [f"it has {len(slots)} places for {len(outlines)} patches"]
@@ -245,7 +187,7 @@ def layout_faults(problem: Problem, slots: Sequence[Slot]) -> list[str]:
         if kind.defects and common_area(shape, kind.flaws) > TOLERANCE * shape.length:
             faults.append(f"patch {name} lies on a defect")
     faults += _stock_faults(slots, stock)
-    # Sheets are laid side by side, so that only what lies on the same one is near.
+    # The sheets are laid side by side, so that only outlines on the same sheet are near.
     step = max(kind.width for kind in stock.kinds) + stock.gap + 1.0
     beside = [
         shapely.Polygon(place(outline, slot) + np.array([slot.sheet * step, 0.0]))
@@ -265,7 +207,7 @@ def layout_faults(problem: Problem, slots: Sequence[Slot]) -> list[str]:
 
 
 def _stock_faults(slots: Sequence[Slot], stock: Stock) -> list[str]:
-    """What is wrong with the sheets that are used."""
+    """The faults in the numbers and kinds of the sheets."""
     pairs = {(slot.sheet, slot.kind) for slot in slots}
     sheets = {sheet for sheet, _ in pairs}
     if len(sheets) < len(pairs):

@@ -1,31 +1,31 @@
-"""First-fit on a raster: the engine that is always there, and gives the same layout every time.
+"""First-fit nesting on a raster.
 
-A sheet grown by half the gap is divided into cells; an outline grown likewise marks every cell
-that it may touch, so cells that are not shared mean outlines that keep their gap. The number of
-cells that a part would share with what lies on a sheet, for all positions at once, is a
-correlation of two masks and one product of Fourier transforms; positions where it is 0 are free.
-Defects take their cells from the beginning.
+A sheet grown by half the gap is divided into cells. An outline, also grown by half the gap, marks
+every cell that it may touch; outlines without a common cell keep their gap. The number of cells
+that a part would share with the parts on a sheet is, for all positions at once, a correlation of
+two masks, computed by Fourier transforms; positions where it is 0 are free. Defects mark their
+cells before any part.
 
-Parts come by size, on the first sheet with a free position, at the one that a rule prefers: the
-one nearest to a side or a corner, or the one with most company, that is, with the largest share of
-the rim around the part taken already or off the sheet. That share is another correlation; it packs
-closer, the more so on finer cells, and takes longer. Several orders and rules are tried, and the
-layout that takes the least stock wins; the first that no layout could beat ends the search. A sheet
-without room for the area of a part is not searched, and by the first rules the first part on an
-empty sheet goes to its corner; so parts that fill a sheet each cost next to nothing. Masks and
-transforms are made when they are asked for, and kept for one part at a time.
+Parts are placed by size, each on the first sheet with a free position, at the free position that a
+rule prefers. A corner rule prefers the position nearest to a side or a corner. The contact rule
+prefers the position where the largest share of the rim around the part is marked already or off the
+sheet, which is another correlation; it packs closer, the more so on finer cells, and takes longer.
+Several orders and rules are tried. The layout that takes the least stock wins, and a layout that
+meets the lower bound ends the search. A sheet whose free area is smaller than a part is not
+searched, and a corner rule puts the first part of an empty sheet in its corner without a search; so
+parts that fill a sheet each cost almost nothing. Masks and transforms are computed when they are
+needed and kept for one part at a time.
 
-Nothing is random. The clock is read for the time limit alone: if that never strikes, the same
-input gives the same layout. When it strikes in the first pass, what is left goes on the last
-sheets or on new ones, without a look at the earlier ones.
+Nothing is random and nothing reads a clock, so the same input gives the same layout. The work is
+counted in cells transformed and is limited by :data:`WORK`. If the limit is reached in the first
+pass, the remaining parts go on the last sheets or on new sheets.
 """
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -34,34 +34,77 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.nesting.cells import Part, Raster
-from miurafab.fabrication.nesting.problem import (
-    Problem,
-    Report,
-    Slot,
-    Stock,
-    cost,
-)
+from miurafab.fabrication.nesting.problem import Problem, Slot, Stock, cost, layout_faults
+
+WORK = 4_000_000_000
+"""The limit of the search in cells transformed: about 40 s on one core of 2020 (measured:
+100 million cells a second)."""
 
 _CELLS = 384
-"""Cells along the longer side of a sheet, about; finer packs closer and takes longer."""
+"""Cells along the longer side of a sheet, about, for the corner rules; finer cells pack closer and
+take longer."""
 
 _FINE = 600
-"""The same for the rule of most company."""
+"""The same for the contact rule."""
 
 _RIM = 12
-"""How many cells wide the rim around a part is (tried: 1 to 16)."""
+"""The width of the rim around a part in cells (tried: 1 to 16)."""
 
 _LAST = 2
-"""How many sheets are looked at for a part once the time is over."""
+"""The number of sheets that are searched for a part once the work limit is reached."""
 
-Clock = Callable[[], float]
 Rule = tuple[float, float] | None
-"""The weights of x and y by which the far corner of a part is least; None for most company."""
+"""A corner rule: the weights of x and y of the far corner of a part, whose sum is minimised. None
+is the contact rule."""
+
+
+@dataclass(frozen=True)
+class Nesting:
+    """A slot for each outline, the lower ``bound`` of the number of sheets, and whether the search
+    was ``finished`` within its work limit.
+    """
+
+    slots: tuple[Slot, ...]
+    bound: int
+    finished: bool
+
+    @property
+    def sheets(self) -> int:
+        """The number of sheets used."""
+        return 1 + max(slot.sheet for slot in self.slots)
+
+
+def nest(problem: Problem, work: int = WORK) -> Nesting:
+    """A slot for each outline, proven by :func:`~miurafab.fabrication.nesting.layout_faults`.
+
+    Raises :class:`~miurafab.errors.LayoutError` naming the outline if an outline fits no sheet at
+    any rotation, or if the stock does not suffice.
+    """
+    _check_sizes(problem)
+    slots, finished = _Search(problem, work).run()
+    faults = layout_faults(problem, slots)
+    if faults:
+        raise LayoutError(f"The nesting cannot be used: {faults[0]}.")
+    return Nesting(tuple(slots), problem.bound, finished)
+
+
+def _check_sizes(problem: Problem) -> None:
+    kinds = problem.stock.kinds
+    for name, outline in zip(problem.names, problem.outlines, strict=True):
+        if not any(kind.fits(outline, turn) for kind in kinds for turn in kind.rotations):
+            wide, high = (outline.max(axis=0) - outline.min(axis=0)).tolist()
+            largest = max(kinds, key=lambda kind: kind.width * kind.height)
+            turns = ", ".join(str(turn) for turn in largest.rotations)
+            raise LayoutError(
+                f"Patch {name} measures {wide:.1f} mm x {high:.1f} mm and does not fit the usable "
+                f"{largest.width:.1f} mm x {largest.height:.1f} mm of the largest sheet, turned by "
+                f"{turns} degrees."
+            )
 
 
 class _Sheet:
-    """What lies on one sheet. Its cells are marked when a part is first looked for among others;
-    until then ``free``, an area that no less is free, tells whether that is worth while.
+    """The parts on one sheet. Cells are marked only when the sheet is first searched; until then
+    ``free``, an upper bound of the free area in mm², decides whether to search.
     """
 
     def __init__(self, kind: int, stock: Stock, raster: Raster) -> None:
@@ -76,8 +119,8 @@ class _Sheet:
         self._transform: NDArray[np.complex64] | None = None
 
     def take(self, number: int, part: int, rule: Rule) -> bool:
-        """Lay outline ``number``, which is as ``part``, at the free position that ``rule`` prefers,
-        if there is a position.
+        """Place outline ``number``, of shape ``part``, at the free position that ``rule`` prefers;
+        False if no position is free.
         """
         shape = self.raster.parts[part]
         if self.free < shape.area * (1 - 1e-6) or part in self._refused:
@@ -111,6 +154,7 @@ class _Sheet:
         wide, high = mask.cells.shape
         columns, rows = raster.cells[0] - wide + 1, raster.cells[1] - high + 1
         near = raster.rim
+        raster.work += math.prod(raster.whole) * (2 if rule is None else 1)
         shared = scipy.fft.irfft2(marked * mask.transform, raster.whole)
         free = np.flatnonzero(shared[near : near + columns, near : near + rows] < 0.5)
         if not len(free):
@@ -119,7 +163,7 @@ class _Sheet:
         if rule is None:
             assert mask.rim is not None
             around = scipy.fft.irfft2(marked * mask.rim, raster.whole)[:columns, :rows]
-            # Rounded, so that the noise of the transforms decides nothing.
+            # Rounding keeps the noise of the transforms out of the decision.
             order = -np.round(around.ravel()[free], 3)
         else:
             far = (i + wide) * raster.cell[0], (j + high) * raster.cell[1]
@@ -128,7 +172,7 @@ class _Sheet:
         return float(order[at]), int(i[at]), int(j[at])
 
     def _marked(self) -> NDArray[np.complex64]:
-        """The transform of the cells that are taken."""
+        """The transform of the marked cells."""
         if self._taken is None:
             self._taken = self.raster.blank(self.allowed)
         if self._transform is None or self._waiting:
@@ -142,8 +186,8 @@ class _Sheet:
 
 
 class _Rack:
-    """Sheets of some kinds: those ``begun``, of them those that are still looked at, and of each
-    kind one that is blank, as long as there are any.
+    """Sheets of some kinds: the sheets ``begun``, the begun sheets that still have room, and one
+    blank sheet of each kind while the stock lasts.
     """
 
     def __init__(self, stock: Stock, rasters: list[Raster], kinds: list[int]) -> None:
@@ -155,8 +199,8 @@ class _Rack:
             self._supply(kind)
 
     def take(self, number: int, part: int, rule: Rule, rest: float, late: bool) -> bool:
-        """Lay outline ``number`` on the first sheet with room for it, if there is one. No outline
-        after it is smaller than ``rest`` mm²; if it is ``late`` only the last sheets are tried.
+        """Place outline ``number`` on the first sheet with room for it; False if there is none. No
+        later outline is smaller than ``rest`` mm². If ``late``, only the last sheets are tried.
         """
         near = self._open[-_LAST:] if late else self._open
         blank = [self._blank[kind] for kind in self.kinds if kind in self._blank]
@@ -184,11 +228,10 @@ class _Rack:
 
 
 class _Search:
-    """One problem, with what all passes share."""
+    """The search for one problem, with the rasters that all passes share."""
 
-    def __init__(self, problem: Problem, clock: Clock) -> None:
-        self.problem, self.clock = problem, clock
-        self.end = clock() + problem.seconds
+    def __init__(self, problem: Problem, work: int) -> None:
+        self.problem, self.limit = problem, work
         self.stock = problem.stock
         self.areas = problem.areas
         first: dict[bytes, int] = {}
@@ -200,8 +243,35 @@ class _Search:
         self.parts = list(parts.values())
         self._rasters: dict[bool, list[Raster]] = {}
 
+    def run(self) -> tuple[list[Slot], bool]:
+        """The best layout found, and whether the search ended within its work limit."""
+        best: list[Slot] = []
+        least = (math.inf, math.inf, math.inf)
+        for rule, order, endless in self.passes():
+            slots = self.first_fit(order, rule, endless, not best)
+            if slots is None:
+                return best, False
+            last = max(slot.sheet for slot in slots)
+            share = sum(
+                area for area, slot in zip(self.areas, slots, strict=True) if slot.sheet == last
+            )
+            taken = (*cost(slots, self.stock), float(share))
+            if taken < least:
+                best, least = slots, taken
+            if self.unbeatable(slots):
+                break
+            if self.late:
+                return best, False
+        return best, True
+
+    @property
+    def late(self) -> bool:
+        """Whether the work limit is reached."""
+        rasters = {id(raster): raster for rasters in self._rasters.values() for raster in rasters}
+        return sum(raster.work for raster in rasters.values()) >= self.limit
+
     def rasters(self, fine: bool) -> list[Raster]:
-        """The raster of each kind of sheet, kinds of one size having the same."""
+        """The raster of each kind of sheet; kinds of the same size share a raster."""
         if fine not in self._rasters:
             kinds = self.stock.kinds
             by_size: dict[tuple[float, float], Raster] = {}
@@ -214,13 +284,13 @@ class _Search:
         return self._rasters[fine]
 
     def orders(self) -> list[list[int]]:
-        """The outlines by area, by their longer side, and by both, the largest first."""
+        """The outlines by area, by longer side, and by their product, the largest first."""
         sides = np.array([np.ptp(outline, axis=0).max() for outline in self.problem.outlines])
         keys = (self.areas, sides, self.areas * sides)
         return [np.argsort(-key, kind="stable").tolist() for key in keys]
 
     def endless(self) -> list[list[int]]:
-        """Orders in which to begin sheets of which there are as many as it takes."""
+        """Orders in which to begin sheets of the unlimited kinds."""
         kinds = self.stock.kinds
         given = [k for k, kind in enumerate(kinds) if kind.quantity is None]
         small_first = sorted(given, key=lambda k: kinds[k].width * kinds[k].height)
@@ -229,7 +299,7 @@ class _Search:
     def first_fit(
         self, order: list[int], rule: Rule, endless: list[int], first: bool
     ) -> list[Slot] | None:
-        """The slots of one pass; None if the time was over, unless this is the ``first``."""
+        """The slots of one pass; None at the work limit, unless this is the ``first`` pass."""
         given = [k for k in self.stock.in_turn if self.stock.kinds[k].quantity is not None]
         racks = [
             _Rack(self.stock, self.rasters(rule is None), kinds)
@@ -237,7 +307,7 @@ class _Search:
         ]
         least = np.append(np.minimum.accumulate(self.areas[order][::-1])[::-1], np.inf)
         for position, number in enumerate(order):
-            late = self.clock() >= self.end
+            late = self.late
             if late and not first:
                 return None
             part, rest = self.alike[number], float(least[position + 1])
@@ -250,7 +320,7 @@ class _Search:
         return found
 
     def _no_room(self, number: int) -> str:
-        """Why the outline has no place."""
+        """The message for an outline without a place."""
         name = self.problem.names[number]
         kinds = self.stock.kinds
         if any(
@@ -264,11 +334,11 @@ class _Search:
             )
         return (
             f"Patch {name} fits no sheet of the stock beside the defects; add a sheet, or make the "
-            "patches smaller with --max-patch."
+            "patches smaller with `max_patch`."
         )
 
     def passes(self) -> Iterator[tuple[Rule, list[int], list[int]]]:
-        """Rule, order and endless sheets of each pass: the quickest, the closest, the others."""
+        """Rule, order and unlimited kinds of each pass: the quickest, the closest, the others."""
         *usual, both = self.orders()
         quick = list(product([(0.01, 1.0), (1.0, 0.01), (1.0, 1.0)], usual, self.endless()))
         yield quick[0]
@@ -277,9 +347,7 @@ class _Search:
         yield from quick[1:]
 
     def unbeatable(self, slots: Sequence[Slot]) -> bool:
-        """Whether no layout could take less stock. If sheets of several kinds come in any number,
-        that is not told.
-        """
+        """Whether no layout can take less stock; False, too, if several kinds are unlimited."""
         used = {(slot.sheet, slot.kind) for slot in slots}
         kinds, gap = self.stock.kinds, self.stock.gap
         if len(kinds) == 1:
@@ -291,30 +359,3 @@ class _Search:
         given = sum(r * (kind.quantity or 0) for r, kind in zip(room, kinds, strict=True))
         need = math.ceil((self.areas.sum() - given) / room[endless[0]] - 1e-9)
         return bool(0 < sum(kind == endless[0] for _, kind in used) <= need)
-
-
-def raster_engine(problem: Problem, report: Report, clock: Clock = time.monotonic) -> bool:
-    """First-fit by size on a raster; see the module.
-
-    Raises :class:`~miurafab.errors.LayoutError` naming the outline if the stock has no room for
-    one.
-    """
-    search = _Search(problem, clock)
-    best = (math.inf, math.inf, math.inf)
-    for number, (rule, order, endless) in enumerate(search.passes()):
-        slots = search.first_fit(order, rule, endless, number == 0)
-        if slots is None:
-            return False
-        last = max(slot.sheet for slot in slots)
-        share = sum(
-            area for area, slot in zip(search.areas, slots, strict=True) if slot.sheet == last
-        )
-        taken = (*cost(slots, problem.stock), float(share))
-        if taken < best:
-            best = taken
-            report(slots)
-        if search.unbeatable(slots):
-            return True
-        if clock() >= search.end:
-            return False
-    return True

@@ -1,11 +1,11 @@
-"""How little travel there must be: a bound that no order of the strokes can beat.
+"""A lower bound of the travel over all orders of the strokes.
 
-Strokes of one operation are made in one go, so the travel is at least the way to the first stroke,
-the way back from the last one, and for each operation what a path through its strokes needs. Of a
-leg from p to q these parts are told apart, none of which overlap:
+Strokes of one operation are made in one go. So the travel is at least the way to the first stroke,
+plus the way back from the last stroke, plus for each operation the travel of a path through its
+strokes. The legs of such a path have these parts, which do not overlap:
 
-- **Balls.** Every end of an open stroke has a leg, which leaves the ball about it whose radius is
-  half the way to the nearest place where another stroke may be entered.
+- **Balls.** A leg ends at every end of an open stroke. It leaves the ball about that end whose
+  radius is half the distance to the nearest place where another stroke can be entered.
 - **Disks** about ends that are far from the ends of all other creases, such as where a crease meets
   the outline. A closed tour crosses every circle an even number of times, and at least twice. If
   the strokes cross the circle of radius r
@@ -15,9 +15,9 @@ leg from p to q these parts are told apart, none of which overlap:
   so the legs within the disk are at least as long as these numbers integrated over r (Held and
   Karp's 1970 bound in the geometric form of Juenger and Pulleyblank 1993, with circles for moats).
 
-Disks do not overlap each other, and a ball whose centre is outside of them keeps clear of them. The
-path of an operation is open: its two ends can spoil two balls or disks, and the two largest are not
-counted. Of closed strokes it is only said that they may be entered at any corner.
+Disks do not overlap each other, and balls with centres outside of the disks are cut to keep clear
+of them. The path of an operation is open, so its two ends can spoil two balls or disks; the two
+largest are not counted. A closed stroke can be entered at any corner.
 """
 
 from __future__ import annotations
@@ -32,12 +32,13 @@ from numpy.typing import NDArray
 from miurafab.fabrication.toolpath import Toolpath
 
 LONELY = 4.0
-"""An end has a disk if other creases end so many times farther away than other strokes do."""
+"""An end has a disk if the ends of other creases are this many times farther away than the ends of
+other strokes."""
 
 
 def travel_bound(toolpath: Toolpath) -> float:
-    """A length in mm below which no order of these strokes, operation by operation, can bring the
-    travel, from the origin and back to it.
+    """The lower bound in mm of the travel from the origin through all strokes, operation by
+    operation, and back to the origin.
     """
     if not len(toolpath):
         return 0.0
@@ -66,8 +67,8 @@ def _nearest_to_origin(toolpath: Toolpath) -> float:
 
 
 def path_bound(strokes: Toolpath) -> float:
-    """A length in mm below which no path through all of ``strokes``, in one go, can bring the
-    travel from the end of its first stroke to the beginning of its last.
+    """The lower bound in mm of the travel of a path through all ``strokes``, from the end of its
+    first stroke to the start of its last.
     """
     if len(strokes) < 2:
         return 0.0
