@@ -1,4 +1,4 @@
 """The device side of each protocol: simulated controllers, a simulated cable, injected faults.
 
-Nothing here does I/O or knows a clock; time enters only by ``advance``.
+The simulators do no I/O and have no clock; time passes only in ``advance``.
 """

@@ -1,7 +1,7 @@
-"""What a machine in memory burnt or drew: every stretch of time and way with the beam on.
+"""The beam log of a simulator: what it burnt or drew, as segments in time and space.
 
-Each virtual machine keeps such a log, so that a test can ask what was made and no sender has to be
-believed. A pen or blade that is down counts as a beam.
+Tests compare a job with this log instead of trusting the sender. A lowered pen or blade counts as a
+beam.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class BeamSegment:
-    """The beam on from ``t0`` to ``t1`` (s of virtual time), moving evenly from (``x0``, ``y0``)
-    to (``x1``, ``y1``) in machine mm (equal: standing still), at ``power``, a fraction of full.
+    """The beam was on from ``t0`` to ``t1`` (s of virtual time) at ``power``, a fraction of full,
+    and moved uniformly from (``x0``, ``y0``) to (``x1``, ``y1``) in machine mm.
     """
 
     t0: float
@@ -28,17 +28,17 @@ class BeamSegment:
 
     @property
     def standing(self) -> bool:
-        """Whether the beam burnt in place."""
+        """Whether the beam did not move."""
         return self.x0 == self.x1 and self.y0 == self.y1
 
 
 def standing_seconds(log: Iterable[BeamSegment]) -> float:
-    """How long the beam stood still while on, all in all."""
+    """The total time in which the beam was on and did not move."""
     return sum(segment.t1 - segment.t0 for segment in log if segment.standing)
 
 
 class BeamLog:
-    """Closes one segment and opens the next at each change; ``pwm`` is 0..255."""
+    """Ends a segment and starts the next at each change; ``pwm`` is 0..255."""
 
     def __init__(self) -> None:
         self.segments: list[BeamSegment] = []
@@ -47,7 +47,7 @@ class BeamLog:
         self._at: Point = (0.0, 0.0)
 
     def mark(self, time: float, at: Point, pwm: int) -> None:
-        """From ``time`` (s) and ``at`` (mm) on the beam has ``pwm``, and may move otherwise."""
+        """From ``time`` (s) and ``at`` (mm) on the beam has ``pwm``; its speed may change too."""
         if self.pwm and time > self._t0:
             self._close(time, at)
         self.pwm, self._t0, self._at = pwm, time, at
@@ -61,6 +61,6 @@ class BeamLog:
 
 
 def _continues(before: BeamSegment, after: BeamSegment) -> bool:
-    """Whether ``after`` is the same standing beam, cut in two by somebody's look at the log."""
+    """Whether ``after`` continues the standing beam ``before``, split by a read of the log."""
     same_place = before.standing and (before.x1, before.y1) == (after.x0, after.y0)
     return same_place and before.t1 == after.t0 and before.power == after.power

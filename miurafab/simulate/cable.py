@@ -1,4 +1,4 @@
-"""The cable between a sender and a machine in memory, on which bytes can come to harm.
+"""The simulated cable between a sender and a simulator; it can lose, change and delay bytes.
 
 Each direction is a :class:`Channel`: bytes go in at one end and come out at the other, at once
 unless they are lost, changed, delayed or joined by noise. :class:`Cable` holds both channels,
@@ -19,7 +19,7 @@ _NEWLINE = 10
 
 
 class Channel:
-    """One direction; times are in ticks."""
+    """One direction of the cable; times are in ticks."""
 
     def __init__(self, seed: int) -> None:
         self.drop = 0.0
@@ -30,7 +30,7 @@ class Channel:
         self._under_way: deque[tuple[int, int]] = deque()
 
     def carry(self, now: int, data: bytes) -> None:
-        """Bytes go in."""
+        """Put bytes in."""
         for byte in data:
             if self.drop > 0:
                 self.drop -= 1
@@ -41,40 +41,40 @@ class Channel:
             self._put(max(now, self.held_until) + self.late, byte)
 
     def noise(self, now: int, count: float) -> None:
-        """Random bytes come out beside what was sent."""
+        """Put ``count`` random bytes in."""
         for byte in self._random.randbytes(int(count)):
             self._put(now, byte)
 
     def _put(self, at: int, byte: int) -> None:
         if self._under_way:
-            at = max(at, self._under_way[-1][0])  # nothing overtakes
+            at = max(at, self._under_way[-1][0])  # no byte overtakes another
         self._under_way.append((at, byte))
 
     def next_after(self, now: int) -> int | None:
-        """When the next byte that is not out by ``now`` comes out."""
+        """The time when the next byte after ``now`` comes out."""
         return next((at for at, _ in self._under_way if at > now), None)
 
     def next_line(self) -> int | None:
-        """When the first line end comes out."""
+        """The time when the first line end comes out."""
         return next((at for at, byte in self._under_way if byte == _NEWLINE), None)
 
     def take(self, now: int) -> bytes:
-        """What has come out by ``now``."""
+        """The bytes that came out by ``now``."""
         out = bytearray()
         while self._under_way and self._under_way[0][0] <= now:
             out.append(self._under_way.popleft()[1])
         return bytes(out)
 
     def clear(self) -> None:
-        """Everything under way is lost."""
+        """Lose all bytes on the way."""
         self._under_way.clear()
 
 
 class Cable:
-    """Both ways, and the ``faults`` that are still to come.
+    """Both directions, and the pending ``faults``.
 
-    ``second`` is how many ticks one has. ``on_fault`` is called with each fault that befalls the
-    machine and the time.
+    A second has ``second`` ticks. ``on_fault`` is called with each fault of the machine itself, and
+    the time.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Cable:
         self._back_at: int | None = None
 
     def send(self, now: int, data: bytes) -> None:
-        """The sender sends ``data``; the faults dated by a byte of it strike."""
+        """The sender sends ``data``; the faults at these bytes strike."""
         if data and self._first is None:
             self._first = now
         self._strike_timed(now)
@@ -112,13 +112,13 @@ class Cable:
                 self._strike(self._at_byte.popleft(), now)
 
     def reply(self, dated: Iterable[tuple[int, int]]) -> None:
-        """The machine has sent bytes, each at its time."""
+        """The machine sent bytes, each at its time."""
         if self.connected:
             for at, byte in dated:
                 self.outward.carry(at, bytes((byte,)))
 
     def next_due(self, now: int) -> int | None:
-        """When the next fault strikes, ends, or lets a byte go."""
+        """The time of the next change: a fault strikes or ends, or a byte comes out."""
         due = (
             self._next_timed(),
             self._back_at,
@@ -128,7 +128,7 @@ class Cable:
         return min((at for at in due if at is not None), default=None)
 
     def happen(self, now: int) -> bytes:
-        """Let the faults that are due strike and end; the bytes that reach the machine."""
+        """Start and end the faults that are due; returns the bytes that reach the machine."""
         if self._back_at is not None and self._back_at <= now:
             self._back_at = None
             self.connected = True

@@ -1,15 +1,15 @@
-"""What goes wrong at a practice machine, and when: faults as values, and how they are written.
+"""The faults of a simulator as values, and their notation.
 
-A fault is ``KIND@WHEN`` or ``KIND=VALUE@WHEN``::
+A fault is written ``KIND@WHEN`` or ``KIND=VALUE@WHEN``::
 
     drop@1200            the 1200th byte that the sender sends is lost
     corrupt=3@2.5s       3 bytes arrive changed, from 2.5 s after the sender's first byte
     disconnect=2s@1200   the cable comes out, and is in again 2 s later
 
-WHEN is a number (the sender is about to send that byte, counted from 1) or a time with its unit,
-``s`` or ``ms``, on the controller's clock since the sender's first byte. VALUE is a count of bytes
-or ``all``, a time, or the number of an alarm, as :data:`KINDS` says. Each fault strikes once, and
-the same faults give the same bytes: noise is drawn from a fixed seed.
+WHEN is a number (just before the sender sends that byte, counted from 1) or a time with its unit,
+``s`` or ``ms``, on the controller's clock since the sender's first byte. VALUE is a number of bytes
+or ``all``, a time, or the number of an alarm; see :data:`KINDS`. Each fault strikes once. The same
+faults give the same bytes, because noise has a fixed seed.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from miurafab.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class FaultKind:
-    """A kind of fault: the ``unit`` of its value ("bytes", "s", "code" or "": none), the value
-    it has unless given (None: it must be given), and ``does``, what happens.
+    """A kind of fault: the ``unit`` of its value ("bytes", "s", "code" or "": none), its default
+    value ``stock`` (None: no default), and its effect ``does``.
     """
 
     unit: str
@@ -54,7 +54,7 @@ KINDS = MappingProxyType(
         "hang": FaultKind("s", _FOR_GOOD, "the controller hangs, for that long or for good"),
     }
 )
-"""Every kind of fault."""
+"""All kinds of faults."""
 
 _FORM = re.compile(r"(?P<kind>[a-z-]+)(?:=(?P<value>[^@=]+))?@(?P<when>[^@=]+)")
 _TIME = re.compile(r"(\d+(?:\.\d+)?|\.\d+)(ms|s)")
@@ -64,10 +64,10 @@ _ALARMS = range(1, 10)
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """``kind`` strikes at the ``at_byte``-th byte of the sender, or ``at_s`` after its first.
+    """``kind`` strikes at the ``at_byte``-th byte of the sender, or ``at_s`` after its first byte.
 
-    ``value`` is in the unit of the kind: bytes, seconds or an alarm's number; ``math.inf`` means
-    all bytes, or for good; 0 where the kind has none.
+    ``value`` is in the unit of the kind: bytes, seconds or an alarm's number. ``math.inf`` means
+    all bytes, or forever; 0 means that the kind has no value.
     """
 
     kind: str
@@ -77,9 +77,9 @@ class Fault:
 
 
 def parse_fault(text: str) -> Fault:
-    """The fault that ``text`` writes; see the module for the form.
+    """Read a fault from ``text``; the docstring of the module describes the notation.
 
-    Raises :class:`~miurafab.errors.InputError` naming what of it cannot be read.
+    Raises :class:`~miurafab.errors.InputError`, naming the part that cannot be read.
     """
     match = _FORM.fullmatch(text.strip())
     if match is None:
@@ -106,7 +106,7 @@ def parse_fault(text: str) -> Fault:
 
 
 def parse_faults(texts: Iterable[str]) -> tuple[Fault, ...]:
-    """The faults that ``texts`` write, in their order; see :func:`parse_fault`."""
+    """Read the faults ``texts``, in their order; see :func:`parse_fault`."""
     return tuple(parse_fault(text) for text in texts)
 
 

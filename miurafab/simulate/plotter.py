@@ -1,8 +1,8 @@
-"""A cutter in memory that takes HPGL: bytes in, XON and XOFF out, and time only by ``advance``.
+"""A simulated HPGL cutter: bytes in, XON and XOFF out, and time only by ``advance``.
 
-It has a receive buffer that overflows when nobody heeds its XOFF, carries out one instruction
-after another, each line at its speed (``VS``, in cm/s, with the pen down), and knows ``ESC.K``. It
-keeps what the tool drew.
+Its receive buffer overflows if the sender ignores XOFF. It executes one instruction after another,
+each line at its speed (``VS``, in cm/s, with the pen down), and knows ``ESC.K``. It logs what the
+tool draws.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from miurafab.plotter.stream import DROP_ALL, XOFF, XON
 from miurafab.simulate.beam import BeamSegment
 
 _FULL, _ROOM = 0.8, 0.4
-"""How full the buffer is when it says XOFF, and XON again."""
+"""The buffer levels at which it sends XOFF and XON, as fractions."""
 _SPEED = 400.0  # mm/s, before any VS and with the pen up
 _TOKEN = re.compile(rb"\s*(?:([A-Za-z]{2})|([-+]?\d+(?:\.\d+)?)(?=[^\d.])|[^A-Za-z\d.+-])")
-"""A word, a number that is whole because something follows it, or what parts them."""
+"""A word, a number (complete once another character follows it), or a separator."""
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnSegment(BeamSegment):
-    """A line drawn with the pen down, pressed on with ``force`` (``FS``)."""
+    """A line drawn with the pen down and the ``force`` of ``FS``."""
 
     force: float
 
 
 class VirtualPlotter:
-    """The device side of the wire; ``rx_bytes`` is its buffer, ``baud`` None takes no time."""
+    """The device side. ``rx_bytes`` is its buffer; with ``baud`` None bytes take no time."""
 
     resets_on_open = False
 
@@ -49,7 +49,7 @@ class VirtualPlotter:
         self.power_cycle()
 
     def power_cycle(self) -> None:
-        """Switch off and on: what it held is forgotten, the tool is up and stands at its origin."""
+        """Switch off and on: the buffer is lost, the tool is up and at its origin."""
         self._coming.clear()
         self._way.clear()
         self.position = (0.0, 0.0)
@@ -64,12 +64,12 @@ class VirtualPlotter:
         self._x: float | None = None
 
     def freeze(self, seconds: float = math.inf) -> None:
-        """Its program hangs: what it draws just now is drawn to its end."""
+        """Its program hangs; it completes the present line."""
         self._thaws_at = self.now + seconds
 
     @property
     def waiting(self) -> int:
-        """Bytes that are still on the wire."""
+        """The bytes still on the wire."""
         return len(self._coming)
 
     def advance(self, seconds: float) -> None:
@@ -77,16 +77,16 @@ class VirtualPlotter:
         self._run(self.now + max(0.0, seconds), stop=False)
 
     def advance_to_line(self, seconds: float) -> None:
-        """Let time pass until it has said something, ``seconds`` at the most."""
+        """Let time pass until it says something, at most ``seconds``."""
         self._run(self.now + max(0.0, seconds), stop=True)
 
     def next_event_in(self) -> float | None:
-        """Seconds until something changes by itself; None if nothing will."""
+        """Seconds until the next change without input; None if there is none."""
         event = min(self._events())
         return None if math.isinf(event) else max(0.0, event - self.now)
 
     def _events(self) -> tuple[float, float]:
-        """When the next byte comes, and when it can go on."""
+        """The times of the next received byte and of the next step."""
         able = self._way or not self._starved
         return (
             self._coming[0][0] if self._coming else math.inf,
@@ -115,7 +115,7 @@ class VirtualPlotter:
             self._coming.append((self._in_free, byte))
 
     def take_output(self) -> bytes:
-        """What it has said since the last call."""
+        """The bytes that it said since the last call."""
         out, self._out = bytes(self._out), bytearray()
         return out
 
@@ -127,7 +127,7 @@ class VirtualPlotter:
         self._starved = False
         if self._buffer.endswith(DROP_ALL):
             del self._buffer[-len(DROP_ALL) :]
-            if self.knows_abort:  # the line being drawn is drawn to its end
+            if self.knows_abort:  # it completes the present line
                 self._buffer.clear()
                 self._way.clear()
         if len(self._buffer) >= _FULL * self._rx_bytes and not self._told_off:
@@ -135,7 +135,7 @@ class VirtualPlotter:
             self._out.append(XOFF)
 
     def _take(self) -> None:
-        """Take the next word or number out of the buffer; ``_starved`` if it is not whole yet."""
+        """Take the next word or number from the buffer; ``_starved`` if it is incomplete."""
         match = _TOKEN.match(self._buffer)
         if match is None:
             self._starved = True

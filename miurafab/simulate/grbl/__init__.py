@@ -1,1 +1,1 @@
-"""A GRBL 1.1 controller and its dialects, simulated step by step as the firmware runs."""
+"""The simulated GRBL 1.1 controller and its dialects, a model of the firmware itself."""

@@ -1,4 +1,4 @@
-"""The ``$`` commands of the virtual controller (``system.c``)."""
+"""The ``$`` commands of the simulated controller (``system.c``)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LARGEST_SETTING = 255
 
 
 def command(machine: Machine, line: str) -> Routine:
-    """Execute ``line``, which begins with ``$``; :attr:`Machine.answer` is its code."""
+    """Execute ``line``, which begins with ``$``; its code goes to :attr:`Machine.answer`."""
     machine.answer = 0
     kind = line[1:2]
     if kind == "":
@@ -42,7 +42,7 @@ def command(machine: Machine, line: str) -> Routine:
 
 
 def run_startup_lines(machine: Machine) -> Routine:
-    """What ``$N`` stored runs after a reset and after homing."""
+    """Run the lines that ``$N`` stored, after a reset and after homing."""
     for index in range(STARTUP_LINES):
         text = yield from _startup_text(machine, index)
         if text is None:
@@ -64,7 +64,7 @@ def _startup_text(machine: Machine, index: int) -> TextRoutine:
 
 
 def _recall(machine: Machine, stored: bytes | None, store: Callable[[bytes], int]) -> TextRoutine:
-    """A stored text, read into the line buffer; one that is damaged is None and made empty."""
+    """Read a stored text into the line buffer; a damaged text gives None and is cleared."""
     if stored is None:
         machine.line[0] = 0
         yield from remember(machine, store(bytes(machine.line[:LINE_SIZE])))
@@ -230,13 +230,13 @@ def _setting(machine: Machine, line: str) -> Routine:
 
 
 def take_settings(machine: Machine) -> None:
-    """The settings changed: planner and stepper go by the new ones."""
+    """Give changed settings to planner and stepper."""
     machine.planner.configure(machine.motion())
     machine.stepper.idle_lock = machine.idle_cycles
 
 
 def _shift(machine: Machine, start: int) -> None:
-    """The firmware moves a stored text to the front of its line buffer, its end included."""
+    """Move a stored text, including its end, to the front of the line buffer."""
     line = machine.line
     end = line.index(0, start) + 1 if 0 in line[start:] else len(line)
     line[: end - start] = line[start:end]

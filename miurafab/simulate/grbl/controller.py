@@ -1,15 +1,14 @@
-"""A GRBL controller in memory: bytes in, bytes out, and time only by ``advance``.
+"""A simulated GRBL controller: bytes in, bytes out, and time only by ``advance``.
 
-It is the firmware's own machinery in virtual time. The main program (``virtual_protocol`` and
-what it calls) runs as a coroutine that yields when it works or waits; the interrupts (received
-bytes, step segments, switches) happen at their cycle of a 16 MHz clock beside it. So `ok` comes
-when the planner has room, a status report shows what the machine does at that moment, EEPROM
-writes lose bytes, and a job takes the time that it takes.
+It models the firmware in virtual time. The main program (:mod:`miurafab.simulate.grbl.protocol`) is
+a coroutine that yields when it works or waits. The interrupts (received bytes, step segments,
+switches) happen at their cycles of a 16 MHz clock. So ``ok`` comes when the planner has room, a
+status report shows the machine at that moment, EEPROM writes lose bytes, and a job takes its real
+time.
 
-Whatever is done to it, however it is cut into calls, the same bytes at the same times give the
-same output. It is GRBL 1.1h unless it is given another dialect
-(:mod:`miurafab.simulate.grbl.dialect`). ``faults`` (:mod:`miurafab.simulate.faults`) befall it
-and its cable on their own.
+The same bytes at the same times give the same output, however the calls divide them. The firmware
+is GRBL 1.1h or another dialect (:mod:`miurafab.simulate.grbl.dialect`). ``faults``
+(:mod:`miurafab.simulate.faults`) strike the controller and its cable at their times.
 """
 
 from __future__ import annotations
@@ -33,11 +32,11 @@ from miurafab.simulate.grbl.state import Machine, Until, Wait
 
 
 def virtual_settings(machine: MachineProfile) -> dict[int, float]:
-    """The settings that make a virtual controller this machine.
+    """The settings that turn a simulated controller into ``machine``.
 
-    What :func:`profile_settings` expects, and the bed, the motion and the motor steps that the
-    time estimate assumes where the profile does not give them as settings; and the tool, which
-    firmware without ``$30`` to ``$32`` keeps elsewhere.
+    These are the settings of :func:`~miurafab.grbl.settings.profile_settings`; the bed, the motion
+    and the motor steps that the time estimate assumes if the profile has no settings for them; and
+    the tool, which firmware without ``$30`` to ``$32`` keeps elsewhere.
     """
     bed, motion, tool = machine.bed, machine.motion, machine.tool
     pairs = dict.fromkeys((100, 101, 102), COMMON_STEPS) | {
@@ -56,14 +55,13 @@ def virtual_settings(machine: MachineProfile) -> dict[int, float]:
 
 
 class VirtualGrbl:
-    """The device side of the wire.
+    """The device side of a GRBL connection.
 
-    ``settings`` maps a ``$`` number to its value, over the firmware's stock defaults (None: just
-    those); an unknown number raises :class:`~miurafab.errors.ProfileError`. ``baud`` paces the
-    wire both ways, ten bit times a byte; None: bytes take no time. ``homing_switches`` False:
-    ``$H`` finds none. ``dialect`` is a name in
-    :data:`~miurafab.simulate.grbl.dialect.DIALECTS`. ``faults`` strike once each. At power-up the
-    banner is in the output.
+    ``settings`` maps ``$`` numbers to values and overrides the firmware's defaults; an unknown
+    number raises :class:`~miurafab.errors.ProfileError`. A byte takes ten bit times at ``baud``, in
+    both directions; with None it takes no time. With ``homing_switches`` False, ``$H`` finds no
+    switch. ``dialect`` is a name in :data:`~miurafab.simulate.grbl.dialect.DIALECTS`. Each of the
+    ``faults`` strikes once. At power-up the banner is in the output.
     """
 
     resets_on_open = True
@@ -87,11 +85,11 @@ class VirtualGrbl:
         self._frozen = False
         self._thaws_at: int | None = None
         faults = tuple(faults)
-        self._cable = Cable(faults, self._suffer, cpu.CLOCK) if faults else None
+        self._cable = Cable(faults, self._apply, cpu.CLOCK) if faults else None
         self._power_on()
 
     def _power_on(self) -> None:
-        """Boot; the time that takes until the banner is written is left out."""
+        """Boot; the time until the banner is written is left out."""
         machine = self._machine
         machine.power_up()
         self._processor = Processor(machine.stepper)
@@ -110,20 +108,20 @@ class VirtualGrbl:
         return self._seconds
 
     def advance(self, seconds: float) -> None:
-        """Let ``seconds`` of virtual time pass: the only way time enters."""
+        """Let ``seconds`` of virtual time pass."""
         self._seconds += max(seconds, 0.0)
         self._run(round(self._seconds * cpu.CLOCK))
 
     def advance_to_line(self, seconds: float) -> None:
-        """Let time pass until a line of output has come out whole, ``seconds`` at the most."""
+        """Let time pass until a complete line of output is out, at most ``seconds``."""
         target = round((self._seconds + max(seconds, 0.0)) * cpu.CLOCK)
         reached = self._run(target, stop_at_line=True)
         self._seconds = reached / cpu.CLOCK if reached < target else self._seconds + seconds
 
     def next_event_in(self) -> float | None:
-        """Seconds until something changes by itself; None if nothing will without input.
+        """Seconds until the next change without input; None if there is none.
 
-        Output that is out already and only waits to be taken is no change.
+        Output that waits to be taken is not a change.
         """
         machine = self._machine
         uart = machine.uart
@@ -140,7 +138,7 @@ class VirtualGrbl:
     # The wire
 
     def receive(self, data: bytes) -> None:
-        """Bytes that reach the UART (with ``baud``: start down the wire) now."""
+        """Take bytes: they reach the UART now, or, with ``baud``, start on the wire now."""
         now, cable = self._machine.now, self._cable
         if cable is None:
             self._machine.uart.receive(now, data)
@@ -150,7 +148,7 @@ class VirtualGrbl:
         self._run(now)
 
     def take_output(self) -> bytes:
-        """The bytes that have come out of the UART (and of the cable) since the last call."""
+        """The bytes that came out of the UART (and of the cable) since the last call."""
         now, cable = self._machine.now, self._cable
         if cable is None:
             return self._machine.uart.take(now)
@@ -159,55 +157,55 @@ class VirtualGrbl:
 
     @property
     def connected(self) -> bool:
-        """Whether the cable is in; a fault may take it out."""
+        """Whether the cable is plugged in; a fault may unplug it."""
         return self._cable is None or self._cable.connected
 
     @property
     def lost_bytes(self) -> int:
-        """Bytes that found the receive ring full, or came while an EEPROM write blocked it."""
+        """The number of bytes lost to a full receive ring or during an EEPROM write."""
         return self._machine.uart.lost
 
-    # What it does
+    # The state
 
     @property
     def beam_log(self) -> list[BeamSegment]:
-        """What was burnt so far, in order of time, up to now; clear it to save memory."""
+        """The beam segments up to now, in order of time; clear the list to save memory."""
         machine = self._machine
         machine.set_pwm(machine.beam.pwm)
         return machine.beam.segments
 
     @property
     def beam_on(self) -> bool:
-        """Whether the beam burns now."""
+        """Whether the beam is on."""
         return self._machine.beam.pwm > 0
 
     @property
     def position(self) -> tuple[float, float, float]:
-        """The machine position in mm now."""
+        """The machine position in mm."""
         x, y, z = self._machine.millimetres(self._machine.position_now())
         return x, y, z
 
     @property
     def state(self) -> str:
-        """The word of its status report: Idle, Run, Hold, Jog, Home, Alarm, Check, Door, Sleep."""
+        """The state in a status report: Idle, Run, Hold, Jog, Home, Alarm, Check, Door, Sleep."""
         return self._machine.state.value
 
     @property
     def settings(self) -> dict[int, float]:
-        """The ``$`` settings now."""
+        """The ``$`` settings."""
         return dict(self._machine.settings.values)
 
-    # What befalls it
+    # Events from outside
 
     def power_cycle(self) -> None:
-        """Switch off and on: only the EEPROM survives; output not yet taken is lost."""
+        """Switch off and on: only the EEPROM survives; output that was not taken is lost."""
         self._frozen = False
         self._thaws_at = None
         self._machine.uart.power_cycle(self._machine.now)
         self._power_on()
 
     def freeze(self, seconds: float = math.inf) -> None:
-        """The main program hangs: nothing is answered, prepared motion runs out."""
+        """The main program hangs: it answers nothing, and the prepared motion runs out."""
         self._frozen = True
         self._thaws_at = None
         if seconds < math.inf:
@@ -228,8 +226,8 @@ class VirtualGrbl:
         self._machine.change_probe_pin(touching)
         self._run(self._machine.now)
 
-    def _suffer(self, fault: Fault, now: int) -> None:
-        """A fault of the controller itself, not of its cable."""
+    def _apply(self, fault: Fault, now: int) -> None:
+        """Apply a fault of the controller itself."""
         machine = self._machine
         if fault.kind == "reset":
             machine.change_control_pin("reset", True)
@@ -244,7 +242,7 @@ class VirtualGrbl:
             self.freeze(fault.value)
 
     def _thaw(self) -> None:
-        """The hang is over: the main program goes on where it was."""
+        """End the hang: the main program continues."""
         now = self._machine.now
         self._frozen = False
         self._thaws_at = None
@@ -257,25 +255,25 @@ class VirtualGrbl:
             self._resume()
 
     def _next_fault(self) -> int | None:
-        """When the next fault strikes or ends, or the cable lets something go."""
+        """The time when the next fault strikes or ends, or the cable releases a byte."""
         due = None if self._cable is None else self._cable.next_due(self._machine.now)
         if due is None or (self._thaws_at is not None and self._thaws_at < due):
             due = self._thaws_at
         return due
 
-    # The run of events
+    # The event loop
 
     def _due(self) -> int | None:
-        """When the main program goes on, if nothing comes between."""
+        """The time when the main program continues, if no interrupt comes before."""
         wait = self._wait
         if wait is None or self._frozen:
             return None
         return wait.time if isinstance(wait, Until) else self._processor.finish()
 
     def _run(self, target: int, stop_at_line: bool = False) -> int:
-        """Let everything happen that is due by ``target``, in its order; returns the time reached.
+        """Process all events up to ``target`` in order; returns the time reached.
 
-        With ``stop_at_line`` it ends where a line of output is out.
+        With ``stop_at_line`` it stops at the end of a line of output.
         """
         cable, machine = self._cable, self._machine
         while True:
@@ -288,12 +286,12 @@ class VirtualGrbl:
             stop = target if due is None else min(target, max(due, machine.now))
             reached = self._run_events(stop, stop_at_line)
             if due is not None and due <= reached:
-                self._befall(reached)
+                self._apply_due(reached)
             elif reached == target or cable is None:
                 return reached
 
-    def _befall(self, now: int) -> None:
-        """What is due strikes, or ends."""
+    def _apply_due(self, now: int) -> None:
+        """Start and end the faults that are due."""
         if self._thaws_at is not None and self._thaws_at <= now:
             self._thaw()
         if self._cable is not None:
@@ -301,12 +299,12 @@ class VirtualGrbl:
             self._machine.uart.receive(now, self._cable.happen(now))
 
     def _pump(self) -> None:
-        """What is out of the UART goes into the cable."""
+        """Move the output of the UART into the cable."""
         if self._cable is not None:
             self._cable.reply(self._machine.uart.take_dated(self._machine.now))
 
     def _run_events(self, target: int, stop_at_line: bool) -> int:
-        """:meth:`_run` while nothing befalls the controller from outside."""
+        """Process all events up to ``target``, without faults; returns the time reached."""
         machine, processor = self._machine, self._processor
         stepper, uart = machine.stepper, machine.uart
         if self._wait is None and machine.pending():
@@ -335,7 +333,7 @@ class VirtualGrbl:
         return target
 
     def _resume(self) -> None:
-        """The main program goes on until it has to wait."""
+        """Run the main program until it waits."""
         machine = self._machine
         while not self._frozen:
             self._wait = next(self._program)

@@ -1,26 +1,26 @@
-"""What differs between the firmwares that speak GRBL, as values: the virtual controller has one.
+"""The differences between the firmwares that speak GRBL, as values.
 
-The machinery is GRBL 1.1h's in all of them: planner, motion, timing, states. What a sender can tell
-apart is here: texts, sizes, which bytes are commands, what exists at all. Facts are from the
-firmwares' sources and what they print:
+All simulated firmwares share the planner, motion, timing and states of GRBL 1.1h. A dialect holds
+the differences that a sender can see: texts, sizes, command bytes, missing features. Sources are
+the firmwares' code and output:
 
 ``grbl-1.1``
     gnea/grbl 1.1h: ``serial.h``, ``protocol.h``, ``planner.h``, ``report.c``, ``config.h``.
 ``grbl-0.9``
-    grbl/grbl 0.9j: ``report.c`` (words for numbers, commas in the status report, settings with
-    remarks), ``serial.c`` (a ring of 128 that keeps one place free; only five bytes are commands,
-    all others go into the line), ``planner.h`` (18 blocks, one free). No jog, no overrides, no
-    laser mode, no sleep.
+    grbl/grbl 0.9j: ``report.c`` (words instead of numbers, commas in the status report, settings
+    with remarks), ``serial.c`` (a ring of 128 with one place free; five command bytes, all other
+    bytes go into the line), ``planner.h`` (18 blocks, one free). No jog, no overrides, no laser
+    mode, no sleep.
 ``grblhal``
-    grblHAL/core: ``grbl.h`` (more command bytes; its stop, 0x19, holds here), a receive buffer of
-    1024 and lines of 256; ``$I`` as boards print it. Settings go to flash or FRAM: nothing is lost
-    meanwhile.
+    grblHAL/core: ``grbl.h`` (more command bytes; its stop, 0x19, is a hold here), a receive buffer
+    of 1024 and lines of 256; ``$I`` as boards print it. Settings go to flash or FRAM, so no bytes
+    are lost meanwhile.
 ``fluidnc``
     bdring/FluidNC 3.7: ``Report.cpp`` (banner, ``[OPT:`` without sizes), a UART queue of 256,
-    bdring/FluidNC#1036 (``$$`` lists ``$10`` alone; the rest stands in ``config.yaml``).
+    bdring/FluidNC#1036 (``$$`` lists ``$10`` alone; ``config.yaml`` holds the rest).
 
-Not modelled: the speed of 32-bit processors (all take GRBL's time), grblHAL's and FluidNC's own
-commands and reports, 0.9's waiting states.
+Not modelled: the speed of 32-bit processors (all have GRBL's timing), the additional commands and
+reports of grblHAL and FluidNC, the waiting states of 0.9.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ _1_1_BYTES = {
 class Dialect:
     """One firmware, as a sender sees it.
 
-    ``build_info`` are the lines of ``$I``, ``{}`` the owner's note. ``rx_bytes`` are usable,
-    ``line_chars`` too; ``planner_blocks`` can be filled. ``realtime`` are the bytes that are
-    commands, and which; other bytes from 0x80 up are dropped or, with ``keeps_high_bytes``, go
-    into the line. ``errors`` and ``alarms`` are words for the codes, None for bare numbers;
-    ``settings`` those that ``$$`` lists with their remarks, None for all of GRBL 1.1's without;
-    ``report_mask`` is $10 as it is born. ``deaf_writes``: what comes while a setting is stored is
-    lost. With ``program_flow``, ``$G`` tells M0 and ends its rates in a point.
+    ``build_info`` are the lines of ``$I``; ``{}`` stands for the owner's note. ``rx_bytes``,
+    ``line_chars`` and ``planner_blocks`` are the usable sizes. ``realtime`` maps the command bytes
+    to commands; other bytes from 0x80 up are dropped or, with ``keeps_high_bytes``, go into the
+    line. ``errors`` and ``alarms`` map codes to words; None: plain numbers. ``settings`` maps the
+    settings that ``$$`` lists to their remarks; None: all settings of GRBL 1.1, without remarks.
+    ``report_mask`` is the default of $10. With ``deaf_writes``, bytes that arrive while a setting
+    is stored are lost. With ``program_flow``, ``$G`` reports M0 and writes rates with a point.
     """
 
     banner: str
@@ -78,14 +78,14 @@ class Dialect:
     deaf_writes: bool = True
 
     def error_text(self, code: int) -> str:
-        """The answer ``error:``, by number or in words."""
+        """The answer ``error:``, with a number or in words."""
         words = (
             str(code) if self.errors is None else self.errors.get(code, f"Invalid gcode ID:{code}")
         )
         return self.error.format(words)
 
     def alarm_text(self, code: int) -> str:
-        """The line ``ALARM:``, by number or in words."""
+        """The line ``ALARM:``, with a number or in words."""
         return self.alarm.format(code if self.alarms is None else self.alarms[code])
 
 
@@ -211,4 +211,4 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
         ),
     }
 )
-"""The dialects by the name that machine profiles use."""
+"""The dialects, by their names in machine profiles."""

@@ -1,9 +1,9 @@
-"""The virtual controller's memory: its 1 KB EEPROM, byte by byte, and the settings kept there.
+"""The EEPROM of the simulated controller: 1 KB, with the settings stored in it.
 
-The image matters because writing it takes time: 3.4 ms for each byte that changes, during which
-the processor is deaf (``eeprom.c``). So settings, stored positions, startup lines and the build
-note are laid out as the firmware lays them out (``settings.h``), in 32-bit floats, and a write
-tells how often it waits: before each byte that follows a changed one.
+The image matters because a write takes 3.4 ms for each changed byte, and the processor is deaf
+meanwhile (``eeprom.c``). So settings, stored positions, startup lines and the build note have the
+firmware's layout (``settings.h``) with 32-bit floats. A write returns the number of its waits:
+before each byte that follows a changed byte.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ NEGATIVE, TOO_SHORT_PULSE, UNKNOWN, NEEDS_HOMING = 4, 6, 3, 10
 
 
 class FirmwareSettings:
-    """The ``$`` settings and what the firmware stores beside them.
+    """The ``$`` settings, and the other stored data.
 
-    ``values`` holds every setting by number, as the firmware would print it. Each method that
-    writes returns how many times it waits for a byte to be programmed.
+    ``values`` holds each setting by number, as the firmware would print it. Each method that writes
+    returns the number of waits for a byte to be programmed.
     """
 
     def __init__(self) -> None:
@@ -50,7 +50,7 @@ class FirmwareSettings:
         self.store_build_note(bytes(LINE_SIZE))
 
     def write(self, values: Mapping[int, float]) -> None:
-        """Put ``values`` over the stored ones, each kept as the firmware's type for it would."""
+        """Store ``values``, each rounded to the firmware's type for it."""
         for number, value in values.items():
             self.values[number] = self._fit(number, value)
         self._save()
@@ -67,7 +67,7 @@ class FirmwareSettings:
 
     @property
     def mist(self) -> bool:
-        """M7 is not compiled into the stock firmware."""
+        """The stock firmware is compiled without M7."""
         return False
 
     @property
@@ -82,19 +82,19 @@ class FirmwareSettings:
 
     @property
     def idle_lock(self) -> float | None:
-        """$1 in seconds; None keeps the motors on without waiting."""
+        """$1 in seconds; None holds the motors without waiting."""
         return None if self.values[1] == 255 else self.values[1] * 1e-3
 
     def motion(self) -> MotionParameters:
-        """What of the settings shapes motion."""
+        """The settings that shape motion."""
         return MotionParameters.from_settings(self.values)
 
     def beyond_travel(self, position: Sequence[float]) -> bool:
-        """Whether ``position`` (machine mm) leaves the travel, from -$130.. up to 0."""
+        """Whether ``position`` (machine mm) is outside the travel, from -$130.. to 0."""
         return any(at > 0.0 or at < -self.values[130 + axis] for axis, at in enumerate(position))
 
     def store(self, number: int, value: float) -> tuple[int, int]:
-        """``$number=value``: the ``error:`` code (0 if it is taken) and the waits."""
+        """``$number=value``: the ``error:`` code (0: stored) and the waits."""
         code = self._refusal(number, value)
         if code:
             return code, 0
@@ -207,7 +207,7 @@ class FirmwareSettings:
 
 
 def _checksum(data: bytes) -> int:
-    """The firmware's: a logical "or" where a rotation was meant leaves 1 of what came before."""
+    """The firmware's checksum, with its logical "or" in place of a rotation."""
     total = 0
     for byte in data:
         total = ((1 if total else 0) + byte) & 0xFF

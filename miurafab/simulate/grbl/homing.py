@@ -1,8 +1,8 @@
-"""The virtual controller's homing cycle: find the switches, pull off, find them again slowly.
+"""The homing cycle of the simulated controller: find the switches, pull off, find them slowly.
 
 Z homes first, then X and Y together (``limits.c``, ``config.h``). Each axis has one switch, half
-the travel away from where power came on; whether they exist is the machine's option. Only a
-reset ends the cycle early: nothing else is looked at until it is over.
+the travel away from the position at power-up; ``homing_switches`` says whether they exist. Only a
+reset ends the cycle early; all other requests wait until its end.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from miurafab.simulate.grbl.state import (
 
 _CYCLES = ((2,), (0, 1))
 _SEARCH, _LOCATE = 1.5, 5.0
-"""Times the travel that is searched, and times the pull-off that is searched again."""
+"""The search distance in travels, and the distance of the slow search in pull-offs."""
 
 
 def home(machine: Machine) -> Routine:
-    """``$H``: home all axes; the state is HOMING already."""
+    """``$H``: home all axes; the state is already HOMING."""
     machine.stepper.idle_lock = 0
     for axes in _CYCLES:
         if not machine.abort:
@@ -62,7 +62,7 @@ def _home(machine: Machine, axes: tuple[int, ...]) -> Routine:
 
 
 def _set_home(machine: Machine, axis: int) -> None:
-    """Machine zero: the switch end of the travel, seen after pulling off."""
+    """Set machine zero at the switch end of the travel, after the pull-off."""
     values = machine.settings.values
     steps_per_mm, pull_off = values[100 + axis], values[27]
     direction, switch = machine.home_switch(axis)
@@ -114,7 +114,7 @@ def _leg(
 
 
 def _count_from_zero(machine: Machine, axes: tuple[int, ...]) -> None:
-    """Each leg counts its axes from zero; the switches stay where they are."""
+    """Count the axes of a leg from zero; the switches do not move."""
     position = list(machine.position)
     for axis in axes:
         direction, switch = machine.home_switch(axis)
@@ -128,7 +128,7 @@ def _pressed(machine: Machine, axis: int) -> bool:
 
 
 def _ended(machine: Machine, axes: tuple[int, ...], approach: bool) -> bool:
-    """Whether the cycle failed: a reset, a door, a switch not found or not left."""
+    """Whether the cycle failed: a reset, a door, a switch not found or not released."""
     requests = machine.requests
     done = machine.stepper.stopped
     if not done and not requests & {RealtimeRequest.RESET, RealtimeRequest.DOOR}:
@@ -146,7 +146,7 @@ def _ended(machine: Machine, axes: tuple[int, ...], approach: bool) -> bool:
 
 
 def _next_press(machine: Machine, move: Move, moving: set[int]) -> int | None:
-    """When, within the running segment, the next of the ``moving`` axes reaches its switch."""
+    """The time in the running segment when the next ``moving`` axis reaches its switch."""
     stepper = machine.stepper
     if not machine.homing_switches or not stepper.running:
         return None

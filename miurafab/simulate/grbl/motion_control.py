@@ -1,4 +1,4 @@
-"""How the virtual controller performs what G-code blocks ask for (``motion_control.c``)."""
+"""The simulated controller performs the actions of G-code blocks (``motion_control.c``)."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ from miurafab.simulate.grbl.state import (
 
 _TRAVEL_EXCEEDED = 15
 _EEPROM_BYTE = round(3.4e-3 * cpu.CLOCK)
-"""Cycles to program one EEPROM byte (ATmega328P data sheet, table 8-2)."""
+"""The cycles to program one EEPROM byte (ATmega328P data sheet, table 8-2)."""
 
 
 def run_gcode(machine: Machine, line: str, *, jog: bool = False) -> Routine:
-    """Execute one line of G-code (or what follows ``$J=``); :attr:`Machine.answer` is its code."""
+    """Execute a line of G-code, or of a jog; its code goes to :attr:`Machine.answer`."""
     letters = sum("A" <= character <= "Z" for character in line)
     yield float(cpu.LINE_FIXED + cpu.words_cost(letters, len(line), line.count(".")))
     settings = machine.settings
@@ -65,7 +65,7 @@ def run_gcode(machine: Machine, line: str, *, jog: bool = False) -> Routine:
 
 
 def remember(machine: Machine, waits: int) -> Routine:
-    """Write to the EEPROM: deaf while waiting for each byte that must be programmed first."""
+    """Write to the EEPROM; the controller is deaf during each of the ``waits``."""
     for _ in range(waits):
         machine.uart.deaf = machine.dialect.deaf_writes
         yield float(_EEPROM_BYTE)
@@ -73,7 +73,7 @@ def remember(machine: Machine, waits: int) -> Routine:
 
 
 def offsets_changed(machine: Machine) -> Routine:
-    """Let all motion end, and report the new offset next."""
+    """Wait for all motion to end; the next report holds the new offset."""
     yield from synchronize(machine)
     machine.offset_count = 0
 
@@ -146,7 +146,7 @@ def plan_move(machine: Machine, move: StraightMove) -> Routine:
 
 
 def _check_soft_limits(machine: Machine, move: StraightMove) -> Routine:
-    """A target beyond the travel: stop in good order, then the alarm."""
+    """If the target is beyond the travel: hold, then raise the alarm."""
     if not machine.settings.beyond_travel(move.target):
         return
     machine.soft_limit = True
@@ -161,7 +161,7 @@ def _check_soft_limits(machine: Machine, move: StraightMove) -> Routine:
 
 
 def _until_idle(machine: Machine) -> Routine:
-    """Wait until the motion under way has ended, or the machine is reset."""
+    """Wait until the motion has ended or the machine is reset."""
     while True:
         yield from realtime(machine)
         if machine.abort or machine.is_in(FirmwareState.IDLE):
@@ -184,7 +184,7 @@ def _jog(machine: Machine, jog: Jog) -> Routine:
 
 
 def _probe(machine: Machine, probe: Probe) -> Routine:
-    """Move until the probe changes (``mc_probe_cycle``), and leave the parser where that is."""
+    """Move until the probe changes (``mc_probe_cycle``), and set the parser's position there."""
     if machine.is_in(FirmwareState.CHECK):
         machine.parser.position = list(probe.move.target)
         return

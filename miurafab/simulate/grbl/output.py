@@ -1,4 +1,4 @@
-"""The virtual controller's outputs: its text, its spindle and coolant, its motors."""
+"""The outputs of the simulated controller: text, spindle, coolant and motors."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from miurafab.motion import cpu
 from miurafab.simulate.grbl.state import FirmwareState, Machine, Routine, Until
 
 _DIGIT_PRINTED = 620
-"""Cycles: a 32-bit division by ten for each digit of a number."""
+"""The cycles for each digit of a number: a 32-bit division by ten."""
 
 
 def say(machine: Machine, text: str) -> Routine:
-    """Print ``text``, waiting while the transmit ring is full."""
+    """Print ``text``; wait while the transmit ring is full."""
     data = text.encode("latin-1")
     done = machine.uart.write(machine.now, data)
     digits = sum(byte in b"0123456789" for byte in data)
@@ -33,7 +33,7 @@ def prepare(machine: Machine) -> Routine:
 
 
 def set_spindle(machine: Machine, spindle: int, word: float) -> None:
-    """Run the spindle as M3, M4 or off (0); in laser mode M4 is dark while nothing moves."""
+    """Run the spindle as M3, M4 or off (0); in laser mode M4 leaves the beam off at rest."""
     if machine.abort:
         return
     if spindle == 0:
@@ -64,12 +64,12 @@ def rest_motors(machine: Machine) -> Routine:
 
 
 def reset_motors(machine: Machine) -> Routine:
-    """Stop, and forget all prepared segments."""
+    """Stop, and drop all prepared segments."""
     yield from rest_motors(machine)
     machine.generator.reset()
 
 
 def sync_positions(machine: Machine) -> None:
-    """Parser and planner take over the stepper's position."""
+    """Set the positions of parser and planner to the stepper's."""
     machine.parser.position = machine.millimetres(machine.position)
     machine.planner.position = machine.position

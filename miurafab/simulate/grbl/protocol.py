@@ -1,4 +1,4 @@
-"""The virtual controller's main program: start, read lines, execute them (``protocol.c``)."""
+"""The main program of the simulated controller: read lines, execute them (``protocol.c``)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ENDS = (0x0A, 0x0D)
 
 
 def firmware(machine: Machine) -> Routine:
-    """The program from power-up, for ever: each reset leads back to its start."""
+    """The endless program from power-up; each reset leads back to its start."""
     while True:
         yield from _restart(machine)
         machine.booting = False
@@ -25,7 +25,7 @@ def firmware(machine: Machine) -> Routine:
 
 
 def _restart(machine: Machine) -> Routine:
-    """What a reset clears; the machine's position survives it."""
+    """Clear the state after a reset; the machine's position survives."""
     machine.clear()
     machine.uart.ring.clear()
     machine.parser = ModalState()
@@ -72,7 +72,7 @@ def _serve(machine: Machine) -> Routine:
 
 
 def _line(machine: Machine, reader: _LineBuffer) -> Routine:
-    """Execute the line that was read, and answer it."""
+    """Execute the line in ``reader``, and answer it."""
     text, too_long = reader.finish()
     if too_long:
         machine.answer = _TOO_LONG
@@ -88,7 +88,7 @@ def _line(machine: Machine, reader: _LineBuffer) -> Routine:
 
 
 class _LineBuffer:
-    """Collects a line: blanks, comments and slashes dropped, letters upper case, 79 at most."""
+    """Collects a line in upper case, at most 79 characters, without blanks, comments, slashes."""
 
     def __init__(self, buffer: bytearray) -> None:
         self.buffer = buffer
@@ -96,7 +96,7 @@ class _LineBuffer:
         self.skipping = ""
 
     def take(self, byte: int) -> bool:
-        """Read one byte; True at the line's end."""
+        """Read a byte; True at the end of the line."""
         if byte in _ENDS:
             return True
         character = chr(byte)
@@ -115,7 +115,7 @@ class _LineBuffer:
         return False
 
     def finish(self) -> tuple[str, bool]:
-        """The line, and whether it was too long; the next one begins."""
+        """The line, and whether it was too long; the next line begins."""
         self.buffer[self.length] = 0
         text = self.buffer[: self.length].decode("latin-1")
         too_long = self.skipping == "too long"

@@ -1,8 +1,8 @@
-"""The virtual controller's look at its flags: holds, starts, stops, overrides, alarms.
+"""The realtime requests of the simulated controller: holds, starts, stops, overrides, alarms.
 
-The main program calls :func:`realtime` wherever it may have to wait (``protocol.c``). It does
-what the interrupts asked for, in a fixed order, then keeps the segment queue filled; while the
-controller is suspended (a hold, an open door, a jog being cancelled) it does not return.
+The main program calls :func:`realtime` wherever it may have to wait (``protocol.c``). It serves the
+requests of the interrupts in a fixed order and keeps the segment queue filled. While the controller
+is suspended (a hold, an open door, a jog cancel) it does not return.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from miurafab.simulate.grbl.state import (
 
 _ALARM_PAUSE = 0.5
 _DOOR_SPINDLE, _DOOR_COOLANT = 4.0, 1.0
-"""s; the waits after an alarm message, and for spindle and coolant after a door (``config.h``)."""
+"""s; the delays after an alarm message, and of spindle and coolant after a door (``config.h``)."""
 _LEAST_OVERRIDE, _MOST_OVERRIDE = 10, 200
 _FEED_STEPS = {0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}
 _SPINDLE_STEPS = {0x9A: 10, 0x9B: -10, 0x9C: 1, 0x9D: -1}
@@ -57,14 +57,14 @@ _FLOOD_STATES = {FirmwareState.IDLE, FirmwareState.CYCLE, FirmwareState.HOLD, Fi
 
 
 def realtime(machine: Machine) -> Routine:
-    """Do what the flags ask; while suspended, stay here."""
+    """Serve the requests; while suspended, do not return."""
     yield from flags(machine)
     if machine.suspend:
         yield from _suspended(machine)
 
 
 def flags(machine: Machine) -> Routine:
-    """Do what the flags ask, once."""
+    """Serve the requests once."""
     if machine.pending():
         yield from _flags(machine)
         if machine.abort:
@@ -74,13 +74,13 @@ def flags(machine: Machine) -> Routine:
 
 
 def start_when_idle(machine: Machine) -> None:
-    """Ask for a start if there is motion to make and none under way."""
+    """Request a start if moves are planned and the controller is idle."""
     if machine.planner.moves and machine.state is FirmwareState.IDLE:
         machine.requests.add(RealtimeRequest.START)
 
 
 def synchronize(machine: Machine) -> Routine:
-    """Wait until all motion is made (or the machine is reset)."""
+    """Wait until all motion has ended or the machine is reset."""
     while True:
         start_when_idle(machine)
         yield from realtime(machine)
@@ -93,7 +93,7 @@ def synchronize(machine: Machine) -> Routine:
 
 
 def dwell(machine: Machine, seconds: float) -> Routine:
-    """Wait ``seconds``, in steps of 50 ms with a look at the flags before each."""
+    """Wait ``seconds`` in steps of 50 ms; serve the requests before each step."""
     for _ in range(cpu.dwell_steps(seconds)):
         if machine.abort:
             return
@@ -198,7 +198,7 @@ def _start(machine: Machine) -> Routine:
 
 
 def _stop(machine: Machine) -> Routine:
-    """All prepared motion is made: a hold is complete, or the cycle is over."""
+    """All prepared motion has ended: a hold is complete, or the cycle is over."""
     generator, suspend = machine.generator, machine.suspend
     holding = machine.state in (FirmwareState.HOLD, FirmwareState.DOOR, FirmwareState.SLEEP)
     if holding and not machine.soft_limit and Suspend.JOG_CANCEL not in suspend:
@@ -222,7 +222,7 @@ def _stop(machine: Machine) -> Routine:
 
 
 def _clamp(percent: int) -> int:
-    """An override within its range, wrapping first as the firmware's byte does."""
+    """An override, wrapped to a byte as in the firmware, then clipped to its range."""
     return min(max(percent & 0xFF, _LEAST_OVERRIDE), _MOST_OVERRIDE)
 
 
@@ -262,7 +262,7 @@ def _override_accessories(machine: Machine) -> None:
 
 
 def _suspended(machine: Machine) -> Routine:
-    """Stay until the hold, door or cancelled motion is over."""
+    """Wait until the hold, door or cancelled motion is over."""
     move = machine.planner.moves[0] if machine.planner.moves else None
     if move is None:
         restore = machine.parser.spindle, machine.parser.speed, bool(machine.parser.coolant)
@@ -288,7 +288,7 @@ def _suspended(machine: Machine) -> Routine:
 
 
 def _progress(machine: Machine) -> tuple[object, ...]:
-    """What of a suspended machine changes when it gets on by itself."""
+    """The parts of a suspended machine's state that change without input."""
     return (
         machine.state,
         frozenset(machine.suspend),
@@ -309,7 +309,7 @@ def _sleep(machine: Machine) -> Routine:
 
 
 def _door(machine: Machine, restore: tuple[int, float, bool]) -> Routine:
-    """Power down once stopped; on a start with the door closed, power up and go on."""
+    """Power down after the stop; at a start with the door closed, power up and continue."""
     suspend = machine.suspend
     if Suspend.RETRACTED not in suspend:
         machine.stop_override = StopOverride.OFF
@@ -336,7 +336,7 @@ def _door(machine: Machine, restore: tuple[int, float, bool]) -> Routine:
 
 
 def _restore_wait(machine: Machine, seconds: float) -> Routine:
-    """Let spindle or coolant come up, unless the door opens again."""
+    """Wait for spindle or coolant to start, unless the door opens again."""
     for _ in range(cpu.dwell_steps(seconds)):
         yield from flags(machine)
         if machine.abort or Suspend.RESTORING not in machine.suspend:
@@ -345,7 +345,7 @@ def _restore_wait(machine: Machine, seconds: float) -> Routine:
 
 
 def _held(machine: Machine, restore: tuple[int, float, bool]) -> Routine:
-    """In a complete hold: stop the spindle if asked, bring it back before going on."""
+    """In a complete hold: stop the spindle on request, and restore it before a start."""
     stop = machine.stop_override
     spindle, word, _ = restore
     if stop is StopOverride.BEGIN:

@@ -1,4 +1,4 @@
-"""What the virtual controller says, to the letter (``report.c``, ``print.c`` of GRBL 1.1h)."""
+"""The texts of the simulated controller (``report.c``, ``print.c`` of GRBL 1.1h)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ HELP = "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\
 _INCHES = single(0.0393701)
 _BUSY_OFFSET, _IDLE_OFFSET = 30, 10
 _BUSY_OVERRIDE, _IDLE_OVERRIDE = 20, 10
-"""Reports from one WCO or Ov field to the next, while moving and while not (``config.h``)."""
+"""The reports between two WCO or Ov fields, in motion and at rest (``config.h``)."""
 _BUSY = frozenset(
     {
         FirmwareState.HOMING,
@@ -26,7 +26,7 @@ _BUSY = frozenset(
 
 
 def number(value: float, decimals: int) -> str:
-    """``value`` as the firmware prints a 32-bit float; what does not fit 32 bits is 2^31."""
+    """``value`` as the firmware prints a 32-bit float; an overflow prints 2^31."""
     sign = "-" if value < 0.0 else ""
     scaled = single(abs(value))
     for _ in range(decimals // 2):
@@ -39,7 +39,7 @@ def number(value: float, decimals: int) -> str:
 
 
 def banner(machine: Machine) -> str:
-    """What a start says."""
+    """The banner of a start."""
     return f"\r\n{machine.dialect.banner}\r\n"
 
 
@@ -49,7 +49,7 @@ def message(machine: Machine, text: str) -> str:
 
 
 def status_code(machine: Machine, code: int) -> str:
-    """The answer to a line: ``ok``, or ``error:`` and why."""
+    """The answer to a line: ``ok`` or ``error:``."""
     return machine.dialect.error_text(code) if code else "ok\r\n"
 
 
@@ -128,12 +128,12 @@ def modes(machine: Machine) -> str:
 
 
 def build_info(machine: Machine, note: str) -> str:
-    """The answer to ``$I``: version, the note of ``$I=``, and what the dialect says besides."""
+    """The answer to ``$I``: the version, the note of ``$I=``, and the dialect's other lines."""
     return "".join(f"{line}\r\n" for line in machine.dialect.build_info).format(note)
 
 
 def status(machine: Machine) -> str:
-    """The answer to ``?``; it moves the counters of the fields that come now and then."""
+    """The answer to ``?``; it advances the counters of the occasional fields."""
     values = machine.settings.values
     position = machine.millimetres(machine.position_now())
     mask = int(values[10])
@@ -163,7 +163,7 @@ def status(machine: Machine) -> str:
 def _status_with_commas(
     machine: Machine, position: Sequence[float], offset: Sequence[float]
 ) -> str:
-    """As GRBL 0.9 says it: both positions and what lies in the buffers, by the bits of $10."""
+    """The status of GRBL 0.9: both positions and the buffer levels, by the bits of $10."""
     mask = int(machine.settings.values[10])
     fields = [_state(machine).partition(":")[0]]
     if mask & 1:

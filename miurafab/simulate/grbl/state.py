@@ -1,9 +1,9 @@
-"""Everything that the virtual controller knows at one moment, and what its interrupts do to it.
+"""The state of the simulated controller, and its interrupts.
 
-The firmware's main program (the other ``virtual_`` modules) is written as generators that yield
-what they wait for: a number of processor cycles to work, :class:`Until` a time, or None for
-whatever happens next. The interrupts (bytes, switches, the end of motion) change this state at
-once, and the main program finds the flags when it looks.
+The main program of the firmware (the other modules here) is written as generators. A generator
+yields what it waits for: a number of processor cycles of work, :class:`Until` a time, or None for
+the next event. The interrupts (bytes, switches, the end of motion) change the state at once, and
+the main program sees their flags later.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ AXES = "XYZ"
 
 @dataclass(frozen=True, slots=True)
 class Until:
-    """Wait, doing nothing else, until the cycle ``time``."""
+    """Wait without work until the cycle ``time``."""
 
     time: int
 
@@ -39,7 +39,7 @@ Routine = Generator[Wait, None, None]
 
 
 class FirmwareState(Enum):
-    """What the controller is doing, by the word in its status report."""
+    """The state of the controller, named as in its status report."""
 
     IDLE = "Idle"
     ALARM = "Alarm"
@@ -53,7 +53,7 @@ class FirmwareState(Enum):
 
 
 class RealtimeRequest(Enum):
-    """What an interrupt asks of the main program."""
+    """A request of an interrupt to the main program."""
 
     STATUS = auto()
     START = auto()
@@ -65,7 +65,7 @@ class RealtimeRequest(Enum):
 
 
 class Suspend(Enum):
-    """How far the controller is in a hold, a door stop or a cancelled motion."""
+    """The progress of a hold, a door stop or a cancelled motion."""
 
     HELD = auto()
     RETRACTED = auto()
@@ -103,11 +103,10 @@ class Machine:
     """The controller's state. ``now`` is in processor cycles since power-up.
 
     ``position`` is the stepper's count of motor steps. ``switches`` holds, for each homed axis,
-    the direction (1 or -1) and the position of its homing switch; before homing it is half the
-    travel away from where power came on. ``limit_pins`` and ``control_pins`` are the switches
-    that somebody holds. ``line`` is the line buffer with what earlier lines left in it, and
-    ``answer`` the ``error:`` code of the line last executed; ``booting`` lasts from power-up
-    until the banner is written.
+    the direction (1 or -1) and the position of its homing switch; before homing the switch is half
+    the travel away from the position at power-up. ``limit_pins`` and ``control_pins`` are the
+    pressed switches. ``line`` is the line buffer with the rests of earlier lines, and ``answer``
+    the ``error:`` code of the last line; ``booting`` lasts from power-up until the banner.
     """
 
     def __init__(
@@ -135,7 +134,7 @@ class Machine:
         self.power_up()
 
     def power_up(self) -> None:
-        """Power comes on: only the EEPROM and the switches remember anything."""
+        """Switch on: only the EEPROM and the switches keep their state."""
         self.set_pwm(0)
         self.stepper.halt()
         self.count_from((0, 0, 0))
@@ -149,7 +148,7 @@ class Machine:
         self.clear()
 
     def clear(self) -> None:
-        """What every reset clears, the state itself excepted (``main.c``)."""
+        """Clear what every reset clears, except ``state`` (``main.c``)."""
         self.abort = False
         self.suspend: set[Suspend] = set()
         self.soft_limit = False
@@ -170,14 +169,14 @@ class Machine:
         self.interrupt_delay = 0
 
     def motion(self) -> MotionParameters:
-        """What of the settings and the firmware shapes motion."""
+        """The parameters of motion, from settings and firmware."""
         blocks = self.dialect.planner_blocks
         return replace(self.settings.motion(), planner_blocks=blocks)
 
-    # What happens in interrupts
+    # The interrupts
 
     def realtime_byte(self, now: int, byte: int) -> None:
-        """The receive interrupt took ``byte`` out of the stream."""
+        """The receive interrupt takes ``byte`` out of the stream."""
         self.now = now
         command = self.dialect.realtime[byte]
         if command == "reset":
@@ -193,7 +192,7 @@ class Machine:
             self.accessory_overrides.add(byte)
 
     def reset(self) -> None:
-        """Beam, coolant and, if moving, motors off; the main program restarts (``mc_reset``)."""
+        """Turn off beam, coolant and moving motors; the main program restarts (``mc_reset``)."""
         if RealtimeRequest.RESET in self.requests:
             return
         self.requests.add(RealtimeRequest.RESET)
@@ -211,13 +210,13 @@ class Machine:
             self.interrupt_delay = self.idle_cycles
 
     def stop_motors(self) -> None:
-        """The step interrupt ends where it is."""
+        """Stop the step interrupt at the present position."""
         self.position = self.position_now()
         self.stepper.halt()
         self.set_pwm(self.beam.pwm)
 
     def change_limit_pin(self, axis: str, pressed: bool) -> None:
-        """A limit switch changes; with hard limits on, any change kills ($21, ``limits.c``)."""
+        """A limit switch changes; with hard limits any change is an alarm ($21, ``limits.c``)."""
         (self.limit_pins.add if pressed else self.limit_pins.discard)(axis)
         watched = self.settings.values[21] and self.state is not FirmwareState.HOMING
         if watched and self.state is not FirmwareState.ALARM and not self.alarm:
@@ -233,11 +232,11 @@ class Machine:
             self.requests.add(_PIN_REQUESTS[pin])
 
     def watch_probe(self) -> None:
-        """From now on the step interrupt looks at the probe."""
+        """The step interrupt checks the probe from now on."""
         self.probing, self.probe_seen = True, False
 
     def change_probe_pin(self, touched: bool) -> None:
-        """The probe changes; the step interrupt notes where."""
+        """The probe changes; the step interrupt records the position."""
         self.probe_pin = touched
         if self.probing and self.stepper.running and self.probe_triggered:
             self.probing, self.probe_seen = False, True
@@ -246,12 +245,12 @@ class Machine:
 
     @property
     def probe_triggered(self) -> bool:
-        """The probe as $6 and a move away from contact see it."""
+        """Whether the probe triggers, inverted by $6 and by a move away from contact."""
         inverted = bool(self.settings.values[6]) != self.probe_away
         return self.probe_pin != inverted
 
     def home_switch(self, axis: int) -> tuple[int, int]:
-        """The homing direction of ``axis`` (1 or -1, $23) and its switch's position in steps."""
+        """The homing direction of ``axis`` (1 or -1, $23) and its switch position in steps."""
         values = self.settings.values
         direction = -1 if int(values[23]) >> axis & 1 else 1
         known = self.switches[axis]
@@ -260,10 +259,10 @@ class Machine:
         return direction, direction * round(0.5 * values[130 + axis] * values[100 + axis])
 
     def engaged_limits(self) -> set[str]:
-        """The axes whose limit pin reads as pressed, under $5.
+        """The axes whose limit pin reads as pressed, with $5.
 
-        The homing switches stand aside except in homing, so that a job may use the whole bed
-        of a machine that was never homed.
+        The homing switches act in homing only, so a job may use the whole bed of a machine that was
+        never homed.
         """
         position = self.position_now()
         homing = self.homing_switches and self.state is FirmwareState.HOMING
@@ -287,26 +286,26 @@ class Machine:
         self.set_pwm(self.beam.pwm)
 
     def _on_settled(self, now: int) -> None:
-        """Power that follows the speed is put out at rest; constant power stays on."""
+        """At rest the beam of M4 goes off; the constant power of M3 stays on."""
         self.now = now
         if self._follows:
             self.set_pwm(0)
 
     def count_from(self, position: tuple[int, ...]) -> None:
-        """Where the machine stands is called ``position`` from now on; nothing moves."""
+        """Rename the present position to ``position``; nothing moves."""
         self.set_pwm(self.beam.pwm)
         self.position = position
         self.set_pwm(self.beam.pwm)
 
-    # What the main program sees
+    # The view of the main program
 
     @property
     def idle_cycles(self) -> int:
-        """How long the motors are held at a stop."""
+        """The cycles for which the motors are held at a stop."""
         return round((self.settings.idle_lock or 0.0) * cpu.CLOCK)
 
     def position_now(self) -> tuple[int, ...]:
-        """The motor position in steps at this moment."""
+        """The present motor position in steps."""
         progress = self.stepper.progress(self.now)
         return self.position if progress is None else steps_taken(*progress)
 
@@ -318,7 +317,7 @@ class Machine:
         ]
 
     def to_pwm(self, word: float | None) -> int:
-        """The PWM value of an S word, or of none, under the override (``spindle_control.c``)."""
+        """The PWM value of an S word, or of None, with the override (``spindle_control.c``)."""
         values = self.settings.values
         low, high = values[31], values[30]
         if word is None:
@@ -335,12 +334,12 @@ class Machine:
         return int((speed - low) * 254.0 / (high - low)) + 1
 
     def set_pwm(self, pwm: int) -> None:
-        """The beam's PWM changes now."""
+        """Set the PWM of the beam now."""
         if pwm or self.beam.pwm:
             self.beam.mark(self.now / cpu.CLOCK, self.point_now(), pwm)
 
     def point_now(self) -> tuple[float, float]:
-        """Where the beam is, in machine mm, between motor steps too."""
+        """The beam position in machine mm, interpolated between motor steps."""
         progress = self.stepper.progress(self.now)
         if progress is None:
             x, y, _ = self.position
@@ -362,11 +361,11 @@ class Machine:
         return x, y
 
     def is_in(self, *states: FirmwareState) -> bool:
-        """Whether the state is one of ``states`` now; it changes across every wait."""
+        """Whether the state is one of ``states`` now; the state may change in every wait."""
         return self.state in states
 
     def pending(self) -> bool:
-        """Whether an interrupt left the main program something to do."""
+        """Whether an interrupt left work for the main program."""
         return bool(
             self.requests
             or self.alarm

@@ -1,9 +1,9 @@
-"""The virtual controller's serial port: bytes that take time, and rings that run full.
+"""The serial port of the simulated controller: bytes take time, and full rings lose bytes.
 
-Received bytes go through the interrupt (``serial.c``): realtime commands are taken out wherever
-they stand, other bytes from 0x80 up are dropped (or kept: that is the dialect's), the rest goes
-into a ring of 128 or so, and what finds it full is lost. While an EEPROM write keeps interrupts
-off, the hardware holds two bytes and the one being shifted in; the others are lost too.
+The receive interrupt (``serial.c``) takes realtime commands out of the stream. It drops other bytes
+from 0x80 up, or keeps them in some dialects. It puts the rest into a ring of about 128 bytes; bytes
+beyond are lost. While an EEPROM write blocks the interrupts, the hardware holds two bytes and the
+byte being received; further bytes are lost.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ _NEWLINE = 10
 
 
 class Uart:
-    """``ring`` holds received bytes not yet read; times are in processor cycles.
+    """``ring`` holds the received, unread bytes; times are in processor cycles.
 
-    ``on_realtime`` is called with each realtime byte and the time. ``baud`` None: bytes take no
+    ``on_realtime`` is called with the time and each realtime byte. With ``baud`` None bytes take no
     time.
     """
 
@@ -42,17 +42,17 @@ class Uart:
         self._tx_free = 0.0
 
     def receive(self, now: int, data: bytes) -> None:
-        """Bytes start down the wire to the controller."""
+        """Bytes start on the wire to the controller."""
         for byte in data:
             self._rx_free = max(self._rx_free, now) + self.byte
             self._coming.append((math.ceil(self._rx_free), byte))
 
     def next_arrival(self) -> int | None:
-        """When the next byte will have arrived."""
+        """The time when the next byte arrives."""
         return self._coming[0][0] if self._coming else None
 
     def arrive(self) -> None:
-        """The next byte has arrived: the receive interrupt, or the hardware if it is off."""
+        """The next byte arrives at the receive interrupt, or at the hardware if that is blocked."""
         now, byte = self._coming.popleft()
         if not self.deaf:
             self._interrupt(now, byte)
@@ -63,7 +63,7 @@ class Uart:
             self.lost += 1
 
     def hear(self, now: int) -> None:
-        """Interrupts are on again: take what the hardware kept."""
+        """Enable interrupts: take the bytes that the hardware kept."""
         self.deaf = False
         kept, self._kept = self._kept, []
         for byte in kept:
@@ -81,18 +81,18 @@ class Uart:
 
     @property
     def room(self) -> int:
-        """Free places in the receive ring."""
+        """The free places in the receive ring."""
         return self.dialect.rx_bytes - len(self.ring)
 
     def write(self, now: int, data: bytes) -> int:
-        """Print ``data``: when the last byte of it is in the transmit ring."""
+        """Print ``data``; returns the time when its last byte is in the transmit ring."""
         for byte in data:
             self._tx_free = max(self._tx_free, now) + self.byte
             self._going.append((math.ceil(self._tx_free), byte))
         return max(now, math.ceil(self._tx_free - self.dialect.tx_bytes * self.byte))
 
     def cut(self, now: int) -> None:
-        """A reset ends a print that waits for room: what is not in the ring yet is not sent."""
+        """A reset ends a waiting print: bytes that are not in the ring yet are not sent."""
         room = self.dialect.tx_bytes + 1
         sent = sum(done <= now for done, _ in self._going)
         while len(self._going) > sent + room:
@@ -100,26 +100,26 @@ class Uart:
         self._tx_free = float(self._going[-1][0]) if self._going else float(now)
 
     def next_departure(self, now: int) -> int | None:
-        """When the next byte that is not out by ``now`` will be out."""
+        """The time when the next byte after ``now`` is out."""
         return next((done for done, _ in self._going if done > now), None)
 
     def next_line(self) -> int | None:
-        """When the first line that is not taken yet will be out, or was."""
+        """The time when the first line that is not taken yet is out."""
         return next((done for done, byte in self._going if byte == _NEWLINE), None)
 
     def power_cycle(self, now: int) -> None:
-        """Switched off and on: all bytes on their way are lost."""
+        """Switch off and on: all bytes on the way are lost."""
         for pending in (self.ring, self._coming, self._going, self._kept):
             pending.clear()
         self.deaf = False
         self._rx_free = self._tx_free = float(now)
 
     def take(self, now: int) -> bytes:
-        """The bytes that are out by ``now``."""
+        """Take the bytes that are out by ``now``."""
         return bytes(byte for _, byte in self.take_dated(now))
 
     def take_dated(self, now: int) -> list[tuple[int, int]]:
-        """The same, each with the time when it was out."""
+        """As :meth:`take`, each byte with its time."""
         out = []
         while self._going and self._going[0][0] <= now:
             out.append(self._going.popleft())

@@ -1,7 +1,7 @@
-"""The motion and the beam of the Marlin in memory: planned moves, one after another, in time.
+"""The motion and the beam of the simulated Marlin controller.
 
-A move takes the time of its trapezoid between the speeds at its ends, as they are planned when it
-begins. The first of several waits a moment for others to be planned behind it
+A move takes the time of its speed trapezoid, with the end speeds that are planned when it begins.
+The first move waits a moment so that others can be planned behind it
 (``BLOCK_DELAY_FOR_1ST_MOVE`` in MarlinFirmware/Marlin, ``planner.h``).
 """
 
@@ -18,10 +18,10 @@ _FIRST_MOVE_S = 0.1
 
 
 class Carriage:
-    """What moves and burns; each method is given the time ``now`` in s, which never goes back.
+    """The moving beam. Each method takes the time ``now`` in s, which never goes back.
 
-    ``due`` is when the move in hand ends, or the first begins; infinite at rest. What was burnt is
-    appended to ``log``.
+    ``due`` is the end of the current move, or the begin of the first; infinite at rest. Burnt
+    segments are appended to ``log``.
     """
 
     def __init__(self, parameters: MotionParameters, log: list[BeamSegment]) -> None:
@@ -29,29 +29,29 @@ class Carriage:
         self.due = math.inf
         self._parameters = parameters
         self._log = log
-        self._running: tuple[Move, float] | None = None  # and its begin
-        self._standing: tuple[float, float] | None = None  # since when, power
+        self._running: tuple[Move, float] | None = None  # the move and its begin
+        self._standing: tuple[float, float] | None = None  # the begin and the power
 
     @property
     def burning(self) -> bool:
-        """Whether the beam burns now."""
+        """Whether the beam is on."""
         moving = self._running is not None and self._running[0].speed_word > 0
         return moving or self._standing is not None
 
     def plan(self, now: float, target: Sequence[float], feed: float, power: float) -> None:
-        """A line to ``target`` at ``feed`` mm/min with ``power`` (S). There must be room for it."""
+        """Plan a move to ``target`` at ``feed`` mm/min with ``power`` (S). It needs room."""
         spindle = 3 if power > 0 else 0
         move = self.planner.append(target, feed, spindle=spindle, speed_word=power)
         if move is not None and self._running is None and math.isinf(self.due):
             self.due = now + _FIRST_MOVE_S
 
     def hurry(self, now: float) -> None:
-        """Somebody waits for the end of all motion: begin at once."""
+        """Begin at once, because a command waits for the end of all motion."""
         if self._running is None and not math.isinf(self.due):
             self.due = min(self.due, now)
 
     def go_on(self, now: float) -> None:
-        """At ``due``: the move in hand is done; the next begins."""
+        """At ``due``: end the current move and begin the next."""
         if self._running is not None:
             self._note(now)
             self.planner.discard()
@@ -63,7 +63,7 @@ class Carriage:
             self._running = move, now
 
     def halt(self, now: float) -> list[float]:
-        """Stop dead and forget what is planned; where it stands, in mm."""
+        """Stop at once and drop all planned moves; returns the position in mm."""
         if self._running is not None:
             self._note(now)
         place = self.place(now)
@@ -71,13 +71,13 @@ class Carriage:
         return place
 
     def put(self, place: Sequence[float]) -> None:
-        """It stands at ``place`` (mm), whatever it did."""
+        """Set the position to ``place`` (mm), at rest."""
         steps = self._parameters.steps_per_mm
         self.planner.reset([round(x * k) for x, k in zip(place, steps, strict=True)])
         self._running, self.due = None, math.inf
 
     def place(self, now: float) -> list[float]:
-        """Where it is, in mm."""
+        """The position in mm."""
         steps = self._parameters.steps_per_mm
         if self._running is None:
             return [n / k for n, k in zip(self.planner.position, steps, strict=True)]
@@ -89,7 +89,7 @@ class Carriage:
         ]
 
     def _note(self, now: float) -> None:
-        """Log what the move in hand has burnt until now."""
+        """Log the part of the current move burnt up to ``now``."""
         assert self._running is not None
         move, begin = self._running
         if move.speed_word > 0 and now > begin:
@@ -98,7 +98,7 @@ class Carriage:
             self._log.append(BeamSegment(begin, now, x0, y0, x1, y1, power))
 
     def stand(self, now: float, power: float) -> None:
-        """The beam is at ``power``, a fraction, from now on, whatever moves."""
+        """Set the beam to ``power``, a fraction, from ``now`` on, independent of moves."""
         if self._standing is not None:
             x, y, _ = self.place(now)
             since, before = self._standing
@@ -107,7 +107,7 @@ class Carriage:
 
 
 def _minutes(move: Move, entry: float, leave: float, nominal: float) -> float:
-    """The time of a trapezoid: up from ``entry``, on at ``nominal``, down to ``leave`` (mm/min)."""
+    """The minutes of a trapezoid from ``entry`` over ``nominal`` to ``leave`` (mm/min)."""
     acceleration, length = move.acceleration, move.length
     top = min(nominal, math.sqrt(acceleration * length + 0.5 * (entry**2 + leave**2)))
     top = max(top, entry, leave)

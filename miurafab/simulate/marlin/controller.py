@@ -1,10 +1,9 @@
-"""A Marlin controller in memory: bytes in, bytes out, and time only by ``advance``.
+"""A simulated Marlin controller: bytes in, bytes out, and time only by ``advance``.
 
-Small beside the virtual GRBL, and enough to be sent to: the count and the checksum of lines, the
-queue of four commands, ``ok`` withheld while the planner is full, ``busy`` every two seconds, M112
-and M410 as the emergency parser sees them or as they wait without it, and a laser whose power goes
-with the moves (``M3 I``, ``M4 I``). The time of parsing is left out. Sources of the facts:
-MarlinFirmware/Marlin, ``queue.cpp``, ``e_parser.cpp``, ``M3-M5.cpp``.
+It models what a sender meets: line numbers and checksums, a queue of four commands, ``ok`` delayed
+while the planner is full, ``busy`` every two seconds, M112 and M410 with or without the emergency
+parser, and a laser whose power goes with the moves (``M3 I``, ``M4 I``). Parsing takes no time.
+Sources: MarlinFirmware/Marlin, ``queue.cpp``, ``e_parser.cpp``, ``M3-M5.cpp``.
 """
 
 from __future__ import annotations
@@ -24,10 +23,10 @@ from miurafab.simulate.beam import BeamSegment
 from miurafab.simulate.marlin.carriage import Carriage
 
 QUEUE = 4
-"""Commands that wait (``BUFSIZE``)."""
+"""The commands that can wait (``BUFSIZE``)."""
 RX_RING = 128
 LONGEST_LINE = 95
-"""Characters kept of a line; what follows is dropped (``MAX_CMD_SIZE``)."""
+"""The characters kept of a line; the rest is dropped (``MAX_CMD_SIZE``)."""
 _BUSY_S = 2.0  # unless M113 says otherwise
 _STOCK_FEED = 1500.0  # mm/min, before any F
 _LINE = re.compile(r"(?:N(\d+) ?)?([^*]*)(?:\*(\d+))?")
@@ -36,11 +35,11 @@ _NAME = re.compile(r"([GM])0*(\d+)(?:\.\d+)?(?=[A-Z]|$)")
 _CUTTER = re.compile(r"M0*([345])(I?)(?:S([\d.]+))?(I?)$")
 
 CommandRoutine = Generator[Callable[[], bool], None, None]
-"""A command under way: it yields what must be true before it goes on."""
+"""A command in execution: it yields the condition for which it waits."""
 
 
 class VirtualMarlin:
-    """The device side of the wire. ``baud`` None: bytes take no time.
+    """The device side of a Marlin connection. With ``baud`` None bytes take no time.
 
     At power-up ``start`` is in the output.
     """
@@ -69,7 +68,7 @@ class VirtualMarlin:
         self.power_cycle()
 
     def power_cycle(self) -> None:
-        """Switch off and on: everything is forgotten."""
+        """Switch off and on: all state is lost."""
         self._coming.clear()
         self._going.clear()
         self.killed = False
@@ -85,7 +84,7 @@ class VirtualMarlin:
         self._condition: Callable[[], bool] = _now
         self._busy_at = self._wake_at = math.inf
         self._thaws_at = -math.inf
-        self._stop_at_thaw: bool | None = None  # whether it is for good
+        self._stop_at_thaw: bool | None = None  # True: a kill
         self._busy_period = _BUSY_S
         self._count = 0
         self._inline = False
@@ -93,7 +92,7 @@ class VirtualMarlin:
         self._say("start")
 
     def freeze(self, seconds: float = math.inf) -> None:
-        """The main program hangs: nothing is answered, planned motion runs out."""
+        """The main program hangs: it answers nothing, and the planned motion runs out."""
         self._thaws_at = self.now + seconds
 
     # Time
@@ -107,7 +106,7 @@ class VirtualMarlin:
         self._run(self.now + max(seconds, 0.0), stop_at_line=True)
 
     def next_event_in(self) -> float | None:
-        """Seconds until something changes by itself; None if nothing will."""
+        """Seconds until the next change without input; None if there is none."""
         event = min(self._events())
         return None if math.isinf(event) else max(0.0, event - self.now)
 
@@ -120,7 +119,7 @@ class VirtualMarlin:
         )
 
     def _main_due(self) -> float:
-        """When the main program does something by itself; while it hangs, when that is over."""
+        """The time of the main program's next step, or of the end of its hang."""
         return self._thaws_at if self._frozen else min(self._busy_at, self._wake_at)
 
     @property
@@ -158,14 +157,14 @@ class VirtualMarlin:
     # The wire
 
     def receive(self, data: bytes) -> None:
-        """Bytes start down the wire to the controller."""
+        """Bytes start on the wire to the controller."""
         for byte in data:
             self._in_free = max(self._in_free, self.now) + self._byte
             self._coming.append((self._in_free, byte))
         self._run(self.now, stop_at_line=False)
 
     def take_output(self) -> bytes:
-        """The bytes that have come out since the last call."""
+        """The bytes that came out since the last call."""
         out = bytearray()
         while self._going and self._going[0][0] <= self.now:
             out.append(self._going.popleft()[1])
@@ -198,7 +197,7 @@ class VirtualMarlin:
             self._emergency(match[1] == b"M112")
 
     def _emergency(self, kill: bool) -> None:
-        """Stop dead; with ``kill`` for good."""
+        """Stop at once; with ``kill`` until a reset."""
         self._state.position = self._carriage.halt(self.now)
         if kill:
             self._carriage.stand(self.now, 0.0)
@@ -211,7 +210,7 @@ class VirtualMarlin:
     # The main loop
 
     def _work(self) -> None:
-        """Go on with the command in hand, and take up others, until something must be awaited."""
+        """Execute commands until one must wait."""
         while not self.killed:
             if self._command is not None:
                 if not self._condition():
@@ -342,7 +341,7 @@ class VirtualMarlin:
 
     @property
     def beam_on(self) -> bool:
-        """Whether the beam burns now."""
+        """Whether the beam is on."""
         return self._carriage.burning
 
 
