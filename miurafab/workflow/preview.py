@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError
-from miurafab.findings import Finding, as_json
+from miurafab.findings import Finding, findings_json
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import parse_dump
 from miurafab.origami.crease_pattern import CreasePattern
@@ -50,7 +50,7 @@ class Preview:
             "machine": self.machine.name,
             "seconds": round(self.seconds, 3),
             "sheets": [sheet.figures() for sheet in self.sheets],
-            "findings": as_json(self.findings),
+            "findings": findings_json(self.findings),
         }
 
 
