@@ -23,7 +23,7 @@ from miurafab.origami.formats.fold import read_fold
 from miurafab.studio.recipe import job_name
 from miurafab.workflow.design import no_target
 from miurafab.workflow.job_directory import GUIDE, write_text
-from miurafab.workflow.picture_svg import svg_text
+from miurafab.workflow.picture import svg_text
 from miurafab.workflow.preview import Preview
 
 Tell = Callable[[dict[str, Any]], None]
