@@ -9,7 +9,6 @@ import typer
 
 import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.findings import findings_json
 
 
 def check(
@@ -22,15 +21,17 @@ def check(
     Exit 1 if one fails.
     """
     console = Console(as_json, quiet)
-    pattern, surface, findings = miurafab.load_pattern(file)
+    pattern, surface, missing = miurafab.load_pattern(file)
+    if missing is not None:
+        console.remark(f"Distances are left out: {missing}.")
     result = miurafab.check(pattern, surface)
-    findings += result.findings
-    report = result.report() | {"findings": findings_json(findings)}
+    report = result.report()
 
     def show() -> None:
         hidden = {"findings", "advice", "iterations"}
         console.facts({key: value for key, value in report.items() if key not in hidden})
-        console.findings(findings)
+        for finding in result.findings:
+            console.line(f"{finding.code}: {finding.message}")
 
     console.answer(report, show)
     if not result.valid:

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from miurafab.findings import Finding, findings_json
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
 from miurafab.geometry.polygons import edge_lengths, facet_means
@@ -53,13 +52,20 @@ class Measurements:
 
 
 @dataclass(frozen=True)
+class AuditFinding:
+    """One fault: a stable ``code``, a sentence, and the ``where`` (facets, vertices or edges)."""
+
+    code: str
+    message: str
+    where: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
 class Audit:
-    """What an audit found; ``valid`` when nothing is wrong. ``where`` of a finding is the indices
-    of its facets, vertices or edges.
-    """
+    """What an audit found; ``valid`` when nothing is wrong."""
 
     measurements: Measurements
-    findings: tuple[Finding, ...]
+    findings: tuple[AuditFinding, ...]
     seconds: float
 
     @property
@@ -71,11 +77,14 @@ class Audit:
         numbers = {f.name: getattr(self.measurements, f.name) for f in fields(self.measurements)}
         return {
             "status": "converged" if self.valid else "invalid",
-            "advice": " ".join(finding.sentence for finding in self.findings),
+            "advice": " ".join(finding.message for finding in self.findings),
             **numbers,
             "iterations": None,
             "seconds": self.seconds,
-            "findings": findings_json(self.findings),
+            "findings": [
+                {"code": f.code, "message": f.message, "where": list(f.where)}
+                for f in self.findings
+            ],
         }
 
 
@@ -161,24 +170,24 @@ def surface_area(surface: TargetSurface, samples: int = 200) -> float:
     return float(density.mean() * d.width * d.height)
 
 
-def _findings(pattern: CreasePattern, measured: Measurements) -> list[Finding]:
+def _findings(pattern: CreasePattern, measured: Measurements) -> list[AuditFinding]:
     found = []
     edges = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
     short = np.flatnonzero(edges < DEGENERATE * edges.mean())
     if len(short):
         found.append(
-            Finding(
+            AuditFinding(
                 "degenerate-edge",
                 f"{_these(short, 'edge')} shorter than a millionth of the mean edge (down to "
                 f"{edges[short].min():.1e} mm): they cannot be creased or cut, so the sheet cannot "
-                "be made. Fit again with `min_edge`.",
+                "be made. Fit again with --min-edge.",
                 tuple(short.tolist()),
             )
         )
     if measured.overlaps:
         pairs = overlaps(pattern)
         found.append(
-            Finding(
+            AuditFinding(
                 "overlap",
                 f"{len(pairs)} pairs of facets overlap in the flat pattern, the first being facets "
                 f"{pairs[0][0]} and {pairs[0][1]}: it cannot be cut from one piece.",
@@ -191,7 +200,7 @@ def _findings(pattern: CreasePattern, measured: Measurements) -> list[Finding]:
     if measured.self_intersections:
         pairs = self_intersections(pattern)
         found.append(
-            Finding(
+            AuditFinding(
                 "self-intersection",
                 f"{len(pairs)} pairs of facets pass through or lie on each other in the folded "
                 f"form, the first being facets {pairs[0][0]} and {pairs[0][1]}.",
@@ -201,7 +210,7 @@ def _findings(pattern: CreasePattern, measured: Measurements) -> list[Finding]:
     return found
 
 
-def _inexact(pattern: CreasePattern, folded: Floats) -> list[Finding]:
+def _inexact(pattern: CreasePattern, folded: Floats) -> list[AuditFinding]:
     """Where planarity, developability and isometry are over ``EXACT``."""
     inner = invariants.interior_vertices(pattern)
     facets = np.arange(len(pattern.faces_vertices))
@@ -218,7 +227,7 @@ def _inexact(pattern: CreasePattern, folded: Floats) -> list[Finding]:
         if over.any():
             where = names[over]
             found.append(
-                Finding(
+                AuditFinding(
                     code,
                     f"{_these(where, noun)} not {virtue}: up to {values.max():.1e}, over "
                     f"{EXACT:.0e}.",

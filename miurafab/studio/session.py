@@ -218,7 +218,7 @@ class Bench:
             self._new_pattern(task, part)
         elif part["part"] == "motion" and self.pattern is not None:
             self.pattern["files"] |= self._put_down(task.id, part.get("files", {}))
-            self.pattern["findings"] += self._findings(part)
+            self.pattern["remarks"] += part.get("remarks", [])
             self.pattern |= {"folding": False, "still": part.get("missing", "")}
         elif part["part"] == "job":
             self._new_job(task, part)
@@ -237,7 +237,7 @@ class Bench:
             "headline": headline(report["status"], opened=opened),
             "advice": self._plain(report["advice"]),
             "lines": pattern_lines(report),
-            "findings": self._findings(part),
+            "remarks": [self._plain(remark) for remark in part["remarks"]],
             "files": self._put_down(task.id, part["files"]),
             "folding": bool(part["files"]),
             "still": "",
@@ -272,16 +272,8 @@ class Bench:
             return []
         return [f"{self.pattern['headline']} {self.pattern['advice']}".strip()]
 
-    def _findings(self, part: News) -> list[dict[str, Any]]:
-        return [
-            finding | {"sentence": self._plain(finding["sentence"])}
-            for finding in part.get("findings", [])
-        ]
-
     def _plain(self, sentence: str) -> str:
-        """``sentence`` with files of the studio's own folder called by their names alone, and the
-        names of options in quotes.
-        """
+        """``sentence`` with files of the studio's own folder called by their names alone."""
         return spell_options(self._own.sub("", sentence), lambda name: f"'{name}'")
 
     def _begin(self, do: str, name: str, **what: Any) -> None:

@@ -22,7 +22,6 @@ import trimesh
 from scipy.interpolate import NdBSpline
 
 from miurafab.errors import TargetError
-from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
 from miurafab.surfaces.mesh_repair import (
@@ -33,7 +32,7 @@ from miurafab.surfaces.mesh_repair import (
     fill_holes,
     oriented_sheet,
     side_lengths,
-    size_findings,
+    size_remarks,
 )
 from miurafab.surfaces.parameterise import flatten
 from miurafab.surfaces.placement import (
@@ -135,7 +134,7 @@ class MeshChart:
 @dataclass(frozen=True, eq=False)
 class MeshSurface:
     """A rectangle of a mesh. ``spline`` maps a little more than ``domain`` to space; ``triangles``
-    (T, 3, 3) are the mesh itself. ``findings`` are about the mesh and its repair;
+    (T, 3, 3) are the mesh itself. ``remarks`` say what the user might want to know of the file;
     ``free`` whether the rectangle may be laid elsewhere.
     """
 
@@ -145,7 +144,7 @@ class MeshSurface:
     placement: GridPlacement
     stiffness: float
     layout: MeshChart = field(repr=False)
-    findings: tuple[Finding, ...] = ()
+    remarks: tuple[str, ...] = ()
     free: bool = True
 
     def point(self, uv: Floats) -> Floats:
@@ -268,14 +267,14 @@ def mesh_surface(
     The other arguments are those of :func:`load_mesh`. Raises
     :class:`~miurafab.errors.TargetError` if the mesh is not one disk.
     """
-    layout, findings = lay_out(vertices, faces, name)
+    layout, remarks = lay_out(vertices, faces, name)
     if place is not None:
         placement, stiffness = _placed_before(place, name)
         surface = layout.surface(placement, stiffness)
     else:
         surface = layout.surface(_placement(layout, region, rotate))
     free = place is None and region is None and rotate is None
-    return replace(surface, findings=findings, free=free)
+    return replace(surface, remarks=remarks, free=free)
 
 
 def _placement(layout: MeshChart, region: Region | None, rotate: float | None) -> GridPlacement:
@@ -304,16 +303,15 @@ def _placed_before(place: dict[str, Any], name: str) -> tuple[GridPlacement, flo
     return GridPlacement(angle, Domain(u0, u1, v0, v1)), stiffness
 
 
-def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[MeshChart, tuple[Finding, ...]]:
-    """The mesh laid flat, and findings on it. Raises ``TargetError`` if it is not one disk."""
+def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[MeshChart, tuple[str, ...]]:
+    """The mesh laid flat, and remarks on it. Raises ``TargetError`` if it is not one disk."""
     vertices, faces = clean(vertices, faces, name)
-    findings = size_findings(vertices, name)
+    remarks = size_remarks(vertices, name)
     faces = oriented_sheet(vertices, faces, name)
     known, real = len(vertices), len(faces)
     vertices, faces, filled = fill_holes(vertices, faces, name)
     if filled:
-        sentence = f"{name}: {filled} small hole{'s were' if filled > 1 else ' was'} filled."
-        findings += (Finding("filled-holes", sentence, name),)
+        remarks += (f"{name}: {filled} small hole{'s were' if filled > 1 else ' was'} filled.",)
     if len(vertices) - len(edges_of(faces)[0]) + len(faces) != 1:
         raise TargetError(f"{name} has a handle; it cannot be laid flat. Cut it open.")
     flat = flatten(vertices, faces)
@@ -324,7 +322,7 @@ def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[MeshChart, tuple[
         even = np.asarray(smoothed.spline(flat), dtype=np.float64)
         if doubled_areas(even, faces).min() > 1e-6 * np.median(doubled_areas(even, faces)):
             flat = flatten(even, faces)
-    return MeshChart(vertices, faces, real, known, flat, rough, name), findings
+    return MeshChart(vertices, faces, real, known, flat, rough, name), remarks
 
 
 def _smoothed(points: Floats, flat: Floats, faces: Ints) -> Smoothed:

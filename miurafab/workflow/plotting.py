@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,8 +16,14 @@ def check_writable(path: Path, what: str) -> None:
 
     ``what`` is the result's name in the sentence. Raises :class:`~miurafab.errors.InputError`.
     """
-    if path.suffix.lower() not in (*PLOTS, ".csv"):
+    suffix = path.suffix.lower()
+    if suffix not in (*PLOTS, ".csv"):
         raise InputError(f"{path}: {what} is written as .png, .svg or .csv, by the ending.")
+    if suffix in PLOTS and importlib.util.find_spec("matplotlib") is None:
+        raise InputError(
+            f"{path}: plots need matplotlib; install it with pip install 'miurafab[plot]', or "
+            "write a .csv."
+        )
     if not path.absolute().parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist.")
 
@@ -26,7 +33,7 @@ def write_result(
 ) -> None:
     """Write the ``table`` to a .csv, or the ``plot`` of the kind that the ending names.
 
-    Raises :class:`~miurafab.errors.InputError` for another ending.
+    Raises :class:`~miurafab.errors.InputError` for another ending, or where matplotlib is missing.
     """
     check_writable(path, what)
     if path.suffix.lower() == ".csv":

@@ -76,3 +76,14 @@ def indented_code(page):
         elif line.startswith("    ") and not within_list:
             wrong.append(number)
     return wrong
+
+
+def prose_of(page):
+    """The text of ``page`` outside its fenced blocks."""
+    fenced, kept = False, []
+    for line in page.read_text(encoding="utf-8").splitlines():
+        if _FENCE.match(line):
+            fenced = not fenced
+        elif not fenced:
+            kept.append(line)
+    return "\n".join(kept)

@@ -8,6 +8,7 @@ import tomllib
 
 import pytest
 from commands import run_line
+from option_tables import CLASSES, TABLE, with_tables
 from pages import PAGES, ROOT, blocks_of, indented_code
 
 BLOCKS = [block for page in PAGES for block in blocks_of(page)]
@@ -116,3 +117,10 @@ def test_few_blocks_are_not_run():
 def test_code_is_fenced_and_its_language_known(page):
     assert indented_code(page) == []
     assert {block.language for block in blocks_of(page)} <= LANGUAGES
+
+
+def test_the_tables_of_options_are_those_declared():
+    """Written by ``python tests/examples/option_tables.py``."""
+    texts = [page.read_text(encoding="utf-8") for page in PAGES]
+    assert [with_tables(text) for text in texts] == texts
+    assert {name for text in texts for _, name in TABLE.findall(text)} == set(CLASSES)
