@@ -189,7 +189,7 @@ def test_nothing_is_heard_or_sent_after_the_end() -> None:
     assert hear(connection, b"") == [Closed()]
     assert hear(connection, b"ok\r\n") == []
     for byte in (STATUS_QUERY, SOFT_RESET):
-        with pytest.raises(ProtocolMisuse):
+        with pytest.raises(ProtocolMisuse, match="the wire is closed"):
             connection.send_realtime(byte)
 
 

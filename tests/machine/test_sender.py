@@ -233,7 +233,7 @@ def test_after_the_interrupt_the_reset_is_the_first_thing_written() -> None:
             raise KeyboardInterrupt
 
     wire = FakeWire(new_device(), before_call=interrupt)
-    with pytest.raises(JobStopped):
+    with pytest.raises(JobStopped, match=r"stopped by Ctrl-C; .* reports the beam off"):
         send(STOPPED, wire)
     assert wire.written[written[0]][1] == b"\x18"
 
@@ -395,7 +395,7 @@ def test_the_journal_says_what_was_taken(tmp_path: Path) -> None:
     path = tmp_path / "deep" / "job.journal"
     send(STOPPED, FakeWire(new_device()), journal_path=path)
     wire = FakeWire(new_device("disconnect@1500ms"))
-    with pytest.raises(PortError):
+    with pytest.raises(PortError, match=r"went away; .* switch the laser off"):
         send(STOPPED, wire, journal_path=path)
     done, failed = read_journal(path)
     assert (done.job, done.lines, done.taken, done.ended) == ("zigzag.nc", 65, 65, "done")
