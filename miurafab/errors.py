@@ -69,9 +69,10 @@ class OptionError(InputError):
     """
 
     def __init__(self, option: str | None, complaint: str, where: str = "") -> None:
-        name = "" if option is None else f"`{option}` "
-        place = f"{where}: " if where else ""
-        super().__init__(f"{place}{name}{complaint.rstrip('.')}.")
+        sentence = complaint if option is None else f"`{option}` {complaint}"
+        if where:  # a file writes the name of an option as it is
+            sentence = f"{where}: " + spell_options(sentence, lambda name: f"'{name}'")
+        super().__init__(sentence.rstrip(".") + ".")
         self.option = option
         self.complaint = complaint
         self.where = where

@@ -36,7 +36,27 @@ def _check(meaning: str) -> Rule:
 
 RULES = {
     # A target
+    "mesh-unit": Rule("warning", "a mesh whose size suggests a unit that is not the millimetre"),
+    "filled-holes": Rule("note", "small holes of a mesh that were filled"),
     "sampling": Rule("warning", "a function that turns faster than its samples show"),
+    # A pattern, checked (miurafab.origami.verify)
+    "no-target": Rule("note", "distances left out, since the target is missing or has changed"),
+    "degenerate-edge": Rule("refusal", "an edge too short to be creased or cut"),
+    "overlap": Rule("refusal", "facets that overlap in the flat pattern"),
+    "planarity": Rule("refusal", "a facet that is not flat in the folded form"),
+    "developability": Rule(
+        "refusal", "an interior vertex whose angles do not add up to 360 degrees"
+    ),
+    "isometry": Rule("refusal", "a facet whose edges differ between flat and folded form"),
+    "self-intersection": Rule("refusal", "facets that meet in the folded form"),
+    # A pattern, converted (miurafab.workflow.convert)
+    "no-creases": Rule("note", "a format that holds a shape and no creases"),
+    "no-folded-form": Rule("note", "a format that does not hold the folded form"),
+    "no-fold-angles": Rule("note", "a format that tells mountains from valleys and no fold angles"),
+    "assumed-folded-flat": Rule("note", "a file without fold angles, taken as folded flat"),
+    # A pattern, folded (miurafab.studio.work)
+    "bent-facets": Rule("note", "a pattern that does not fold rigidly"),
+    "contacts": Rule("warning", "facets that pass through each other on the way"),
     # A job, judged without a machine (miurafab.machine.judge_job)
     "lines": Rule("refusal", "a line too long for the controller, or not printable ASCII"),
     "program": _check("a program that GRBL 1.1 would answer with an error"),
@@ -124,6 +144,6 @@ def refusals(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(finding for finding in findings if finding.severity == "refusal")
 
 
-def as_json(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+def findings_json(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """``findings`` as every report holds them under ``findings``."""
     return [finding.as_json() for finding in findings]

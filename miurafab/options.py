@@ -5,8 +5,9 @@ A declaration says how a value is written (its :class:`Kind`: unit, range, choic
 sees of an option is made from its declaration: the command line, design and material files, the
 form of the page, the tables in docs and the messages.
 
-Outside, an option has the name of its field without the suffix ``_mm``, and is written in
-millimetres and degrees. Inside, the field holds millimetres, radians or whatever the kind says.
+Outside, an option has the name of its field without its unit (``_mm``, ``_mm_min``, ``_s``), and
+is written in millimetres and degrees. Inside, the field holds millimetres, radians or whatever
+the kind says.
 """
 
 from __future__ import annotations
@@ -14,15 +15,17 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from miurafab.errors import OptionError, UnitError
-from miurafab.units import parse_angle, parse_feed, parse_length
+from miurafab.units import parse_angle, parse_feed, parse_length, parse_pressure
 
 _KEY = "miurafab.option"
+_UNIT = re.compile(r"_(mm|mm2|mm_min|mm_s2|s|pa)$")
 
 
 class Kind:
@@ -113,6 +116,11 @@ def angle(low: float = 0.0, high: float = 360.0, *, above: bool = False) -> Quan
     return Quantity(parse_angle, "an angle", "ANGLE", " deg", math.pi / 180, low, high, above)
 
 
+def modulus(low: float = 0.0, high: float = math.inf) -> Quantity:
+    """A modulus in pascal, such as ``3GPa``."""
+    return Quantity(parse_pressure, "a modulus", "MODULUS", " Pa", low=low, high=high)
+
+
 def feed(low: float = 1.0, high: float = 1e6) -> Quantity:
     """A feed in mm/min."""
     return Quantity(parse_feed, "a feed", "FEED", " mm/min", low=low, high=high)
@@ -186,7 +194,7 @@ class Choice(Kind):
 
     def check(self, inside: object) -> None:
         if inside not in self.names:
-            near = difflib.get_close_matches(str(inside), self.names, n=1)
+            near = difflib.get_close_matches(str(inside), self.names, n=1, cutoff=0.75)
             hint = f"did you mean '{near[0]}'" if near else f"it must be {self.accepts}"
             raise ValueError(f"is '{inside}'; {hint}")
 
@@ -360,11 +368,14 @@ class Declared:
     page: bool
 
 
+REQUIRED: Any = dataclasses.MISSING
+
+
 def option(
     kind: Kind,
     help: str,
-    *,
     default: Any = None,
+    *,
     group: str = "",
     default_text: str | None = None,
     page: bool = True,
@@ -378,7 +389,8 @@ def option(
     help : str
         What it means, as one sentence.
     default : any
-        The value inside if nobody gives it; None for an option that may be absent.
+        The value inside if nobody gives it; None for an option that may be absent, REQUIRED for
+        one that may not.
     group : str
         The heading under which help shows it.
     default_text : str, optional
@@ -388,10 +400,15 @@ def option(
     """
     shown = default_text
     if shown is None:
-        absent = default is None or default is False or default in ((), frozenset())
+        absent = default in (None, REQUIRED, (), frozenset()) or default is False
         shown = "" if absent else kind.show(default)
     metadata = {_KEY: (kind, help, group, shown, page)}
     return dataclasses.field(default=default, metadata=metadata)
+
+
+def outside(field: str) -> str:
+    """The name of a field outside."""
+    return _UNIT.sub("", field)
 
 
 def declared(cls: type) -> Mapping[str, Declared]:
@@ -404,7 +421,7 @@ def _declarations(cls: type) -> Iterator[Declared]:
     for entry in fields(cls):
         if _KEY in entry.metadata:
             kind, text, group, shown, page = entry.metadata[_KEY]
-            name = entry.name.removesuffix("_mm")
+            name = outside(entry.name)
             yield Declared(name, entry.name, kind, text, group, entry.default, shown, page)
         elif isinstance(hints[entry.name], type) and is_dataclass(hints[entry.name]):
             yield from _declarations(hints[entry.name])
@@ -420,6 +437,7 @@ def read_options(
     where: str = "",
     folder: Path = Path(),
     over: Mapping[str, object] | None = None,
+    base: T | None = None,
 ) -> T:
     """The options ``given`` as a value of ``cls``; None leaves an option as it is by default.
 
@@ -436,6 +454,8 @@ def read_options(
         Where the files that ``given`` names are looked for.
     over : mapping, optional
         Values that win over those ``given``, such as those of the command line over a file's.
+    base : instance of cls, optional
+        What holds for options that are not given, in place of the defaults.
 
     Raises
     ------
@@ -465,23 +485,25 @@ def read_options(
         if isinstance(kind, File) and name not in over:
             inside[name] = folder / inside[name]
     try:
-        return _made(cls, inside)
+        return _made(cls, inside, base)
     except OptionError as fault:
         raise OptionError(fault.option, fault.complaint, place(fault.option)) from None
 
 
-def _made(cls: type[T], inside: Mapping[str, Any]) -> T:
-    """A value of ``cls`` of the values ``inside``, by the names outside."""
+def _made(cls: type[T], inside: Mapping[str, Any], base: T | None = None) -> T:
+    """A value of ``cls`` of the values ``inside``, by the names outside, and of ``base``."""
     hints = get_type_hints(cls)
     values: dict[str, Any] = {}
     for entry in fields(cls):  # type: ignore[arg-type]
         if _KEY in entry.metadata:
-            name = entry.name.removesuffix("_mm")
+            name = outside(entry.name)
             if name in inside:
                 values[entry.name] = inside[name]
+            elif base is None and entry.default is REQUIRED:
+                raise OptionError(name, "is missing")
         elif isinstance(hints[entry.name], type) and is_dataclass(hints[entry.name]):
             values[entry.name] = _made(hints[entry.name], inside)
-    return cls(**values)
+    return cls(**(values if base is None else vars(base) | values))
 
 
 def check_options(value: Any) -> None:
@@ -493,7 +515,7 @@ def check_options(value: Any) -> None:
             try:
                 kind.check(inside)
             except ValueError as fault:
-                raise OptionError(entry.name.removesuffix("_mm"), str(fault)) from None
+                raise OptionError(outside(entry.name), str(fault)) from None
 
 
 def _nearest(name: str, known: Sequence[str] | Mapping[str, object]) -> str:

@@ -76,7 +76,10 @@ def test_a_message_names_the_option_as_its_reader_writes_it():
         read_options(Outer, {"gap": -1}, where="job.toml")
     assert str(caught.value).startswith("job.toml: 'gap' is -1 mm")
     spelled = spell_options(caught.value.sentence, lambda name: f"--{name}")
-    assert spelled.startswith("job.toml: --gap is -1 mm")
+    assert spelled.startswith("job.toml: 'gap' is -1 mm")
+    with pytest.raises(OptionError) as caught:
+        read_options(Outer, {"gap": -1})
+    assert spell_options(caught.value.sentence, lambda name: f"--{name}").startswith("--gap is -1")
 
 
 def test_a_declaration_tells_all_that_is_shown():

@@ -9,6 +9,7 @@ import typer
 
 import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.findings import findings_json
 
 
 def check(
@@ -21,17 +22,15 @@ def check(
     Exit 1 if one fails.
     """
     console = Console(as_json, quiet)
-    pattern, surface, missing = miurafab.load_pattern(file)
-    if missing is not None:
-        console.remark(f"Distances are left out: {missing}.")
+    pattern, surface, findings = miurafab.load_pattern(file)
     result = miurafab.check(pattern, surface)
-    report = result.report()
+    findings += result.findings
+    report = result.report() | {"findings": findings_json(findings)}
 
     def show() -> None:
         hidden = {"findings", "advice", "iterations"}
         console.facts({key: value for key, value in report.items() if key not in hidden})
-        for finding in result.findings:
-            console.line(f"{finding.code}: {finding.message}")
+        console.findings(findings)
 
     console.answer(report, show)
     if not result.valid:

@@ -14,7 +14,7 @@ import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
 from miurafab.cli.sheets import MachineOption, MaterialOption
 from miurafab.errors import InputError, MachineError
-from miurafab.findings import as_json, refusals
+from miurafab.findings import findings_json, refusals
 from miurafab.units import parse_length
 
 if TYPE_CHECKING:
@@ -205,7 +205,7 @@ def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -
         "machine": prepared.machine.name,
         "seconds": round(sum(sheet.seconds for sheet in prepared.dry_runs), 3),
         "sheets": [sheet.figures() for sheet in prepared.dry_runs],
-        "findings": as_json(found),
+        "findings": findings_json(found),
     }
 
     def show() -> None:
@@ -281,7 +281,7 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
             "estimated_s": float(each.estimated_s),
             "seconds": each.result.seconds,
             "refused_lines": len(each.result.errors),
-            "findings": as_json(each.findings),
+            "findings": findings_json(each.findings),
         }
         for each in done
     ]

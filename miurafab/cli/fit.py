@@ -117,8 +117,8 @@ def fit(
         max_aspect=max_aspect,
         polish=polish,
     )
-    for remark in wanted.remarks:
-        console.remark(remark)
+    for finding in wanted.findings:
+        console.remark(finding.sentence)
     with console.progress("fitting") as progress:
         result = miurafab.fit(wanted.request, progress)
     answer = result.report()

@@ -34,6 +34,7 @@ import shapely
 from miurafab.errors import InputError, LayoutError
 from miurafab.fabrication.nesting.problem import Ring, SheetKind, Stock
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.options import Choice, Whole, length
 from miurafab.profiles import GRAINS, Table, read_toml
 from miurafab.profiles.machine import Bed
 
@@ -90,13 +91,13 @@ def read_stock(path: Path) -> tuple[StockSheet, ...]:
 def _sheet(table: Table, name: str) -> StockSheet:
     sheet = StockSheet(
         name=table.text("name", name),
-        width_mm=table.length("width", low=1, high=1e5),
-        height_mm=table.length("height", low=1, high=1e5),
-        quantity=table.whole("quantity", low=1, high=10_000) if table.has("quantity") else None,
-        grain=table.choice("grain", GRAINS) if table.has("grain") else None,
+        width_mm=table.value("width", length(1, 1e5)),
+        height_mm=table.value("height", length(1, 1e5)),
+        quantity=table.value("quantity", Whole(1, 10_000), None),
+        grain=table.value("grain", Choice(GRAINS), None),
         defects_mm=tuple(_defect(entry) for entry in table.tables("defects")),
     )
-    table.finish(known=("quantity", "grain"))
+    table.finish()
     return sheet
 
 
@@ -108,8 +109,8 @@ def _defect(table: Table) -> Ring:
         if len(ring) < 3 or not shapely.Polygon(ring).is_valid:
             raise table.fault("outline", "must be three points or more around a simple shape")
     else:
-        x, y = (table.length(key, low=-1e5, high=1e5) for key in ("x", "y"))
-        wide, high = (table.length(key, low=0.01, high=1e5) for key in ("width", "height"))
+        x, y = (table.value(key, length(-1e5, 1e5)) for key in ("x", "y"))
+        wide, high = (table.value(key, length(0.01, 1e5)) for key in ("width", "height"))
         ring = ((x, y), (x + wide, y), (x + wide, y + high), (x, y + high))
     table.finish(known=("outline",))
     return ring

@@ -5,60 +5,44 @@ The numbers are those of GRBL (``report.h``); the dialects that derive from GRBL
 
 from __future__ import annotations
 
-LETTER_EXPECTED = 1
-NUMBER_EXPECTED = 2
-NEGATIVE = 4
-BAD_JOG = 16
-UNSUPPORTED = 20
-GROUP_CONFLICT = 21
-NO_FEED = 22
-NOT_WHOLE = 23
-AXES_CLAIMED_TWICE = 24
-WORD_REPEATED = 25
-NO_AXES = 26
-LINE_NUMBER = 27
-VALUE_MISSING = 28
-NO_SUCH_OFFSET = 29
-G53_MOTION = 30
-AXES_WHILE_OFF = 31
-NO_AXES_IN_PLANE = 32
-IMPOSSIBLE_TARGET = 33
-IMPOSSIBLE_RADIUS = 34
-NO_CENTRE = 35
-LEFT_OVER = 36
-OFFSET_AXIS = 37
-TOOL_NUMBER = 38
+from typing import NamedTuple
 
-_SENTENCES = {
-    LETTER_EXPECTED: "{what} stands where a word's letter must be",
-    NUMBER_EXPECTED: "{what} has no readable number",
-    NEGATIVE: "{what} may not be negative",
-    BAD_JOG: "{what} is not allowed in a jog",
-    UNSUPPORTED: "{what} is not a word that the controller knows",
-    GROUP_CONFLICT: "{what} contradicts another word of the line",
-    NO_FEED: "{what} needs a feed, and no F was given",
-    NOT_WHOLE: "{what} must be a whole number",
-    AXES_CLAIMED_TWICE: "{what} and another command of the line both want the axis words",
-    WORD_REPEATED: "{what} stands twice in the line",
-    NO_AXES: "{what} needs axis words",
-    LINE_NUMBER: "{what} is above the largest line number, 10000000",
-    VALUE_MISSING: "{what} needs a P or L word",
-    NO_SUCH_OFFSET: "{what} is not one of the work offsets P0 to P6",
-    G53_MOTION: "{what} works only with G0 or G1",
-    AXES_WHILE_OFF: "{what} leaves no motion mode, yet axis words stand in the line",
-    NO_AXES_IN_PLANE: "{what} has no axis word in its plane",
-    IMPOSSIBLE_TARGET: "{what} cannot reach this end point",
-    IMPOSSIBLE_RADIUS: "{what} has a radius too small to reach the end point",
-    NO_CENTRE: "{what} has no centre offset (I, J, K) in its plane",
-    LEFT_OVER: "{what} is used by no command of the line",
-    OFFSET_AXIS: "{what} takes a Z word and nothing else",
-    TOOL_NUMBER: "{what} is above the largest tool number, 255",
-}
+
+class Reason(NamedTuple):
+    """The ``number`` of an ``error:`` answer, and its ``sentence`` about ``what``."""
+
+    number: int
+    sentence: str
+
+
+LETTER_EXPECTED = Reason(1, "{what} stands where a word's letter must be")
+NUMBER_EXPECTED = Reason(2, "{what} has no readable number")
+NEGATIVE = Reason(4, "{what} may not be negative")
+BAD_JOG = Reason(16, "{what} is not allowed in a jog")
+UNSUPPORTED = Reason(20, "{what} is not a word that the controller knows")
+GROUP_CONFLICT = Reason(21, "{what} contradicts another word of the line")
+NO_FEED = Reason(22, "{what} needs a feed, and no F was given")
+NOT_WHOLE = Reason(23, "{what} must be a whole number")
+AXES_CLAIMED_TWICE = Reason(24, "{what} and another command of the line both want the axis words")
+WORD_REPEATED = Reason(25, "{what} stands twice in the line")
+NO_AXES = Reason(26, "{what} needs axis words")
+LINE_NUMBER = Reason(27, "{what} is above the largest line number, 10000000")
+VALUE_MISSING = Reason(28, "{what} needs a P or L word")
+NO_SUCH_OFFSET = Reason(29, "{what} is not one of the work offsets P0 to P6")
+G53_MOTION = Reason(30, "{what} works only with G0 or G1")
+AXES_WHILE_OFF = Reason(31, "{what} leaves no motion mode, yet axis words stand in the line")
+NO_AXES_IN_PLANE = Reason(32, "{what} has no axis word in its plane")
+IMPOSSIBLE_TARGET = Reason(33, "{what} cannot reach this end point")
+IMPOSSIBLE_RADIUS = Reason(34, "{what} has a radius too small to reach the end point")
+NO_CENTRE = Reason(35, "{what} has no centre offset (I, J, K) in its plane")
+LEFT_OVER = Reason(36, "{what} is used by no command of the line")
+OFFSET_AXIS = Reason(37, "{what} takes a Z word and nothing else")
+TOOL_NUMBER = Reason(38, "{what} is above the largest tool number, 255")
 
 
 class BlockError(Exception):
     """The controller would refuse a block with the error ``code``; ``what`` names the culprit."""
 
-    def __init__(self, code: int, what: str) -> None:
-        super().__init__(_SENTENCES[code].format(what=what))
-        self.code = code
+    def __init__(self, reason: Reason, what: str) -> None:
+        super().__init__(reason.sentence.format(what=what))
+        self.code = reason.number

@@ -16,7 +16,7 @@ from typing import Protocol
 
 from miurafab.gcode import block_errors
 from miurafab.gcode.arcs import centre_from_radius
-from miurafab.gcode.block_errors import BlockError
+from miurafab.gcode.block_errors import BlockError, Reason
 from miurafab.gcode.numbers import read_single, single, whole_byte
 from miurafab.gcode.words import (
     CLOCKWISE,
@@ -187,12 +187,11 @@ def _read_words(line: str, block: Block, rules: Rules) -> None:
     words, groups = block.words, block.groups
     for letter, text in split_words(line):
         if letter in "GM":
-            spelling = look_up(letter, text, rules.mist)
-            if spelling.claims and block.claim is not Claim.NONE:
+            command, claims = look_up(letter, text, rules.mist)
+            if claims and block.claim is not Claim.NONE:
                 raise BlockError(block_errors.AXES_CLAIMED_TWICE, letter + text)
-            command = spelling.command
-            if command is None:
-                raise BlockError(spelling.error, letter + text)
+            if isinstance(command, Reason):
+                raise BlockError(command, letter + text)
             if command.group in groups:
                 raise BlockError(block_errors.GROUP_CONFLICT, letter + text)
             groups.add(command.group)

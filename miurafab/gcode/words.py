@@ -9,8 +9,8 @@ from enum import IntEnum
 from functools import lru_cache
 
 from miurafab.gcode import block_errors
-from miurafab.gcode.block_errors import BlockError
-from miurafab.gcode.numbers import read_single, single, to_unsigned
+from miurafab.gcode.block_errors import BlockError, Reason
+from miurafab.gcode.numbers import read_single, single, whole_byte
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _WORD = re.compile(rf"([A-Z])({_NUMBER})", re.ASCII)
@@ -135,37 +135,29 @@ _POINTED = {28, 30, 38, 43, 61, 90, 91, 92}
 """G words with decimals in use; other decimals are unknown words instead of bad fractions."""
 
 
-@dataclass(frozen=True, slots=True)
-class Spelling:
-    """A G or M word as written: its command or its ``error`` code, and whether it claims axes."""
-
-    command: Command | None
-    error: int
-    claims: bool
-
-
 @lru_cache(maxsize=4096)
-def look_up(letter: str, number: str, mist: bool) -> Spelling:
-    """The meaning of a word; M7 exists only in firmware compiled with ``mist``.
+def look_up(letter: str, number: str, mist: bool) -> tuple[Command | Reason, bool]:
+    """The command of a word, or the reason why there is none; and whether it claims the axis words.
 
-    The fraction is read in hundredths in single precision, as in ``gcode.c``.
+    M7 exists only in firmware compiled with ``mist``. The fraction is read in hundredths in single
+    precision, as in ``gcode.c``.
     """
     value = read_single(number)
-    whole = to_unsigned(value) & 0xFF
+    whole = whole_byte(value)
     hundredths = _round_half_away(single(100.0 * single(value - whole))) & 0xFFFF
     if letter == "M":
         if hundredths:
-            return Spelling(None, block_errors.NOT_WHOLE, False)
+            return block_errors.NOT_WHOLE, False
         known = _M.get(whole) if mist or whole != 7 else None
-        return Spelling(known, block_errors.UNSUPPORTED, False)
+        return known or block_errors.UNSUPPORTED, False
     if whole == 49:
-        return Spelling(Command(Group.TOOL_LENGTH, "tool_length", 0, Claim.TOOL_LENGTH), 0, True)
+        return Command(Group.TOOL_LENGTH, "tool_length", 0, Claim.TOOL_LENGTH), True
     command = _G.get((whole, hundredths))
     if command is not None:
-        return Spelling(command, 0, command.claim is not Claim.NONE)
+        return command, command.claim is not Claim.NONE
     pointless = (whole, 0) in _G and whole not in _POINTED
-    error = block_errors.NOT_WHOLE if pointless else block_errors.UNSUPPORTED
-    return Spelling(None, error, whole in _CLAIMING)
+    reason = block_errors.NOT_WHOLE if pointless else block_errors.UNSUPPORTED
+    return reason, whole in _CLAIMING
 
 
 def _round_half_away(value: float) -> int:

@@ -14,7 +14,7 @@ from array import array
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -289,50 +289,35 @@ def _lines(program: Program) -> Iterator[_Sent]:
         numbers = program.line_number[block]
         span = numbers[0], numbers[-1] + 1
         begin, stop = np.searchsorted(program.line, span).tolist()
-        moves = _moves(program, begin, stop)
-        move_bounds = [*np.searchsorted(program.line[begin:stop], numbers).tolist(), len(moves)]
-        events_begin, events_stop = np.searchsorted(program.event_line, span).tolist()
-        events = _events(program, events_begin, events_stop)
-        event_lines = program.event_line[events_begin:events_stop]
-        event_bounds = [*np.searchsorted(event_lines, numbers).tolist(), len(events)]
-        places = (program.event_move[events_begin:events_stop] - begin).tolist()
-        for index, (size, words, points) in enumerate(
-            zip(
-                program.line_bytes[block].tolist(),
-                program.line_words[block].tolist(),
-                program.line_points[block].tolist(),
-                strict=True,
-            )
-        ):
-            here, end = move_bounds[index], move_bounds[index + 1]
+        here = slice(begin, stop)
+        moves: list[_Move] = _rows(
+            program.end[here],
+            program.feed_mm_min[here],
+            program.motion[here] == RAPID,
+            program.spindle[here],
+            program.power[here],
+            np.arange(begin, stop),
+        )
+        move_bounds = [*np.searchsorted(program.line[here], numbers).tolist(), len(moves)]
+        at = slice(*np.searchsorted(program.event_line, span).tolist())
+        events: list[_Event] = _rows(
+            program.event_kind[at], program.event_seconds[at], program.event_power[at]
+        )
+        event_bounds = [*np.searchsorted(program.event_line[at], numbers).tolist(), len(events)]
+        places = (program.event_move[at] - begin).tolist()
+        sizes = _rows(
+            program.line_bytes[block], program.line_words[block], program.line_points[block]
+        )
+        for index, (size, words, points) in enumerate(sizes):
+            first_move, end = move_bounds[index], move_bounds[index + 1]
             actions: list[_Move | _Event] = []
             for event in range(event_bounds[index], event_bounds[index + 1]):
-                actions += moves[here : places[event]]
+                actions += moves[first_move : places[event]]
                 actions.append(events[event])
-                here = max(here, places[event])
-            yield _Sent(size, words, points, [*actions, *moves[here:end]])
+                first_move = max(first_move, places[event])
+            yield _Sent(size, words, points, [*actions, *moves[first_move:end]])
 
 
-def _moves(program: Program, begin: int, stop: int) -> list[_Move]:
-    return list(
-        zip(
-            program.end[begin:stop].tolist(),
-            program.feed_mm_min[begin:stop].tolist(),
-            (program.motion[begin:stop] == RAPID).tolist(),
-            program.spindle[begin:stop].tolist(),
-            program.power[begin:stop].tolist(),
-            range(begin, stop),
-            strict=True,
-        )
-    )
-
-
-def _events(program: Program, begin: int, stop: int) -> list[_Event]:
-    return list(
-        zip(
-            program.event_kind[begin:stop].tolist(),
-            program.event_seconds[begin:stop].tolist(),
-            program.event_power[begin:stop].tolist(),
-            strict=True,
-        )
-    )
+def _rows(*columns: NDArray[Any]) -> list[Any]:
+    """The rows of a table of ``columns``, as tuples of Python numbers."""
+    return list(zip(*(column.tolist() for column in columns), strict=True))

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from miurafab.findings import Finding, findings_json
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
 from miurafab.geometry.polygons import edge_lengths, facet_means
@@ -52,20 +53,13 @@ class Measurements:
 
 
 @dataclass(frozen=True)
-class AuditFinding:
-    """One fault: a stable ``code``, a sentence, and the ``where`` (facets, vertices or edges)."""
-
-    code: str
-    message: str
-    where: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
 class Audit:
-    """What an audit found; ``valid`` when nothing is wrong."""
+    """What an audit found; ``valid`` when nothing is wrong. ``where`` of a finding is the indices
+    of its facets, vertices or edges.
+    """
 
     measurements: Measurements
-    findings: tuple[AuditFinding, ...]
+    findings: tuple[Finding, ...]
     seconds: float
 
     @property
@@ -77,14 +71,11 @@ class Audit:
         numbers = {f.name: getattr(self.measurements, f.name) for f in fields(self.measurements)}
         return {
             "status": "converged" if self.valid else "invalid",
-            "advice": " ".join(finding.message for finding in self.findings),
+            "advice": " ".join(finding.sentence for finding in self.findings),
             **numbers,
             "iterations": None,
             "seconds": self.seconds,
-            "findings": [
-                {"code": f.code, "message": f.message, "where": list(f.where)}
-                for f in self.findings
-            ],
+            "findings": findings_json(self.findings),
         }
 
 
@@ -170,24 +161,24 @@ def surface_area(surface: TargetSurface, samples: int = 200) -> float:
     return float(density.mean() * d.width * d.height)
 
 
-def _findings(pattern: CreasePattern, measured: Measurements) -> list[AuditFinding]:
+def _findings(pattern: CreasePattern, measured: Measurements) -> list[Finding]:
     found = []
     edges = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
     short = np.flatnonzero(edges < DEGENERATE * edges.mean())
     if len(short):
         found.append(
-            AuditFinding(
+            Finding(
                 "degenerate-edge",
                 f"{_these(short, 'edge')} shorter than a millionth of the mean edge (down to "
                 f"{edges[short].min():.1e} mm): they cannot be creased or cut, so the sheet cannot "
-                "be made. Fit again with --min-edge.",
+                "be made. Fit again with `min_edge`.",
                 tuple(short.tolist()),
             )
         )
     if measured.overlaps:
         pairs = overlaps(pattern)
         found.append(
-            AuditFinding(
+            Finding(
                 "overlap",
                 f"{len(pairs)} pairs of facets overlap in the flat pattern, the first being facets "
                 f"{pairs[0][0]} and {pairs[0][1]}: it cannot be cut from one piece.",
@@ -200,7 +191,7 @@ def _findings(pattern: CreasePattern, measured: Measurements) -> list[AuditFindi
     if measured.self_intersections:
         pairs = self_intersections(pattern)
         found.append(
-            AuditFinding(
+            Finding(
                 "self-intersection",
                 f"{len(pairs)} pairs of facets pass through or lie on each other in the folded "
                 f"form, the first being facets {pairs[0][0]} and {pairs[0][1]}.",
@@ -210,7 +201,7 @@ def _findings(pattern: CreasePattern, measured: Measurements) -> list[AuditFindi
     return found
 
 
-def _inexact(pattern: CreasePattern, folded: Floats) -> list[AuditFinding]:
+def _inexact(pattern: CreasePattern, folded: Floats) -> list[Finding]:
     """Where planarity, developability and isometry are over ``EXACT``."""
     inner = invariants.interior_vertices(pattern)
     facets = np.arange(len(pattern.faces_vertices))
@@ -227,7 +218,7 @@ def _inexact(pattern: CreasePattern, folded: Floats) -> list[AuditFinding]:
         if over.any():
             where = names[over]
             found.append(
-                AuditFinding(
+                Finding(
                     code,
                     f"{_these(where, noun)} not {virtue}: up to {values.max():.1e}, over "
                     f"{EXACT:.0e}.",

@@ -10,6 +10,18 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from miurafab.options import (
+    REQUIRED,
+    Choice,
+    Flag,
+    Several,
+    Whole,
+    angle,
+    feed,
+    length,
+    number,
+    option,
+)
 from miurafab.profiles.material import OPERATIONS
 from miurafab.profiles.shipped import find_file
 from miurafab.profiles.table import Table, read_toml
@@ -22,38 +34,63 @@ FLOW_CONTROL = ("none", "xon-xoff", "rts-cts")
 
 @dataclass(frozen=True)
 class Bed:
-    """The usable work area: ``width_mm`` along X, ``height_mm`` along Y, and the margin kept."""
+    """The usable work area in mm."""
 
-    width_mm: float
-    height_mm: float
-    margin_mm: float
+    width_mm: float = option(length(10, 20_000), "Work area along X.", REQUIRED)
+    height_mm: float = option(length(10, 20_000), "Work area along Y.", REQUIRED)
+    margin_mm: float = option(length(0, 500), "Kept free along the edges.", 5.0)
 
 
 @dataclass(frozen=True)
 class MotionLimits:
     """What the firmware's planner is set to: rates in mm/min, accelerations in mm/s²."""
 
-    max_rate_mm_min: tuple[float, float]
-    acceleration_mm_s2: tuple[float, float]
-    junction_deviation_mm: float
+    max_rate_x_mm_min: float = option(feed(), "Maximum rate of X (`$110`).", REQUIRED)
+    max_rate_y_mm_min: float = option(feed(), "Maximum rate of Y (`$111`).", REQUIRED)
+    acceleration_x_mm_s2: float = option(
+        number(1, 1e5, unit=" mm/s²"), "Acceleration of X in mm/s² (`$120`).", REQUIRED
+    )
+    acceleration_y_mm_s2: float = option(
+        number(1, 1e5, unit=" mm/s²"), "Acceleration of Y in mm/s² (`$121`).", REQUIRED
+    )
+    junction_deviation_mm: float = option(length(0, 1), "Junction deviation (`$11`).", 0.01)
+
+    @property
+    def max_rate_mm_min(self) -> tuple[float, float]:
+        """The maximum rates of X and Y."""
+        return self.max_rate_x_mm_min, self.max_rate_y_mm_min
+
+    @property
+    def acceleration_mm_s2(self) -> tuple[float, float]:
+        """The accelerations of X and Y."""
+        return self.acceleration_x_mm_s2, self.acceleration_y_mm_s2
 
 
 @dataclass(frozen=True)
 class Knife:
-    """A blade that trails behind the axis of its holder, as the wheel of a caster does.
+    """A blade that trails behind the axis of its holder, as the wheel of a caster does."""
 
-    ``offset_mm`` is how far its tip trails, 0 where the machine corrects for that itself.
-    At a corner that turns by more than ``corner_angle`` (rad) the blade is swivelled about its tip.
-    A closed outline is cut on over its beginning by ``overcut_mm``. ``s_shallow`` is the S of a
-    depth that marks the sheet and does not part it, for scores and engravings; None if there is
-    no such depth. ``leave_out`` are the operations that this knife is not asked to make.
-    """
-
-    offset_mm: float
-    corner_angle: float
-    overcut_mm: float
-    s_shallow: int | None
-    leave_out: tuple[str, ...]
+    offset_mm: float = option(
+        length(0, 5),
+        "How far the tip trails; 0 where the machine corrects for that itself.",
+        REQUIRED,
+    )
+    corner_angle: float = option(
+        angle(1, 180),
+        "At a corner that turns by more, the blade is swivelled about its tip in fine steps.",
+        math.radians(20),
+    )
+    overcut_mm: float = option(
+        length(0, 20), "A closed outline is cut on over its beginning by this length.", 0.0
+    )
+    s_shallow: int | None = option(
+        Whole(),
+        "S of a depth that marks the sheet and does not part it, for scores and engravings.",
+        default_text="the knife has no such depth",
+    )
+    leave_out: tuple[str, ...] = option(
+        Several(Choice(OPERATIONS)), "Operations that this knife is not asked to make.", ()
+    )
 
 
 @dataclass(frozen=True)
@@ -79,17 +116,20 @@ class Tool:
 
 @dataclass(frozen=True)
 class Controller:
-    """How to talk to it: ``rx_bytes`` usable receive buffer, ``line_chars`` usable line length.
+    """How to talk to the controller."""
 
-    ``flow_control`` is how a machine that answers nothing holds up its sender.
-    """
-
-    baud: int
-    streaming: str
-    rx_bytes: int
-    line_chars: int
-    planner_blocks: int
-    flow_control: str = "none"
+    baud: int = option(Whole(300, 4_000_000), "Speed of the serial port in baud.", 115_200)
+    streaming: str = option(
+        Choice(STREAMING), "How the sender keeps the receive buffer full.", STREAMING[0]
+    )
+    rx_bytes: int = option(Whole(16, 65_536), "Usable bytes of the receive buffer.", 128)
+    line_chars: int = option(Whole(20, 4096), "Usable characters of a line.", 79)
+    planner_blocks: int = option(Whole(1, 1024), "Moves that the planner holds.", 15)
+    flow_control: str = option(
+        Choice(FLOW_CONTROL),
+        "How a machine that answers nothing holds up its sender.",
+        FLOW_CONTROL[0],
+    )
 
 
 @dataclass(frozen=True)
@@ -129,84 +169,38 @@ def load_machine(name: str | Path) -> MachineProfile:
     profile = MachineProfile(
         name=path.stem,
         title=table.text("title"),
-        dialect=table.choice("dialect", DIALECTS),
-        bed=_bed(table.table("bed")),
-        motion=_motion(table.table("motion")),
+        dialect=table.value("dialect", Choice(DIALECTS)),
+        bed=table.table("bed").options(Bed),
+        motion=table.table("motion").options(MotionLimits),
         tool=_tool(table.table("tool")),
-        controller=_controller(table.table("controller")),
+        controller=table.table("controller").options(Controller),
         settings=_settings(table.table("settings", {})),
     )
     table.finish()
+    if 2 * profile.bed.margin_mm >= min(profile.bed.width_mm, profile.bed.height_mm):
+        raise table.fault("bed", "has a margin that leaves nothing of the bed")
     return profile
 
 
-def _bed(table: Table) -> Bed:
-    bed = Bed(
-        width_mm=table.length("width", low=10, high=20_000),
-        height_mm=table.length("height", low=10, high=20_000),
-        margin_mm=table.length("margin", 5.0, low=0, high=500),
-    )
-    table.finish()
-    if 2 * bed.margin_mm >= min(bed.width_mm, bed.height_mm):
-        raise table.fault("margin", "leaves nothing of the bed")
-    return bed
-
-
-def _motion(table: Table) -> MotionLimits:
-    motion = MotionLimits(
-        max_rate_mm_min=(
-            table.feed("max_rate_x", low=1, high=1e6),
-            table.feed("max_rate_y", low=1, high=1e6),
-        ),
-        acceleration_mm_s2=(
-            table.number("acceleration_x", low=1, high=1e5),
-            table.number("acceleration_y", low=1, high=1e5),
-        ),
-        junction_deviation_mm=table.length("junction_deviation", 0.01, low=0, high=1),
-    )
-    table.finish()
-    return motion
-
-
 def _tool(table: Table) -> Tool:
-    kind = table.choice("kind", TOOLS)
-    s_max = table.whole("s_max", 1000, low=1, high=100_000)
+    kind = table.value("kind", Choice(TOOLS))
+    s_max = table.value("s_max", Whole(1, 100_000), 1000)
+    own_s = Whole(0, s_max)
     tool = Tool(
         kind=kind,
-        s_min=table.whole("s_min", 0, low=0, high=s_max),
+        s_min=table.value("s_min", own_s, 0),
         s_max=s_max,
-        beam_mode=table.choice("beam_mode", ("M4", "M3"), "M4" if kind == "laser" else "M3"),
-        air_assist=table.flag("air_assist", False),
-        s_down=table.whole("s_down", s_max, low=0, high=s_max),
-        s_up=table.whole("s_up", 0, low=0, high=s_max),
-        settle_s=table.number("settle", 0.0, low=0, high=10),
-        knife=_knife(table, s_max) if kind == "knife" else None,
+        beam_mode=table.value("beam_mode", Choice(("M4", "M3")), "M4" if kind == "laser" else "M3"),
+        air_assist=table.value("air_assist", Flag(), False),
+        s_down=table.value("s_down", own_s, s_max),
+        s_up=table.value("s_up", own_s, 0),
+        settle_s=table.value("settle", number(0, 10, unit=" s"), 0.0),
+        knife=table.options(Knife) if kind == "knife" else None,
     )
     table.finish()
+    if tool.knife is not None and (tool.knife.s_shallow or 0) > s_max:
+        raise table.fault("s_shallow", f"is {tool.knife.s_shallow}, which exceeds s_max ({s_max})")
     return tool
-
-
-def _knife(table: Table, s_max: int) -> Knife:
-    return Knife(
-        offset_mm=table.length("offset", low=0, high=5),
-        corner_angle=table.angle("corner_angle", math.radians(20), low=0.02, high=math.pi),
-        overcut_mm=table.length("overcut", 0.0, low=0, high=20),
-        s_shallow=table.whole("s_shallow", low=0, high=s_max) if table.has("s_shallow") else None,
-        leave_out=table.choices("leave_out", OPERATIONS, ()),
-    )
-
-
-def _controller(table: Table) -> Controller:
-    controller = Controller(
-        baud=table.whole("baud", 115_200, low=300, high=4_000_000),
-        streaming=table.choice("streaming", STREAMING, "character-counting"),
-        rx_bytes=table.whole("rx_bytes", 128, low=16, high=65_536),
-        line_chars=table.whole("line_chars", 79, low=20, high=4096),
-        planner_blocks=table.whole("planner_blocks", 15, low=1, high=1024),
-        flow_control=table.choice("flow_control", FLOW_CONTROL, "none"),
-    )
-    table.finish()
-    return controller
 
 
 def _settings(table: Table) -> dict[int, float]:

@@ -7,9 +7,20 @@ different S ranges; the profile of the machine turns them into S words.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from miurafab.options import (
+    REQUIRED,
+    Choice,
+    Whole,
+    angle,
+    feed,
+    length,
+    modulus,
+    number,
+    option,
+)
 from miurafab.profiles.shipped import find_file
 from miurafab.profiles.table import Table, read_toml
 
@@ -33,20 +44,23 @@ FITS = ("centre", "stretch_cut", "stretch_gap")
 
 @dataclass(frozen=True)
 class Perforation:
-    """Dashes on a crease, lengths in mm: ``cut`` burnt, ``gap`` left, ``end_bridge`` left whole
-    at both crease ends, and no burnt end segment shorter than ``min_end``.
+    """Dashes on a crease, lengths in mm."""
 
-    ``start_end`` is what a crease begins and ends with: a ``bridge``, or a ``cut`` right from the
-    vertex. ``fit`` says what gives way so that the dashes fill the crease: the two end dashes
-    (``centre``), all dashes (``stretch_cut``), or all gaps (``stretch_gap``).
-    """
-
-    cut_mm: float
-    gap_mm: float
-    end_bridge_mm: float
-    min_end_mm: float
-    start_end: str = "bridge"
-    fit: str = "centre"
+    cut_mm: float = option(length(0.05, 100), "Length of a burnt dash.", REQUIRED)
+    gap_mm: float = option(length(0.05, 100), "Length left whole between dashes.", REQUIRED)
+    end_bridge_mm: float = option(length(0, 20), "Left whole at both ends of a crease.", REQUIRED)
+    min_end_mm: float = option(length(0, 100), "The shortest dash at a crease's end.", REQUIRED)
+    start_end: str = option(
+        Choice(START_ENDS),
+        "What a crease begins and ends with: a bridge, or a cut right from the vertex.",
+        START_ENDS[0],
+    )
+    fit: str = option(
+        Choice(FITS),
+        "What gives way so that the dashes fill the crease: the two end dashes (centre), all "
+        "dashes (stretch_cut), or all gaps (stretch_gap).",
+        FITS[0],
+    )
 
     @property
     def bridge_mm(self) -> float:
@@ -70,25 +84,27 @@ def _all_perforated() -> dict[str, Crease]:
 
 @dataclass(frozen=True)
 class TabRule:
-    """Glue tabs: ``height`` in mm, and the ``inset`` kept from the borders of the glued facet.
+    """Glue tabs."""
 
-    No inner angle at the base of a tab exceeds ``max_angle`` (rad), and one with less glue than
-    ``min_area_mm2`` is told.
-    """
-
-    height_mm: float
-    inset_mm: float
-    max_angle: float = math.radians(75)
-    min_area_mm2: float = 10.0
+    height_mm: float = option(length(0.5, 100), "Height of a tab.", REQUIRED)
+    inset_mm: float = option(
+        length(0, 10), "Distance kept from the borders of the glued facet.", 0.3
+    )
+    max_angle: float = option(
+        angle(5, 180), "Largest inner angle at the base of a tab.", math.radians(75)
+    )
+    min_area_mm2: float = option(
+        number(0, 1e6, unit=" mm²"), "A tab with less glue than this area in mm² is told.", 10.0
+    )
 
 
 @dataclass(frozen=True)
 class Operation:
-    """How one operation is made: ``power`` in 0..1, ``feed_mm_min``, and ``passes``."""
+    """How one operation is made."""
 
-    power: float
-    feed_mm_min: float
-    passes: int
+    power: float = option(number(0, 1), "Fraction of the laser's full power.", REQUIRED)
+    feed_mm_min: float = option(feed(), "Speed of the head.", REQUIRED)
+    passes: int = option(Whole(1, 50), "How often each stroke is made.", 1)
 
 
 @dataclass(frozen=True)
@@ -126,40 +142,26 @@ def load_material(name: str | Path) -> Material:
     """
     path = find_file("materials", str(name))
     table = Table(read_toml(path), path.name)
-    thickness = table.length("thickness", low=0.01, high=20)
-    max_power = table.number("max_power", 1.0, low=0.01, high=1)
-    kerf = table.length("kerf", low=0, high=2)
-    perforation = _perforation(table.table("perforation"))
+    max_power = table.value("max_power", number(0.01, 1), 1.0)
+    kerf = table.value("kerf", length(0, 2))
+    perforation = table.table("perforation").options(Perforation)
     creases, relief_hole = _creases(table.table("creases", {}), perforation, kerf)
     material = Material(
         name=path.stem,
         title=table.text("title"),
-        thickness_mm=thickness,
+        thickness_mm=table.value("thickness", length(0.01, 20)),
         kerf_mm=kerf,
         max_power=max_power,
         perforation=perforation,
-        tabs=_tabs(table.table("tabs")),
+        tabs=table.table("tabs").options(TabRule),
         operations=_operations(table.table("operations"), max_power),
-        modulus_pa=table.modulus("modulus", low=1e5, high=1e12) if table.has("modulus") else None,
+        modulus_pa=table.value("modulus", modulus(1e5, 1e12), None),
         creases=creases,
         relief_hole_mm=relief_hole,
-        grain=table.choice("grain", GRAINS, "none"),
+        grain=table.value("grain", Choice(GRAINS), "none"),
     )
     table.finish()
     return material
-
-
-def _perforation(table: Table) -> Perforation:
-    perforation = Perforation(
-        cut_mm=table.length("cut", low=0.05, high=100),
-        gap_mm=table.length("gap", low=0.05, high=100),
-        end_bridge_mm=table.length("end_bridge", low=0, high=20),
-        min_end_mm=table.length("min_end", low=0, high=100),
-        start_end=table.choice("start_end", START_ENDS, "bridge"),
-        fit=table.choice("fit", FITS, "centre"),
-    )
-    table.finish()
-    return perforation
 
 
 def _creases(table: Table, usual: Perforation, kerf: float) -> tuple[dict[str, Crease], float]:
@@ -169,25 +171,16 @@ def _creases(table: Table, usual: Perforation, kerf: float) -> tuple[dict[str, C
     creases = {}
     for kind in CREASE_KINDS:
         entry = table.table(kind, {})
-        mode = entry.choice("mode", MODES, "perforate")
-        own = replace(
-            usual,
-            cut_mm=entry.length("cut", usual.cut_mm, low=0.05, high=100),
-            gap_mm=entry.length("gap", usual.gap_mm, low=0.05, high=100),
-            end_bridge_mm=entry.length("end_bridge", usual.end_bridge_mm, low=0, high=20),
-            min_end_mm=entry.length("min_end", usual.min_end_mm, low=0, high=100),
-            start_end=entry.choice("start_end", START_ENDS, usual.start_end),
-            fit=entry.choice("fit", FITS, usual.fit),
-        )
+        mode = entry.value("mode", Choice(MODES), "perforate")
+        own = entry.options(Perforation, usual)
         if mode == "cut" and own.bridge_mm == 0.0:
             raise entry.fault(
                 "mode",
                 "is 'cut' without bridges at the ends, which would part the sheet; give it "
                 "start_end = 'bridge' and an end_bridge",
             )
-        entry.finish()
         creases[kind] = Crease(mode, None if own == usual else own)
-    hole = table.length("relief_hole", 0.0, low=0, high=20)
+    hole = table.value("relief_hole", length(0, 20), 0.0)
     if 0.0 < hole < kerf + MIN_HOLE_PATH_MM:
         raise table.fault(
             "relief_hole",
@@ -198,26 +191,12 @@ def _creases(table: Table, usual: Perforation, kerf: float) -> tuple[dict[str, C
     return creases, hole
 
 
-def _tabs(table: Table) -> TabRule:
-    rule = TabRule(
-        height_mm=table.length("height", low=0.5, high=100),
-        inset_mm=table.length("inset", 0.3, low=0, high=10),
-        max_angle=table.angle("max_angle", math.radians(75), low=0.1, high=math.pi),
-        min_area_mm2=table.number("min_area", 10.0, low=0, high=1e6),
-    )
-    table.finish()
-    return rule
-
-
 def _operations(table: Table, max_power: float) -> dict[str, Operation]:
     operations = {}
     for name in OPERATIONS:
         entry = table.table(name)
-        operations[name] = Operation(
-            power=entry.number("power", low=0, high=max_power),
-            feed_mm_min=entry.feed("feed", low=1, high=1e6),
-            passes=entry.whole("passes", 1, low=1, high=50),
-        )
-        entry.finish()
+        operations[name] = made = entry.options(Operation)
+        if made.power > max_power:
+            raise entry.fault("power", f"is {made.power:g}; max_power allows {max_power:g} at most")
     table.finish()
     return operations

@@ -218,7 +218,7 @@ class Bench:
             self._new_pattern(task, part)
         elif part["part"] == "motion" and self.pattern is not None:
             self.pattern["files"] |= self._put_down(task.id, part.get("files", {}))
-            self.pattern["remarks"] += part.get("remarks", [])
+            self.pattern["findings"] += self._findings(part)
             self.pattern |= {"folding": False, "still": part.get("missing", "")}
         elif part["part"] == "job":
             self._new_job(task, part)
@@ -237,7 +237,7 @@ class Bench:
             "headline": headline(report["status"], opened=opened),
             "advice": self._plain(report["advice"]),
             "lines": pattern_lines(report),
-            "remarks": [self._plain(remark) for remark in part["remarks"]],
+            "findings": self._findings(part),
             "files": self._put_down(task.id, part["files"]),
             "folding": bool(part["files"]),
             "still": "",
@@ -272,8 +272,16 @@ class Bench:
             return []
         return [f"{self.pattern['headline']} {self.pattern['advice']}".strip()]
 
+    def _findings(self, part: News) -> list[dict[str, Any]]:
+        return [
+            finding | {"sentence": self._plain(finding["sentence"])}
+            for finding in part.get("findings", [])
+        ]
+
     def _plain(self, sentence: str) -> str:
-        """``sentence`` with files of the studio's own folder called by their names alone."""
+        """``sentence`` with files of the studio's own folder called by their names alone, and the
+        names of options in quotes.
+        """
         return spell_options(self._own.sub("", sentence), lambda name: f"'{name}'")
 
     def _begin(self, do: str, name: str, **what: Any) -> None:

@@ -17,11 +17,13 @@ from typing import Any
 import miurafab
 from miurafab.errors import MiurafabError, PatternError
 from miurafab.fabrication.drawing.svg import pattern_svg
+from miurafab.findings import Finding, findings_json
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.fold import read_fold
 from miurafab.studio.recipe import job_name
+from miurafab.workflow.design import no_target
 from miurafab.workflow.job_directory import GUIDE, write_text
-from miurafab.workflow.picture_svg import svg_text
+from miurafab.workflow.picture import svg_text
 from miurafab.workflow.preview import Preview
 
 Tell = Callable[[dict[str, Any]], None]
@@ -70,7 +72,11 @@ def carry_out(order: Order, tell: Tell) -> None:
 def _fit(order: Order, tell: Tell) -> None:
     wanted = miurafab.design(order.target, **order.options)
     result = miurafab.fit(wanted.request, _progress(tell, 0.0, _FITTING))
-    part = {"part": "pattern", "report": result.report(), "remarks": list(wanted.remarks)}
+    part = {
+        "part": "pattern",
+        "report": result.report(),
+        "findings": findings_json(wanted.findings),
+    }
     if result.pattern is None:
         tell(part | {"files": {}})
         return
@@ -82,22 +88,21 @@ def _fit(order: Order, tell: Tell) -> None:
 
 def _open(order: Order, tell: Tell) -> None:
     tell({"progress": 0.0, "note": "checking the pattern"})
-    pattern, surface, missing = _read(order)
+    pattern, surface, findings = _read(order)
     report = miurafab.check(pattern, surface).report()
     copy = order.folder / f"{order.name}.fold"
     shutil.copyfile(order.file, copy)
-    remarks = [] if missing is None else [f"Distances are left out: {missing}."]
-    part = {"part": "pattern", "report": report, "remarks": remarks}
+    part = {"part": "pattern", "report": report, "findings": findings_json(findings)}
     _show(order, pattern, part | {"files": {"fold": copy.name}}, tell)
 
 
-def _read(order: Order) -> tuple[CreasePattern, Any, str | None]:
+def _read(order: Order) -> tuple[CreasePattern, Any, tuple[Finding, ...]]:
     """The pattern with its target. A file from the browser must not name a mesh by its path."""
     pattern = read_fold(order.file)
     mesh = pattern.target.get("mesh")
     if mesh is None or order.ours:
         return miurafab.load_pattern(order.file)
-    return pattern, None, "its target is a mesh, which is not in the file"
+    return pattern, None, no_target("its target is a mesh, which is not in the file")
 
 
 def _with_mesh_in(folder: Path, pattern: CreasePattern) -> CreasePattern:
@@ -124,13 +129,16 @@ def _show(order: Order, pattern: CreasePattern, part: dict[str, Any], tell: Tell
         return
     miurafab.write_motion(folding, folder / MOTION, order.name)
     told = folding.report()
-    remarks = []
+    findings = []
     if not told["rigid"]:
-        remarks.append("It does not fold rigidly: its facets bend a little on the way.")
+        bends = "It does not fold rigidly: its facets bend a little on the way."
+        findings.append(Finding("bent-facets", bends))
     if told["self_contacts"]:
         frames = f"{len(told['self_contacts'])} of {told['frames']} positions"
-        remarks.append(f"On the way facets pass through each other in {frames}.")
-    tell({"part": "motion", "files": {"page": MOTION}, "remarks": remarks})
+        findings.append(
+            Finding("contacts", f"On the way facets pass through each other in {frames}.")
+        )
+    tell({"part": "motion", "files": {"page": MOTION}, "findings": findings_json(findings)})
 
 
 def _sheets(order: Order, tell: Tell) -> None:

@@ -22,6 +22,7 @@ import trimesh
 from scipy.interpolate import NdBSpline
 
 from miurafab.errors import TargetError
+from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
 from miurafab.surfaces.mesh_repair import (
@@ -32,7 +33,7 @@ from miurafab.surfaces.mesh_repair import (
     fill_holes,
     oriented_sheet,
     side_lengths,
-    size_remarks,
+    size_findings,
 )
 from miurafab.surfaces.parameterise import flatten
 from miurafab.surfaces.placement import (
@@ -134,7 +135,7 @@ class MeshChart:
 @dataclass(frozen=True, eq=False)
 class MeshSurface:
     """A rectangle of a mesh. ``spline`` maps a little more than ``domain`` to space; ``triangles``
-    (T, 3, 3) are the mesh itself. ``remarks`` say what the user might want to know of the file;
+    (T, 3, 3) are the mesh itself. ``findings`` are about the mesh and its repair;
     ``free`` whether the rectangle may be laid elsewhere.
     """
 
@@ -144,7 +145,7 @@ class MeshSurface:
     placement: GridPlacement
     stiffness: float
     layout: MeshChart = field(repr=False)
-    remarks: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     free: bool = True
 
     def point(self, uv: Floats) -> Floats:
@@ -267,14 +268,14 @@ def mesh_surface(
     The other arguments are those of :func:`load_mesh`. Raises
     :class:`~miurafab.errors.TargetError` if the mesh is not one disk.
     """
-    layout, remarks = lay_out(vertices, faces, name)
+    layout, findings = lay_out(vertices, faces, name)
     if place is not None:
         placement, stiffness = _placed_before(place, name)
         surface = layout.surface(placement, stiffness)
     else:
         surface = layout.surface(_placement(layout, region, rotate))
     free = place is None and region is None and rotate is None
-    return replace(surface, remarks=remarks, free=free)
+    return replace(surface, findings=findings, free=free)
 
 
 def _placement(layout: MeshChart, region: Region | None, rotate: float | None) -> GridPlacement:
@@ -303,15 +304,16 @@ def _placed_before(place: dict[str, Any], name: str) -> tuple[GridPlacement, flo
     return GridPlacement(angle, Domain(u0, u1, v0, v1)), stiffness
 
 
-def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[MeshChart, tuple[str, ...]]:
-    """The mesh laid flat, and remarks on it. Raises ``TargetError`` if it is not one disk."""
+def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[MeshChart, tuple[Finding, ...]]:
+    """The mesh laid flat, and findings on it. Raises ``TargetError`` if it is not one disk."""
     vertices, faces = clean(vertices, faces, name)
-    remarks = size_remarks(vertices, name)
+    findings = size_findings(vertices, name)
     faces = oriented_sheet(vertices, faces, name)
     known, real = len(vertices), len(faces)
     vertices, faces, filled = fill_holes(vertices, faces, name)
     if filled:
-        remarks += (f"{name}: {filled} small hole{'s were' if filled > 1 else ' was'} filled.",)
+        sentence = f"{name}: {filled} small hole{'s were' if filled > 1 else ' was'} filled."
+        findings += (Finding("filled-holes", sentence, name),)
     if len(vertices) - len(edges_of(faces)[0]) + len(faces) != 1:
         raise TargetError(f"{name} has a handle; it cannot be laid flat. Cut it open.")
     flat = flatten(vertices, faces)
@@ -322,7 +324,7 @@ def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[MeshChart, tuple[
         even = np.asarray(smoothed.spline(flat), dtype=np.float64)
         if doubled_areas(even, faces).min() > 1e-6 * np.median(doubled_areas(even, faces)):
             flat = flatten(even, faces)
-    return MeshChart(vertices, faces, real, known, flat, rough, name), remarks
+    return MeshChart(vertices, faces, real, known, flat, rough, name), findings
 
 
 def _smoothed(points: Floats, flat: Floats, faces: Ints) -> Smoothed:

@@ -13,6 +13,7 @@ import numpy as np
 import trimesh
 
 from miurafab.errors import TargetError
+from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.surfaces.parameterise import border_loops
 
@@ -51,13 +52,18 @@ def clean(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
     return vertices[used], faces.reshape(-1, 3)
 
 
-def size_remarks(vertices: Floats, name: str) -> tuple[str, ...]:
+def size_findings(vertices: Floats, name: str) -> tuple[Finding, ...]:
+    """A finding where the size of the mesh suggests a unit that is not the millimetre."""
     size = float(np.ptp(vertices, axis=0).max())
     if 1.0 <= size <= 10_000.0:
         return ()
     return (
-        f"{name} is {size:.3g} mm large, as mesh files are read in millimetres; if it is in "
-        "another unit, give the size that is meant with --size.",
+        Finding(
+            "mesh-unit",
+            f"{name} is {size:.3g} mm large, since mesh files are read in millimetres; if it is in "
+            "another unit, give the size that is meant with `size`.",
+            name,
+        ),
     )
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from miurafab.errors import OptionError, PatternError, TargetError
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.findings import Finding
 from miurafab.options import read_options
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitOptions, FitRequest
@@ -28,15 +29,15 @@ from miurafab.surfaces.surface import TargetSurface
 
 @dataclass(frozen=True)
 class Design:
-    """A request with a title, the machine and material that its file names, if any, and remarks on
-    the target that the user might want to know. ``layout`` is what the file asks of the sheets.
+    """A request with a title, the machine and material that its file names, if any, and findings
+    on the target. ``layout`` is what the file asks of the sheets.
     """
 
     request: FitRequest
     title: str
     machine: str | None = None
     material: str | None = None
-    remarks: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     layout: LayoutOptions | None = None
 
 
@@ -87,7 +88,7 @@ def _on_mesh(path: Path, asked: FitOptions, title: str) -> Design:
     surface, sha256 = load_mesh(path, region=asked.region, rotate=asked.rotate)
     target = {"mesh": str(path.resolve()), "sha256": sha256, **surface.description}
     request = FitRequest(**vars(asked), surface=surface, target=target)
-    return Design(request, title, remarks=surface.remarks)
+    return Design(request, title, findings=surface.findings)
 
 
 def _on_surface(name: str, parameters: Mapping[str, Any], asked: FitOptions, title: str) -> Design:
@@ -141,25 +142,30 @@ def save_pattern(pattern: CreasePattern, path: Path, title: str = "") -> None:
     write_fold(replace(pattern, target=target), path, title)
 
 
-def load_pattern(path: Path) -> tuple[CreasePattern, TargetSurface | None, str | None]:
-    """The pattern in a FOLD file, its target, and why the target is not there if it is not.
+def load_pattern(path: Path) -> tuple[CreasePattern, TargetSurface | None, tuple[Finding, ...]]:
+    """The pattern in a FOLD file, its target (None without one), and findings on the target.
 
-    A pattern without a target is a pattern from another program; a mesh that has moved away or
-    changed since is a remark and not an error.
+    A pattern without a target comes from another program. A mesh that was moved or has changed
+    since the fit is a finding and no error.
     """
     pattern = read_fold(path)
     target = pattern.target
     if not target:
-        return pattern, None, None
+        return pattern, None, ()
     if "mesh" in target:
         mesh = path.parent / str(target["mesh"])
         if not mesh.is_file():
-            return pattern, None, f"the target mesh {mesh} is not there"
+            return pattern, None, no_target(f"the target mesh {mesh} is not there")
         if hashlib.sha256(mesh.read_bytes()).hexdigest() != target.get("sha256"):
-            return pattern, None, f"the target mesh {mesh} has changed since the fit"
-        return pattern, load_mesh(mesh, place=target)[0], None
+            return pattern, None, no_target(f"the target mesh {mesh} has changed since the fit")
+        return pattern, load_mesh(mesh, place=target)[0], ()
     parameters = target.get("parameters", {})
     if not isinstance(target.get("surface"), str) or not isinstance(parameters, dict):
         raise PatternError(f"{path}: 'miurafab:target' names neither a surface nor a mesh.")
     surface, _ = make_surface(target["surface"], parameters)
-    return pattern, surface, None
+    return pattern, surface, ()
+
+
+def no_target(why: str) -> tuple[Finding, ...]:
+    """The finding on a pattern whose target cannot be used."""
+    return (Finding("no-target", f"Distances are left out: {why}."),)

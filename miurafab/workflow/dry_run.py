@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
-from miurafab.findings import Finding, as_json
+from miurafab.findings import Finding, findings_json
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program, strokes
 from miurafab.gcode.reading import read_program
@@ -93,7 +93,7 @@ class SheetPreview:
             "travel_mm": round(self.travel_mm, 3),
             "bounds_mm": None if self.bounds_mm is None else list(self.bounds_mm),
             "warnings": list(self.warnings),
-            "findings": as_json(self.findings),
+            "findings": findings_json(self.findings),
         }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,14 +15,8 @@ def check_writable(path: Path, what: str) -> None:
 
     ``what`` is the result's name in the sentence. Raises :class:`~miurafab.errors.InputError`.
     """
-    suffix = path.suffix.lower()
-    if suffix not in (*PLOTS, ".csv"):
+    if path.suffix.lower() not in (*PLOTS, ".csv"):
         raise InputError(f"{path}: {what} is written as .png, .svg or .csv, by the ending.")
-    if suffix in PLOTS and importlib.util.find_spec("matplotlib") is None:
-        raise InputError(
-            f"{path}: plots need matplotlib; install it with pip install 'miurafab[plot]', or "
-            "write a .csv."
-        )
     if not path.absolute().parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist.")
 
@@ -33,7 +26,7 @@ def write_result(
 ) -> None:
     """Write the ``table`` to a .csv, or the ``plot`` of the kind that the ending names.
 
-    Raises :class:`~miurafab.errors.InputError` for another ending, or where matplotlib is missing.
+    Raises :class:`~miurafab.errors.InputError` for another ending.
     """
     check_writable(path, what)
     if path.suffix.lower() == ".csv":

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError
-from miurafab.findings import Finding, as_json
+from miurafab.findings import Finding, findings_json
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import parse_dump
 from miurafab.origami.crease_pattern import CreasePattern
@@ -50,7 +50,7 @@ class Preview:
             "machine": self.machine.name,
             "seconds": round(self.seconds, 3),
             "sheets": [sheet.figures() for sheet in self.sheets],
-            "findings": as_json(self.findings),
+            "findings": findings_json(self.findings),
         }
 
 
@@ -111,14 +111,10 @@ def with_settings(machine: MachineProfile, dump: Path) -> MachineProfile:
         machine,
         motion=replace(
             motion,
-            max_rate_mm_min=(
-                values.get(110, motion.max_rate_mm_min[0]),
-                values.get(111, motion.max_rate_mm_min[1]),
-            ),
-            acceleration_mm_s2=(
-                values.get(120, motion.acceleration_mm_s2[0]),
-                values.get(121, motion.acceleration_mm_s2[1]),
-            ),
+            max_rate_x_mm_min=values.get(110, motion.max_rate_x_mm_min),
+            max_rate_y_mm_min=values.get(111, motion.max_rate_y_mm_min),
+            acceleration_x_mm_s2=values.get(120, motion.acceleration_x_mm_s2),
+            acceleration_y_mm_s2=values.get(121, motion.acceleration_y_mm_s2),
             junction_deviation_mm=values.get(11, motion.junction_deviation_mm),
         ),
         tool=replace(

@@ -1,7 +1,6 @@
 """miurafab energy: what it prints, what it writes, what it refuses."""
 
 import csv
-import importlib.util
 import io
 import json
 from dataclasses import replace
@@ -114,17 +113,6 @@ def test_a_material_without_a_modulus_is_refused(hypar):
     material = replace(load_material("card-250"), modulus_pa=None)
     with pytest.raises(InputError, match="gives no modulus"):
         energy(hypar, material=material)
-
-
-def test_without_matplotlib_the_way_out_is_told(run, saved, monkeypatch):
-    there = importlib.util.find_spec
-
-    def missing(name, *rest):
-        return None if name == "matplotlib" else there(name, *rest)
-
-    monkeypatch.setattr(importlib.util, "find_spec", missing)
-    told = sentence(run("energy", saved, "-o", "e.png"), 2)
-    assert "pip install 'miurafab[plot]'" in told
 
 
 def test_a_path_that_is_lost_is_exit_1(run, saved):

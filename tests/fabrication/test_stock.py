@@ -69,7 +69,7 @@ def test_a_stock_file_is_read(tmp_path):
     ("old", "new", "complaint"),
     [
         ("quantity", "quantiy", r"stock.toml \[\[sheets\]\] 1: 'quantiy' is not a known key; did"),
-        ("quantity = 2", "quantity = 0", "'quantity' is 0; it must lie between 1 and"),
+        ("quantity = 2", "quantity = 0", "'quantity' is 0; it must be between 1 and"),
         ('grain = "y"', 'grain = "z"', "'grain' is 'z'; it must be one of none, x, y"),
         ('"20cm"\nheight', '"20 kg"\nheight', "'width' cannot be read"),
         ('x = "12mm"\n', "", r"\[\[defects\]\] 1: 'x' is missing"),

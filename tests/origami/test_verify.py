@@ -134,7 +134,7 @@ def test_a_degenerate_edge_is_named():
     found = codes(broken)
     edge = int(np.flatnonzero((pattern.edges_vertices == [0, 1]).all(axis=1))[0])
     assert found["degenerate-edge"] == (edge,)
-    message = next(f.message for f in audit(broken).findings if f.code == "degenerate-edge")
+    message = next(f.sentence for f in audit(broken).findings if f.code == "degenerate-edge")
     assert f"Edge {edge} is" in message
 
 

@@ -139,7 +139,7 @@ def test_a_pattern_stays_when_only_its_folding_is_cancelled(asked):
     (running.order.folder / "hypar.fold").write_text("{}")
     report = {"status": "converged", "advice": "", "facets": 4, "vertices": 9}
     files = {"fold": "hypar.fold"}
-    running.coming = [{"part": "pattern", "report": report, "remarks": [], "files": files}]
+    running.coming = [{"part": "pattern", "report": report, "findings": [], "files": files}]
     assert asked.state()["pattern"]["folding"]
     pattern = asked.post("cancel", {}).json()["pattern"]
     assert (pattern["folding"], pattern["still"]) == (False, "The folding was not computed.")
@@ -217,7 +217,7 @@ def test_where_no_sheet_was_found_there_is_nothing_to_lay_out(asked):
     asked.fit()
     report = {"status": "stalled", "advice": "Ask for more --facets.", "facets": None}
     asked.orders[0].coming = [
-        {"part": "pattern", "report": report, "remarks": [], "files": {}},
+        {"part": "pattern", "report": report, "findings": [], "files": {}},
         {"done": True},
     ]
     pattern = asked.state()["pattern"]
@@ -282,7 +282,7 @@ def test_a_pattern_of_the_browser_reads_no_other_file(done, tmp_path):
     source = done.upload("x.fold", json.dumps(fold).encode()).json()["source"]
     done.post("open", {"source": source})
     pattern = done.state()["pattern"]
-    assert pattern["remarks"][0] == (
+    assert pattern["findings"][0]["sentence"] == (
         "Distances are left out: its target is a mesh, which is not in the file."
     )
     assert "secret" not in json.dumps(done.state())

@@ -93,7 +93,7 @@ def test_from_a_surface_to_sheets_by_keyboard(page):
     assert page.text("pattern-command") == command
     assert "Flat facets" in page.text("figures")
     folding = page.run("document.getElementById('space').getAttribute('src')")
-    assert folding.endswith("folding.html"), page.text("remarks")
+    assert folding.endswith("folding.html"), page.text("findings")
     page.until("document.getElementById('flat').naturalWidth > 0")
 
     page.run("document.getElementById('shape-tab').focus()")

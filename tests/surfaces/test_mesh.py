@@ -195,10 +195,10 @@ def test_every_format_gives_the_same_surface(tmp_path, suffix):
 def test_a_size_that_suggests_another_unit_is_a_remark(tmp_path, scale, noted):
     v, f = square()
     surface, _ = load_mesh(written(tmp_path / "mesh.off", v * scale, f))
-    assert bool(surface.remarks) == noted
+    assert bool(surface.findings) == noted
     if noted:
-        assert "millimetres" in surface.remarks[0]
-        assert "--size" in surface.remarks[0]
+        assert "millimetres" in surface.findings[0].sentence
+        assert "`size`" in surface.findings[0].sentence
 
 
 def test_dirt_is_cleaned_away():
@@ -216,7 +216,7 @@ def test_small_holes_are_filled_and_said():
     v, f = square(21)
     middle = v[f].mean(axis=1)
     surface = mesh_surface(v, f[np.abs(middle - [50, 50, 0]).max(axis=1) > 5])
-    assert "1 small hole was filled" in surface.remarks[0]
+    assert "1 small hole was filled" in surface.findings[0].sentence
     point = surface.point(np.array([0.0, 0.0]))
     assert abs(point[2]) < 1e-6
     # distances are to the mesh as it is, hole and all
@@ -335,8 +335,8 @@ def test_a_mesh_is_fitted_checked_and_laid_out_again_from_its_file(tmp_path):
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
     report = json.loads(result.stdout)
-    pattern, _, missing = load_pattern(out)
-    assert missing is None
+    pattern, _, findings = load_pattern(out)
+    assert findings == ()
     assert pattern.target["rotate"] == pytest.approx(10)
     checked = CliRunner().invoke(app, ["check", str(out), "--json"])
     assert checked.exit_code == 0

@@ -73,8 +73,8 @@ def test_a_mesh_target_is_still_found_from_another_folder(tmp_path: Path) -> Non
     assert found is not None
     save_pattern(found, tmp_path / "a.fold")
     convert(tmp_path / "a.fold", tmp_path / "there" / "b.fold")
-    _, surface, missing = load_pattern(tmp_path / "there" / "b.fold")
-    assert missing is None
+    _, surface, findings = load_pattern(tmp_path / "there" / "b.fold")
+    assert findings == ()
     assert surface is not None
 
 

@@ -50,8 +50,8 @@ def made(tmp_path_factory):
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_check_passes_from_the_file_alone(made, target):
-    pattern, surface, missing = miurafab.load_pattern(made[target][0])
-    assert missing is None
+    pattern, surface, findings = miurafab.load_pattern(made[target][0])
+    assert findings == ()
     audit = miurafab.check(pattern, surface)
     assert audit.findings == ()
     measured = audit.measurements

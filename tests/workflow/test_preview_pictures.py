@@ -1,5 +1,6 @@
 """The pictures, read back: pixels where strokes are, and an SVG path that is the strokes."""
 
+import io
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -13,21 +14,31 @@ from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
 from miurafab.posting import post
 from miurafab.workflow.dry_run import LAYERS, dry_run
-from miurafab.workflow.picture import picture, write_pictures
-from miurafab.workflow.picture_svg import svg_text
+from miurafab.workflow.picture import (
+    LEFT,
+    PIXELS,
+    TOP,
+    png_bytes,
+    svg_text,
+    write_pictures,
+)
 from miurafab.workflow.preview import preview
 
 SVG = "{http://www.w3.org/2000/svg}"
 COLOURS = {layer.name: layer.colour for layer in LAYERS}
-PIXELS_A_MM = 1160 / 400
-CORNER = (78 + 14, 116 + 14)
+PIXELS_A_MM = PIXELS / 400
+CORNER = (LEFT * PIXELS / 100, TOP * PIXELS / 100)
 """The pixel of the bed's upper left corner."""
+
+
+def picture(sheet, machine):
+    return Image.open(io.BytesIO(png_bytes(sheet, machine))).convert("RGB")
 
 
 def pixel(image, x, y):
     """The colour, #rrggbb, at a point in mm of a 400 mm bed."""
-    column = round(CORNER[0] + x * PIXELS_A_MM)
-    row = round(CORNER[1] + (400 - y) * PIXELS_A_MM)
+    column = int(CORNER[0] + x * PIXELS_A_MM)
+    row = int(CORNER[1] + (400 - y) * PIXELS_A_MM)
     return "#{:02x}{:02x}{:02x}".format(*image.getpixel((column, row)))
 
 

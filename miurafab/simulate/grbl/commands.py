@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Generator
 
-from miurafab.gcode.numbers import read_single, to_unsigned, whole_byte
+from miurafab.gcode.numbers import read_single, whole_byte
 from miurafab.simulate.grbl import report
 from miurafab.simulate.grbl.eeprom import LINE_SIZE, STARTUP_LINES
 from miurafab.simulate.grbl.homing import home
@@ -214,7 +214,7 @@ def _setting(machine: Machine, line: str) -> Routine:
     if value.end() != len(line) or parameter > _LARGEST_SETTING:
         machine.answer = _UNKNOWN
         return
-    number = to_unsigned(parameter) & 0xFF
+    number = whole_byte(parameter)
     listed = machine.dialect.settings
     if listed is not None and number not in listed:
         machine.answer = _UNKNOWN

@@ -29,7 +29,8 @@ export function showPattern(pattern) {
   byId("headline").textContent = pattern.headline;
   byId("advice").textContent = pattern.advice;
   const waiting = pattern.folding ? ["The folding is still being computed."] : [];
-  byId("remarks").replaceChildren(...items([...pattern.remarks, ...waiting, ...(pattern.still ? [pattern.still] : [])]));
+  const findings = pattern.findings.map(({ sentence }) => sentence);
+  byId("findings").replaceChildren(...items([...findings, ...waiting, ...(pattern.still ? [pattern.still] : [])]));
   byId("pattern-downloads").replaceChildren(
     ...(files.fold ? [download("Pattern .fold", `${files.fold}?save`)] : []),
     ...(files.picture ? [download("Drawing .svg", `${files.picture}?save`)] : []),

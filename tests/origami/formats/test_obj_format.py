@@ -75,7 +75,7 @@ def test_the_published_pair_is_developable_and_cannot_be_made():
     assert set(found) == {"degenerate-edge", "isometry"}
     edges = pattern.edges_vertices[list(found["degenerate-edge"].where)]
     assert edges.tolist() == [[1364, 1365], [1381, 1382]]
-    assert "cannot be made" in found["degenerate-edge"].message
+    assert "cannot be made" in found["degenerate-edge"].sentence
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,82 @@
+"""The options of a fit: values or text, bare angles in degrees, whoever writes them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from problems import saddle_mesh
+
+from miurafab.errors import InputError, OptionError
+from miurafab.surfaces.catalogue import make_surface
+from miurafab.workflow.design import design
+
+
+def test_values_and_text_ask_for_the_same():
+    values = design("hypar", facets=(8, 6), size=250, amplitude=0.5, seed=np.int64(3))
+    text = design("hypar", facets="8x6", size="25cm", amplitude="0.5", seed="3")
+    for name in ("facets", "size_mm", "amplitude", "seed", "target"):
+        assert getattr(values.request, name) == getattr(text.request, name)
+
+
+@pytest.mark.parametrize("forty", [40, 40.0, "40", "40deg", f"{math.radians(40)}rad"])
+def test_a_bare_angle_is_degrees(forty, tmp_path):
+    assert design("hypar", min_angle=forty).request.min_angle == pytest.approx(math.radians(40))
+    written = forty if isinstance(forty, int | float) else f'"{forty}"'
+    file = tmp_path / "sphere.toml"
+    file.write_text(
+        f'min_angle = {written}\n[target]\nsurface = "sphere"\nwidth = {written}\n'
+        f"[layout]\ntab_angle = {written}\n"
+    )
+    made = design(str(file))
+    assert made.request.min_angle == pytest.approx(math.radians(40))
+    assert made.request.target["parameters"]["width"] == pytest.approx(40)
+    assert made.layout.tab_angle == pytest.approx(math.radians(40))
+
+
+def test_the_grid_on_a_mesh_is_turned_by_degrees(tmp_path):
+    file = tmp_path / "saddle.stl"
+    saddle_mesh(15).export(file)
+    plain, turned = (
+        design(str(file), rotate=angle, facets=(6, 6)).request.surface for angle in (0, 30)
+    )
+    angle = turned.placement.angle - plain.placement.angle
+    assert math.degrees(angle) == pytest.approx(30)
+    assert turned.description["rotate"] == pytest.approx(30)
+
+
+def test_parameters_come_back_from_a_file_as_they_were():
+    surface, written = make_surface("sphere", {"width": "1.2rad", "height": 77.7})
+    again, same = make_surface("sphere", written)
+    assert same == written
+    uv = surface.domain.lattice(5, 5)
+    assert np.array_equal(surface.point(uv), again.point(uv))
+
+
+@pytest.mark.parametrize("bare", [0.016, 1, "0.016", " 4 "])
+def test_a_limit_on_flat_foldability_needs_its_unit(bare):
+    with pytest.raises(OptionError, match=r"without a unit; write .*rad, as the paper does") as no:
+        design("hypar", flat_foldable=bare)
+    assert no.value.option == "flat_foldable"
+
+
+def test_a_limit_on_flat_foldability_with_its_unit():
+    for text, inside in (("0.016rad", 0.016), ("0.9deg", math.radians(0.9)), ("exact", 0.0)):
+        assert design("hypar", flat_foldable=text).request.flat_foldable == pytest.approx(inside)
+    assert design("hypar", flat_foldable="off").request.flat_foldable is None
+    with pytest.raises(InputError, match=r"is 229\.183 deg; it must be exact, off, or an angle"):
+        design("hypar", flat_foldable="4rad")
+
+
+def test_a_fault_of_a_file_names_the_file_and_one_of_the_caller_does_not(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('size = "-3mm"\n[target]\nsurface = "hypar"\n')
+    with pytest.raises(OptionError, match=r"^mine\.toml: 'size' is -3 mm"):
+        design(str(file))
+    with pytest.raises(OptionError, match=r"^'size' is -4 mm"):
+        design(str(file), size=-4)
+    assert design(str(file), size=100).request.size_mm == 100
+    file.write_text('sizee = "3mm"\n[target]\nsurface = "hypar"\n')
+    with pytest.raises(OptionError, match=r"^mine\.toml: 'sizee' is not a known key; .* 'size'"):
+        design(str(file))
