@@ -39,6 +39,17 @@ RULES = {
     "mesh-unit": Rule("warning", "a mesh whose size suggests a unit that is not the millimetre"),
     "filled-holes": Rule("note", "small holes of a mesh that were filled"),
     "sampling": Rule("warning", "a function that turns faster than its samples show"),
+    # A fit (miurafab.origami.fitting)
+    "interrupted": Rule("refusal", "a fit that was interrupted; the sheet is the best so far"),
+    "no-sheet": Rule("refusal", "no exact sheet was found"),
+    "no-sheet-in-limits": Rule("refusal", "no sheet meets all limits at any number of facets"),
+    "residual": Rule("refusal", "facets that are not exactly planar, developable or isometric"),
+    "min-edge": Rule("refusal", "an edge shorter than `min_edge`"),
+    "max-deviation": Rule("refusal", "a sheet farther from the target than `max_deviation`"),
+    "facet-shape": Rule("refusal", "facets that break a limit on angles or proportions"),
+    "flat-foldable": Rule("refusal", "a sheet less flat-foldable than asked"),
+    "smaller-part": Rule("warning", "a sheet on a smaller part of the mesh's rectangle"),
+    "far-from-target": Rule("warning", "a mid-surface that lies far from the target"),
     # A pattern, checked (miurafab.origami.verify)
     "no-target": Rule("note", "distances left out, since the target is missing or has changed"),
     "degenerate-edge": Rule("refusal", "an edge too short to be creased or cut"),

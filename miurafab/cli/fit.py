@@ -9,6 +9,7 @@ import typer
 
 import miurafab
 from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.findings import findings_json
 from miurafab.workflow.json_text import json_text
 
 TargetArgument = Annotated[
@@ -122,12 +123,17 @@ def fit(
     with console.progress("fitting") as progress:
         result = miurafab.fit(wanted.request, progress)
     answer = result.report()
+    answer["findings"] = findings_json((*wanted.findings, *result.findings))
     if result.pattern is not None:
         miurafab.save_pattern(result.pattern, out, wanted.title)
         answer["file"] = str(out)
     if report is not None:
         report.write_text(json_text(answer) + "\n", encoding="utf-8", newline="\n")
-    shown = {key: value for key, value in answer.items() if key != "attempts" and value != ""}
+    shown = {
+        key: value
+        for key, value in answer.items()
+        if key not in ("attempts", "findings") and value != ""
+    }
     console.answer(answer, lambda: console.facts(shown))
     if result.status != "converged":
         raise typer.Exit(1)

@@ -24,6 +24,7 @@ import itertools
 import time
 from collections.abc import Callable
 
+from miurafab.findings import Finding
 from miurafab.origami.fitting.request import INTERRUPTED, Attempt, FitRequest, FitResult
 from miurafab.origami.fitting.search import coarsest
 from miurafab.origami.fitting.strategies import Candidate, strategies_for
@@ -84,17 +85,28 @@ def _fit(
     iterations = sum(a.iterations for a in made)
     seconds = time.perf_counter() - started
     if best is None:
-        advice = _advice_when_stalled(made)
-        return FitResult("stalled", advice, None, None, tuple(made), iterations, seconds)
+        stalled = _no_sheet(made)
+        return FitResult(
+            "stalled",
+            stalled.sentence,
+            None,
+            None,
+            tuple(made),
+            iterations,
+            seconds,
+            findings=(stalled,),
+        )
     status = "interrupted" if interrupted else "infeasible" if best.faults else "converged"
-    place = best.attempt.place
-    stopped = [INTERRUPTED] if interrupted else []
-    remarks = [f"On the whole rectangle no sheet was found; this one has {place}."] if place else []
+    findings = [INTERRUPTED, *best.faults] if interrupted else list(best.faults)
+    if place := best.attempt.place:
+        sentence = f"On the whole rectangle no sheet was found; this one has {place}."
+        findings.append(Finding("smaller-part", sentence))
     if best.rank[1]:
-        remarks.append("The mid-surface lies far from the target; ask for more `facets`.")
+        sentence = "The mid-surface lies far from the target; ask for more `facets`."
+        findings.append(Finding("far-from-target", sentence))
     return FitResult(
         status,
-        " ".join((*stopped, *best.faults, *remarks)),
+        " ".join(finding.sentence for finding in findings),
         best.pattern,
         best.measurements,
         tuple(made),
@@ -103,13 +115,15 @@ def _fit(
         best.deviation_mm,
         best.polished,
         best.active_bounds,
+        findings=tuple(findings),
     )
 
 
-def _advice_when_stalled(attempts: list[Attempt]) -> str:
+def _no_sheet(attempts: list[Attempt]) -> Finding:
     residual = min(a.residual for a in attempts)
-    return (
+    return Finding(
+        "no-sheet",
         f"No exact sheet was found in {len(attempts)} attempts (best residual {residual:.1e}): "
         "the target bends too much for one sheet of this pattern. Ask for more `facets`, raise "
-        "`zigzag` and `amplitude`, drop `flat_foldable`, or take a smaller part of the target."
+        "`zigzag` and `amplitude`, drop `flat_foldable`, or take a smaller part of the target.",
     )

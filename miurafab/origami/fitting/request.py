@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, get_args
 
 from miurafab.errors import OptionError, UnitError
+from miurafab.findings import Finding, findings_json
 from miurafab.options import (
     Choice,
     Kind,
@@ -80,7 +81,9 @@ class FlatFoldability(Kind):
         return f"{inside:g}rad" if inside else "exact"
 
 
-INTERRUPTED = "The fit was interrupted; this is the best exact sheet up to then."
+INTERRUPTED = Finding(
+    "interrupted", "The fit was interrupted; this is the best exact sheet up to then."
+)
 """The advice of a fit that Ctrl-C ended."""
 
 
@@ -271,6 +274,7 @@ class FitResult:
     deviation_mm: float | None = None
     polished: bool = False
     active_bounds: Mapping[str, int] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
 
     def report(self) -> dict[str, Any]:
         """The fit report, ready for JSON."""
@@ -284,6 +288,7 @@ class FitResult:
             "deviation_mm": self.deviation_mm,
             "polished": self.polished,
             "active_bounds": dict(self.active_bounds),
+            "findings": findings_json(self.findings),
             "attempts": [
                 {
                     "way": a.way,

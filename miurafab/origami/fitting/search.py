@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from miurafab.findings import Finding
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.fitting.request import INTERRUPTED, FitRequest, FitResult
 
@@ -75,7 +76,8 @@ def _search(
         if _too_fine(request, result):
             break
     best = replace(min(tried.values(), key=_miss(request)), status="infeasible")
-    return replace(best, advice=_why(request, list(tried.values()), best))
+    why = Finding("no-sheet-in-limits", _why(request, list(tried.values()), best))
+    return replace(best, advice=why.sentence, findings=(why,))
 
 
 def _best_so_far(request: FitRequest, tried: Mapping[int, FitResult]) -> FitResult:
@@ -84,7 +86,12 @@ def _best_so_far(request: FitRequest, tried: Mapping[int, FitResult]) -> FitResu
     sheets = [tried[n] for n in sorted(tried) if tried[n].pattern is not None]
     if not sheets:
         raise KeyboardInterrupt
-    return replace(min(sheets, key=miss), status="interrupted", advice=INTERRUPTED)
+    return replace(
+        min(sheets, key=miss),
+        status="interrupted",
+        advice=INTERRUPTED.sentence,
+        findings=(INTERRUPTED,),
+    )
 
 
 def _sizes() -> list[int]:

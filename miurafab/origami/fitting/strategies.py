@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from miurafab.findings import Finding
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cylinder import cylinder_on
@@ -64,7 +65,7 @@ class Candidate:
     attempt: Attempt
     pattern: CreasePattern
     measurements: Measurements
-    faults: tuple[str, ...]
+    faults: tuple[Finding, ...]
     deviation_mm: float
     polished: bool = False
     active_bounds: Mapping[str, int] = field(default_factory=dict)
@@ -249,7 +250,7 @@ class Strategy:
             self.corrugation,
             max(measured.max_planarity or 0.0, measured.max_developability or 0.0),
             iterations,
-            " ".join(faults),
+            " ".join(fault.sentence for fault in faults),
             self.place,
         )
         return Candidate(attempt, pattern, measured, faults, deviation)
@@ -356,8 +357,8 @@ def _faults(
     deviation: float,
     unmeasured: Bounds,
     sheet: Tessellation,
-) -> Iterator[str]:
-    """The faults of this sheet, a sentence of advice each; ``unmeasured`` are the limits that
+) -> Iterator[Finding]:
+    """The faults of this sheet, each with advice; ``unmeasured`` are the limits that
     ``measured`` does not contain.
     """
     residual = max(
@@ -366,35 +367,42 @@ def _faults(
         measured.max_isometry or 0.0,
     )
     if residual > EXACT:
-        yield f"A residual of {residual:.1e} is left; ask for fewer `facets`."
+        sentence = f"A residual of {residual:.1e} is left; ask for fewer `facets`."
+        yield Finding("residual", sentence)
     if measured.self_intersections:
-        yield (
+        yield Finding(
+            "self-intersection",
             f"{measured.self_intersections} pairs of facets pass through each other; ask for more "
-            "`facets`, lower `zigzag` or `amplitude`, or take a smaller part of the target."
+            "`facets`, lower `zigzag` or `amplitude`, or take a smaller part of the target.",
         )
     if measured.overlaps:
-        yield f"{measured.overlaps} pairs of facets overlap in the flat pattern; lower `zigzag`."
+        pairs = f"{measured.overlaps} pairs of facets"
+        yield Finding("overlap", f"{pairs} overlap in the flat pattern; lower `zigzag`.")
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
     wanted = request.min_edge_mm or DEGENERATE * mean
     if measured.min_edge_mm < wanted:
-        yield (
+        yield Finding(
+            "min-edge",
             f"The shortest edge is {measured.min_edge_mm:.3g} mm, under the {wanted:.3g} mm asked "
-            "for; ask for fewer `facets` or a larger `size`."
+            "for; ask for fewer `facets` or a larger `size`.",
         )
     if request.max_deviation_mm is not None and deviation > request.max_deviation_mm:
         what = "mid-surface" if request.follow == "middle" else request.follow
-        yield (
+        yield Finding(
+            "max-deviation",
             f"The {what} lies up to {deviation:.3g} mm from the target, over the "
-            f"{request.max_deviation_mm:.3g} mm allowed; ask for more `facets`."
+            f"{request.max_deviation_mm:.3g} mm allowed; ask for more `facets`.",
         )
     if unmeasured.any:
         broken = unmeasured(sheet.vertices.ravel())[0] < -1e-9
         for kind, number in unmeasured.count(broken).items():
             if number:
-                yield (
+                yield Finding(
+                    "facet-shape",
                     f"{number} facet corners or sides break the {kind} limit; loosen it, or ask "
-                    "for other `facets`, `amplitude` or `zigzag`."
+                    "for other `facets`, `amplitude` or `zigzag`.",
                 )
     asked = request.flat_foldable
     if asked is not None and (measured.max_flat_foldability or 0.0) > max(asked, EXACT):
-        yield f"The sheet is flat-foldable only to {measured.max_flat_foldability:.1e} rad."
+        reached = f"{measured.max_flat_foldability:.1e} rad"
+        yield Finding("flat-foldable", f"The sheet is flat-foldable only to {reached}.")
