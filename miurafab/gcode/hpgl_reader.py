@@ -58,15 +58,15 @@ class _HpglReader:
         self.force = 1.0
         self.feed = _SPEED * _MM_MIN_PER_CM_S
         self.context = 0
-        self.made = ProgramBuilder(name)
+        self.tables = ProgramBuilder(name)
 
     def read(self, job: Job) -> Program:
         for number, line in enumerate(job.iter_lines(), 1):
             if line.strip():
-                self.made.sent.add(number, len(line) + 1, 0, 0)
+                self.tables.sent.add(number, len(line) + 1, 0, 0)
                 for name, parameters in instructions(self.name, number, line):
                     self._do(number, name, [*map(float, _NUMBER.findall(parameters))])
-        return self.made.program()
+        return self.tables.program()
 
     def _do(self, number: int, name: str, values: list[float]) -> None:
         if name == "IN":
@@ -80,7 +80,7 @@ class _HpglReader:
         elif name == "SP":
             pen = int(values[0]) if values else 0
             operation = OPERATIONS[pen - 1] if 1 <= pen <= len(OPERATIONS) else ""
-            self.context = self.made.number_of(Context(operation=operation))
+            self.context = self.tables.number_of(Context(operation=operation))
         elif name == "VS":
             self.feed = (values[0] if values else _SPEED) * _MM_MIN_PER_CM_S
         elif name == "FS":
@@ -106,5 +106,5 @@ class _HpglReader:
                     if self.down
                     else (RAPID, 0.0, 0.0, BEAM_OFF)
                 )
-                self.made.moves.add(*target, 0.0, *tool, number, self.context)
+                self.tables.moves.add(*target, 0.0, *tool, number, self.context)
             self.at = target

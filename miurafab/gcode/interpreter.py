@@ -68,7 +68,7 @@ class _Interpreter:
         self.stored: list[Sequence[float]] = [(0.0, 0.0, 0.0)] * 8
         self.at: Sequence[float] = (0.0, 0.0, 0.0)
         self.context = Context()
-        self.made = ProgramBuilder(job.name)
+        self.tables = ProgramBuilder(job.name)
 
     def read(self) -> Program:
         number = 1
@@ -85,7 +85,7 @@ class _Interpreter:
                     first = stop
             self._words(number, text, lines, first, count)
             number += count
-        return self.made.program()
+        return self.tables.program()
 
     def _words(self, number: int, text: str, lines: TextLines, first: int, stop: int) -> None:
         """Read lines ``first`` to ``stop`` (exclusive) of a chunk that begins with ``number``."""
@@ -96,7 +96,7 @@ class _Interpreter:
             if code:
                 code = code.upper()
                 words = len(code.translate(_NO_LETTERS))
-                self.made.sent.add(index, len(code) + 1, words, code.count("."))
+                self.tables.sent.add(index, len(code) + 1, words, code.count("."))
                 self._line(index, code.replace("/", ""))
             elif "(" in line:
                 self._comment(line)
@@ -110,31 +110,31 @@ class _Interpreter:
             return False
         spindle, laser = self.state.spindle, self.rules.laser
         numbers = np.arange(number + first, number + stop)
-        self.made.sent.extend(
+        self.tables.sent.extend(
             numbers, lines.size[first:stop] + 1, lines.words[first:stop], lines.points[first:stop]
         )
         before = np.concatenate([[self.at], run.target[:-1]])
         goes = (run.target != before).any(axis=1)
         power = np.where(run.rapid, 0.0, run.speed) if laser else run.speed
-        before_it = len(self.made.moves) + np.cumsum(goes) - goes
+        before_it = len(self.tables.moves) + np.cumsum(goes) - goes
         # In laser mode a new power goes with the motion; under M3 a line without motion stops to
         # set it. Without laser mode each new power waits for the motion to end.
         stops = ~goes & (spindle == BEAM_M3) if laser else run.changes & (spindle != BEAM_OFF)
         if stops.any():
             nothing = np.zeros(int(stops.sum()))
-            self.made.events.extend(
+            self.tables.events.extend(
                 before_it[stops], nothing, nothing, power[stops], numbers[stops]
             )
         if goes.any():
             count = int(goes.sum())
-            self.made.moves.extend(
+            self.tables.moves.extend(
                 *run.target[goes].T,
                 np.where(run.rapid, RAPID, FEED)[goes],
                 np.where(run.rapid, 0.0, run.feed)[goes],
                 power[goes] if spindle else np.zeros(count),
                 np.full(count, spindle),
                 numbers[goes],
-                np.full(count, self.made.number_of(self.context)),
+                np.full(count, self.tables.number_of(self.context)),
             )
         self.at = tuple(run.target[-1].tolist())
         return True
@@ -196,20 +196,20 @@ class _Interpreter:
             feed = 0.0
         elif move.inverse_time:
             feed *= sum((b - a) ** 2 for a, b in zip(start, target, strict=True)) ** 0.5
-        self.made.moves.add(
+        self.tables.moves.add(
             *target,
             RAPID if move.rapid else FEED,
             feed,
             move.speed if move.spindle else 0.0,
             move.spindle,
             number,
-            self.made.number_of(self.context),
+            self.tables.number_of(self.context),
         )
 
     def _event(
         self, kind: int, number: int, *, seconds: float = 0.0, power: float = np.nan
     ) -> None:
-        self.made.events.add(len(self.made.moves), kind, seconds, power, number)
+        self.tables.events.add(len(self.tables.moves), kind, seconds, power, number)
 
 
 def _chunks(text: str) -> Iterator[str]:

@@ -170,16 +170,16 @@ def regular_moves(
     """
     if state.inches or state.distance or state.inverse_time:
         return None
-    given = lines.values[:, first:stop]
-    motion = _filled(given[_G], float(state.motion))
-    feed = _filled(given[_F], state.feed)
-    speed = _filled(given[_S], state.speed)
+    words = lines.values[:, first:stop]
+    motion = _filled(words[_G], float(state.motion))
+    feed = _filled(words[_F], state.feed)
+    speed = _filled(words[_S], state.speed)
     rapid = motion == SEEK
     if not (rapid | (motion == LINEAR)).all() or not (rapid | (feed != 0.0)).all():
         return None
     target = np.empty((stop - first, 3))
     for axis, row in enumerate((_X, _Y)):
-        places = given[row] + state.coord_system[axis] + state.coord_offset[axis]
+        places = words[row] + state.coord_system[axis] + state.coord_offset[axis]
         target[:, axis] = _filled(places, state.position[axis])
     target[:, 2] = state.position[2]
     changes = np.diff(speed, prepend=state.speed) != 0.0

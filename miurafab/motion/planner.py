@@ -172,10 +172,10 @@ class Planner:
 
         Returns None if it is shorter than half a motor step. The queue must have room.
         """
-        made = self.make(target, feed, rapid=rapid, inverse_time=inverse_time, steady=steady)
-        if made is None:
+        planned = self.make(target, feed, rapid=rapid, inverse_time=inverse_time, steady=steady)
+        if planned is None:
             return None
-        move, direction, end = made
+        move, direction, end = planned
         move.spindle, move.speed_word, move.tag = spindle, speed_word, tag
         if self.moves:
             move.junction_sqr = self._junction_sqr(direction)

@@ -101,7 +101,7 @@ def test_an_arc_is_as_long_as_it_should_be() -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("G0 X1\nG1 X2", "job.nc, line 2: the move needs a feed, and no F was given (error:22)."),
+        ("G0 X1\nG1 X2", "job.nc, line 2: the move needs a feed, and F is missing (error:22)."),
         ("G0 X1\n\nG99", "job.nc, line 3: G99 is not a word that the controller knows (error:20)."),
         ("$H", "job.nc, line 1: '$H' is a command to the controller"),
         ("G0 X1?", "job.nc, line 1: '?' is the status query"),

@@ -1,7 +1,7 @@
-"""Which blocks the controller takes, which it refuses and by what number, in its own order.
+"""The blocks that the controller takes, and those that it refuses with which number, in its order.
 
-The recorded answers of the real firmware stand in ``tests/grbl/test_virtual_transcripts.py``;
-here are the others that follow from its rules.
+``test_virtual_transcripts.py`` holds the recorded answers of the real firmware; these cases follow
+from its rules.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Lines read by the ten thousand mean what the word parser says that they mean."""
+"""The array reader and the word parser agree on every line."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.connection import (
+    FEED_HOLD,
     SOFT_RESET,
     STATUS_QUERY,
     Connection,
@@ -76,6 +77,11 @@ def test_the_newline_counts_and_the_buffer_is_filled_to_the_byte() -> None:
     assert not connection.may_send(line("X1234567"))
     with pytest.raises(ProtocolMisuse):
         connection.send_line(line("X1234567"))
+
+
+def test_the_realtime_bytes_are_those_of_the_firmware() -> None:
+    """``CMD_RESET``, ``CMD_STATUS_REPORT`` and ``CMD_FEED_HOLD`` of GRBL 1.1's ``config.h``."""
+    assert (SOFT_RESET, STATUS_QUERY, FEED_HOLD) == (b"\x18", b"?", b"!")
 
 
 def test_realtime_bytes_never_count() -> None:

@@ -1,4 +1,4 @@
-"""Random programs, read back and run: what the reader says is burnt is what the beam log shows."""
+"""Random programs, read and run: the reader and the beam log agree on what is burnt."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_closed_is_final_and_the_end_always_closes() -> None:
 
 @pytest.mark.parametrize("state", [State.LOCKED, State.ALARMED, State.UNSYNCED])
 def test_no_reply_reopens_motion_but_unlocking_or_a_restart(state: State) -> None:
-    """An alarm or a broken account is never healed by what a running job may hear."""
+    """No reply to a running job heals an alarm or a broken account."""
     for item in Input:
         if item in SENT or item in (Input.BANNER, Input.UNLOCK):
             continue

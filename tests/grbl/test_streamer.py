@@ -1,4 +1,4 @@
-"""The streamer against scripted answers: what goes when, and what ends a job."""
+"""The streamer against scripted answers: when each line is sent, and what ends a job."""
 
 from __future__ import annotations
 

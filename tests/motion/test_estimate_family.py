@@ -1,4 +1,4 @@
-"""The estimate against the virtual controller's own motion, over a family of jobs.
+"""The estimate against the motion of the simulated controller, over a family of jobs.
 
 An ideal sender keeps the receive buffer full; the time from the first beam to the last and the time
 that the beam is on are held against what the estimate says of the same moves.

@@ -1,4 +1,4 @@
-"""Faults of the virtual controller: how they are written, and what each does, when."""
+"""The faults of the simulated controller: their notation, and the effect of each."""
 
 from __future__ import annotations
 

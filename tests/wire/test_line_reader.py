@@ -1,4 +1,4 @@
-"""Lines are the same however the bytes are cut, and noise does not pile up."""
+"""Lines do not depend on the chunking of the bytes, and noise takes no memory."""
 
 from __future__ import annotations
 

@@ -84,11 +84,11 @@ def _leg(
         direction, _ = machine.home_switch(axis)
         target[axis] = direction * distance if approach else -direction * distance
     speed = rate * math.sqrt(len(axes))
-    made = machine.planner.make(target, speed, steady=True, origin=machine.position)
+    planned = machine.planner.make(target, speed, steady=True, origin=machine.position)
     generator, stepper = machine.generator, machine.stepper
     moving = set(axes)
-    if made is not None:
-        generator.system_move = move = made[0]
+    if planned is not None:
+        generator.system_move = move = planned[0]
         stopped: dict[int, int] = {}
         yield from prepare(machine)
         stepper.wake(machine.now)

@@ -1,4 +1,4 @@
-"""What the virtual controller burns, where, how long, and how strongly."""
+"""The beam of the simulated controller: where, how long and how strongly it burns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever is done to the virtual controller, it never raises, and chunks make no difference."""
+"""No input makes the simulated controller raise, and the chunking of its input does not matter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The other firmwares that the virtual controller can be: what a sender sees of each."""
+"""The dialects of the simulated controller, as a sender sees them."""
 
 from __future__ import annotations
 

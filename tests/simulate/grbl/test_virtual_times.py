@@ -1,4 +1,4 @@
-"""The estimate and the virtual controller against jobs timed on the firmware's own binary."""
+"""The estimate and the simulated controller against jobs timed on the firmware's own binary."""
 
 from __future__ import annotations
 

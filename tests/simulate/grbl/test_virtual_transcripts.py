@@ -1,4 +1,4 @@
-"""The virtual controller against what the real firmware answered, and how long its jobs took."""
+"""The simulated controller against recorded answers and job times of the real firmware."""
 
 from __future__ import annotations
 

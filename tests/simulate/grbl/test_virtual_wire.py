@@ -1,4 +1,4 @@
-"""Buffers, lines, EEPROM and settings of the virtual controller, and what befalls it."""
+"""Buffers, lines, EEPROM, settings and outside events of the simulated controller."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plays scripts to a virtual controller: lines, raw bytes, waits, and things done to it."""
+"""Plays scripts to a simulated controller: lines, raw bytes, waits and outside events."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Step = str | bytes | float | Callable[[VirtualGrbl], object]
 
 
 def ready(settings: dict[int, float] | None = None, **options: object) -> VirtualGrbl:
-    """A controller that has said its banner."""
+    """A controller after its banner."""
     device = VirtualGrbl(settings, baud=115_200, **options)
     device.advance(0.1)
     assert device.take_output().decode().startswith(BANNER)
