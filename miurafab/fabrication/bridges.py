@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from miurafab.geometry.arrays import Floats
 
 
-def bridged(ring: NDArray[np.float64], count: int, gap: float) -> list[NDArray[np.float64]]:
+def bridged(ring: Floats, count: int, gap: float) -> list[Floats]:
     """The closed ``ring`` (n, 2) in ``count`` pieces with gaps of ``gap`` mm between them.
 
     Each gap lies in the middle of a side of its own, so that no corner hangs on it; sides shorter

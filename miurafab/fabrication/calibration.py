@@ -21,20 +21,20 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError, ProfileError
 from miurafab.fabrication.lettering import text_strokes, text_width
 from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
 from miurafab.fabrication.route.order import StrokeSet, order_strokes
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.miura import MiuraCell, regular_miura
 from miurafab.origami.unfold import unfold
 from miurafab.profiles import OPERATIONS, MachineProfile, Material
 from miurafab.profiles.material import Operation, Perforation
 
-Points = NDArray[np.float64]
+Points = Floats
 
 SHEET = "sheet-01"
 DASHES = ((0.7, 1.3), (1.0, 1.0), (1.4, 1.0), (1.8, 0.8))

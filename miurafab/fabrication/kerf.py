@@ -14,7 +14,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
+
+from miurafab.geometry.arrays import Floats
 
 MITRE_LIMIT = 2.0
 
@@ -26,9 +27,7 @@ def allowance(kerf: float) -> float:
     return math.hypot(MITRE_LIMIT, 1.0) * kerf / 2
 
 
-def cut_lines(
-    outlines: Sequence[NDArray[np.float64]], kerf: float
-) -> list[list[NDArray[np.float64]]]:
+def cut_lines(outlines: Sequence[Floats], kerf: float) -> list[list[Floats]]:
     """For each simple closed outline (n, 2), not repeating its first point, the closed cut lines
     (m, 2) in mm, likewise: the outer one first, counter-clockwise.
     """

@@ -22,11 +22,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.toolpath import Toolpath
-from miurafab.geometry.arrays import places_in_runs
+from miurafab.geometry.arrays import Floats, Ints, places_in_runs
 from miurafab.profiles import OPERATIONS, Knife
 
 ALIGNING_OFFSETS = 20
@@ -34,7 +33,7 @@ ALIGNING_OFFSETS = 20
 _MM = 1e-3  # what is shorter cannot be told apart in the file
 _PUSH = 1e-3  # mm, how far the tip may be pushed back in a swivel
 _STRAIGHT = 1e-9  # rad, below which there is no turn
-_Points = NDArray[np.float64]
+_Points = Floats
 
 
 def tip_way(toolpath: Toolpath, knife: Knife, margin_mm: float) -> Toolpath:
@@ -148,5 +147,5 @@ def axis_way(toolpath: Toolpath, knife: Knife) -> Toolpath:
     return replace(toolpath, points=way, offsets=offsets)
 
 
-def _offsets(lengths: NDArray[np.int64]) -> NDArray[np.int64]:
+def _offsets(lengths: Ints) -> Ints:
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)

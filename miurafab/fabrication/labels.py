@@ -20,10 +20,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.fabrication.lettering import text_strokes, text_width
 from miurafab.fabrication.tabs import NO_LIMIT, TabRegions, clip_convex
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 
 CLEARANCE_MM = 0.5
@@ -46,7 +46,7 @@ class Text:
 
     patch: int
     text: str
-    strokes: tuple[NDArray[np.float64], ...]
+    strokes: tuple[Floats, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,12 +66,12 @@ class _Spots:
     (N, 2) running along ``along`` (N, 2) is :meth:`height`.
     """
 
-    centre: NDArray[np.float64]
-    along: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    depth: NDArray[np.float64]
+    centre: Floats
+    along: Floats
+    normal: Floats
+    depth: Floats
 
-    def height(self, width: NDArray[np.float64]) -> NDArray[np.float64]:
+    def height(self, width: Floats) -> Floats:
         """(N,) for texts of ``width`` (N,) over height; negative if the centre is too near."""
         along = np.abs(np.einsum("nki,ni->nk", self.normal, self.along))
         across = np.abs(
@@ -79,17 +79,16 @@ class _Spots:
             - self.normal[..., 0] * self.along[:, None, 1]
         )
         taken = (width[:, None] * along + across) / 2
-        found: NDArray[np.float64] = (self.depth / np.maximum(taken, 1e-12)).min(axis=1)
-        return found
+        return np.asarray((self.depth / np.maximum(taken, 1e-12)).min(axis=1))
 
 
 def place_texts(
     pattern: CreasePattern,
-    face_patch: NDArray[np.int64],
+    face_patch: Ints,
     names: Sequence[str],
     tabs: TabRegions,
-    numbers: NDArray[np.int64],
-    turns: NDArray[np.float64],
+    numbers: Ints,
+    turns: Floats,
 ) -> Lettering:
     """The texts of all patches.
 
@@ -114,10 +113,7 @@ def place_texts(
 
 
 def _tab_numbers(
-    face_patch: NDArray[np.int64],
-    tabs: TabRegions,
-    numbers: NDArray[np.int64],
-    turns: NDArray[np.float64],
+    face_patch: Ints, tabs: TabRegions, numbers: Ints, turns: Floats
 ) -> tuple[list[Text], int, int]:
     """Each tab's number on the tab and on the facet under it, how many of these have no room, and
     how many tabs have none for the letter.
@@ -149,7 +145,7 @@ def _tab_numbers(
     return texts, left_out, unmarked
 
 
-def _facet_spots(pattern: CreasePattern, tabs: TabRegions, turns: NDArray[np.float64]) -> _Spots:
+def _facet_spots(pattern: CreasePattern, tabs: TabRegions, turns: Floats) -> _Spots:
     """A place in each facet, along its longest side, beyond whatever tabs cover it."""
     corners = pattern.faces_vertices
     points, count = pattern.vertices_coords[corners], (corners >= 0).sum(axis=1)
@@ -176,9 +172,7 @@ def _facet_spots(pattern: CreasePattern, tabs: TabRegions, turns: NDArray[np.flo
     return _spots(points, present, _upright(longest, turns))
 
 
-def _spots(
-    points: NDArray[np.float64], present: NDArray[np.bool_], along: NDArray[np.float64]
-) -> _Spots:
+def _spots(points: Floats, present: Bools, along: Floats) -> _Spots:
     count = np.maximum(present.sum(axis=1), 1)[:, None]
     slot = np.arange(points.shape[1])
     following = np.where(slot + 1 < count, slot + 1, 0)
@@ -194,7 +188,7 @@ def _spots(
     return _Spots(centre, along, normal, depth)
 
 
-def _upright(along: NDArray[np.float64], turns: NDArray[np.float64]) -> NDArray[np.float64]:
+def _upright(along: Floats, turns: Floats) -> Floats:
     """The unit directions of ``along`` (N, 2), each reversed if, turned by ``turns`` (N,), its
     text would run to the left. Within 10 degrees of upright it runs upwards.
     """
@@ -204,12 +198,6 @@ def _upright(along: NDArray[np.float64], turns: NDArray[np.float64]) -> NDArray[
     return np.where(forward[:, None] < -1e-9, -along, along)
 
 
-def _written(
-    patch: int,
-    text: str,
-    centre: NDArray[np.float64],
-    along: NDArray[np.float64],
-    height: float,
-) -> Text:
+def _written(patch: int, text: str, centre: Floats, along: Floats, height: float) -> Text:
     frame = height * np.stack([along, np.array([-along[1], along[0]])])
     return Text(patch, text, tuple(centre + stroke @ frame for stroke in text_strokes(text)))

@@ -13,12 +13,12 @@ import json
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.sheets import Layout, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
+from miurafab.geometry.arrays import Floats
 
 SCHEMA = "miurafab-layout/1"
 
@@ -134,7 +134,7 @@ def _sheet(table: dict[str, Any]) -> Sheet:
     )
 
 
-def _points(values: list[list[float]]) -> NDArray[np.float64]:
+def _points(values: list[list[float]]) -> Floats:
     points = np.array(values, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2:
         raise ValueError("a list of points is not a list of pairs")

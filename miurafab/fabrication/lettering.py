@@ -7,9 +7,9 @@ points of a stroke and commas between strokes. Capital letters, digits and ``- .
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
+from miurafab.geometry.arrays import Floats
 
 _HEIGHT = 6.0
 _WIDTH = 4.0
@@ -72,7 +72,7 @@ def text_width(text: str) -> float:
     return (len(text) * _ADVANCE - (_ADVANCE - _WIDTH)) / _HEIGHT
 
 
-def text_strokes(text: str) -> list[NDArray[np.float64]]:
+def text_strokes(text: str) -> list[Floats]:
     """The strokes (n, 2) of ``text``, of height 1 and centred on the origin.
 
     Raises :class:`~miurafab.errors.LayoutError` for a character that has no letter.

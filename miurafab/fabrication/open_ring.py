@@ -24,12 +24,13 @@ from numpy.typing import NDArray
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.seams import COINCIDENT, ring_seams
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.unfold import turned_upright, with_angles_of_the_folded_form
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+Floats = Floats
+Ints = Ints
 _T = TypeVar("_T", np.float64, np.int64)
 
 _AXES = ("row", "column")
@@ -197,5 +198,4 @@ def _faces(pattern: CreasePattern, parts: _Parts, axis: int, line: int) -> Ints:
     row, column = np.divmod(pattern.faces_vertices[facets], grid.columns)
     row -= row.min(axis=1, keepdims=True)
     column -= column.min(axis=1, keepdims=True)
-    corners: Ints = grid.faces_vertices[:, :1] + row * grid.columns + column
-    return corners
+    return np.asarray(grid.faces_vertices[:, :1] + row * grid.columns + column)

@@ -24,10 +24,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
-from miurafab.geometry.arrays import places_in_runs
+from miurafab.geometry.arrays import Floats, Ints, places_in_runs
 from miurafab.profiles import Material
 from miurafab.profiles.material import Perforation
 
@@ -42,20 +41,15 @@ class Dashes:
     ``starts`` and ``ends`` (D, 2) in mm, as drawn; ``crease`` (D,) int64, the crease each lies on.
     """
 
-    starts: NDArray[np.float64]
-    ends: NDArray[np.float64]
-    crease: NDArray[np.int64]
+    starts: Floats
+    ends: Floats
+    crease: Ints
 
     def __len__(self) -> int:
         return len(self.crease)
 
 
-def perforate(
-    starts: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    material: Material,
-    kind: str = "mountain",
-) -> Dashes:
+def perforate(starts: Floats, ends: Floats, material: Material, kind: str = "mountain") -> Dashes:
     """The dashes of N creases of one ``kind`` from ``starts`` (N, 2) to ``ends`` (N, 2), in mm.
 
     Raises :class:`~miurafab.errors.LayoutError` if the material asks for dashes that its kerf
@@ -72,12 +66,7 @@ def perforate(
     return _drawn(starts, ends, length, _FITS[rule.fit](length, rule, least), kerf)
 
 
-def unbroken(
-    starts: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    material: Material,
-    kind: str = "mountain",
-) -> Dashes:
+def unbroken(starts: Floats, ends: Floats, material: Material, kind: str = "mountain") -> Dashes:
     """One stroke along each of N creases of one ``kind``, but for the bridges at its ends."""
     rule, least = material.perforation_of(kind), material.kerf_mm + MIN_STROKE_MM
     length = np.linalg.norm(ends - starts, axis=1)
@@ -93,20 +82,14 @@ class _Fit:
     dashes, of the other dashes, and of the gaps.
     """
 
-    count: NDArray[np.int64]
-    bridge: NDArray[np.float64]
-    end: NDArray[np.float64]
-    cut: NDArray[np.float64]
-    gap: NDArray[np.float64]
+    count: Ints
+    bridge: Floats
+    end: Floats
+    cut: Floats
+    gap: Floats
 
 
-def _drawn(
-    starts: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    length: NDArray[np.float64],
-    fit: _Fit,
-    kerf: float,
-) -> Dashes:
+def _drawn(starts: Floats, ends: Floats, length: Floats, fit: _Fit, kerf: float) -> Dashes:
     crease = np.repeat(np.arange(len(length)), fit.count)
     index = places_in_runs(fit.count)
     last = index == fit.count[crease] - 1
@@ -123,9 +106,7 @@ def _drawn(
     return Dashes(drawn[:, 0], drawn[:, 1], crease)
 
 
-def _single(
-    length: NDArray[np.float64], rule: Perforation, least: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _single(length: Floats, rule: Perforation, least: float) -> tuple[Floats, Floats]:
     """(N,) the bridge at each end and the length of a crease's only dash."""
     used = length - 2 * rule.bridge_mm
     min_end = max(rule.min_end_mm, least)
@@ -134,13 +115,13 @@ def _single(
 
 
 def _fitted(
-    length: NDArray[np.float64],
+    length: Floats,
     rule: Perforation,
     least: float,
-    count: NDArray[np.int64],
-    end: NDArray[np.float64],
-    cut: NDArray[np.float64],
-    gap: NDArray[np.float64],
+    count: Ints,
+    end: Floats,
+    cut: Floats,
+    gap: Floats,
 ) -> _Fit:
     """The fit where it has two dashes or more, a single dash elsewhere."""
     bridge, alone = _single(length, rule, least)
@@ -152,7 +133,7 @@ def _fitted(
 _SLACK = 1e-9
 
 
-def _centre(length: NDArray[np.float64], rule: Perforation, least: float) -> _Fit:
+def _centre(length: Floats, rule: Perforation, least: float) -> _Fit:
     cut, gap, min_end = rule.cut_mm, rule.gap_mm, max(rule.min_end_mm, least)
     used = length - 2 * rule.bridge_mm
     count = np.floor((used + 2 * cut + gap - 2 * min_end) / (cut + gap) + _SLACK).astype(np.int64)
@@ -161,7 +142,7 @@ def _centre(length: NDArray[np.float64], rule: Perforation, least: float) -> _Fi
     return _fitted(length, rule, least, count, end, cut * same, gap * same)
 
 
-def _stretch_cut(length: NDArray[np.float64], rule: Perforation, least: float) -> _Fit:
+def _stretch_cut(length: Floats, rule: Perforation, least: float) -> _Fit:
     cut, gap, min_end = rule.cut_mm, rule.gap_mm, max(rule.min_end_mm, least)
     used = length - 2 * rule.bridge_mm
     nearest = np.floor((used + gap) / (cut + gap) + 0.5)
@@ -171,7 +152,7 @@ def _stretch_cut(length: NDArray[np.float64], rule: Perforation, least: float) -
     return _fitted(length, rule, least, count, dash, dash, np.full_like(length, gap))
 
 
-def _stretch_gap(length: NDArray[np.float64], rule: Perforation, least: float) -> _Fit:
+def _stretch_gap(length: Floats, rule: Perforation, least: float) -> _Fit:
     cut, gap = rule.cut_mm, rule.gap_mm
     used = length - 2 * rule.bridge_mm
     count = np.floor((used + gap) / (cut + gap) + _SLACK).astype(np.int64)

@@ -12,8 +12,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 
 _SIDE_MM = 0.15
@@ -26,18 +26,14 @@ class Holes:
     ``edge`` (H,) one of its creases; ``left_out`` is how many found no room.
     """
 
-    vertex: NDArray[np.int64]
-    patch: NDArray[np.int64]
-    edge: NDArray[np.int64]
+    vertex: Ints
+    patch: Ints
+    edge: Ints
     left_out: int
 
 
 def relief_holes(
-    pattern: CreasePattern,
-    face_patch: NDArray[np.int64],
-    edges: NDArray[np.int64],
-    room: NDArray[np.float64],
-    diameter: float,
+    pattern: CreasePattern, face_patch: Ints, edges: Ints, room: Floats, diameter: float
 ) -> Holes:
     """The holes of ``diameter`` mm where the creases ``edges`` (n,) meet.
 
@@ -66,7 +62,7 @@ def relief_holes(
     return Holes(vertex, patch[first[vertex], 0], first[vertex], int((wanted & cramped).sum()))
 
 
-def circles(centres: NDArray[np.float64], diameter: float) -> tuple[NDArray[np.float64], int]:
+def circles(centres: Floats, diameter: float) -> tuple[Floats, int]:
     """The closed polygons drawn for circles of ``diameter`` mm around ``centres`` (n, 2): their
     points (n * count, 2), first and last of each the same, and the count.
     """

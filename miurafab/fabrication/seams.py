@@ -23,6 +23,7 @@ import scipy.spatial
 from numpy.typing import NDArray
 
 from miurafab.geometry.angles import fold_angles
+from miurafab.geometry.arrays import Bools, Ints
 from miurafab.geometry.polygons import edge_lengths, facet_normals
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.unfold import FLAT_ANGLE
@@ -41,14 +42,14 @@ class Seams:
     glued inside column 1. ``fold`` (S,) is the assignment of the crease.
     """
 
-    edges: NDArray[np.int64]
-    faces: NDArray[np.int64]
+    edges: Ints
+    faces: Ints
     fold: NDArray[np.str_]
 
     def __len__(self) -> int:
         return len(self.edges)
 
-    def swapped(self, which: NDArray[np.bool_]) -> Seams:
+    def swapped(self, which: Bools) -> Seams:
         """The seams with the tab on the other side where ``which`` (S,) says so."""
         turn = which[:, None]
         return Seams(
@@ -57,7 +58,7 @@ class Seams:
             self.fold,
         )
 
-    def take(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> Seams:
+    def take(self, which: Ints | Bools) -> Seams:
         """The seams that ``which`` picks."""
         return Seams(self.edges[which], self.faces[which], self.fold[which])
 
@@ -70,9 +71,7 @@ class Seams:
         )
 
 
-def inner_seams(
-    pattern: CreasePattern, edges: NDArray[np.int64], sides: NDArray[np.int64]
-) -> Seams:
+def inner_seams(pattern: CreasePattern, edges: Ints, sides: Ints) -> Seams:
     """The seams on ``edges`` (S,) between two facets each, ``edges_faces[edge, side]`` being the
     one that is glued upon.
     """
@@ -85,7 +84,7 @@ def inner_seams(
     )
 
 
-def all_seams(pattern: CreasePattern, face_patch: NDArray[np.int64]) -> Seams:
+def all_seams(pattern: CreasePattern, face_patch: Ints) -> Seams:
     """The seams of the split ``face_patch`` (F,): between patches, then between borders."""
     faces = pattern.edges_faces
     patch = np.where(faces >= 0, face_patch[faces], -1)

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from miurafab.fabrication.labels import Lettering, place_texts
 from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, nest, turned
@@ -28,6 +27,7 @@ from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.stock import LaidStock, lay_stock
 from miurafab.fabrication.strokes import Blank, RigidTransform, sheet_strokes
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, Material
 
@@ -41,11 +41,10 @@ class Placement:
     y_mm: float
     rotation_deg: float
 
-    def from_patch(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def from_patch(self, points: Floats) -> Floats:
         """``points`` (n, 2) of the patch frame on the sheet."""
         shift = np.array([self.x_mm, self.y_mm])
-        moved: NDArray[np.float64] = turned(points, self.rotation_deg) + shift
-        return moved
+        return np.asarray(turned(points, self.rotation_deg) + shift)
 
 
 @dataclass(frozen=True)

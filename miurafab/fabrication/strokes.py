@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.bridges import bridged
@@ -31,7 +30,7 @@ from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
 from miurafab.fabrication.relief import Holes, circles, relief_holes
 from miurafab.fabrication.route.order import HOLE, OUTLINE, StrokeSet
 from miurafab.fabrication.toolpath import Toolpath
-from miurafab.geometry.arrays import run_starts
+from miurafab.geometry.arrays import Floats, Ints, run_starts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import OPERATIONS, Material
 from miurafab.profiles.material import CREASE_KINDS
@@ -76,9 +75,9 @@ class RigidTransform:
     pattern, and the number of the ``sheet`` (P,).
     """
 
-    matrix: NDArray[np.float64]
-    shift: NDArray[np.float64]
-    sheet: NDArray[np.int64]
+    matrix: Floats
+    shift: Floats
+    sheet: Ints
 
 
 def sheet_strokes(
@@ -180,7 +179,7 @@ def _turned_over(strokes: StrokeSet) -> StrokeSet:
     return replace(strokes, toolpath=replace(front, points=points))
 
 
-def pin_centres(width: float, height: float, margin: float) -> NDArray[np.float64]:
+def pin_centres(width: float, height: float, margin: float) -> Floats:
     """(3, 2) where the registration holes lie on the front of a sheet, in mm: at unequal distances
     from all corners, so that a sheet turned over or about in a wrong way does not match.
     """
@@ -215,12 +214,12 @@ class _Part:
     """S strokes of one operation in the pattern's plane."""
 
     operation: int
-    points: NDArray[np.float64]
-    count: NDArray[np.int64]
-    patch: NDArray[np.int64]
-    edge: NDArray[np.int64]
-    group: NDArray[np.int64]
-    rank: NDArray[np.int64]
+    points: Floats
+    count: Ints
+    patch: Ints
+    edge: Ints
+    group: Ints
+    rank: Ints
 
 
 def _engraved(texts: Sequence[Text]) -> _Part:
@@ -244,9 +243,9 @@ class _Creases:
     the second, on ``patch`` (N,).
     """
 
-    ends: NDArray[np.float64]
-    edge: NDArray[np.int64]
-    patch: NDArray[np.int64]
+    ends: Floats
+    edge: Ints
+    patch: Ints
 
 
 def _creases(
@@ -363,7 +362,7 @@ def _outlines(pieces: Pieces, options: LayoutOptions, kerf: float) -> tuple[_Par
 
 def _inner_edges(
     pattern: CreasePattern, pieces: Pieces, assignments: Sequence[str]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[Ints, Ints]:
     """The edges between two facets of one patch that are so assigned, and that patch."""
     faces = pattern.edges_faces
     patch = np.where(faces >= 0, pieces.face_patch[faces], -1)

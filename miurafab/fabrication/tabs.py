@@ -25,10 +25,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.seams import Seams, all_seams, ring_seams
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import edge_lengths, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
@@ -62,7 +62,7 @@ class Tab:
     edge: int
     mate_edge: int
     mate_patch: int
-    polygon_mm: NDArray[np.float64]
+    polygon_mm: Floats
     fold: str = "flat"
 
 
@@ -75,60 +75,58 @@ class TabRegions:
     """
 
     seams: Seams
-    points: NDArray[np.float64]
-    glued: NDArray[np.float64]
-    count: NDArray[np.int64]
+    points: Floats
+    glued: Floats
+    count: Ints
 
     def __len__(self) -> int:
         return len(self.count)
 
     @property
-    def edge(self) -> NDArray[np.int64]:
+    def edge(self) -> Ints:
         """(N,) the pattern edge that each stands on."""
         return self.seams.edges[:, 0]
 
     @property
-    def own_face(self) -> NDArray[np.int64]:
+    def own_face(self) -> Ints:
         """(N,) the facet that bears it."""
         return self.seams.faces[:, 0]
 
     @property
-    def mate_face(self) -> NDArray[np.int64]:
+    def mate_face(self) -> Ints:
         """(N,) the facet that it is glued to."""
         return self.seams.faces[:, 1]
 
-    def polygon(self, index: int | np.integer) -> NDArray[np.float64]:
+    def polygon(self, index: int | np.integer) -> Floats:
         """(n, 2) corners of one tab."""
         return self.points[index, : self.count[index]]
 
-    def take(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> TabRegions:
+    def take(self, which: Ints | Bools) -> TabRegions:
         """The tabs that ``which`` picks."""
         points, glued = self.points[which], self.glued[which]
         return TabRegions(self.seams.take(which), points, glued, self.count[which])
 
     @property
-    def present(self) -> NDArray[np.bool_]:
+    def present(self) -> Bools:
         """(N, m) which corners are real."""
-        found: NDArray[np.bool_] = np.arange(self.points.shape[1]) < self.count[:, None]
-        return found
+        return np.arange(self.points.shape[1]) < self.count[:, None]
 
     @property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """(N,) glue areas in mm²."""
         ahead = np.where(self.present[..., None], self.points, self.points[:, :1])
         return signed_areas(ahead)
 
     @property
-    def usable(self) -> NDArray[np.bool_]:
+    def usable(self) -> Bools:
         """(N,) which are long and large enough to hold."""
         base = np.linalg.norm(self.points[:, 1] - self.points[:, 0], axis=1)
         area = self.areas
         large = (base >= MIN_SIDE_MM) & (area >= MIN_SIDE_MM * base) & (area >= MIN_AREA_MM2)
-        found: NDArray[np.bool_] = large & (self.count >= 3)
-        return found
+        return np.asarray(large & (self.count >= 3))
 
     @property
-    def glue(self) -> NDArray[np.float64]:
+    def glue(self) -> Floats:
         """(N,) glue areas in mm², 0 where a tab is not usable."""
         return np.where(self.usable, self.areas, 0.0)
 
@@ -144,10 +142,10 @@ def tab_regions(
     pattern: CreasePattern,
     seams: Seams,
     material: Material,
-    bearing: NDArray[np.bool_] | None = None,
+    bearing: Bools | None = None,
     *,
     full_facet: bool = False,
-    raised: NDArray[np.bool_] | None = None,
+    raised: Bools | None = None,
 ) -> TabRegions:
     """The tabs on N ``seams``, where ``raised`` (N,) says so as much higher than the material's as
     :data:`RAISED` allows and with no limit to their angles.
@@ -221,9 +219,7 @@ def tab_regions(
     return TabRegions(seams, placed, glued, sides)
 
 
-def _frames(
-    pattern: CreasePattern, edges: NDArray[np.int64], faces: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _frames(pattern: CreasePattern, edges: Ints, faces: Ints) -> tuple[Floats, Floats, Floats]:
     """Of each of ``edges`` (N,), with its facet in ``faces`` (N,) on the left: the first end and
     the last (N, 2), and the unit vectors along it and into the facet, (N, 2, 2).
     """
@@ -239,11 +235,11 @@ def _frames(
 
 def choose_tabs(
     pattern: CreasePattern,
-    face_patch: NDArray[np.int64],
+    face_patch: Ints,
     material: Material,
     options: LayoutOptions | None = None,
-    tight: NDArray[np.bool_] | None = None,
-) -> tuple[TabRegions, NDArray[np.bool_], NDArray[np.int64]]:
+    tight: Bools | None = None,
+) -> tuple[TabRegions, Bools, Ints]:
     """One tab for each seam of the split ``face_patch`` (F,), the patch id of each facet.
 
     The patch that ``options`` name bears the tab. Where it would have less glue than the material
@@ -262,7 +258,7 @@ def choose_tabs(
     lower |= (patch[:, 0] == patch[:, 1]) & (seams.edges[:, 0] < seams.edges[:, 1])
     seams = seams.swapped(_by_lower(patch, options.tab_side) != lower)
 
-    def made(seams: Seams, raised: NDArray[np.bool_] | None = None) -> TabRegions:
+    def made(seams: Seams, raised: Bools | None = None) -> TabRegions:
         bearing = _bearing(pattern, seams)
         full = options.full_facet
         return tab_regions(pattern, seams, material, bearing, full_facet=full, raised=raised)
@@ -290,7 +286,7 @@ def ring_tabs(pattern: CreasePattern, material: Material, options: LayoutOptions
     return tab_regions(pattern, seams, material, full_facet=options.full_facet)
 
 
-def _by_lower(patch: NDArray[np.int64], side: str) -> NDArray[np.bool_]:
+def _by_lower(patch: Ints, side: str) -> Bools:
     """(N,) whether the lower one of two patches ``patch`` (N, 2) bears the tab."""
     if side != "alternate":
         return np.full(len(patch), side == "lower")
@@ -305,12 +301,7 @@ def _by_lower(patch: NDArray[np.int64], side: str) -> NDArray[np.bool_]:
     return found
 
 
-def _not_steeper(
-    points: NDArray[np.float64],
-    count: NDArray[np.int64],
-    angle: float,
-    free: NDArray[np.bool_],
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _not_steeper(points: Floats, count: Ints, angle: float, free: Bools) -> tuple[Floats, Ints]:
     """The polygons with their inner angles at the base, on y = 0, cut to ``angle`` at most, but for
     those that are ``free`` (N,).
     """
@@ -327,7 +318,7 @@ def _not_steeper(
     return points, count
 
 
-def _bearing(pattern: CreasePattern, seams: Seams) -> NDArray[np.bool_]:
+def _bearing(pattern: CreasePattern, seams: Seams) -> Bools:
     """(F, k) which facet sides have a tab glued inside them."""
     found = np.zeros(pattern.faces_edges.shape, dtype=bool)
     mate = seams.faces[:, 1]
@@ -336,12 +327,7 @@ def _bearing(pattern: CreasePattern, seams: Seams) -> NDArray[np.bool_]:
     return found
 
 
-def clip_convex(
-    points: NDArray[np.float64],
-    count: NDArray[np.int64],
-    normal: NDArray[np.float64],
-    limit: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def clip_convex(points: Floats, count: Ints, normal: Floats, limit: Floats) -> tuple[Floats, Ints]:
     """The parts p·n >= limit of N convex polygons ``points`` (N, m, 2) of ``count`` corners.
 
     Each corner hands on itself if it is inside, and the crossing on the side that follows it if
@@ -368,9 +354,7 @@ def clip_convex(
     return np.take_along_axis(handed, order[..., None], axis=1), total
 
 
-def _base_first(
-    points: NDArray[np.float64], count: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _base_first(points: Floats, count: Ints) -> tuple[Floats, Ints]:
     """The polygons with their base, the two corners on y = 0, as first side; those without a
     base are left without corners.
     """

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.profiles import OPERATIONS
 
 
@@ -29,36 +29,35 @@ class Toolpath:
     sheet: str
     width_mm: float
     height_mm: float
-    points: NDArray[np.float64]
-    offsets: NDArray[np.int64]
-    operation: NDArray[np.int64]
-    patch: NDArray[np.int64]
-    edge: NDArray[np.int64]
+    points: Floats
+    offsets: Ints
+    operation: Ints
+    patch: Ints
+    edge: Ints
 
     def __len__(self) -> int:
         return len(self.operation)
 
-    def stroke(self, index: int) -> NDArray[np.float64]:
+    def stroke(self, index: int) -> Floats:
         """(n, 2) points of one stroke."""
         return self.points[self.offsets[index] : self.offsets[index + 1]]
 
     @property
-    def starts(self) -> NDArray[np.float64]:
+    def starts(self) -> Floats:
         """(S, 2) first points."""
         return self.points[self.offsets[:-1]]
 
     @property
-    def ends(self) -> NDArray[np.float64]:
+    def ends(self) -> Floats:
         """(S, 2) last points."""
         return self.points[self.offsets[1:] - 1]
 
     @property
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Floats:
         """(S,) lengths of the strokes in mm."""
         steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(steps)])
-        lengths: NDArray[np.float64] = along[self.offsets[1:] - 1] - along[self.offsets[:-1]]
-        return lengths
+        return np.asarray(along[self.offsets[1:] - 1] - along[self.offsets[:-1]])
 
     def length_of(self, operation: str) -> float:
         """The length in mm of all strokes of one operation."""

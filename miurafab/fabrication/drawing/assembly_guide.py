@@ -12,7 +12,6 @@ import io
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 
@@ -40,16 +39,13 @@ from miurafab.fabrication.drawing.sheet_pages import SheetPages
 from miurafab.fabrication.drawing.views import Views
 from miurafab.fabrication.sheets import Layout
 from miurafab.fabrication.wording import count
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, Material
 
 
 def assembly_guide(
-    layout: Layout,
-    pattern: CreasePattern,
-    machine: MachineProfile,
-    material: Material,
-    title: str,
+    layout: Layout, pattern: CreasePattern, machine: MachineProfile, material: Material, title: str
 ) -> bytes:
     """The guide as PDF. ``layout`` must have its toolpaths."""
     stream = io.BytesIO()
@@ -112,7 +108,7 @@ class _Overview:
         """What the overview says beside the pictures."""
         pattern, material, totals = self.views.pattern, self.material, self.views.layout.totals
 
-        def size(points: NDArray[np.float64]) -> str:
+        def size(points: Floats) -> str:
             return " x ".join(f"{side:.0f}" for side in np.ptp(points, axis=0)) + " mm"
 
         found = [("Flat size", [size(pattern.vertices_coords)])]

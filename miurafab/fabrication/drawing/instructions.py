@@ -17,13 +17,13 @@ from miurafab.fabrication.drawing.page import (
     QUIET,
     ROOM,
     VALLEY,
-    Floats,
     paragraph,
     polygon,
     text,
     tint,
     wrapped,
 )
+from miurafab.geometry.arrays import Floats
 
 _FOLDING = (
     "Crease every line both ways, one row after another.",
@@ -81,8 +81,7 @@ def _solid(x: float, y: float, size: float, points: Sequence[tuple[float, float,
     across = space[:, 0] * math.cos(a) - space[:, 1] * math.sin(a)
     away = space[:, 0] * math.sin(a) + space[:, 1] * math.cos(a)
     seen = np.column_stack([across, away * math.sin(b) + space[:, 2] * math.cos(b)])
-    placed: Floats = seen * size + np.array([x, y])
-    return placed
+    return np.asarray(seen * size + np.array([x, y]))
 
 
 def _draw_folds(canvas: Canvas, x: float, y: float) -> None:

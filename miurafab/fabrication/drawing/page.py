@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from reportlab.lib.colors import Color, HexColor, white
 from reportlab.lib.units import mm
 from reportlab.pdfbase.pdfmetrics import stringWidth
@@ -16,8 +15,8 @@ from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.drawing.colours import patch_colour
 from miurafab.fabrication.wording import runs
+from miurafab.geometry.arrays import Floats
 
-Floats = NDArray[np.float64]
 Page = Callable[[Canvas], None]
 """What draws one page."""
 Box = tuple[float, float, float, float]

@@ -17,6 +17,7 @@ from reportlab.pdfgen.canvas import Canvas
 from miurafab.fabrication.drawing.page import CREASE_COLOURS, INK
 from miurafab.fabrication.drawing.svg import COLOURS
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.geometry.arrays import Bools, Ints
 from miurafab.profiles import OPERATIONS
 
 LINE_MM = 0.1
@@ -71,7 +72,7 @@ def draw_for_people(
     toolpath: Toolpath,
     letters: NDArray[np.str_],
     scale: float = 1.0,
-    chosen: NDArray[np.int64] | None = None,
+    chosen: Ints | None = None,
 ) -> None:
     """The strokes, or those ``chosen``, in colours for people: mountains, valleys, cuts, lettering.
 
@@ -82,7 +83,7 @@ def draw_for_people(
     letter = np.where(edge >= 0, letters[edge], "")
     engraved = operation == OPERATIONS.index("engrave")
     cut = operation == OPERATIONS.index("cut")
-    kinds: list[tuple[Color, float, NDArray[np.bool_]]] = [
+    kinds: list[tuple[Color, float, Bools]] = [
         (INK, 0.12, engraved),
         *((colour, 0.17, ~cut & (letter == name)) for name, colour in CREASE_COLOURS.items()),
         (INK, 0.28, cut),

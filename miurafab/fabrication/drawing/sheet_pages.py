@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from reportlab.lib.units import mm
 from reportlab.pdfbase.pdfmetrics import stringWidth
 from reportlab.pdfgen.canvas import Canvas
@@ -42,6 +41,7 @@ from miurafab.fabrication.drawing.views import OUTLINED, Views, named
 from miurafab.fabrication.sheets import Layout, Placement, Sheet
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.fabrication.wording import count
+from miurafab.geometry.arrays import Floats
 from miurafab.profiles import OPERATIONS
 
 _CARD = 33.0
@@ -227,10 +227,9 @@ class SheetPages:
         patch = self.layout.patches[placed.patch]
         pattern = self.views.pattern
 
-        def on_page(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        def on_page(points: Floats) -> Floats:
             moved = placed.from_patch(patch.from_pattern(points)) * scale
-            placed_there: NDArray[np.float64] = moved + np.array(corner)
-            return placed_there
+            return np.asarray(moved + np.array(corner))
 
         corners = pattern.faces_vertices[patch.faces]
         points = on_page(pattern.vertices_coords[corners[corners >= 0]])
@@ -332,9 +331,7 @@ class SheetPages:
         return found or ["Stands alone: nothing is glued to it."]
 
 
-def _clear_place(
-    places: NDArray[np.float64], strokes: NDArray[np.float64], label: str, size: float
-) -> NDArray[np.float64]:
+def _clear_place(places: Floats, strokes: Floats, label: str, size: float) -> Floats:
     """The first of ``places`` (n, 2), or else the one nearest to it, where a ``label`` in type of
     ``size`` hides none of the points ``strokes`` (m, 2); the first if there is no such place.
     """
@@ -343,5 +340,4 @@ def _clear_place(
     near = np.argsort(np.linalg.norm(places - places[0], axis=1), kind="stable").tolist()
     hidden = ((np.abs(strokes - places[k]) < room).all(axis=1).any() for k in near)
     best = next((k for k, hides in zip(near, hidden, strict=True) if not hides), 0)
-    place: NDArray[np.float64] = places[best]
-    return place
+    return np.asarray(places[best])

@@ -15,11 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 import svgwrite
-from numpy.typing import NDArray
 
 from miurafab.fabrication.drawing.colours import hex_of, patch_colour
 from miurafab.fabrication.sheets import Layout
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import OPERATIONS
 
@@ -104,10 +104,7 @@ def pattern_svg(pattern: CreasePattern, layout: Layout | None = None) -> str:
 
 
 def _add_facets(
-    drawing: svgwrite.Drawing,
-    pattern: CreasePattern,
-    points: NDArray[np.float64],
-    layout: Layout | None,
+    drawing: svgwrite.Drawing, pattern: CreasePattern, points: Floats, layout: Layout | None
 ) -> None:
     groups = [np.arange(len(pattern.faces_vertices))]
     if layout is not None:
@@ -123,10 +120,7 @@ def _add_facets(
 
 
 def _add_names(
-    drawing: svgwrite.Drawing,
-    pattern: CreasePattern,
-    points: NDArray[np.float64],
-    layout: Layout,
+    drawing: svgwrite.Drawing, pattern: CreasePattern, points: Floats, layout: Layout
 ) -> None:
     size = np.ptp(points, axis=0).max() / 30
     group = drawing.g(

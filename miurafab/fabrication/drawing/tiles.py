@@ -29,7 +29,6 @@ from miurafab.fabrication.drawing.page import (
     QUIET,
     RULE,
     VALLEY,
-    Floats,
     legend,
     paragraph,
     text,
@@ -37,6 +36,7 @@ from miurafab.fabrication.drawing.page import (
 from miurafab.fabrication.drawing.pdf import draw_for_people, new_canvas
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.fabrication.wording import count
+from miurafab.geometry.arrays import Floats, Ints
 
 PAGES_MM = {
     "a4": (210.0, 297.0),
@@ -128,12 +128,11 @@ class _Tiles:
         x, y = self.origin.tolist()
         return x + column * self.step[0], y + row * self.step[1]
 
-    def strokes_in(self, row: int, column: int) -> NDArray[np.int64]:
+    def strokes_in(self, row: int, column: int) -> Ints:
         """The strokes that touch a tile."""
         x, y = self.corner(row, column)
         window = shapely.box(x, y, x + self.shown[0], y + self.shown[1])
-        found: NDArray[np.int64] = np.sort(self._tree.query(window, predicate="intersects"))
-        return found
+        return np.sort(self._tree.query(window, predicate="intersects"))
 
     @cached_property
     def _tree(self) -> shapely.STRtree:

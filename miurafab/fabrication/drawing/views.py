@@ -21,7 +21,6 @@ from miurafab.fabrication.drawing.page import (
     INK,
     PALE,
     Box,
-    Floats,
     fitted,
     polygon,
     text,
@@ -30,6 +29,7 @@ from miurafab.fabrication.drawing.page import (
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.partition.split import boundaries
 from miurafab.fabrication.sheets import Layout
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.picture import project
 
@@ -72,7 +72,7 @@ class Views:
         return self.patches[self.base(patch)].label.partition("-")[0]
 
     @cached_property
-    def face_patch(self) -> NDArray[np.int64]:
+    def face_patch(self) -> Ints:
         """(F,) the patch of each facet."""
         found = np.zeros(len(self.pattern.faces_vertices), dtype=np.int64)
         for patch in self.patches:
@@ -94,7 +94,7 @@ class Views:
         return float(height / max(width, 1e-9))
 
     @cached_property
-    def rings(self) -> list[NDArray[np.int64]]:
+    def rings(self) -> list[Ints]:
         """The vertices around each patch."""
         return [each.vertices for each in boundaries(self.pattern, self.face_patch)]
 
@@ -166,7 +166,7 @@ class Views:
         box: Box,
         shown: Collection[int],
         done: Collection[int] = (),
-        seams: NDArray[np.int64] | None = None,
+        seams: Ints | None = None,
     ) -> None:
         """The patches alone: those ``shown`` in colour, those ``done`` lighter, all others pale,
         and the pattern edges ``seams`` drawn heavily.

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from miurafab.fabrication.nesting.problem import SheetKind, buffered, turned
-from miurafab.geometry.arrays import places_in_runs
+from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs
 
 
 @dataclass(frozen=True, eq=False)
 class Mask:
     """The cells of an outline at one rotation, their transform, and the transform of its rim."""
 
-    cells: NDArray[np.bool_]
+    cells: Bools
     transform: NDArray[np.complex64]
     rim: NDArray[np.complex64] | None
     """Scaled so that a wholly marked rim counts 1."""
@@ -37,11 +37,11 @@ class Part:
     their bounding box begins at the origin, with the shift.
     """
 
-    outline: NDArray[np.float64]
+    outline: Floats
     area: float
-    turns: dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
+    turns: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
 
-    def turned(self, rotation: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def turned(self, rotation: int) -> tuple[Floats, Floats]:
         if rotation not in self.turns:
             points = turned(self.outline, rotation)
             low = points.min(axis=0)
@@ -64,16 +64,16 @@ class Raster:
         self.cells = [n - 2 * rim for n in self.whole]
         self.cell = size / self.cells
         self._held = -1
-        self._cells: dict[int, NDArray[np.bool_]] = {}
+        self._cells: dict[int, Bools] = {}
         self._masks: dict[int, Mask] = {}
 
-    def reach(self, number: int, rotation: int) -> NDArray[np.int64]:
+    def reach(self, number: int, rotation: int) -> Ints:
         """(2,) the number of cells of the part along both axes."""
         high = self.parts[number].turned(rotation)[0].max(axis=0)
-        count: NDArray[np.int64] = np.ceil((high + self.gap) / self.cell - 1e-7).astype(np.int64)
+        count: Ints = np.ceil((high + self.gap) / self.cell - 1e-7).astype(np.int64)
         return count.clip(1, np.array(self.cells))
 
-    def marked(self, number: int, rotation: int) -> NDArray[np.bool_]:
+    def marked(self, number: int, rotation: int) -> Bools:
         """The cells that the part may touch."""
         if number != self._held:
             return self._grown(number, rotation, 0)
@@ -96,10 +96,9 @@ class Raster:
         return self._masks[rotation]
 
     def _transform(self, cells: NDArray[np.float32]) -> NDArray[np.complex64]:
-        found: NDArray[np.complex64] = np.conj(scipy.fft.rfft2(cells, self.whole))
-        return found
+        return np.conj(scipy.fft.rfft2(cells, self.whole))
 
-    def _grown(self, number: int, rotation: int, more: int) -> NDArray[np.bool_]:
+    def _grown(self, number: int, rotation: int, more: int) -> Bools:
         """The cells that the part grown by ``more`` cells may touch."""
         points, half = self.parts[number].turned(rotation)[0], self.gap / 2
         # A cell that the grown outline touches has its centre within half a diagonal of it.
@@ -117,9 +116,7 @@ class Raster:
             inside += self._inside(lost, np.array(self.cells), 0)
         return taken
 
-    def _inside(
-        self, shape: BaseGeometry, count: NDArray[np.int64], beyond: int
-    ) -> NDArray[np.bool_]:
+    def _inside(self, shape: BaseGeometry, count: Ints, beyond: int) -> Bools:
         rings = shapely.get_rings(shapely.get_parts(shape))
         half = self.gap / 2
         return _scan(
@@ -127,7 +124,7 @@ class Raster:
         )
 
 
-def _scan(rings: list[NDArray[np.float64]], count: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _scan(rings: list[Floats], count: Ints) -> Bools:
     """The cells whose centres lie inside ``rings`` (in units of cells), by the even-odd rule."""
     flips = np.zeros((count[0] + 1, count[1]), dtype=np.int64)
     for ring in rings:
@@ -140,5 +137,4 @@ def _scan(rings: list[NDArray[np.float64]], count: NDArray[np.int64]) -> NDArray
         part = (row + 0.5 - a[side, 1]) / (b[side, 1] - a[side, 1])
         x = a[side, 0] + part * (b[side, 0] - a[side, 0])
         np.add.at(flips, (np.ceil(x - 0.5).clip(0, count[0]).astype(np.int64), row), 1)
-    inside: NDArray[np.bool_] = np.cumsum(flips, axis=0)[:-1] % 2 == 1
-    return inside
+    return np.asarray(np.cumsum(flips, axis=0)[:-1] % 2 == 1)

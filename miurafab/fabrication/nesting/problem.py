@@ -19,9 +19,9 @@ from functools import cached_property
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from miurafab.geometry.arrays import Floats
 from miurafab.geometry.shapes import common_area
 
 TOLERANCE = 1e-6
@@ -44,7 +44,7 @@ class SheetKind:
     quantity: int | None = None
     defects: tuple[Ring, ...] = ()
 
-    def fits(self, outline: NDArray[np.float64], rotation: int) -> bool:
+    def fits(self, outline: Floats, rotation: int) -> bool:
         """Whether the bounding box of ``outline`` (n, 2) at ``rotation`` fits the sheet."""
         wide, high = np.ptp(turned(outline, rotation), axis=0)
         return bool(wide <= self.width + TOLERANCE and high <= self.height + TOLERANCE)
@@ -83,16 +83,15 @@ class Stock:
 class Problem:
     """The ``outlines`` to nest, closed curves (n, 2) in mm, their ``names``, and the ``stock``."""
 
-    outlines: tuple[NDArray[np.float64], ...]
+    outlines: tuple[Floats, ...]
     names: tuple[str, ...]
     stock: Stock
 
     @cached_property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> Floats:
         """(N,) the areas of the outlines grown by half the gap, in mm², at most a little less."""
         shapes = [shapely.Polygon(outline) for outline in self.outlines]
-        found: NDArray[np.float64] = shapely.area(shapely.buffer(shapes, self.stock.gap / 2))
-        return found
+        return shapely.area(shapely.buffer(shapes, self.stock.gap / 2))
 
     @cached_property
     def bound(self) -> int:
@@ -128,14 +127,13 @@ class Slot:
     rotation_deg: int
 
 
-def place(points: NDArray[np.float64], slot: Slot) -> NDArray[np.float64]:
+def place(points: Floats, slot: Slot) -> Floats:
     """``points`` (n, 2) of an outline, moved to the usable part of its sheet."""
     shift = np.array([slot.x_mm, slot.y_mm])
-    moved: NDArray[np.float64] = turned(points, slot.rotation_deg) + shift
-    return moved
+    return np.asarray(turned(points, slot.rotation_deg) + shift)
 
 
-def turned(points: NDArray[np.float64], rotation_deg: float) -> NDArray[np.float64]:
+def turned(points: Floats, rotation_deg: float) -> Floats:
     """``points`` (n, 2) turned counter-clockwise about the origin; exact for right angles."""
     quarter, rest = divmod(rotation_deg, 90.0)
     if rest == 0.0:

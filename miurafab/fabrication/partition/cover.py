@@ -23,9 +23,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.optimize
 import scipy.spatial
-from numpy.typing import NDArray
 
 from miurafab.fabrication.partition.fit_box import boxes_at
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import principal_axes
 
 _NEAR = 4
@@ -47,7 +47,7 @@ _SAMPLE = 12_000
 """Facets that stand for all during the search."""
 
 
-def frame_of(points: NDArray[np.float64], width: float, height: float) -> NDArray[np.float64]:
+def frame_of(points: Floats, width: float, height: float) -> Floats:
     """(3,) the frame whose rectangle ``width`` x ``height`` mm holds ``points`` (n, 2) with the
     least excess, and of all that hold them the one turned to their smallest box.
     """
@@ -65,7 +65,7 @@ def frame_of(points: NDArray[np.float64], width: float, height: float) -> NDArra
     return np.append(middle @ turn, angle)
 
 
-def brickwork(shapes: NDArray[np.float64], size: tuple[float, float]) -> list[NDArray[np.float64]]:
+def brickwork(shapes: Floats, size: tuple[float, float]) -> list[Floats]:
     """Frames (K, 3) of sides ``size`` in mm laid in rows over facets ``shapes`` (N, c, 2), along
     and across the longer axis of the whole; those that hold nothing are left out.
     """
@@ -102,28 +102,23 @@ def brickwork(shapes: NDArray[np.float64], size: tuple[float, float]) -> list[ND
     return found
 
 
-def excess(
-    corners: NDArray[np.float64], frames: NDArray[np.float64], width: float, height: float
-) -> NDArray[np.float64]:
+def excess(corners: Floats, frames: Floats, width: float, height: float) -> Floats:
     """(N,) how far in mm the point sets ``corners`` (N, c, 2) stand out of ``frames`` (N, 3), or
     of one frame (3,); negative inside.
     """
     x, y = _seen(corners[..., 0].T, corners[..., 1].T, frames.T)
     long, short = width / 2, height / 2
-    found: NDArray[np.float64] = np.maximum(
-        np.abs(x).max(axis=0, initial=-np.inf) - long,
-        np.abs(y).max(axis=0, initial=-np.inf) - short,
+    return np.asarray(
+        np.maximum(
+            np.abs(x).max(axis=0, initial=-np.inf) - long,
+            np.abs(y).max(axis=0, initial=-np.inf) - short,
+        )
     )
-    return found
 
 
 def nearest(
-    centres: NDArray[np.float64],
-    frames: NDArray[np.float64],
-    width: float,
-    height: float,
-    most: int,
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    centres: Floats, frames: Floats, width: float, height: float, most: int
+) -> tuple[Ints, Floats]:
     """(N, m) the ``most`` frames that points ``centres`` (N, 2) lie deepest in, and the excess of
     the points over them in mm, unsorted.
     """
@@ -139,9 +134,7 @@ def nearest(
     return near.astype(np.int64), apart
 
 
-def _seen(
-    x: NDArray[np.float64], y: NDArray[np.float64], frames: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _seen(x: Floats, y: Floats, frames: Floats) -> tuple[Floats, Floats]:
     """The points (c, N) in their ``frames``, given as (3, N) or (3,)."""
     c, s = np.cos(frames[2]), np.sin(frames[2])
     x, y = x - frames[0], y - frames[1]
@@ -155,7 +148,7 @@ class Relaxation:
     out. ``spent`` counts the evaluations of L, in units of one with 4,000 facets in play.
     """
 
-    def __init__(self, shapes: NDArray[np.float64], width: float, height: float) -> None:
+    def __init__(self, shapes: Floats, width: float, height: float) -> None:
         self.shapes, self.size = shapes, (width, height)
         total = len(shapes)
         # Steps of the golden ratio leave no stripes in a grid, whatever its number of columns.
@@ -170,7 +163,7 @@ class Relaxation:
         self.centres = self.corners.mean(axis=1)
         self.radius = np.linalg.norm(self.corners - self.centres[:, None], axis=2).max(axis=1)
 
-    def look(self, frames: NDArray[np.float64]) -> None:
+    def look(self, frames: Floats) -> None:
         """Find the frames near each shape, and leave out what lies deep inside one."""
         near, apart = nearest(self.centres, frames, *self.size, _NEAR)
         self.active = np.flatnonzero(apart.min(axis=1) + self.radius > -_REACH_MM)
@@ -178,7 +171,7 @@ class Relaxation:
         self.x = np.ascontiguousarray(self.corners[self.active, :, 0].T)
         self.y = np.ascontiguousarray(self.corners[self.active, :, 1].T)
 
-    def least(self, frames: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def least(self, frames: Floats) -> tuple[Ints, Floats]:
         """(A,) the frame that holds each active shape best, and the excess over it."""
         long, short = self.size[0] / 2 - self.margin, self.size[1] / 2 - self.margin
         over = np.empty(self.near.shape[::-1])
@@ -189,7 +182,7 @@ class Relaxation:
         shape = np.arange(len(best))
         return self.near[shape, best], over[best, shape]
 
-    def _loss(self, steps: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def _loss(self, steps: Floats) -> tuple[float, Floats]:
         """L / mm² and its gradient over the frames, given as one vector with angles in arms."""
         frames = steps.reshape(-1, 3) * UNITS
         self.spent += 0.2 + len(self.active) / 4000
@@ -213,12 +206,8 @@ class Relaxation:
         return float((over**2).sum()), (slope * UNITS).ravel()
 
     def relax(
-        self,
-        frames: NDArray[np.float64],
-        margins: tuple[float, ...] = (),
-        rounds: int = 4,
-        steps: int = 60,
-    ) -> tuple[NDArray[np.float64], float]:
+        self, frames: Floats, margins: tuple[float, ...] = (), rounds: int = 4, steps: int = 60
+    ) -> tuple[Floats, float]:
         """The frames moved to a least L nearby, and that L in mm².
 
         With ``margins`` in mm the facets are first asked to lie so deep inside, one after the
@@ -240,7 +229,7 @@ class Relaxation:
             last = loss
         return frames, loss
 
-    def descended(self, frames: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
+    def descended(self, frames: Floats, steps: int) -> Floats:
         """The frames at a least L, each facet being held by the frames that were near it."""
         found = scipy.optimize.minimize(
             self._loss,
@@ -249,12 +238,9 @@ class Relaxation:
             method="L-BFGS-B",
             options={"maxiter": steps, "maxcor": 30},
         )
-        moved: NDArray[np.float64] = found.x.reshape(-1, 3) * UNITS
-        return moved
+        return np.asarray(found.x.reshape(-1, 3) * UNITS)
 
-    def settled(
-        self, frames: NDArray[np.float64], margins: tuple[float, ...] = ()
-    ) -> tuple[NDArray[np.float64], float]:
+    def settled(self, frames: Floats, margins: tuple[float, ...] = ()) -> tuple[Floats, float]:
         """The frames relaxed, with what they leave out of all shapes added to the sample."""
         frames, loss = self.relax(frames, margins)
         for _ in range(4):
@@ -270,7 +256,7 @@ class Relaxation:
             loss = np.inf
         return frames, loss
 
-    def _left_out(self, frames: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _left_out(self, frames: Floats) -> Ints:
         """The shapes that no frame holds."""
         corners, centres = self.shapes, self.shapes.mean(axis=1)
         first, _ = nearest(centres, frames, *self.size, 1)

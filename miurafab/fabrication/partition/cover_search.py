@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.fabrication.partition.cover import ENOUGH, UNITS, Relaxation, excess, nearest
+from miurafab.geometry.arrays import Floats
 
 _MARGINS_MM = (8.0, 3.0)
 """Margins at which frames are relaxed first, every other time."""
@@ -31,24 +31,22 @@ _LEAVES, _TRIES = 3, 4
 class Chain:
     """One beginning of a search, and what it has come to: ``frames`` (K, 3) and their L in mm²."""
 
-    frames: NDArray[np.float64]
+    frames: Floats
     loss: float
 
 
 class CoverSearch(Relaxation):
     """The search for covers of ``shapes`` (N, c, 2) by frames ``width`` x ``height`` mm."""
 
-    def __init__(
-        self, shapes: NDArray[np.float64], width: float, height: float, seed: int = 0
-    ) -> None:
+    def __init__(self, shapes: Floats, width: float, height: float, seed: int = 0) -> None:
         super().__init__(shapes, width, height)
         self.random = np.random.default_rng(seed)
 
-    def begin(self, frames: NDArray[np.float64]) -> Chain:
+    def begin(self, frames: Floats) -> Chain:
         """A beginning with ``frames`` (K, 3)."""
         return Chain(*self.relax(frames))
 
-    def needed(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    def needed(self, frames: Floats) -> Floats:
         """(K,) how many shapes of the sample each frame holds alone."""
         near, apart = nearest(self.centres, frames, *self.size, 2)
         if near.shape[1] < 2:
@@ -57,7 +55,7 @@ class CoverSearch(Relaxation):
         holder = near[np.arange(len(near)), apart.argmin(axis=1)]
         return np.bincount(holder, alone.astype(np.float64), len(frames)).astype(np.float64)
 
-    def fewer(self, chains: list[Chain], count: int, effort: float) -> NDArray[np.float64] | None:
+    def fewer(self, chains: list[Chain], count: int, effort: float) -> Floats | None:
         """A cover by ``count`` frames at most, or None if it takes more than ``effort``.
 
         The search begins with ``chains``, which have ``count`` + 1 frames or other numbers of them,
@@ -96,12 +94,12 @@ class CoverSearch(Relaxation):
                 chain.frames, chain.loss = moved, loss
         return None
 
-    def _eased(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _eased(self, frames: Floats) -> Floats:
         """The cover ``frames`` with the room that is left over shared out, if it stays one."""
         eased, loss = self.settled(frames, _EASED_MM)
         return eased if loss <= ENOUGH else frames
 
-    def _shaken(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _shaken(self, frames: Floats) -> Floats:
         """The frames with those about one place that they leave out changed at random."""
         self.margin = 0.0
         self.look(frames)
@@ -124,9 +122,7 @@ class CoverSearch(Relaxation):
         frames[near] += self.random.normal(size=(len(near), 3)) * far * UNITS
         return frames
 
-    def _taken_over(
-        self, frames: NDArray[np.float64], over: NDArray[np.float64], place: int
-    ) -> NDArray[np.float64]:
+    def _taken_over(self, frames: Floats, over: Floats, place: int) -> Floats:
         """The frames after another one than the nearest had to take what is left out about the
         active facet ``place``.
         """

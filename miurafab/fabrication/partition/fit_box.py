@@ -22,6 +22,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Bools, Floats
+
 TOLERANCE = 1e-9
 """How far, in mm, an extent may exceed the rectangle by rounding."""
 
@@ -44,7 +46,7 @@ class Space:
     turns: tuple[int, ...] | None = None
 
     @property
-    def directions(self) -> NDArray[np.float64]:
+    def directions(self) -> Floats:
         """(D, 2) along which support values are taken for :meth:`holds`."""
         return fan(_ANGLES if self.turns is None else 1)
 
@@ -52,17 +54,16 @@ class Space:
         """The space less ``by`` mm each way."""
         return Space(self.width - by, self.height - by, self.turns)
 
-    def holds(self, values: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def holds(self, values: NDArray[np.float32]) -> Bools:
         """(...,) whether shapes with support ``values`` (..., D) fit."""
         if self.turns is None:
             return fits(values, self.width, self.height)
         size = np.array([self.width, self.height]) - _ROUNDING
         extents = values[..., :2] + values[..., 2:]
         ways = [(extents <= (size if turn == 0 else size[::-1])).all(-1) for turn in self.turns]
-        found: NDArray[np.bool_] = np.logical_or.reduce(ways)
-        return found
+        return np.asarray(np.logical_or.reduce(ways))
 
-    def turn(self, points: NDArray[np.float64]) -> float | None:
+    def turn(self, points: Floats) -> float | None:
         """The angle θ in radians whose turn by -θ fits ``points`` (n, 2): with the smallest box, or
         0 where the turns are given; None if none does.
         """
@@ -74,7 +75,7 @@ class Space:
         return 0.0 if any(ways) else None
 
 
-def fan(turns: int) -> NDArray[np.float64]:
+def fan(turns: int) -> Floats:
     """(4 * turns, 2) unit directions: ``turns`` of them in the first quadrant, then each turned
     by 90, 180 and 270 degrees.
     """
@@ -84,9 +85,7 @@ def fan(turns: int) -> NDArray[np.float64]:
     return np.concatenate([first, second, -first, -second])
 
 
-def support(
-    polygons: NDArray[np.float64], present: NDArray[np.bool_], directions: NDArray[np.float64]
-) -> NDArray[np.float32]:
+def support(polygons: Floats, present: Bools, directions: Floats) -> NDArray[np.float32]:
     """(N, D) support values in mm of N polygons of up to k corners.
 
     ``polygons`` (N, k, 2), ``present`` (N, k) whether a corner is real, the first ones first;
@@ -106,7 +105,7 @@ def support(
     return np.ascontiguousarray(values.T)
 
 
-def fits(values: NDArray[np.float32], width: float, height: float) -> NDArray[np.bool_]:
+def fits(values: NDArray[np.float32], width: float, height: float) -> Bools:
     """(...,) whether shapes with support ``values`` (..., 4 * turns) fit the rectangle.
 
     The sizes in mm; a shape may lie along or across. Extents are compared with
@@ -116,20 +115,19 @@ def fits(values: NDArray[np.float32], width: float, height: float) -> NDArray[np
     along = values[..., :quarter] + values[..., 2 * quarter : 3 * quarter]
     across = values[..., quarter : 2 * quarter] + values[..., 3 * quarter :]
     long, short = max(width, height) - _ROUNDING, min(width, height) - _ROUNDING
-    found: NDArray[np.bool_] = (
-        (np.maximum(along, across) <= long) & (np.minimum(along, across) <= short)
-    ).any(axis=-1)
-    return found
+    return np.asarray(
+        ((np.maximum(along, across) <= long) & (np.minimum(along, across) <= short)).any(axis=-1)
+    )
 
 
-def box_of(points: NDArray[np.float64]) -> tuple[float, float]:
+def box_of(points: Floats) -> tuple[float, float]:
     """The longer and the shorter side in mm of the smallest box around ``points`` (n, 2)."""
     _, sizes = boxes_at(points, 0.0, 0.0)
     best = int(np.argmin(sizes.prod(axis=1)))
     return float(sizes[best].max()), float(sizes[best].min())
 
 
-def best_turn(points: NDArray[np.float64], width: float, height: float) -> float | None:
+def best_turn(points: Floats, width: float, height: float) -> float | None:
     """The angle θ in radians, -π/2 < θ <= π/2, whose turn by -θ fits ``points`` (n, 2) into the
     rectangle with the smallest box, or None if no angle fits. Exact up to :data:`TOLERANCE`.
     """
@@ -174,5 +172,4 @@ def _solved(a: NDArray[Any], b: NDArray[Any], level: float) -> NDArray[Any]:
 def _spans(hull: NDArray[Any], angles: NDArray[Any]) -> NDArray[Any]:
     """(A, 2) from the least to the greatest hull corner along each angle."""
     along = hull @ np.stack([np.cos(angles), np.sin(angles)])
-    spans: NDArray[Any] = hull[along.argmax(axis=0)] - hull[along.argmin(axis=0)]
-    return spans
+    return np.asarray(hull[along.argmax(axis=0)] - hull[along.argmin(axis=0)])

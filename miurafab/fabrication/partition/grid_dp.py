@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.fabrication.partition.fit_box import Space
+from miurafab.geometry.arrays import Floats, Ints
 
 Rectangle = tuple[int, int, int, int]
 """Rows from, rows to, columns from, columns to; the ends excluded."""
@@ -45,8 +46,8 @@ class GridShape:
     body: NDArray[np.float32]
     right: NDArray[np.float32]
     top: NDArray[np.float32]
-    right_mm: NDArray[np.float64]
-    top_mm: NDArray[np.float64]
+    right_mm: Floats
+    top_mm: Floats
 
     def rows_from(self, row: int) -> GridShape:
         """The grid without its first ``row`` rows."""
@@ -121,7 +122,7 @@ class _Bands:
     def __init__(self, shape: GridShape, space: Space) -> None:
         self.shape, self.space = shape, space
         self.columns, self.rows = shape.right_mm.shape
-        self.cost: list[NDArray[np.float64]] = []
+        self.cost: list[Floats] = []
         body, right, cut_mm = shape.body.copy(), shape.right.copy(), shape.right_mm
         for h in range(1, self.rows + 1):
             top = shape.rows_from(h - 1)
@@ -144,9 +145,9 @@ class _Bands:
         body: NDArray[np.float32],
         top: NDArray[np.float32],
         right: NDArray[np.float32],
-        cut_mm: NDArray[np.float64],
+        cut_mm: Floats,
         h: int,
-    ) -> NDArray[np.float64]:
+    ) -> Floats:
         """(C + 1, B) cost in mm of the greedy runs of B bands over their first c columns."""
         bands = body.shape[1]
         cost = np.zeros((self.columns + 1, bands))
@@ -168,7 +169,7 @@ class _Bands:
             cost[c + 1] = cost[c] + step
         return cost
 
-    def _cuts(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    def _cuts(self) -> tuple[Floats, Ints]:
         """(R + 1, C + 1) the least cost of the first r rows and c columns, and the last band's
         height there.
         """
@@ -183,11 +184,11 @@ class _Bands:
                 choice[r, better] = h
         return best, choice
 
-    def suffix_total(self) -> NDArray[np.float64]:
+    def suffix_total(self) -> Floats:
         """(R + 1,) the least cost of the rows from r on, over all columns."""
         return self._suffix()[0]
 
-    def _suffix(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    def _suffix(self) -> tuple[Floats, Ints]:
         total = np.full(self.rows + 1, np.inf)
         choice = np.zeros(self.rows + 1, dtype=np.int64)
         total[self.rows] = 0.0

@@ -14,13 +14,13 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.cover import brickwork, excess, frame_of, nearest
 from miurafab.fabrication.partition.cover_search import CoverSearch
 from miurafab.fabrication.partition.min_cut import Recut
 from miurafab.fabrication.tabs import TabRegions
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import edge_lengths, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
@@ -46,8 +46,8 @@ for another time.
 
 def improved(
     pattern: CreasePattern,
-    patch: NDArray[np.int64],
-    part: NDArray[np.int64],
+    patch: Ints,
+    part: Ints,
     size: tuple[float, float],
     ring: TabRegions,
     depth: float,
@@ -55,7 +55,7 @@ def improved(
     options: LayoutOptions,
     *,
     straight: bool,
-) -> NDArray[np.int64]:
+) -> Ints:
     """(F,) a split no worse than ``patch`` (F,), ids from 0, of which the lower one bears tabs.
 
     Patches lie within one ``part`` (F,) of the pattern each, and patches of a lower part have lower
@@ -66,7 +66,7 @@ def improved(
     room = _room(pattern, ring)
     alternate = options.tab_side == "alternate"
 
-    def recut(patch: NDArray[np.int64], frames: NDArray[np.float64]) -> NDArray[np.int64] | None:
+    def recut(patch: Ints, frames: Floats) -> Ints | None:
         """The split with shorter seams, or None if it does not hold."""
         cut = Recut(
             pattern,
@@ -102,18 +102,13 @@ def improved(
     return np.unique(found, return_inverse=True)[1].astype(np.int64)
 
 
-def _seam_mm(pattern: CreasePattern, patch: NDArray[np.int64]) -> float:
+def _seam_mm(pattern: CreasePattern, patch: Ints) -> float:
     pair = pattern.edges_faces
     seam = (pair >= 0).all(axis=1) & (patch[pair[:, 0]] != patch[pair[:, 1]])
     return float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices[seam]).sum())
 
 
-def _frames(
-    room: NDArray[np.float64],
-    patch: NDArray[np.int64],
-    facets: NDArray[np.int64],
-    size: tuple[float, float],
-) -> NDArray[np.float64]:
+def _frames(room: Floats, patch: Ints, facets: Ints, size: tuple[float, float]) -> Floats:
     """(K, 3) the frames about the patches that ``facets`` make up, alone."""
     order = facets[np.argsort(patch[facets], kind="stable")]
     ends = np.flatnonzero(np.diff(patch[order])) + 1
@@ -122,12 +117,12 @@ def _frames(
 
 def _fewer(
     pattern: CreasePattern,
-    part: NDArray[np.int64],
-    patch: NDArray[np.int64],
+    part: Ints,
+    patch: Ints,
     size: tuple[float, float],
-    room: NDArray[np.float64],
+    room: Floats,
     depth: float,
-) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+) -> Iterator[tuple[Ints, Floats]]:
     """Splits of fewer patches than ``patch``, with their frames, the fewest first; tabs may still
     stand out.
     """
@@ -165,17 +160,14 @@ def _fewer(
         yield found, np.concatenate(covers)
 
 
-def _deepest(
-    room: NDArray[np.float64], frames: NDArray[np.float64], size: tuple[float, float]
-) -> NDArray[np.int64]:
+def _deepest(room: Floats, frames: Floats, size: tuple[float, float]) -> Ints:
     """(N,) the frame that each facet lies deepest in."""
     near, _ = nearest(room.mean(axis=1), frames, *size, 4)
     over = np.stack([excess(room, frames[column], *size) for column in near.T], axis=1)
-    found: NDArray[np.int64] = near[np.arange(len(near)), over.argmin(axis=1)]
-    return found
+    return np.asarray(near[np.arange(len(near)), over.argmin(axis=1)])
 
 
-def _room(pattern: CreasePattern, ring: TabRegions) -> NDArray[np.float64]:
+def _room(pattern: CreasePattern, ring: TabRegions) -> Floats:
     """(F, c, 2) the corners of each facet and of the tabs that stand on the pattern's border."""
     corners = pattern.faces_vertices
     room = pattern.vertices_coords[np.where(corners >= 0, corners, corners[:, :1])]
@@ -193,9 +185,7 @@ def _room(pattern: CreasePattern, ring: TabRegions) -> NDArray[np.float64]:
     return room
 
 
-def _without_rim(
-    pattern: CreasePattern, room: NDArray[np.float64], depth: float
-) -> NDArray[np.float64]:
+def _without_rim(pattern: CreasePattern, room: Floats, depth: float) -> Floats:
     """``room`` with the border of the pattern drawn in by ``depth`` mm, but by no more than half
     the way to the middle of a facet: no tab of another patch is wanted there.
     """

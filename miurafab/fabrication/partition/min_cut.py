@@ -23,7 +23,6 @@ import itertools
 
 import numpy as np
 import scipy.sparse
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from miurafab.fabrication.partition.cover import excess, frame_of
@@ -31,6 +30,7 @@ from miurafab.fabrication.partition.fit_box import TOLERANCE
 from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.seams import all_seams, inner_seams
 from miurafab.fabrication.tabs import TabRegions, tab_regions
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -58,11 +58,11 @@ class Recut:
     def __init__(
         self,
         pattern: CreasePattern,
-        patch: NDArray[np.int64],
-        frames: NDArray[np.float64],
+        patch: Ints,
+        frames: Floats,
         size: tuple[float, float],
-        room: NDArray[np.float64],
-        part: NDArray[np.int64],
+        room: Floats,
+        part: Ints,
         material: Material,
         *,
         full_facet: bool,
@@ -118,7 +118,7 @@ class Recut:
         self.tab_points = np.where(present[..., None], points, points[:, :1])
         self.tab_points[~present.any(axis=1)] = np.nan
 
-    def _outside(self, tab: NDArray[np.int64], patch: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _outside(self, tab: Ints, patch: Ints) -> Bools:
         """Whether each tab, -1 for none, stands out of the frame of ``patch``; same shapes."""
         found = np.zeros(tab.shape, dtype=bool)
         real = np.flatnonzero((tab >= 0).ravel() & (patch >= 0).ravel())
@@ -127,12 +127,7 @@ class Recut:
         found.ravel()[real] = over > _FLUSH_MM
         return found
 
-    def _seam_cost(
-        self,
-        facet: NDArray[np.int64],
-        mine: NDArray[np.int64],
-        theirs: NDArray[np.int64],
-    ) -> NDArray[np.float64]:
+    def _seam_cost(self, facet: Ints, mine: Ints, theirs: Ints) -> Floats:
         """(n, k) what the sides of ``facet`` (n,) cost if it is in patch ``mine`` (n,) and its
         neighbours are in ``theirs`` (n, k), -1 for none.
         """
@@ -144,8 +139,7 @@ class Recut:
         taken = seam & (~lower | self.alternate | (self.weak[own] & (own >= 0)))
         out = self._outside(np.where(bears, own, -1), np.where(bears, mine[:, None], -1))
         out |= self._outside(np.where(taken, other, -1), np.where(taken, theirs, -1))
-        found: NDArray[np.float64] = np.where(seam, self.cost[edges] + _PENALTY * out, 0.0)
-        return found
+        return np.where(seam, self.cost[edges] + _PENALTY * out, 0.0)
 
     def faults(self) -> int:
         """How many facets and tabs stand out of the frame of their patch."""
@@ -213,7 +207,7 @@ class Recut:
             if not fresh.any():
                 return
 
-    def _pairs(self) -> NDArray[np.int64]:
+    def _pairs(self) -> Ints:
         """(P, 2) patches next to each other, the lower one first."""
         pair = self.pattern.edges_faces[(self.pattern.edges_faces >= 0).all(axis=1)]
         pair = pair[self.part[pair[:, 0]] == self.part[pair[:, 1]]]
@@ -277,16 +271,15 @@ class Recut:
         """The patches that are not disks."""
         return [patch for patch in np.unique(self.patch).tolist() if not self._is_disk(patch)]
 
-    def _mixed(self, zone: NDArray[np.int64]) -> bool:
+    def _mixed(self, zone: Ints) -> bool:
         return bool((self.part[zone] != self.part[zone[0]]).any())
 
 
-def _prices(pattern: CreasePattern) -> NDArray[np.float64]:
+def _prices(pattern: CreasePattern) -> Floats:
     """(E,) what a mm of each edge costs as a seam, 1 or a little more."""
     if pattern.grid is None:
         return np.ones(len(pattern.edges_vertices))
     columns = pattern.grid[0]
     low, high = np.sort(pattern.edges_vertices, axis=1).T
     line = np.where(high - low == 1, low // columns, low % columns)
-    price: NDArray[np.float64] = 1.0 + _PRICE * ((line * 0.6180339887498949) % 1.0)
-    return price
+    return np.asarray(1.0 + _PRICE * ((line * 0.6180339887498949) % 1.0))

@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.nesting import turned
@@ -19,6 +18,7 @@ from miurafab.fabrication.partition.fit_box import Space
 from miurafab.fabrication.partition.patch_outline import Piece, Pieces, make_pieces
 from miurafab.fabrication.stock import LaidStock
 from miurafab.fabrication.tabs import FOLDS, Tab
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -38,15 +38,15 @@ class Patch:
 
     id: int
     label: str
-    faces: NDArray[np.int64]
-    outline_mm: NDArray[np.float64]
-    waste_mm: tuple[NDArray[np.float64], ...]
+    faces: Ints
+    outline_mm: Floats
+    waste_mm: tuple[Floats, ...]
     origin_mm: tuple[float, float]
     rotation_deg: float
     tabs: tuple[Tab, ...]
     copy: int = 1
 
-    def from_pattern(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def from_pattern(self, points: Floats) -> Floats:
         """``points`` (n, 2) of the pattern in the patch frame."""
         return turned(points - self.origin_mm, self.rotation_deg)
 
@@ -58,7 +58,7 @@ class Framed:
     """
 
     pieces: Pieces
-    numbers: NDArray[np.int64]
+    numbers: Ints
     patches: tuple[Patch, ...]
 
 
@@ -102,7 +102,7 @@ def copied(patches: tuple[Patch, ...], quantity: int) -> tuple[Patch, ...]:
     )
 
 
-def _numbers(pieces: Pieces) -> NDArray[np.int64]:
+def _numbers(pieces: Pieces) -> Ints:
     """The number of each tab, from 1, patch by patch along the outline."""
     numbers = np.empty(len(pieces.tabs), dtype=np.int64)
     order = np.concatenate([piece.tabs for piece in pieces.pieces])
@@ -111,12 +111,7 @@ def _numbers(pieces: Pieces) -> NDArray[np.int64]:
 
 
 def _patch(
-    pattern: CreasePattern,
-    number: int,
-    piece: Piece,
-    pieces: Pieces,
-    numbers: NDArray[np.int64],
-    space: Space,
+    pattern: CreasePattern, number: int, piece: Piece, pieces: Pieces, numbers: Ints, space: Space
 ) -> Patch:
     line = piece.cut_lines[0]
     angle = space.turn(line)
@@ -126,7 +121,7 @@ def _patch(
     low = turned(line, rotation).min(axis=0)
     origin = np.round(turned(low, -rotation), DIGITS)
 
-    def framed(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def framed(points: Floats) -> Floats:
         return np.round(turned(points - origin, rotation), DIGITS)
 
     tabs = pieces.tabs

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from miurafab.fabrication.kerf import allowance, cut_lines
@@ -21,6 +20,7 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.fit_box import Space
 from miurafab.fabrication.partition.split import Boundary, boundaries, split
 from miurafab.fabrication.tabs import TabRegions, choose_tabs
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.shapes import common_area
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
@@ -35,10 +35,10 @@ class Piece:
     the beam follows: the outer ring first, then rings around enclosed waste.
     """
 
-    faces: NDArray[np.int64]
-    tabs: NDArray[np.int64]
-    outline: NDArray[np.float64]
-    cut_lines: list[NDArray[np.float64]]
+    faces: Ints
+    tabs: Ints
+    outline: Floats
+    cut_lines: list[Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +48,9 @@ class Pieces:
     """
 
     pieces: list[Piece]
-    face_patch: NDArray[np.int64]
+    face_patch: Ints
     tabs: TabRegions
-    untabbed: NDArray[np.int64]
+    untabbed: Ints
 
 
 def make_pieces(
@@ -100,11 +100,8 @@ def make_pieces(
 
 
 def _outlines(
-    pattern: CreasePattern,
-    face_patch: NDArray[np.int64],
-    around: list[Boundary],
-    tabs: TabRegions,
-) -> tuple[list[NDArray[np.float64]], list[NDArray[np.int64]]]:
+    pattern: CreasePattern, face_patch: Ints, around: list[Boundary], tabs: TabRegions
+) -> tuple[list[Floats], list[Ints]]:
     """The outline of each patch, and its tabs in turn along it."""
     tab_of_edge = np.full(len(pattern.edges_vertices), -1)
     tab_of_edge[tabs.edge] = np.arange(len(tabs))
@@ -130,10 +127,10 @@ def _outlines(
 def _without_collisions(
     pattern: CreasePattern,
     around: list[Boundary],
-    outlines: list[NDArray[np.float64]],
-    standing: list[NDArray[np.int64]],
+    outlines: list[Floats],
+    standing: list[Ints],
     tabs: TabRegions,
-) -> NDArray[np.bool_]:
+) -> Bools:
     """(N,) which tabs may stay."""
     kept = np.ones(len(tabs), dtype=bool)
     valid = shapely.is_valid(np.array([shapely.Polygon(outline) for outline in outlines]))

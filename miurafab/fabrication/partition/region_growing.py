@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.fabrication.partition.fit_box import Space
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import facet_means, principal_axes
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -29,7 +30,7 @@ class _Growth:
         pattern: CreasePattern,
         reach: NDArray[np.float32],
         space: Space,
-        free: NDArray[np.bool_],
+        free: Bools,
         most: int,
     ) -> None:
         self.corners = [[v for v in face if v >= 0] for face in pattern.faces_vertices.tolist()]
@@ -88,9 +89,9 @@ def grow_patches(
     pattern: CreasePattern,
     reach: NDArray[np.float32],
     space: Space,
-    faces: NDArray[np.int64] | None = None,
+    faces: Ints | None = None,
     most: int | None = None,
-) -> NDArray[np.int64]:
+) -> Ints:
     """(F,) patch ids from 0 of ``faces`` (all by default), -1 for the others.
 
     ``reach`` (F, D) are the support values of each facet with all tabs that may stand on it, and
@@ -112,21 +113,17 @@ def grow_patches(
     return found if most else _merged(pattern, reach, space, found)
 
 
-def _ranks(pattern: CreasePattern, space: Space) -> NDArray[np.float64]:
+def _ranks(pattern: CreasePattern, space: Space) -> Floats:
     """(F, 2) facet centres in the pattern's principal axes, in units of the bed's sides."""
     centres = facet_means(pattern.vertices_coords, pattern.faces_vertices)
     centred, axes = centres - centres.mean(axis=0), principal_axes(centres)
     sides = max(space.width, space.height), min(space.width, space.height)
-    ranks: NDArray[np.float64] = (centred @ axes[:, ::-1]) / sides
-    return ranks
+    return np.asarray((centred @ axes[:, ::-1]) / sides)
 
 
 def _merged(
-    pattern: CreasePattern,
-    reach: NDArray[np.float32],
-    space: Space,
-    face_patch: NDArray[np.int64],
-) -> NDArray[np.int64]:
+    pattern: CreasePattern, reach: NDArray[np.float32], space: Space, face_patch: Ints
+) -> Ints:
     """Neighbouring patches joined, smallest first, while the union is a disk that fits."""
     count = int(face_patch.max(initial=-1)) + 1
     members = [np.flatnonzero(face_patch == patch) for patch in range(count)]
@@ -165,7 +162,7 @@ def _merged(
     return merged
 
 
-def is_disk(pattern: CreasePattern, faces: NDArray[np.int64]) -> bool:
+def is_disk(pattern: CreasePattern, faces: Ints) -> bool:
     """Whether the facets ``faces`` are connected, without holes and without pinched vertices.
 
     A boundary that is one simple closed loop of vertices encloses a disk; connected facets with

@@ -25,6 +25,7 @@ from miurafab.fabrication.partition.improve import improved
 from miurafab.fabrication.partition.region_growing import grow_patches, is_disk
 from miurafab.fabrication.seams import inner_seams
 from miurafab.fabrication.tabs import TabRegions, choose_tabs, ring_tabs, tab_regions
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
@@ -39,8 +40,8 @@ class Boundary:
     edge i. ``vertices`` and ``edges`` (n,) int64.
     """
 
-    vertices: NDArray[np.int64]
-    edges: NDArray[np.int64]
+    vertices: Ints
+    edges: Ints
 
 
 def split(
@@ -51,7 +52,7 @@ def split(
     options: LayoutOptions | None = None,
     *,
     turns: tuple[int, ...] | None = None,
-) -> NDArray[np.int64]:
+) -> Ints:
     """(F,) the patch of each facet, from 0, so that each fits ``width`` x ``height`` mm, turned at
     will or by quarter ``turns`` alone (:class:`~miurafab.fabrication.partition.fit_box.Space`).
 
@@ -139,7 +140,7 @@ def split(
     return found.max() - found if turned else found
 
 
-def _blocks(cells: NDArray[np.int64] | None, options: LayoutOptions) -> list[Rectangle]:
+def _blocks(cells: Ints | None, options: LayoutOptions) -> list[Rectangle]:
     """The parts of the grid between the seams that ``options`` ask for."""
     wanted = {"row": options.seam_rows, "column": options.seam_columns}
     if cells is None:
@@ -189,7 +190,7 @@ def _tab_room(pattern: CreasePattern, tabs: TabRegions) -> float:
     return float(depth.max(initial=0.0, where=tabs.present))
 
 
-def boundaries(pattern: CreasePattern, face_patch: NDArray[np.int64]) -> list[Boundary]:
+def boundaries(pattern: CreasePattern, face_patch: Ints) -> list[Boundary]:
     """The boundary of each patch of the split ``face_patch`` (F,), by patch id.
 
     Each begins at its lowest-numbered edge.
@@ -254,7 +255,7 @@ def _fits_whole(
     return is_disk(pattern, faces) and not len(_overlapping(pattern, np.zeros_like(faces)))
 
 
-def _cells(pattern: CreasePattern) -> NDArray[np.int64] | None:
+def _cells(pattern: CreasePattern) -> Ints | None:
     """(R, C) the facet in each cell of the grid, or None if the facets are not those of a grid."""
     if pattern.grid is None:
         return None
@@ -273,7 +274,7 @@ def _cells(pattern: CreasePattern) -> NDArray[np.int64] | None:
     return cells
 
 
-def _places(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+def _places(cells: Ints) -> Ints:
     """(F,) the position of each facet in the flattened ``cells``."""
     place = np.empty(cells.size, dtype=np.int64)
     place[cells.ravel()] = np.arange(cells.size)
@@ -282,7 +283,7 @@ def _places(cells: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _grid_shape(
     pattern: CreasePattern,
-    cells: NDArray[np.int64],
+    cells: Ints,
     body: NDArray[np.float32],
     tabs: TabRegions,
     tab_values: NDArray[np.float32],
@@ -295,7 +296,7 @@ def _grid_shape(
     ends = pattern.vertices_coords[pattern.edges_vertices[tabs.edge]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
-    def standing(which: NDArray[np.bool_]) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    def standing(which: Bools) -> tuple[NDArray[np.float32], Floats]:
         values = np.full((cells.size, body.shape[1]), -np.inf, dtype=np.float32)
         values[own[which]] = tab_values[which]
         sides = np.zeros(cells.size)
@@ -311,11 +312,7 @@ def _grid_shape(
 
 
 def _check_alone(
-    pattern: CreasePattern,
-    doubtful: NDArray[np.bool_],
-    tabs: TabRegions,
-    space: Space,
-    options: LayoutOptions,
+    pattern: CreasePattern, doubtful: Bools, tabs: TabRegions, space: Space, options: LayoutOptions
 ) -> None:
     """Raise a LayoutError for the first ``doubtful`` (F,) facet that does not fit at any angle."""
     for face in np.flatnonzero(doubtful).tolist():
@@ -342,7 +339,7 @@ def _check_alone(
         )
 
 
-def _overlapping(pattern: CreasePattern, face_patch: NDArray[np.int64]) -> list[int]:
+def _overlapping(pattern: CreasePattern, face_patch: Ints) -> list[int]:
     """The patches whose boundary crosses or touches itself in the plane.
 
     Facets are counter-clockwise, so a patch is an immersed disk, and it overlaps itself only if
@@ -354,11 +351,8 @@ def _overlapping(pattern: CreasePattern, face_patch: NDArray[np.int64]) -> list[
 
 
 def _without_overlaps(
-    pattern: CreasePattern,
-    face_patch: NDArray[np.int64],
-    reach: NDArray[np.float32],
-    space: Space,
-) -> NDArray[np.int64]:
+    pattern: CreasePattern, face_patch: Ints, reach: NDArray[np.float32], space: Space
+) -> Ints:
     """The split with every patch that overlaps itself grown again in halves, ids from 0."""
     while True:
         bad = _overlapping(pattern, face_patch)

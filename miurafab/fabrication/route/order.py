@@ -22,11 +22,10 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.fabrication.route.postman import Route, find_route
 from miurafab.fabrication.toolpath import Toolpath
-from miurafab.geometry.arrays import places_in_runs
+from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs
 from miurafab.profiles import OPERATIONS, MachineProfile, Material
 
 HOLE = 0
@@ -43,8 +42,8 @@ class StrokeSet:
     """
 
     toolpath: Toolpath
-    group: NDArray[np.int64]
-    rank: NDArray[np.int64]
+    group: Ints
+    rank: Ints
 
 
 OUTLINE = 3
@@ -62,11 +61,7 @@ def corner_of(machine: MachineProfile, material: Material) -> float:
 
 
 def order_strokes(
-    strokes: StrokeSet,
-    edges_vertices: NDArray[np.int64],
-    *,
-    spread_heat: bool = False,
-    corner_mm: float = 1.0,
+    strokes: StrokeSet, edges_vertices: Ints, *, spread_heat: bool = False, corner_mm: float = 1.0
 ) -> Toolpath:
     """The toolpath of ``strokes`` in order. ``edges_vertices`` (E, 2) of the pattern tells which
     creases meet; a crease's strokes run from its first vertex to its second. ``corner_mm`` is the
@@ -97,9 +92,9 @@ class _StrokeOrder:
     begun.
     """
 
-    stroke: NDArray[np.int64]
-    backwards: NDArray[np.bool_]
-    begin: NDArray[np.int64]
+    stroke: Ints
+    backwards: Bools
+    begin: Ints
 
 
 def _joined(parts: list[_StrokeOrder]) -> _StrokeOrder:
@@ -129,15 +124,13 @@ def _arranged(raw: Toolpath, order: _StrokeOrder) -> Toolpath:
     )
 
 
-def _groups(group: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _groups(group: Ints) -> tuple[Ints, Ints]:
     """Where each run of equal ``group`` begins, and how long it is."""
     begin = np.flatnonzero(np.diff(group, prepend=group[:1] - 1))
     return begin, np.diff(np.append(begin, len(group)))
 
 
-def _unrolled(
-    begin: NDArray[np.int64], count: NDArray[np.int64], backwards: NDArray[np.bool_]
-) -> NDArray[np.int64]:
+def _unrolled(begin: Ints, count: Ints, backwards: Bools) -> Ints:
     """The members of runs, each run forwards or backwards."""
     step = places_in_runs(count)
     back = np.repeat(backwards, count)
@@ -145,12 +138,7 @@ def _unrolled(
 
 
 def _creases(
-    raw: Toolpath,
-    chosen: NDArray[np.int64],
-    group: NDArray[np.int64],
-    edges_vertices: NDArray[np.int64],
-    here: NDArray[np.float64],
-    corner: float,
+    raw: Toolpath, chosen: Ints, group: Ints, edges_vertices: Ints, here: Floats, corner: float
 ) -> _StrokeOrder:
     runs = _runs(raw, chosen, group, edges_vertices)
     route = runs.route(here, corner)
@@ -158,12 +146,7 @@ def _creases(
 
 
 def _spread_creases(
-    raw: Toolpath,
-    chosen: NDArray[np.int64],
-    group: NDArray[np.int64],
-    edges_vertices: NDArray[np.int64],
-    here: NDArray[np.float64],
-    corner: float,
+    raw: Toolpath, chosen: Ints, group: Ints, edges_vertices: Ints, here: Floats, corner: float
 ) -> _StrokeOrder:
     """Patch after patch, and of each every other trail on the way through, the rest on the way
     back, each from its nearer end.
@@ -190,7 +173,7 @@ def _spread_creases(
     return _joined(parts)
 
 
-def _far_apart(middles: NDArray[np.float64], begin: int) -> list[int]:
+def _far_apart(middles: Floats, begin: int) -> list[int]:
     """All of ``middles`` (n, 2) from ``begin`` on, each time the farthest from the last two."""
     left = np.ones(len(middles), dtype=bool)
     taken = [begin]
@@ -208,32 +191,25 @@ class _Runs:
     its ``node``s (C, 2), its drawn ``ends`` (C, 2, 2), and the ``positions`` of all nodes.
     """
 
-    begin: NDArray[np.int64]
-    count: NDArray[np.int64]
-    node: NDArray[np.int64]
-    ends: NDArray[np.float64]
-    positions: NDArray[np.float64]
+    begin: Ints
+    count: Ints
+    node: Ints
+    ends: Floats
+    positions: Floats
 
-    def route(self, here: NDArray[np.float64], corner: float) -> Route:
+    def route(self, here: Floats, corner: float) -> Route:
         """The route over the creases from ``here``."""
         a, b = self.node.T
         return find_route(a, b, self.positions, here, self.ends, corner)
 
-    def made(
-        self, chosen: NDArray[np.int64], order: NDArray[np.int64], backwards: NDArray[np.bool_]
-    ) -> _StrokeOrder:
+    def made(self, chosen: Ints, order: Ints, backwards: Bools) -> _StrokeOrder:
         """The strokes of the creases in ``order``."""
         member = _unrolled(self.begin[order], self.count[order], backwards)
         back = np.repeat(backwards, self.count[order])
         return _StrokeOrder(chosen[member], back, np.zeros(len(member), dtype=np.int64))
 
 
-def _runs(
-    raw: Toolpath,
-    chosen: NDArray[np.int64],
-    group: NDArray[np.int64],
-    edges_vertices: NDArray[np.int64],
-) -> _Runs:
+def _runs(raw: Toolpath, chosen: Ints, group: Ints, edges_vertices: Ints) -> _Runs:
     begin, count = _groups(group)
     ends = np.stack([raw.starts[chosen[begin]], raw.ends[chosen[begin + count - 1]]], axis=1)
     # The same pattern vertex is another node on another patch.
@@ -246,7 +222,7 @@ def _runs(
     return _Runs(begin, count, node, ends, total / np.bincount(node.ravel())[:, None])
 
 
-def _holes(raw: Toolpath, chosen: NDArray[np.int64], here: NDArray[np.float64]) -> _StrokeOrder:
+def _holes(raw: Toolpath, chosen: Ints, here: Floats) -> _StrokeOrder:
     """Small closed strokes, each time the nearest one left."""
     middle = np.array([raw.stroke(int(k))[:-1].mean(axis=0) for k in chosen])
     left = np.arange(len(chosen))
@@ -263,11 +239,7 @@ def _holes(raw: Toolpath, chosen: NDArray[np.int64], here: NDArray[np.float64]) 
 
 
 def _nearest(
-    raw: Toolpath,
-    chosen: NDArray[np.int64],
-    group: NDArray[np.int64],
-    here: NDArray[np.float64],
-    spread: bool = False,
+    raw: Toolpath, chosen: Ints, group: Ints, here: Floats, spread: bool = False
 ) -> _StrokeOrder:
     """Groups by the nearest entry: the beginning of a text, either end of an open stroke on its
     own, and any corner of a closed one. With ``spread`` each time the group farthest from the two
@@ -309,12 +281,7 @@ def _nearest(
     return _StrokeOrder(chosen[member], reverse, np.repeat(np.array(corner)[taken], count[which]))
 
 
-def _middles(
-    raw: Toolpath,
-    chosen: NDArray[np.int64],
-    begin: NDArray[np.int64],
-    count: NDArray[np.int64],
-) -> NDArray[np.float64]:
+def _middles(raw: Toolpath, chosen: Ints, begin: Ints, count: Ints) -> Floats:
     """(G, 2) the middle of the box around each group of strokes."""
     found = []
     for at, strokes in zip(begin.tolist(), count.tolist(), strict=True):

@@ -27,10 +27,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 import scipy.sparse
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from miurafab.fabrication.route.tour import closed_tour
+from miurafab.geometry.arrays import Bools, Floats, Ints
 
 _ASSIGNED = 1200
 """Odd nodes that are assigned at once; more are halved along the longer side first."""
@@ -44,18 +44,18 @@ class Route:
     ``bound_mm`` what no route falls below (0 where it is not known).
     """
 
-    order: NDArray[np.int64]
-    backwards: NDArray[np.bool_]
+    order: Ints
+    backwards: Bools
     legs_mm: float
     bound_mm: float
 
 
 def find_route(
-    a: NDArray[np.int64],
-    b: NDArray[np.int64],
-    positions: NDArray[np.float64],
-    start: NDArray[np.float64],
-    ends: NDArray[np.float64] | None = None,
+    a: Ints,
+    b: Ints,
+    positions: Floats,
+    start: Floats,
+    ends: Floats | None = None,
     corner: float = 1.0,
 ) -> Route:
     """The route over M creases between the nodes ``a`` and ``b`` (M,), none of which is a loop.
@@ -93,9 +93,7 @@ def find_route(
     return Route(made[:, 0], made[:, 1] == 1, float(_lengths(legs, placed).sum()), bound)
 
 
-def match(
-    nodes: NDArray[np.int64], positions: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], float]:
+def match(nodes: Ints, positions: Floats) -> tuple[Ints, float]:
     """Pairs (n / 2, 2) of an even number of ``nodes`` (n,), and a lower bound of their length in
     mm (0 where the nodes were halved).
     """
@@ -122,10 +120,7 @@ def match(
 
 
 def _split_cycles(
-    sent: NDArray[np.int64],
-    apart: NDArray[np.float64],
-    names: NDArray[np.int64],
-    pairs: list[tuple[int, int]],
+    sent: Ints, apart: Floats, names: Ints, pairs: list[tuple[int, int]]
 ) -> list[int]:
     """Append the pairs that the cycles of ``sent`` give, and return the nodes left alone."""
     alone: list[int] = []
@@ -153,19 +148,16 @@ def _split_cycles(
     return alone
 
 
-def _apart(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+def _apart(x: Floats, y: Floats) -> Floats:
     """The distances of points (..., 2); 0 to a point that is anywhere."""
-    found: NDArray[np.float64] = np.nan_to_num(np.linalg.norm(x - y, axis=-1), nan=0.0)
-    return found
+    return np.asarray(np.nan_to_num(np.linalg.norm(x - y, axis=-1), nan=0.0))
 
 
-def _lengths(legs: NDArray[np.int64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
+def _lengths(legs: Ints, positions: Floats) -> Floats:
     return _apart(positions[legs[:, 0]], positions[legs[:, 1]])
 
 
-def _exchange_gains(
-    some: NDArray[np.int64], legs: NDArray[np.int64], positions: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _exchange_gains(some: Ints, legs: Ints, positions: Floats) -> tuple[Floats, Bools]:
     """(m, n) what is gained by exchanging ``some`` legs (m, 2) with ``legs`` (n, 2), and whether
     straight (ac, bd) or crossed (ad, bc).
     """
@@ -176,12 +168,12 @@ def _exchange_gains(
     return now - np.minimum(straight, crossed), straight <= crossed
 
 
-def _exchange(legs: NDArray[np.int64], i: int, j: int, straight: bool) -> None:
+def _exchange(legs: Ints, i: int, j: int, straight: bool) -> None:
     (a, b), (c, d) = legs[i].tolist(), legs[j].tolist()
     legs[i], legs[j] = ((a, c), (b, d)) if straight else ((a, d), (b, c))
 
 
-def _exchanged(legs: NDArray[np.int64], positions: NDArray[np.float64]) -> NDArray[np.int64]:
+def _exchanged(legs: Ints, positions: Floats) -> Ints:
     """The legs after all exchanges of two that shorten them."""
     if len(legs) < 2:
         return legs
@@ -199,12 +191,7 @@ def _exchanged(legs: NDArray[np.int64], positions: NDArray[np.float64]) -> NDArr
                 _exchange(legs, i, j, bool(straight[i, j]))
 
 
-def _joined(
-    a: NDArray[np.int64],
-    b: NDArray[np.int64],
-    legs: NDArray[np.int64],
-    positions: NDArray[np.float64],
-) -> NDArray[np.int64]:
+def _joined(a: Ints, b: Ints, legs: Ints, positions: Floats) -> Ints:
     """The legs changed so that creases and legs are one component."""
     _, label = _components(a, b, legs, len(positions))
     if label.max() == 0:
@@ -225,12 +212,7 @@ def _joined(
     return legs
 
 
-def _begun(
-    used: NDArray[np.int64],
-    legs: NDArray[np.int64],
-    start: int,
-    positions: NDArray[np.float64],
-) -> NDArray[np.int64]:
+def _begun(used: Ints, legs: Ints, start: int, positions: Floats) -> Ints:
     """The legs of a closed tour through the nodes ``used`` with node ``start``, and after it the
     node that is anywhere, let in: in place of the leg that saves most, or at the nearest node.
     """
@@ -244,9 +226,7 @@ def _begun(
     return np.concatenate([np.delete(legs, k, axis=0), [[start, entry], [last, start + 1]]])
 
 
-def _components(
-    a: NDArray[np.int64], b: NDArray[np.int64], legs: NDArray[np.int64], nodes: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _components(a: Ints, b: Ints, legs: Ints, nodes: int) -> tuple[Ints, Ints]:
     """The nodes in use, and (N,) the component of each node, from 0 for those in use."""
     tails, heads = np.concatenate([a, legs[:, 0]]), np.concatenate([b, legs[:, 1]])
     graph = scipy.sparse.coo_array((np.ones(len(tails)), (tails, heads)), shape=(nodes, nodes))
@@ -257,12 +237,7 @@ def _components(
     return used, label
 
 
-def _with_bare_components(
-    a: NDArray[np.int64],
-    b: NDArray[np.int64],
-    legs: NDArray[np.int64],
-    positions: NDArray[np.float64],
-) -> NDArray[np.int64]:
+def _with_bare_components(a: Ints, b: Ints, legs: Ints, positions: Floats) -> Ints:
     """The legs with all components that have none joined to one that has."""
     used, label = _components(a, b, legs, len(positions))
     for bare in np.setdiff1d(label[used], label[legs[:, 0]]).tolist():
@@ -271,9 +246,7 @@ def _with_bare_components(
     return legs
 
 
-def _with_bare(
-    members: NDArray[np.int64], legs: NDArray[np.int64], positions: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def _with_bare(members: Ints, legs: Ints, positions: Floats) -> Ints:
     """The legs with the nodes ``members``, which have none, joined by the least detour of a leg."""
     ends = positions[legs]
     out = _apart(positions[members][:, None, None], ends[None]).sum(axis=2)

@@ -24,16 +24,12 @@ import itertools
 
 import numpy as np
 import scipy.sparse
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from miurafab.geometry.arrays import Floats, Ints
 
-def closed_tour(
-    tails: NDArray[np.int64],
-    heads: NDArray[np.int64],
-    ends: NDArray[np.float64],
-    corner: float,
-) -> NDArray[np.int64]:
+
+def closed_tour(tails: Ints, heads: Ints, ends: Floats, corner: float) -> Ints:
     """(M, 2) the edges in turn and the direction of each (1 for head to tail).
 
     ``tails`` and ``heads`` (M,) are the nodes of each edge and ``ends`` (M, 2, 2) where it is drawn
@@ -65,26 +61,23 @@ def closed_tour(
 class _Prices:
     """What the passes between half-edges cost, in mm."""
 
-    def __init__(
-        self, places: NDArray[np.float64], ways: NDArray[np.float64], corner: float
-    ) -> None:
+    def __init__(self, places: Floats, ways: Floats, corner: float) -> None:
         self.places, self.ways, self.corner = places, ways, corner
 
-    def of(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.float64]:
+    def of(self, i: Ints, j: Ints) -> Floats:
         """The price of each pass from i to j, the same both ways."""
         apart = np.nan_to_num(np.linalg.norm(self.places[i] - self.places[j], axis=-1))
         one, other = self.ways[i], self.ways[j]
         both = (one != 0).any(axis=-1) & (other != 0).any(axis=-1)
         turn = np.sqrt(np.clip((1 + np.einsum("...k,...k->...", one, other)) / 2, 0, 1))
-        price: NDArray[np.float64] = apart + self.corner * np.where(both, turn, 0.0)
-        return price
+        return np.asarray(apart + self.corner * np.where(both, turn, 0.0))
 
 
 _PAIRINGS = np.array([[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]])
 """The ways to pair four things: the first with the second, the third with the fourth."""
 
 
-def _cheapest(at: NDArray[np.int64], prices: _Prices) -> NDArray[np.int64]:
+def _cheapest(at: Ints, prices: _Prices) -> Ints:
     """(2 M,) the partner of each half-edge at its node."""
     partner = np.full(len(at), -1)
     order = np.argsort(at, kind="stable")
@@ -110,22 +103,16 @@ def _cheapest(at: NDArray[np.int64], prices: _Prices) -> NDArray[np.int64]:
     return partner
 
 
-def _trails(partner: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+def _trails(partner: Ints, count: int) -> Ints:
     """(2 M,) the closed trail that each half-edge is part of."""
     half = np.arange(2 * count)
     rows = np.concatenate([half, half])
     columns = np.concatenate([(half + count) % (2 * count), partner])
     graph = scipy.sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(2 * count,) * 2)
-    label: NDArray[np.int64] = connected_components(graph, directed=False)[1].astype(np.int64)
-    return label
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _join(
-    partner: NDArray[np.int64],
-    trail: NDArray[np.int64],
-    at: NDArray[np.int64],
-    prices: _Prices,
-) -> None:
+def _join(partner: Ints, trail: Ints, at: Ints, prices: _Prices) -> None:
     """Exchange partners, the cheapest exchange first, where that joins two trails."""
     one, other = _meeting(partner, trail, at)
     partner_one, partner_other = partner[one], partner[other]
@@ -158,9 +145,7 @@ def _join(
             partner[i], partner[j] = j, i
 
 
-def _meeting(
-    partner: NDArray[np.int64], trail: NDArray[np.int64], at: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _meeting(partner: Ints, trail: Ints, at: Ints) -> tuple[Ints, Ints]:
     """Half-edges of two pairs at one node that are parts of two trails, one of each pair."""
     pairs = np.flatnonzero(np.arange(len(partner)) < partner)
     pairs = pairs[np.argsort(at[pairs], kind="stable")]

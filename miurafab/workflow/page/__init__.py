@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.contact import triangulate
 from miurafab.version import __version__
@@ -40,7 +41,7 @@ class Slider:
 
     names: tuple[str, ...] = ()
     start: int = 0
-    strain: NDArray[np.float64] | None = None
+    strain: Floats | None = None
     show_strain: bool = False
 
 
@@ -50,7 +51,7 @@ def write_page(
     title: str,
     preview: Preview | None = None,
     pattern: CreasePattern | None = None,
-    motion: NDArray[np.float64] | None = None,
+    motion: Floats | None = None,
     slider: Slider | None = None,
 ) -> None:
     """Write the page of a ``preview``, of a ``pattern``, or of both, to ``path``.
@@ -68,7 +69,7 @@ def page_text(
     title: str,
     preview: Preview | None = None,
     pattern: CreasePattern | None = None,
-    motion: NDArray[np.float64] | None = None,
+    motion: Floats | None = None,
     slider: Slider | None = None,
 ) -> str:
     """The text of the page that :func:`write_page` writes."""
@@ -103,10 +104,7 @@ def _json(data: dict[str, Any]) -> str:
 
 
 def _data(
-    preview: Preview | None,
-    pattern: CreasePattern | None,
-    motion: NDArray[np.float64] | None,
-    slider: Slider,
+    preview: Preview | None, pattern: CreasePattern | None, motion: Floats | None, slider: Slider
 ) -> dict[str, Any]:
     facts = {}
     if preview is not None:
@@ -154,9 +152,7 @@ def _sheet(preview: Preview, sheet: SheetPreview) -> dict[str, Any]:
     }
 
 
-def _fold(
-    pattern: CreasePattern, motion: NDArray[np.float64] | None, slider: Slider
-) -> dict[str, Any]:
+def _fold(pattern: CreasePattern, motion: Floats | None, slider: Slider) -> dict[str, Any]:
     assignments = [letter for letter in ASSIGNMENTS if np.any(pattern.edges_assignment == letter)]
     kinds = np.array([assignments.index(letter) for letter in pattern.edges_assignment.tolist()])
     ends = pattern.vertices_coords[pattern.edges_vertices]
@@ -182,7 +178,7 @@ def _fold(
     }
 
 
-def _strain(slider: Slider, owners: NDArray[np.int64]) -> dict[str, Any] | None:
+def _strain(slider: Slider, owners: Ints) -> dict[str, Any] | None:
     """Strains in 255ths of the greatest, and the facet of each triangle."""
     if slider.strain is None:
         return None
@@ -195,12 +191,12 @@ def _strain(slider: Slider, owners: NDArray[np.int64]) -> dict[str, Any] | None:
     }
 
 
-def _form(name: str, frames: NDArray[np.float64], *, flat: bool = False) -> dict[str, Any]:
+def _form(name: str, frames: Floats, *, flat: bool = False) -> dict[str, Any]:
     box, packed = _packed(frames.reshape(-1, 3))
     return {"name": name, "flat": flat, "frames": len(frames), "box": box, "points": packed}
 
 
-def _packed(points: NDArray[np.float64]) -> tuple[list[float], str]:
+def _packed(points: Floats) -> tuple[list[float], str]:
     """Points (n, d) as a box [low..., size...] and 16-bit fractions of it."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = high - low
