@@ -19,7 +19,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, Literal, TypeVar, get_type_hints
 
 from miurafab.errors import OptionError, UnitError
 from miurafab.units import parse_angle, parse_feed, parse_length, parse_pressure
@@ -354,8 +354,8 @@ class Declared:
     """One option as everybody who shows or reads it sees it.
 
     ``name`` is its name outside, ``field`` that of the dataclass field. ``default`` is the value
-    inside if nobody gives it; ``default_text`` how that is written, empty for none.
-    ``page`` says whether the form of the page has it.
+    inside if nobody gives it; ``default_text`` how that is written, empty for none. ``page`` is
+    where the form of the page has it: ``first``, under ``more``, or not at all (empty).
     """
 
     name: str
@@ -365,7 +365,12 @@ class Declared:
     group: str
     default: Any
     default_text: str
-    page: bool
+    page: str
+
+    @property
+    def label(self) -> str:
+        """What its field on the page is called."""
+        return self.name.replace("_", " ").capitalize()
 
 
 REQUIRED: Any = dataclasses.MISSING
@@ -378,7 +383,7 @@ def option(
     *,
     group: str = "",
     default_text: str | None = None,
-    page: bool = True,
+    page: Literal["first", "more", ""] = "",
 ) -> Any:
     """Declare an option as a field of a frozen dataclass.
 
@@ -395,8 +400,8 @@ def option(
         The heading under which help shows it.
     default_text : str, optional
         What holds where ``default`` is None, such as ``the material's``.
-    page : bool
-        Whether the form of the page has it.
+    page : str
+        Where the form of the page has it: ``first``, under ``more``, or not at all (empty).
     """
     shown = default_text
     if shown is None:

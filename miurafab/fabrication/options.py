@@ -44,41 +44,42 @@ class NestingOptions:
     """The sheets on which patches are nested."""
 
     quantity: int = option(
-        Whole(1, 1000), "How many of the whole model to make.", default=1, group="Sheets"
+        Whole(1, 1000),
+        "How many of the whole model to make.",
+        default=1,
+        group="Sheets",
+        page="first",
     )
     stock: Path | None = option(
         File(),
         "A TOML file with the sheets to use: sizes, quantities, defects.",
         group="Sheets",
         default_text="as many sheets of the bed's size as it takes",
-        page=False,
     )
     margin_mm: float | None = option(
         length(0, 100),
         "Kept free along the sheet's edges.",
         group="Sheets",
         default_text="the machine's",
+        page="more",
     )
     grain: str | None = option(
         Choice(GRAINS),
         "How the fibres run in sheets that do not say so themselves.",
         group="Sheets",
         default_text="the material's",
-        page=False,
     )
     along_grain: str | None = option(
         Choice(("x", "y")),
         "The pattern's axis that is laid along the fibres.",
         group="Sheets",
         default_text="x",
-        page=False,
     )
     rotations: tuple[int, ...] = option(
         Several(Whole(0, 359), distinct),
         "Whole degrees by which patches may be turned on the sheet.",
         default=(0, 90, 180, 270),
         group="Sheets",
-        page=False,
     )
 
     def __post_init__(self) -> None:
@@ -90,58 +91,68 @@ class LayoutOptions:
     """How a pattern is laid out. Sizes are (longer, shorter) side in mm."""
 
     gap_mm: float = option(
-        length(0, 100), "Kept between patches on a sheet.", default=2.0, group="Patches"
+        length(0, 100),
+        "Kept between patches on a sheet.",
+        default=2.0,
+        group="Patches",
+        page="first",
     )
     offcuts_mm: tuple[tuple[float, float], ...] = option(
-        Several(SIDES), "Left-over sheets to use up first.", default=(), group="Sheets"
+        Several(SIDES),
+        "Left-over sheets to use up first.",
+        default=(),
+        group="Sheets",
+        page="more",
     )
     max_patch_mm: tuple[float, float] | None = option(
-        SIDES, "The largest patch.", group="Patches", default_text="the bed"
+        SIDES,
+        "The largest patch.",
+        group="Patches",
+        default_text="the bed",
+        page="first",
     )
     seam_rows: tuple[int, ...] = option(
         Several(LINES, distinct),
         "Rows of facets after which the pattern is cut in any case.",
         default=(),
         group="Patches",
-        page=False,
     )
     seam_columns: tuple[int, ...] = option(
         Several(LINES, distinct),
         "Columns of facets after which the pattern is cut in any case.",
         default=(),
         group="Patches",
-        page=False,
     )
     open_row: int | None = option(
         LINES,
         "Open a closed ring after this row of facets, and count rows from it.",
         group="Patches",
         default_text="where it is open already",
-        page=False,
     )
     open_column: int | None = option(
         LINES,
         "Open a closed ring after this column of facets, and count columns from it.",
         group="Patches",
         default_text="where it is open already",
-        page=False,
     )
     tab_height_mm: float | None = option(
-        length(0.5, 100), "Height of the tabs.", group="Tabs", default_text="the material's"
+        length(0.5, 100),
+        "Height of the tabs.",
+        group="Tabs",
+        default_text="the material's",
+        page="more",
     )
     tab_inset_mm: float | None = option(
         length(0, 100),
         "Distance of the tabs from the borders of the facet that they are glued to.",
         group="Tabs",
         default_text="the material's",
-        page=False,
     )
     tab_angle: float | None = option(
         angle(5, 180),
         "Largest inner angle at the base of a tab.",
         group="Tabs",
         default_text="the material's",
-        page=False,
     )
     tab_side: str = option(
         Choice(TAB_SIDES),
@@ -149,33 +160,42 @@ class LayoutOptions:
         "alternate: both in turn, edge by edge.",
         default="lower",
         group="Tabs",
+        page="more",
     )
     full_facet: bool = option(
         Flag(),
         "Make each tab as large as the facet that it is glued to, less the inset.",
         default=False,
         group="Tabs",
+        page="more",
     )
     two_sided: bool = option(
         Flag(),
         "Score the valleys from the back of the sheet.",
         default=False,
         group="Cutting",
+        page="more",
     )
     bridges: int = option(
         Whole(0, 12),
         "Places in which each outline is left whole so that nothing falls out: 0, or 2 and more.",
         default=0,
         group="Cutting",
+        page="more",
     )
     bridge_mm: float = option(
-        length(0.1, 20), "Length of a holding bridge.", default=BRIDGE_MM, group="Cutting"
+        length(0.1, 20),
+        "Length of a holding bridge.",
+        default=BRIDGE_MM,
+        group="Cutting",
+        page="more",
     )
     spread_heat: bool = option(
         Flag(),
         "Cut neighbouring patches far apart in time.",
         default=False,
         group="Cutting",
+        page="more",
     )
     nesting: NestingOptions = field(default_factory=NestingOptions)
 

@@ -26,9 +26,9 @@ from urllib.parse import unquote
 
 import miurafab
 from miurafab.errors import MiurafabError
-from miurafab.fabrication.options import TAB_SIDES
 from miurafab.origami.fitting.request import DEFAULT_FACETS, DEFAULT_SIZE_MM, FACETS
 from miurafab.profiles import load_machine, load_material, shipped_names
+from miurafab.studio.form import by_label, filled
 from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
 from miurafab.studio.orders import read_fit, read_layout, read_source
@@ -65,12 +65,13 @@ class Studio:
                 return self._post(route, request)
             return self._get(route, request.path.partition("?")[2])
         except MiurafabError as fault:
-            return refusal(400, str(fault))
+            return refusal(400, by_label(fault.sentence))
 
     def _get(self, route: str, query: str) -> Response:
         if route in ("", *PARTS):
             name = route or PAGE
-            return own_file(name, self._page.joinpath(name).read_bytes())
+            content = self._page.joinpath(name).read_bytes()
+            return own_file(name, filled(content.decode()).encode() if name == PAGE else content)
         if route == "catalogue":
             return answer({**self._catalogue, "first": self._first})
         if route == "state":
@@ -120,7 +121,6 @@ def _catalogue() -> dict[str, Any]:
             {"name": name, "title": load_material(name).title}
             for name in shipped_names("materials")
         ],
-        "tab_sides": TAB_SIDES,
         "file_suffixes": (*MESH_SUFFIXES, PATTERN_SUFFIX),
         "file_limit": FILE_LIMIT,
         "defaults": {

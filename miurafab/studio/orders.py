@@ -2,8 +2,8 @@
 
 Nothing that comes from the browser is ever taken for a path. A surface, a machine or a material is
 one of those that are listed, its parameters are numbers, and a file is the number of one that was
-given to the studio before. Options are those of ``miurafab fit`` and ``miurafab sheets`` that name
-no file, in their written form.
+given to the studio before. Options are those that the page has a field for
+(:mod:`~miurafab.studio.form`); none of them names a file.
 """
 
 from __future__ import annotations
@@ -14,24 +14,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from miurafab.errors import InputError, TargetError
+from miurafab.options import Declared, Flag, Whole
 from miurafab.profiles import shipped_names
+from miurafab.studio.form import FIT, LAYOUT
+from miurafab.studio.recipe import Value
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface
 from miurafab.workflow.design import design
 from miurafab.workflow.job_directory import layout_options
-
-FIT_OPTIONS = (
-    "facets",
-    "size",
-    "min_edge",
-    "max_deviation",
-    "amplitude",
-    "zigzag",
-    "flat_foldable",
-    "close",
-)
-LAYOUT_TEXTS = ("gap", "margin", "max_patch", "offcuts", "tab_height", "tab_side", "bridge")
-LAYOUT_NUMBERS = ("quantity", "bridges")
-LAYOUT_FLAGS = ("full_facet", "two_sided", "spread_heat")
 
 _LONGEST = 200
 
@@ -43,7 +32,7 @@ class FitOrder:
     surface: str | None
     parameters: Mapping[str, str]
     source: str | None
-    options: Mapping[str, str]
+    options: Mapping[str, Value]
 
     @property
     def target(self) -> str:
@@ -59,7 +48,7 @@ class LayoutOrder:
 
     machine: str
     material: str
-    options: Mapping[str, str | int | bool] = field(default_factory=dict)
+    options: Mapping[str, Value] = field(default_factory=dict)
 
 
 def read_fit(body: bytes) -> FitOrder:
@@ -69,13 +58,13 @@ def read_fit(body: bytes) -> FitOrder:
     """
     order = _read(body, ("target", "options"))
     target = _table(order.get("target"), "The target")
-    options = _texts(_table(order.get("options", {}), "The options"), FIT_OPTIONS)
+    options = _options(order.get("options", {}), FIT)
     if "source" in target:
         return FitOrder(None, {}, _text("source", target["source"]), options)
     return _named(_text("surface", target.get("surface")), target.get("parameters", {}), options)
 
 
-def _named(surface: str, parameters: Any, options: Mapping[str, str]) -> FitOrder:
+def _named(surface: str, parameters: Any, options: Mapping[str, Value]) -> FitOrder:
     if surface not in CATALOGUE:
         raise TargetError(f"'{surface}' is not a known surface.")
     given = _texts(_table(parameters, "The parameters"), tuple(CATALOGUE[surface].parameters))
@@ -98,26 +87,27 @@ def read_layout(body: bytes) -> LayoutOrder:
     order = _read(body, ("machine", "material", "options"))
     machine = _listed("machine", order.get("machine"), shipped_names("firmware_profiles"))
     material = _listed("material", order.get("material"), shipped_names("materials"))
-    given = _table(order.get("options", {}), "The options")
-    options: dict[str, str | int | bool] = {}
-    for key, value in given.items():
-        if key in LAYOUT_FLAGS and isinstance(value, bool):
-            if value:
-                options[key] = True
-        elif key in LAYOUT_NUMBERS:
-            text = _text(key, value)
-            if text and not (text.isascii() and text.isdigit()):
-                raise InputError(f"The layout options: '{key}' is '{text}', not a whole number.")
-            if text:
-                options[key] = int(text)
-        elif key in LAYOUT_TEXTS:
-            text = _text(key, value)
-            if text:
-                options[key] = text
-        else:
-            raise InputError(f"The layout options: '{key[:40]}' cannot be set here.")
+    options = _options(order.get("options", {}), LAYOUT)
     layout_options(options)
     return LayoutOrder(machine, material, options)
+
+
+def _options(given: Any, fields: Mapping[str, Declared]) -> dict[str, Value]:
+    """The options that were filled in, as a design file writes them."""
+    options: dict[str, Value] = {}
+    for name, value in _table(given, "The options").items():
+        if name not in fields:
+            raise InputError(f"'{name[:40]}' cannot be set here.")
+        kind = fields[name].kind
+        if isinstance(kind, Flag) and isinstance(value, bool):
+            if value:
+                options[name] = True
+            continue
+        text = _text(name, value)
+        if text:
+            whole = isinstance(kind, Whole) and text.isascii() and text.isdigit()
+            options[name] = int(text) if whole else text
+    return options
 
 
 def _read(body: bytes, keys: tuple[str, ...]) -> dict[str, Any]:

@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from miurafab.errors import InputError, spell_options
+from miurafab.errors import InputError
 from miurafab.studio import recipe
+from miurafab.studio.form import by_label
 from miurafab.studio.names import safe_stem, suffix_of
 from miurafab.studio.orders import FitOrder, LayoutOrder
 from miurafab.studio.report_text import headline, layout_lines, layout_warnings, pattern_lines
@@ -69,7 +70,7 @@ class Asked:
     command: str
     file: str
     target: Mapping[str, str] | None = None
-    options: Mapping[str, str] = field(default_factory=dict)
+    options: Mapping[str, recipe.Value] = field(default_factory=dict)
     layout: LayoutOrder | None = None
 
 
@@ -279,10 +280,10 @@ class Bench:
         ]
 
     def _plain(self, sentence: str) -> str:
-        """``sentence`` with files of the studio's own folder called by their names alone, and the
-        names of options in quotes.
+        """``sentence`` with files of the studio's own folder called by their names alone, and
+        options as their fields are called.
         """
-        return spell_options(self._own.sub("", sentence), lambda name: f"'{name}'")
+        return by_label(self._own.sub("", sentence))
 
     def _begin(self, do: str, name: str, **what: Any) -> None:
         number = self._number()

@@ -205,7 +205,7 @@ def _progress(tell: Tell, low: float, high: float) -> Callable[[float, str], Non
 def failure(fault: MiurafabError | OSError | MemoryError) -> str:
     """What went wrong, in one sentence."""
     if isinstance(fault, MemoryError):
-        return "This computer has not enough memory for that; ask for fewer --facets."
+        return "This computer has not enough memory for that; ask for fewer `facets`."
     if isinstance(fault, OSError):
         return f"A file could not be read or written: {fault.strerror or fault}."
-    return str(fault)
+    return fault.sentence

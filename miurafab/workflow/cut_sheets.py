@@ -71,7 +71,7 @@ class CutOptions:
     )
     resume: bool = option(
         Flag(),
-        "Go on with what was interrupted; needs home or at, once stopped.",
+        "Go on with what was interrupted; needs `home` or `at`, once stopped.",
         default=False,
         group="Start",
     )

@@ -9,6 +9,7 @@ import re
 
 from pages import PAGES
 
+from miurafab.errors import spell_options
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.options import declared
 from miurafab.origami.fitting.request import FitOptions
@@ -17,6 +18,11 @@ from miurafab.workflow.cut_sheets import CutOptions
 CLASSES = {each.__name__: each for each in (FitOptions, LayoutOptions, CutOptions)}
 
 TABLE = re.compile(r"(<!-- options of (\w+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
+
+
+def flag(name):
+    """An option as the command line writes it."""
+    return f"--{name.replace('_', '-')}"
 
 
 def table(cls):
@@ -29,8 +35,11 @@ def table(cls):
         if option.group != group:
             group = option.group
             lines.append(f"| **{group}** | | |")
-        flag = f"--{option.name.replace('_', '-')} {option.kind.metavar}".strip()
-        cells = (f"`{flag}`", option.help, option.default_text)
+        cells = (
+            f"`{f'{flag(option.name)} {option.kind.metavar}'.strip()}`",
+            spell_options(option.help, lambda name: f"`{flag(name)}`"),
+            option.default_text,
+        )
         lines.append("| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
 

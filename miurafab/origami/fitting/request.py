@@ -93,28 +93,32 @@ class FitOptions:
 
     facets: tuple[int, int] | None = option(
         FACETS,
-        "Columns and rows of facets.",
+        "Columns and rows of facets; left out with both `max_deviation` and `min_edge`, the "
+        "coarsest sheet that meets them.",
         group="Sheet",
-        default_text=f"{FACETS.show(DEFAULT_FACETS)}; with both max-deviation and min-edge, "
-        "the coarsest sheet that meets them",
+        default_text=FACETS.show(DEFAULT_FACETS),
+        page="first",
     )
     size_mm: float | None = option(
         length(above=True),
         "Longest side of the folded bounding box.",
         group="Sheet",
         default_text=f"{DEFAULT_SIZE_MM:g} mm; a mesh keeps its file's size",
+        page="first",
     )
     amplitude: float | None = option(
         number(0, above=True),
         "Height of the corrugation over the row spacing.",
         group="Sheet",
         default_text="automatic",
+        page="more",
     )
     zigzag: float | None = option(
         number(0, above=True),
         "Zig-zag over the column spacing.",
         group="Sheet",
         default_text="automatic",
+        page="more",
     )
     close: str = option(
         Choice(CLOSINGS),
@@ -122,6 +126,7 @@ class FitOptions:
         "(all round but one facet), or seam (all round, to be glued).",
         default="sector",
         group="Sheet",
+        page="more",
     )
     follow: Follow = option(
         Choice(get_args(Follow)),
@@ -132,17 +137,23 @@ class FitOptions:
     )
     flat_foldable: float | None = option(
         FlatFoldability(),
-        "Largest |pi - a1 - a3| at a vertex, with its unit: 0.016rad or 0.9deg.",
+        "Largest |pi - a1 - a3| at a vertex: exact (0), off, or a limit with its unit, such as "
+        "0.016rad or 0.9deg.",
         group="Limits",
         default_text="off",
+        page="more",
     )
     min_edge_mm: float | None = option(
-        length(above=True), "The shortest edge allowed.", group="Limits"
+        length(above=True),
+        "The shortest edge allowed.",
+        group="Limits",
+        page="first",
     )
     max_deviation_mm: float | None = option(
         length(above=True),
         "The farthest that the mid-surface may lie from the target.",
         group="Limits",
+        page="more",
     )
     min_angle: float | None = option(
         angle(0, 90), "The least sector angle allowed.", group="Limits"

@@ -1,5 +1,5 @@
-// The forms: filled from the catalogue, read back as orders. Values stay as they were written, with
-// their units; only an angle without one is given degrees, which is what its field says.
+// The forms: surfaces, machines and materials filled in from the catalogue, all read back as orders.
+// Values stay as they were written.
 
 import { byId, element } from "./tools.js";
 
@@ -14,9 +14,6 @@ export function fillForms(given) {
   byId("size").value = defaults.size;
   options(byId("machine"), given.machines, first?.machine ?? defaults.machine);
   options(byId("material"), given.materials, first?.material ?? defaults.material);
-  byId("tab_side").append(...given.tab_sides.map((side, at) => (
-    element("option", { value: at ? side : "", textContent: side })
-  )));
   byId("file").accept = given.file_suffixes.join(",");
   byId("file-help").textContent = `${given.file_suffixes.join(" ")}, up to ${given.file_limit >> 20} MB; or drop it here`;
   byId("target").addEventListener("change", () => showTarget());
@@ -102,8 +99,7 @@ export function fitOrder() {
   if (source?.kind === "pattern") return ["open", { source: source.id }];
   const target = source ? { source: source.id } : { surface: surface.name, parameters: {} };
   for (const { key, unit, default: usual } of surface?.parameters ?? []) {
-    const text = byId(`parameter-${key}`).value.trim();
-    const value = unit && /^[-+.\deE]+$/.test(text) ? text + unit : text;
+    const value = byId(`parameter-${key}`).value.trim();
     if (value && value !== `${usual}${unit}`) target.parameters[key] = value;
   }
   return ["fit", { target, options: values("sheet-options") }];
