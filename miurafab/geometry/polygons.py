@@ -6,6 +6,9 @@ than k corners. ``points`` are (V, 2) or (V, 3).
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
+
 import numpy as np
 
 from miurafab.geometry.arrays import Floats, Ints
@@ -14,6 +17,32 @@ from miurafab.geometry.arrays import Floats, Ints
 def filled(faces: Ints) -> Ints:
     """``faces`` (F, k) with the first corner of each face in place of -1."""
     return np.where(faces >= 0, faces, faces[:, :1])
+
+
+def next_corners(faces: Ints) -> Ints:
+    """(F, k) the slot of the corner after each corner; 0 after the last corner of a face."""
+    slot = np.broadcast_to(np.arange(faces.shape[1]) + 1, faces.shape)
+    return np.where(slot < (faces >= 0).sum(axis=1)[:, None], slot, 0)
+
+
+def previous_corners(faces: Ints) -> Ints:
+    """(F, k) the slot of the corner before each corner; the last corner before slot 0."""
+    slot = np.broadcast_to(np.arange(faces.shape[1]), faces.shape)
+    return np.where(slot > 0, slot - 1, (faces >= 0).sum(axis=1)[:, None] - 1)
+
+
+def reversed_faces(faces: Ints) -> Ints:
+    """``faces`` (F, k) with the corners of each face in the opposite order."""
+    sizes = (faces >= 0).sum(axis=1)[:, None]
+    slot = np.arange(faces.shape[1])
+    return np.take_along_axis(faces, np.where(slot < sizes, sizes - 1 - slot, slot), axis=1)
+
+
+def sides_and_diagonals(faces: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """For each pair of corners: the faces (n,) that have both, and the two vertices (n, 2)."""
+    for pair in itertools.combinations(range(faces.shape[1]), 2):
+        having = np.flatnonzero(faces[:, pair[1]] >= 0)
+        yield having, faces[having][:, pair]
 
 
 def facet_means(points: Floats, faces: Ints) -> Floats:

@@ -1,8 +1,8 @@
-"""Generalized cylinders by direct construction: no solver, every constraint met by algebra.
+"""Generalized cylinders by direct construction: algebra meets every constraint, without a solver.
 
 The profile is a zig-zag polyline P_j in the plane across the axis, with unit segments d_j in the
-directions theta_j. Columns are a step a apart along the axis, and alternate columns are pushed
-along v_j, the one vector by which neighbouring facets stay planar:
+directions theta_j. Columns are a step a apart along the axis. Alternate columns are shifted along
+v_j, the only direction that keeps neighbouring facets planar:
 
     X_ij = (i a, P_j + h_i v_j),   v_j = (-1)^j (d_{j-1} + d_j) / sin(theta_{j-1} - theta_j)
 
@@ -24,8 +24,8 @@ from miurafab.surfaces.analytic import GeneralizedCylinder
 def cylinder_over_polyline(profile: Floats, step: float, push: float, columns: int) -> Tessellation:
     """The tessellation of ``columns`` x (n - 2) vertices over a zig-zag polyline.
 
-    ``profile`` (n, 2) are y and z of the polyline, the first and last point serving only for the
-    directions at the ends; columns are ``step`` apart and pushed by +-``push`` / 2.
+    ``profile`` (n, 2) are y and z of the polyline; its first and last point only give the
+    directions at the ends. Columns are ``step`` apart and shifted by +-``push`` / 2.
     """
     segments = np.diff(profile, axis=0)
     d = segments / np.linalg.norm(segments, axis=1, keepdims=True)
@@ -51,11 +51,11 @@ def cylinder_on(
     """The tessellation of ``columns`` x ``rows`` vertices on a generalized cylinder.
 
     ``amplitude`` is the height of the corrugation over the row spacing, ``zigzag`` the zig-zag
-    over the column spacing. The zig-zag profile has its vertices evenly spaced along the curve,
-    half the height above and below it; ``level`` lifts the sheet by that part of the height.
+    over the column spacing. The vertices of the profile are evenly spaced along the curve, half the
+    height above and below it; ``level`` lifts the sheet by that part of the height.
 
-    Around a closed profile, and with an odd number of ``rows``, the zig-zag comes round to where it
-    began: the sheet is a tube, its last row of vertices being its first.
+    On a closed profile, with an odd number of ``rows``, the sheet is a tube whose last row of
+    vertices is its first row.
     """
     if surface.closed and rows % 2:
         around = np.arange(-2, rows + 2) % (rows - 1)

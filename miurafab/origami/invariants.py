@@ -1,8 +1,8 @@
-"""The conditions of a pattern measured from its arrays alone, whatever its facets look like.
+"""The invariants of a pattern, measured from its arrays alone, for facets of any shape.
 
-The solver works on a regular grid; this module does not, so that what the solver claims is
-measured by other code. Corners are numbered h = facet * k + corner; going round a vertex is the
-permutation that takes each corner to the next one counter-clockwise.
+The solver works on a regular grid and this module does not, so that other code measures what the
+solver claims. Corners are numbered h = facet * k + corner. The ring around a vertex is a
+permutation that maps each corner to the next corner counter-clockwise.
 """
 
 from __future__ import annotations
@@ -13,7 +13,12 @@ import numpy as np
 
 from miurafab.geometry.angles import angle_between
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.polygons import edge_lengths
+from miurafab.geometry.polygons import (
+    edge_lengths,
+    next_corners,
+    previous_corners,
+    sides_and_diagonals,
+)
 from miurafab.origami.crease_pattern import CreasePattern
 
 DEGENERATE = 1e-6
@@ -22,9 +27,10 @@ DEGENERATE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class CornerRing:
-    """The corners of all facets: ``vertex`` (C,), the corner's sector ``angle`` (C,) in the folded
-    form, and the next corner counter-clockwise about the vertex, -1 at a border; C = F * k, and
-    corners that a facet does not have hold vertex -1.
+    """The C = F * k corners of all facets.
+
+    ``vertex`` (C,) is -1 where a facet has fewer corners; ``angle`` (C,) is the sector angle;
+    ``following`` (C,) the next corner counter-clockwise about the vertex, -1 at a border.
     """
 
     vertex: Ints
@@ -36,24 +42,21 @@ def corner_ring(pattern: CreasePattern, points: Floats) -> CornerRing:
     """The corners of ``pattern`` with their angles in ``points`` (V, 3)."""
     faces = pattern.faces_vertices
     count, k = faces.shape
-    sizes = (faces >= 0).sum(axis=1)[:, None]
-    slot = np.arange(k)[None, :]
-    after = np.where(slot + 1 < sizes, slot + 1, 0)
-    before = np.where(slot > 0, slot - 1, sizes - 1)
+    after, before = next_corners(faces), previous_corners(faces)
     real = faces >= 0
-    here: Floats = points[faces]
+    here = points[faces]
     to_next = points[np.take_along_axis(faces, after, axis=1)] - here
     to_previous = points[np.take_along_axis(faces, before, axis=1)] - here
     angle = np.where(real, angle_between(to_next, to_previous), 0.0)
 
-    # the corner that starts each directed side: sides[e, 0] runs with the edge, sides[e, 1] against
+    # the corner that starts each directed side: sides[e, 0] along the edge, sides[e, 1] against it
     sides = np.full((len(pattern.edges_vertices), 2), -1, dtype=np.int64)
     edges = pattern.faces_edges
     face, corner = np.nonzero(real)
     edge = edges[face, corner]
     against = (pattern.edges_vertices[edge, 0] != faces[face, corner]).astype(np.int64)
     sides[edge, against] = face * k + corner
-    # counter-clockwise next: the side that leaves this vertex along our incoming side
+    # the next corner counter-clockwise starts the side opposite to the incoming side
     incoming = np.take_along_axis(edges, before, axis=1)[face, corner]
     leaves_against = (pattern.edges_vertices[incoming, 0] != faces[face, corner]).astype(np.int64)
     following = np.full(count * k, -1, dtype=np.int64)
@@ -70,11 +73,11 @@ def interior_vertices(pattern: CreasePattern) -> Ints:
     return np.flatnonzero(inside)
 
 
-def angle_surplus(ring: CornerRing, vertices: Ints) -> Floats:
-    """(I,) sum of the sector angles minus 2 pi at ``vertices``, radians: developability."""
+def angle_defect(ring: CornerRing, vertices: Ints) -> Floats:
+    """(I,) 2 pi minus the sum of the sector angles at ``vertices``, radians; 0 is developable."""
     real = ring.vertex >= 0
     total = np.bincount(ring.vertex[real], ring.angle[real], minlength=int(vertices.max()) + 1)
-    return np.asarray(total[vertices] - 2 * np.pi, dtype=np.float64)
+    return np.asarray(2 * np.pi - total[vertices])
 
 
 def kawasaki_residual(ring: CornerRing, vertices: Ints) -> Floats:
@@ -97,8 +100,7 @@ def kawasaki_residual(ring: CornerRing, vertices: Ints) -> Floats:
         done |= at == first
         parity = 1 - parity
     odd = steps % 2 == 1
-    residual: Floats = np.where(odd, np.pi, np.abs(sums[0] - np.pi))
-    return residual
+    return np.where(odd, np.pi, np.abs(sums[0] - np.pi))
 
 
 def facet_planarity(pattern: CreasePattern, points: Floats) -> Floats:
@@ -120,22 +122,18 @@ def facet_planarity(pattern: CreasePattern, points: Floats) -> Floats:
 def isometry(pattern: CreasePattern) -> Floats:
     """(F,) the largest relative difference, flat to folded, of each facet's sides and diagonals.
 
-    The diagonals make it an isometry of the facet and not only of its border. A side that is
-    degenerate in both forms has no relative difference; the audit names it by itself.
+    With the diagonals it is an isometry of the facet and not of its border alone. A side that is
+    degenerate in both forms counts as 0; verification reports it on its own.
     """
     assert pattern.folded_coords is not None
     faces = pattern.faces_vertices
     mean = float(edge_lengths(pattern.folded_coords, pattern.edges_vertices).mean())
     worst = np.zeros(len(faces))
-    k = faces.shape[1]
-    for one in range(k):
-        for other in range(one + 1, k):
-            real = faces[:, other] >= 0
-            ends = faces[real][:, [one, other]]
-            flat = edge_lengths(pattern.vertices_coords, ends)
-            folded = edge_lengths(pattern.folded_coords, ends)
-            longer = np.maximum(flat, folded)
-            sound = longer > DEGENERATE * mean
-            difference = np.where(sound, np.abs(flat - folded) / np.where(sound, longer, 1.0), 0.0)
-            worst[real] = np.maximum(worst[real], difference)
+    for facets, ends in sides_and_diagonals(faces):
+        flat = edge_lengths(pattern.vertices_coords, ends)
+        folded = edge_lengths(pattern.folded_coords, ends)
+        longer = np.maximum(flat, folded)
+        sound = longer > DEGENERATE * mean
+        difference = np.where(sound, np.abs(flat - folded) / np.where(sound, longer, 1.0), 0.0)
+        worst[facets] = np.maximum(worst[facets], difference)
     return worst

@@ -1,4 +1,4 @@
-"""The regular Miura-ori in closed form: the oracle that everything else is tested against.
+"""The regular Miura-ori in closed form: the reference of the tests.
 
 One cell has parallelogram facets with sides a (across the rows) and b (along them) and acute angle
 alpha. Folded by theta (the angle between facets and the base plane's normal section):

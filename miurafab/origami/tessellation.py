@@ -1,6 +1,7 @@
-"""A tessellation: a regular grid of vertices, in folded form, that is or is to become an origami.
+"""A tessellation: a regular grid of vertices in folded form, exact or not yet exact.
 
-Polylines of vertices with the same row index zig-zag along i; ridges and valleys alternate in j.
+Vertices with the same row index j form a polyline that zig-zags along i. Ridges and valleys
+alternate in j.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.geometry.arrays import Floats
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.geometry.quads import QuadGrid
 
 
@@ -36,15 +38,12 @@ class Tessellation:
     @property
     def edge_lengths(self) -> Floats:
         """(E,) lengths in the order of ``grid.edges_vertices``."""
-        ends = self.vertices[self.grid.edges_vertices]
-        lengths: Floats = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        return lengths
+        return edge_lengths(self.vertices, self.grid.edges_vertices)
 
     @property
     def midsurface(self) -> Floats:
-        """(F, 3) the means of each facet's corners, on which the up and down of the rows cancel."""
-        middle: Floats = self.vertices[self.grid.faces_vertices].mean(axis=1)
-        return middle
+        """(F, 3) the mean of each facet's corners, where the up and down of the rows cancels."""
+        return np.asarray(self.vertices[self.grid.faces_vertices].mean(axis=1))
 
     def scaled(self, factor: float) -> Tessellation:
         """The same tessellation, ``factor`` times as large."""

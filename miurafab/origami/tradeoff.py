@@ -1,12 +1,12 @@
-"""Accuracy against effort: how near a sheet comes to its target for how many facets.
+"""Accuracy against effort: the distance of a sheet from its target for a number of facets.
 
 Let n be the facets along a side (the root of their number F), d the Hausdorff distance between
 sheet and target over the diagonal of the folded form, A the area of the paper and A0 that of the
-target. A corrugation of height in proportion to its facets gives
+target. A corrugation whose height is proportional to the size of its facets gives
 
     d(n) = c / n,        A / A0 = a + b / n,
 
-a > 1 being the price in paper that no refinement takes away. With a weight w in (0, 1) on effort,
+where a > 1 is paper that no refinement saves. With a weight w in (0, 1) on effort,
 
     C_w(n) = (1 - w) d(n) / 1% + w n^2 / 1000,    least at  n = ((1 - w) 1000 c / (2 w 1%))^(1/3).
 
@@ -27,13 +27,14 @@ UNIT_DISTANCE = 0.01
 UNIT_FACETS = 1000.0
 WEIGHTS = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95)
 ENOUGH = 3
-"""Sheets that it takes to fit a law."""
+"""The least number of sheets for a law."""
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One sheet: what was asked and what was measured, None where no sheet was found. Lengths in
-    mm; the names are those of the fit report.
+    """One sheet: its request and its measurements, which are None where no sheet was found.
+
+    Lengths in mm; the names are those of the fit report.
     """
 
     columns: int
@@ -55,7 +56,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class CostCurve:
-    """The cost at each sheet for one ``weight`` on effort, and where the law has its least."""
+    """The cost of each sheet for one ``weight`` on effort, the sheet and the optimum of the law."""
 
     weight: float
     costs: tuple[float, ...]
@@ -65,12 +66,11 @@ class CostCurve:
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """The samples by facets, and what follows from those that converged; the laws are None where
-    fewer than three did.
+    """The samples by facets, and the laws of those that converged, None for fewer than three.
 
-    ``coefficient`` is c of d = c / n; ``exponent`` what the power of n comes out as if left free
-    (-1 by the law); ``law_error`` the largest relative distance of a sample from c / n.
-    ``area_limit`` and ``area_slope`` are a and b.
+    ``coefficient`` is c of d = c / n; ``exponent`` the power of n if it is fitted too (-1 by the
+    law); ``law_error`` the largest relative distance of a sample from c / n. ``area_limit`` and
+    ``area_slope`` are a and b.
     """
 
     samples: tuple[Sample, ...]
@@ -112,16 +112,17 @@ def summarise(samples: list[Sample], weights: tuple[float, ...] = WEIGHTS) -> Tr
     area = np.array([s.area_ratio for s in found], dtype=np.float64)
     coefficient = float(np.exp(np.log(d * n).mean()))
     exponent = float(np.polyfit(np.log(n), np.log(d), 1)[0])
-    # weighed by n: the fine sheets tell more of the limit
+    # weighted by n, since fine sheets are closer to the limit
     slope, limit = np.polyfit(1 / n, area, 1, w=n)
     curves = []
     for weight in weights:
         costs = cost(weight, n, d)
+        best = found[int(np.argmin(costs))]
         curves.append(
             CostCurve(
                 weight,
                 tuple(costs.tolist()),
-                found[int(np.argmin(costs))].columns * found[int(np.argmin(costs))].rows,
+                best.columns * best.rows,
                 optimal_side(weight, coefficient) ** 2,
             )
         )
@@ -138,8 +139,7 @@ def summarise(samples: list[Sample], weights: tuple[float, ...] = WEIGHTS) -> Tr
 
 def cost(weight: float, n: Floats, d: Floats) -> Floats:
     """C_w of sheets with ``n`` facets a side at the relative distances ``d``."""
-    total: Floats = (1 - weight) * d / UNIT_DISTANCE + weight * n**2 / UNIT_FACETS
-    return total
+    return (1 - weight) * d / UNIT_DISTANCE + weight * n**2 / UNIT_FACETS
 
 
 def optimal_side(weight: float, coefficient: float) -> float:

@@ -1,11 +1,11 @@
 """Unfolding: a developable tessellation laid flat without stretching, with its fold angles.
 
-The heading of each facet follows from its neighbour's by the corner angles at the side between
-them, up the middle column and then along each row; the vertices follow by adding up sides. Both are
-plain sums of lengths and angles of the folded form, so rounding adds up and is never amplified
-(placing each row from the positions of the one before does amplify it, by 1e8 on a spiral of 20
-rows). The flat pattern is isometric as far as the sheet is developable and planar; the audit
-measures it afresh.
+The heading of each facet follows from that of its neighbour and the corner angles at their common
+side, first up the middle column and then along each row. The vertices follow by adding up sides.
+Both are sums of lengths and angles of the folded form, so that rounding adds up and is not
+amplified. (Placing each row from the positions of the row before amplifies rounding, by 1e8 on a
+spiral of 20 rows.) The flat pattern is isometric as far as the sheet is developable and planar;
+verification measures that independently.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.tessellation import Tessellation
 
 FLAT_ANGLE = 1e-9
-"""Fold angles below this many radians are flat: an edge that is there but need not be folded."""
+"""Radians; an edge with a smaller fold angle is flat and not folded."""
 
 
 def unfold(
     tessellation: Tessellation, *, scale: float = 1.0, target: dict[str, Any] | None = None
 ) -> CreasePattern:
-    """The crease pattern of ``tessellation``, rows along x, in the first quadrant."""
+    """The crease pattern of ``tessellation``, with rows along x, in the first quadrant."""
     grid = tessellation.grid
     flat = turned_upright(_develop(tessellation.points))
     folded = tessellation.vertices
@@ -53,8 +53,8 @@ def unfold(
 def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
     """``pattern`` with its fold angles measured in its folded form, for facets of any shape.
 
-    Mountains and valleys follow from their signs; borders, cuts and joins stay what they are. A
-    crease or facet without extent, about which nothing can turn, is flat.
+    The sign makes a mountain or valley; borders, cuts and joins stay. The fold angle at a crease or
+    facet without extent is 0.
     """
     assert pattern.folded_coords is not None
     normals = facet_normals(pattern.folded_coords, pattern.faces_vertices)
@@ -81,7 +81,7 @@ def grid_fold_angles(points: Floats, grid: QuadGrid) -> Floats:
     across = np.zeros((grid.rows - 1, grid.columns))
     v = grid.vertices
     edges = np.stack([v[1:-1, :-1].ravel(), v[1:-1, 1:].ravel()], axis=1)
-    # an edge along +i has the facet above (larger j) on its left, one along +j the facet before
+    # on the left of an edge along +i lies the facet of larger j, along +j that of smaller i
     along[1:-1] = fold_angles(
         points, edges, normals[1:].reshape(-1, 3), normals[:-1].reshape(-1, 3)
     ).reshape(along[1:-1].shape)
@@ -109,8 +109,8 @@ def _develop(points: Floats) -> Floats:
     right_corner = angle_between(-right[:-1], up[:, 1:])
     upper_corner = angle_between(right[1:], -up[:, :-1])
 
-    # the heading of each facet's lower side: up the middle column, then along each row both ways,
-    # so that rounding has half as far to add up
+    # the heading of each facet's lower side: up the middle column, then along each row in both
+    # directions, so that rounding adds up over half a row
     middle = (points.shape[1] - 1) // 2
     rising = left_corner[:, middle] + upper_corner[:, middle] - np.pi
     first = np.concatenate([[0.0], np.cumsum(rising[:-1])])
@@ -123,8 +123,7 @@ def _develop(points: Floats) -> Floats:
     across = np.linalg.norm(up[:, middle], axis=1)[:, None] * _unit(upward)
     start = np.concatenate([np.zeros((1, 2)), np.cumsum(across, axis=0)])
     steps = np.concatenate([np.zeros((len(start), 1, 2)), np.cumsum(along, axis=1)], axis=1)
-    flat: Floats = start[:, None, :] + steps - steps[:, [middle]]
-    return flat
+    return np.asarray(start[:, None, :] + steps - steps[:, [middle]])
 
 
 def _unit(angle: Floats) -> Floats:
@@ -132,10 +131,9 @@ def _unit(angle: Floats) -> Floats:
 
 
 def turned_upright(flat: Floats) -> Floats:
-    """The mean row direction along x, and the lower left of the bounding box at the origin."""
+    """``flat`` with its mean row direction along x, its bounding box in the first quadrant."""
     heading = flat[:, -1] - flat[:, 0]
     mean = heading.sum(axis=0)
     c, s = mean / np.linalg.norm(mean)
     turned = flat @ np.array([[c, -s], [s, c]])
-    upright: Floats = turned - turned.reshape(-1, 2).min(axis=0)
-    return upright
+    return np.asarray(turned - turned.reshape(-1, 2).min(axis=0))

@@ -108,7 +108,7 @@ def measure(pattern: CreasePattern, surface: TargetSurface | None = None) -> Mea
         float(shortest),
         covered,
         max_planarity=float(invariants.facet_planarity(pattern, folded).max()),
-        max_developability=_largest(invariants.angle_surplus(ring, inner)) if len(inner) else 0.0,
+        max_developability=_largest(invariants.angle_defect(ring, inner)) if len(inner) else 0.0,
         max_flat_foldability=(
             _largest(invariants.kawasaki_residual(ring, inner)) if len(inner) else 0.0
         ),
@@ -206,10 +206,10 @@ def _inexact(pattern: CreasePattern, folded: Floats) -> list[Finding]:
     inner = invariants.interior_vertices(pattern)
     facets = np.arange(len(pattern.faces_vertices))
     ring = invariants.corner_ring(pattern, folded)
-    surplus = invariants.angle_surplus(ring, inner) if len(inner) else np.empty(0)
+    defect = invariants.angle_defect(ring, inner) if len(inner) else np.empty(0)
     checks = (
         ("planarity", "planar", "facet", facets, invariants.facet_planarity(pattern, folded)),
-        ("developability", "developable", "vertex", inner, np.abs(surplus)),
+        ("developability", "developable", "vertex", inner, np.abs(defect)),
         ("isometry", "the same flat and folded", "facet", facets, invariants.isometry(pattern)),
     )
     found = []

@@ -61,7 +61,7 @@ def test_joules_with_a_material(run, saved):
 def test_people_get_a_verdict(run, saved, tmp_path):
     done = run("energy", saved, "--steps", "10")
     assert done.returncode == 0
-    assert done.stdout.strip().endswith("held by a barrier on the way to flat.")
+    assert done.stdout.strip().endswith("a barrier on the way to flat holds the folded form.")
     save_pattern(regular(5, 5), tmp_path / "flat.fold")
     done = run("energy", tmp_path / "flat.fold", "--steps", "6", "-o", tmp_path / "flat.png")
     assert "It folds rigidly" in done.stdout

@@ -1,15 +1,15 @@
-"""Paper as bars and hinges: edges that keep their length, and folds that resist bending.
+"""The bar-and-hinge model of paper: edges that keep their length, and folds that resist bending.
 
 Each quad is split on its shorter diagonal. The energy of a shape x is
 
     E(x) = sum over hinges 1/2 k (rho - rho_0)^2 + sum over bars c^2 / (2 delta),
     c = (|d|^2 - L^2) / (2 L)
 
-over fold angles rho and bar vectors d; a bar of compliance delta = 0 does not stretch at all. The
-hinges are the diagonals (and edges assigned F), of stiffness k = k_f l and flat at rest, and the
-creases, of stiffness k = k_c l and at rest in the folded form. With k_c = 0, the default and the
-reading of Dudte et al., Nature Materials 15 (2016), only bent facets cost energy. The unit of
-length is the pattern's mean edge L and the unit of energy k_f L, until a material gives a size:
+over fold angles rho and bar vectors d. A bar of compliance delta = 0 does not stretch. Hinges are
+the diagonals (and edges assigned F), with stiffness k = k_f l and flat at rest, and the creases,
+with stiffness k = k_c l and at rest in the folded form. With k_c = 0, the default and the reading
+of Dudte et al., Nature Materials 15 (2016), only bent facets cost energy. The unit of length is the
+pattern's mean edge L and the unit of energy is k_f L, unless a material gives
 
     k of a diagonal = 0.55 D (l / t)^(1/3),   D = E t^3 / (12 (1 - nu^2))
 
@@ -30,9 +30,9 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.hinges import hinge_angles
 
 POISSON_RATIO = 0.3
-"""Of a material that gives only its modulus; D changes by 4 % between 0.25 and 0.35."""
+"""For a material that gives only its modulus; D changes by 4 % between 0.25 and 0.35."""
 DEGENERATE = 1e-9
-"""In mean edges: a shorter edge or a lower triangle is a fault of the pattern."""
+"""In mean edges; the pattern is refused for a shorter edge or a lower triangle."""
 FACET_BENDING = 0.55
 """C_B of Filipov et al. 2017, for quads whose sides do not stretch."""
 
@@ -41,11 +41,11 @@ FACET_BENDING = 0.55
 class BarHingeModel:
     """A sheet of V vertices, in the unit of length ``unit_mm`` and of energy ``unit_joule``.
 
-    ``points`` (V, 3) the shape it was made from. ``bars`` (B, 2) with rest ``lengths`` (B,) and
-    ``compliance`` (B,); ``hinges`` (H, 4) of vertices u, v, a, b with ``stiffness`` (H,) and
-    ``rest`` angles (H,). ``creases`` (C, 4) are hinges too, on the pattern's edges
-    ``creases_edges`` (C,) that have a facet on both sides and are not assigned F, whether they
-    resist or not. ``unit_joule`` is None where no material was given.
+    ``points`` (V, 3) are the folded form. ``bars`` (B, 2) have rest ``lengths`` (B,) and
+    ``compliance`` (B,); ``hinges`` (H, 4) of vertices u, v, a, b have ``stiffness`` (H,) and
+    ``rest`` angles (H,). ``creases`` (C, 4) are the hinges, with stiffness or without, on the
+    pattern's edges ``creases_edges`` (C,) that have a facet on both sides and are not assigned F.
+    ``unit_joule`` is None without a material.
     """
 
     points: Floats
@@ -63,8 +63,7 @@ class BarHingeModel:
     def strains(self, points: Floats) -> Floats:
         """(B,) c = (|d|^2 - L^2) / (2 L) of each bar at ``points`` (V, 3)."""
         d = points[self.bars[:, 1]] - points[self.bars[:, 0]]
-        strain: Floats = (np.einsum("bk,bk->b", d, d) - self.lengths**2) / (2 * self.lengths)
-        return strain
+        return np.asarray((np.einsum("bk,bk->b", d, d) - self.lengths**2) / (2 * self.lengths))
 
     def energy(self, points: Floats) -> float:
         """The energy at ``points`` (V, 3); bars of compliance 0 add nothing."""
@@ -77,7 +76,7 @@ class BarHingeModel:
 
 @dataclass(frozen=True)
 class Paper:
-    """What a sheet is made of: ``thickness_mm`` and Young's ``modulus_pa``."""
+    """The material of a sheet: ``thickness_mm`` and Young's ``modulus_pa``."""
 
     thickness_mm: float
     modulus_pa: float
@@ -100,8 +99,8 @@ def sheet_model(
     """
     if pattern.folded_coords is None:
         raise PatternError(
-            "The pattern has no folded form, so the energy of folding it is not defined; make one "
-            "with 'miurafab fit', or give the folded mesh to 'miurafab convert --folded'."
+            "The pattern has no folded form, so the energy of folding it is not defined; fit it, "
+            "or convert it with its folded mesh as `folded`."
         )
     if pattern.faces_vertices.shape[1] > 4:
         raise PatternError(
@@ -162,7 +161,7 @@ def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:
 def _diagonals(points: Floats, faces: Ints) -> Ints:
     """(F, 4) the hinge u, v, a, b on each facet's shorter diagonal, -1 for triangles.
 
-    Where a quad is not convex only the diagonal from its reflex corner lies inside, and is taken.
+    In a quad that is not convex it is the diagonal from the reflex corner, which lies inside.
     """
     hinges = np.full((len(faces), 4), -1, dtype=np.int64)
     if faces.shape[1] < 4:
@@ -183,15 +182,15 @@ def _diagonals(points: Floats, faces: Ints) -> Ints:
 
 
 def _across_edges(pattern: CreasePattern, diagonals: Ints, edges: Ints) -> Ints:
-    """(n, 4) the hinge of each of ``edges``: its ends, and the third corners of its triangles."""
+    """(n, 4) the hinge of each of ``edges``: its ends and the third corners of its triangles."""
     faces, ends = pattern.faces_vertices, pattern.edges_vertices[edges]
     third = []
     for side in (0, 1):
         face = pattern.edges_faces[edges, side]
         corners, split = faces[face], diagonals[face]
-        other = (corners >= 0) & (corners != ends[:, :1]) & (corners != ends[:, 1:])
-        # the end of this face's diagonal that is not on the crease; any corner of a triangle
-        beyond = other & (
+        off_edge = (corners >= 0) & (corners != ends[:, :1]) & (corners != ends[:, 1:])
+        # the end of the face's diagonal that is not on the edge; in a triangle the third corner
+        beyond = off_edge & (
             (corners == split[:, :1]) | (corners == split[:, 1:2]) | (split[:, :1] < 0)
         )
         third.append(corners[np.arange(len(corners)), beyond.argmax(axis=1)])

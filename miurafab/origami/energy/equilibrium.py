@@ -11,14 +11,13 @@ A' = (J' grad d), n = (f, mu) and D = diag(delta, 0),
     [ H  A' ] [ dx ]       [ F_x ]
     [ A  -D ] [ dn ]  =  - [ F_a ],    H = Hessian of L,
 
-by eliminating dn after D has been raised by a tiny eps: K dx = -F_x - A' W F_a and
+by eliminating dn after D is raised by a tiny eps: K dx = -F_x - A' W F_a and
 dn = W (A dx + F_a), with K = H + A' W A and W = 1 / (D + eps). K is as sparse as the mesh and a
-third of the saddle system in size, without zeros on its diagonal, so one fill-reducing order of
-the vertices serves every factorisation and no pivoting is needed. Where the iteration ends depends
-neither on eps nor on how old K is, since F is exact; so K is factored anew only when the iteration
-slows down.
+third of the saddle system in size, with no zeros on its diagonal. So one fill-reducing order of
+the vertices serves every factorisation, and no pivoting is needed. F is exact, so the solution
+depends neither on eps nor on the age of K, and K is factored again only when convergence slows.
 
-Rigid motions are taken out by holding six coordinates of one triangle, in axes laid along it.
+Six coordinates of one triangle are held, in axes along it, to exclude rigid motions.
 """
 
 from __future__ import annotations
@@ -37,23 +36,22 @@ from miurafab.origami.energy.bar_hinge import BarHingeModel
 from miurafab.origami.energy.hinges import hinge_angles, hinge_derivatives, hinge_gradients
 
 TOLERANCE = 1e-11
-"""On every component of F (forces over the stiffest hinge, if that is over 1): convergence is
-judged by what is out of balance, never by the length of a step."""
+"""Limit of every component of F (forces over the stiffest hinge, if that is over 1). Convergence is
+judged by F and not by the length of a step."""
 EPS = 1e-10
-"""The compliance lent to inextensible bars in K. Larger, and large bar forces slow the iteration
-down; smaller, and rounding does.
-"""
+"""The compliance of inextensible bars in K. Larger values slow the iteration down under large bar
+forces, smaller values by rounding."""
 SLOW = 0.2
-"""K is factored anew when an iteration leaves more than this of the residual."""
+"""K is factored again after an iteration that leaves more than this part of the residual."""
 MAX_ITERATIONS = 25
 SHORTEST_STEP = 1.0 / 64
 ENOUGH = 0.1
-"""A step counts if it lowers the residual by this part of what a linear problem would give."""
+"""A step must lower the residual by this part of the reduction in a linear problem."""
 
 
 class EquilibriumState(NamedTuple):
-    """A shape with its reactions: ``points`` (V, 3), bar ``forces`` (B,) and the multiplier ``mu``
-    of the driven quantity, in the axes of :attr:`Driven.axes`.
+    """``points`` (V, 3) in the axes of :attr:`Driven.axes`, the bar ``forces`` (B,) and the
+    multiplier ``mu`` of the driven quantity.
     """
 
     points: Floats
@@ -70,7 +68,7 @@ class EquilibriumState(NamedTuple):
 
 
 class Residual(NamedTuple):
-    """F: ``force`` (free coordinates,), ``strain`` (B,), and the driven quantity's ``miss``."""
+    """F: ``force`` (free coordinates,), ``strain`` (B,) and the ``miss`` of the driven quantity."""
 
     force: Floats
     strain: Floats
@@ -87,8 +85,8 @@ class Factored(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Where an iteration ended, its last factorisation (to start the next one with), and whether
-    F fell below the tolerance.
+    """The last state of an iteration, its last factor (to start the next iteration with), and
+    whether F is within the tolerance.
     """
 
     state: EquilibriumState
@@ -107,14 +105,14 @@ class Driven:
 
     @property
     def rest(self) -> EquilibriumState:
-        """The shape that the model was made from, free of forces."""
+        """The folded form without forces."""
         return EquilibriumState(self.model.points @ self.axes, np.zeros(len(self.model.bars)), 0.0)
 
     @cached_property
     def axes(self) -> Floats:
         """(3, 3) orthonormal columns: along the first side of the held triangle, and in its plane.
 
-        A state's points are the model's turned into these axes: ``points @ axes``.
+        The points of a state are ``points @ axes``.
         """
         p = self.model.points[self._held]
         x = (p[1] - p[0]) / np.linalg.norm(p[1] - p[0])
@@ -129,7 +127,7 @@ class Driven:
         return float(np.linalg.norm(points[self.stencil[1]] - points[self.stencil[0]]))
 
     def residual(self, state: EquilibriumState, target: float) -> Residual:
-        """F at ``state`` with the driven quantity wanted at ``target``."""
+        """F at ``state``, with ``target`` for the driven quantity."""
         model, points = self.model, state.points
         angle, gradient = hinge_gradients(points, model.hinges)
         bend = (model.stiffness * (angle - model.rest))[:, None, None] * gradient
@@ -141,7 +139,7 @@ class Driven:
         return Residual(force, strain, value - target)
 
     def size(self, residual: Residual) -> float:
-        """The largest component of F; not a number where a triangle has degenerated."""
+        """The largest component of F; NaN where a triangle has degenerated."""
         force = np.abs(residual.force).max(initial=0.0) / self._stiffest
         strain = np.abs(residual.strain).max(initial=0.0)
         return float(np.max([force, strain, abs(residual.miss)]))
@@ -155,9 +153,9 @@ class Driven:
         bend += (model.stiffness * (angle - model.rest))[:, None, None, None, None] * hessian
         bars = (points[model.bars[:, 1]] - points[model.bars[:, 0]]) / model.lengths[:, None]
         weights = 1.0 / (model.compliance + EPS)
-        one = weights[:, None, None] * bars[:, :, None] * bars[:, None, :]
-        one += (state.forces / model.lengths)[:, None, None] * np.eye(3)
-        stretch = np.stack([one, -one, -one, one], axis=1)
+        block = weights[:, None, None] * bars[:, :, None] * bars[:, None, :]
+        block += (state.forces / model.lengths)[:, None, None] * np.eye(3)
+        stretch = np.stack([block, -block, -block, block], axis=1)
         drive, turning = self._drive_hessian(points)
         held = state.mu * turning + drive[:, :, None, None] * drive / EPS
         values = (bend.swapaxes(2, 3), stretch, held.swapaxes(1, 2))
@@ -171,11 +169,11 @@ class Driven:
         """The Newton step (dx, dn) for ``residual`` with K as ``factored``."""
         bars, weights, drive = factored.bars, factored.weights, factored.drive
         pull = (weights * residual.strain)[:, None] * bars
-        none = np.zeros((len(self.model.hinges), 4, 3))
-        right = residual.force + self._gather(none, pull, residual.miss / EPS * drive)
+        no_bend = np.zeros((len(self.model.hinges), 4, 3))
+        right = residual.force + self._gather(no_bend, pull, residual.miss / EPS * drive)
         coordinates = np.zeros(self.model.points.size)
         coordinates[self._free] = -factored.k.solve(right)
-        dx: Floats = coordinates.reshape(-1, 3)
+        dx = coordinates.reshape(-1, 3)
         first, second = self.model.bars.T
         stretch = np.einsum("bk,bk->b", bars, dx[second] - dx[first])
         return EquilibriumState(
@@ -203,7 +201,7 @@ class Driven:
         return gradient, signs[:, None, :, None] * across[None, :, None, :]
 
     def _gather(self, bend: Floats, pull: Floats, drive: Floats) -> Floats:
-        """The free coordinates of the sum, over vertices, of the vectors of hinges, bars, drive."""
+        """The free coordinates of the sums at the vertices of hinge, bar and drive vectors."""
         vectors = np.concatenate([bend.reshape(-1, 3), -pull, pull, drive])
         count = len(self.model.points)
         total = np.empty((count, 3))
@@ -222,7 +220,7 @@ class Driven:
 
     @cached_property
     def _held(self) -> Ints:
-        """The corners (3,) of the triangle that is held: the one nearest to the middle."""
+        """The corners (3,) of the held triangle, which is nearest to the middle."""
         model = self.model
         centres = model.points[model.hinges[:, :3]].mean(axis=1)
         away = np.linalg.norm(centres - model.points.mean(axis=0), axis=1)
@@ -238,7 +236,7 @@ class Driven:
 
     @cached_property
     def _pairs(self) -> tuple[Ints, Ints]:
-        """The vertex pairs of all 3x3 blocks of K, in the order in which they are computed."""
+        """The vertex pairs of all 3x3 blocks of K, in the order of computation."""
         rows, columns = [], []
         for stencils in (self.model.hinges, self.model.bars, self.stencil[None]):
             size = stencils.shape[1]
@@ -248,7 +246,7 @@ class Driven:
 
     @cached_property
     def _elimination(self) -> Ints:
-        """(V,) vertices in a fill-reducing order: SuperLU's minimum degree on the vertex graph."""
+        """(V,) vertices in a fill-reducing order, by minimum degree on the vertex graph."""
         count = len(self.model.points)
         rows, columns = self._pairs
         ones = np.ones(len(rows))
@@ -259,8 +257,8 @@ class Driven:
 
     @cached_property
     def _sparsity(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Ints]:
-        """Rows and column starts of K (CSC), and the place of each computed value in its data:
-        1 + the index, or 0 for a held coordinate.
+        """Rows and column starts of K (CSC), and the place of each computed value in its data: 1 +
+        the index, or 0 for a held coordinate.
         """
         free = self._free
         new = np.full(self.model.points.size, -1, dtype=np.int64)
@@ -282,8 +280,8 @@ def solve(
 ) -> Solution:
     """The equilibrium near ``guess`` with the driven quantity at ``target``.
 
-    ``factored`` is an earlier K to begin with. A step that does not lower the largest component of
-    F is first taken again with a fresh K, then shortened. Failure is a result, not an exception.
+    ``factored`` is an earlier K to start with. A step that does not lower the largest component of
+    F is repeated with a new K, then shortened. Failure is a result, not an exception.
     """
     state, fresh = guess, False
     residual = driven.residual(state, target)
@@ -296,7 +294,7 @@ def solve(
         if factored is None:
             try:
                 factored, fresh = driven.factor(state), True
-            except RuntimeError:  # SuperLU: exactly singular
+            except RuntimeError:  # exactly singular
                 break
         step = driven.step(factored, residual)
         length = 1.0
@@ -323,7 +321,7 @@ def solve(
 def _polished(
     driven: Driven, state: EquilibriumState, target: float, factored: Factored | None
 ) -> EquilibriumState:
-    """One more step on the last K, which takes the residual down to rounding, if it does."""
+    """``state`` after one more step with the last K, if that lowers the residual."""
     if factored is None:
         return state
     residual = driven.residual(state, target)

@@ -3,7 +3,7 @@
 A hinge is the edge u -> v with a triangle (u, v, a) on its left and (v, u, b) on its right. With
 
     e = v - u, l = |e|, t = e / l, and for each wing w in (a, b), W = w - u:
-    s_w = W.t / l        where the foot of w lies along the edge, 0 at u and 1 at v
+    s_w = W.t / l        the foot of w along the edge, 0 at u and 1 at v
     h_w = |W - l s_w t|  its height, m_w = (W - l s_w t) / h_w, n_w the unit normal: n_a = t x m_a,
                          n_b = m_b x t, so that n_a = n_b where the hinge is flat
 
@@ -19,9 +19,8 @@ and Q_w = n_w t' + t n_w',
     d2 rho / dw de =  s_w S_w / h_w^2 - t n_w' / (l h_w)
     d2 rho / de de =  sum  s_w Q_w / (l h_w) - (s_w^2 / h_w^2 + 1 / (2 l^2)) S_w
 
-and d2 rho / da db = 0; the rows of u follow from d/du = -(d/de + d/da + d/db). In the last line
-n_w m_w' stands by its symmetric half alone, since the other halves of the two wings, which turn
-opposite ways, cancel.
+and d2 rho / da db = 0; the rows of u follow from d/du = -(d/de + d/da + d/db). The last line holds
+only the symmetric part of n_w m_w', since the antisymmetric parts of the two wings cancel.
 """
 
 from __future__ import annotations
@@ -83,10 +82,8 @@ def _frames(points: Floats, hinges: Ints) -> _Frames:
 
 def _angle(f: _Frames) -> Floats:
     # n_a x n_b is along t; its component there is n_b . (t x n_a) = -n_b . m_a
-    angle: Floats = np.arctan2(
-        np.einsum("hk,hk->h", f.n[:, 1], f.m[:, 0]), np.einsum("hk,hk->h", f.n[:, 0], f.n[:, 1])
-    )
-    return angle
+    sine = np.einsum("hk,hk->h", f.n[:, 1], f.m[:, 0])
+    return np.asarray(np.arctan2(sine, np.einsum("hk,hk->h", f.n[:, 0], f.n[:, 1])))
 
 
 def _gradient(f: _Frames) -> Floats:

@@ -1,13 +1,13 @@
-"""How hard a folded sheet resists unfolding: its energy along the quasi-static path to flat.
+"""The energy of a folded sheet along the quasi-static path to flat, with barrier and stable states.
 
-One crease is driven from its angle in the folded form towards flat in equal steps; at each the
+One crease is driven from its angle in the folded form towards flat in equal steps. At each step the
 whole sheet is in static equilibrium (:mod:`miurafab.origami.energy.equilibrium`). The torque is the
-slope of the energy, dE/d rho, so its zeros are the stable states and the barriers, found between
-the steps by regula falsi. Flat itself is a branch point, where very many motions meet; the path
+slope of the energy, dE/d rho. Its zeros are the stable states and the barriers; regula falsi finds
+them between the steps. The flat state is a branch point, where very many motions meet, so the path
 stops a little short of it.
 
-A sheet that folds rigidly has an energy of zero all the way; the less flat-foldable it is, the
-higher the barrier that keeps the folded form (Dudte et al., Nature Materials 15 (2016)).
+The energy of a sheet that folds rigidly is zero along the path. The less flat-foldable a sheet is,
+the higher is the barrier that keeps its folded form (Dudte et al., Nature Materials 15 (2016)).
 """
 
 from __future__ import annotations
@@ -29,28 +29,27 @@ from miurafab.origami.energy.hinges import hinge_angles
 Progress = Callable[[float, str], None]
 
 NEARLY_FLAT = math.radians(2.5)
-"""Where the driven crease stops short of flat."""
+"""The last angle of the driven crease, radians, a little short of flat."""
 HISTORY = 4
-"""States that the predictor extrapolates from: a cubic through the last four."""
+"""The number of states for the prediction: a cubic through the last four."""
 MAX_HALVINGS = 7
 NOISE = 1e-15
-"""Energies up to this, in the model's unit, are rounding: the sheet folds rigidly."""
+"""Energies up to this, in the model's unit, are rounding; the sheet then folds rigidly."""
 MAX_FALSI = 30
 ZERO_LOAD = 1e-9
-"""Of the torques beside it: what is left where the energy is stationary, to second order."""
+"""Relative torque tolerance at a stationary point of the energy."""
 SMALL_TURN = 1e-3
-"""The turn, in radians, to either side of the folded form over which its stiffness is measured."""
+"""Radians to either side of the folded form, for the difference quotient of its stiffness."""
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
     """n equilibria in a row, the first of them the folded form.
 
-    ``coords`` (n, V, 3) in mm, in the folded form's own axes with one triangle near the middle
+    ``coords`` (n, V, 3) in mm, in the axes of the folded form, with one triangle near the middle
     held still; ``drives`` (n,) the driven fold angle in radians, or the distance in mm;
     ``energies`` (n,) and ``loads`` (n,), the torque or force dE/d drive, in the units of ``model``.
-    Where the path could not be followed to its end ``converged`` is False, and it holds what was
-    reached.
+    If ``converged`` is False, the path ends where the solver lost it.
     """
 
     coords: Floats
@@ -71,12 +70,12 @@ class StableState:
 
 @dataclass(frozen=True, eq=False)
 class EnergyCurve:
-    """The energy along ``path`` and what it says.
+    """The energy along ``path``, with its barrier and stable states.
 
-    ``barrier`` is the highest maximum of the energy between the folded form and flat, 0 where there
-    is none, and ``barrier_angle`` the driven angle there, or None. ``stable`` are the local minima
-    from the folded form to flat, none if the sheet folds ``rigidly``, when no state is preferred.
-    ``flat_energy`` is that of the flat sheet, ``stiffness`` d2E/d rho2 at the folded form.
+    ``barrier`` is the highest maximum of the energy between the folded form and flat, 0 without a
+    maximum, and ``barrier_angle`` the driven angle there, or None. ``stable`` are the local minima
+    from the folded form to flat, empty if the sheet is ``rigid`` and prefers no state.
+    ``flat_energy`` is the energy of the flat sheet, ``stiffness`` d2E/d rho2 at the folded form.
     Energies are in the units of ``path.model``, angles in radians; ``crease`` is the driven edge of
     the pattern.
     """
@@ -96,21 +95,21 @@ class EnergyCurve:
         return self.barrier > 0 and len(self.stable) > 1
 
     def verdict(self) -> str:
-        """One sentence on what the curve says."""
+        """The result in one sentence."""
         if not self.path.converged:
             reached = math.degrees(abs(self.path.drives[-1]))
             return (
                 f"The path was lost at {reached:.1f} degrees, where the sheet jumps to another "
-                "shape; take more --steps, or drive another --crease."
+                "shape; take more `steps`, or drive another `crease`."
             )
         if self.rigid:
             return "It folds rigidly: no energy is stored on the way to flat."
         if self.bistable:
-            return "It is bistable: the folded form is held by a barrier on the way to flat."
+            return "It is bistable: a barrier on the way to flat holds the folded form."
         return "It is not bistable: there is no barrier on the way to flat."
 
     def report(self) -> dict[str, Any]:
-        """The answer of ``miurafab energy --json``; energies in joules if a material was given."""
+        """The curve's numbers, ready for JSON; energies in joules if a material was given."""
         model = self.path.model
         unit = 1.0 if model.unit_joule is None else model.unit_joule
         angle = self.barrier_angle
@@ -181,13 +180,13 @@ def folding_path(
     model: BarHingeModel | None = None,
     on_progress: Progress | None = None,
 ) -> Path:
-    """The quasi-static path of ``pattern`` from its folded form, ``steps`` equal steps of one
-    crease's fold angle to +-``until`` radians (below the folded angle: towards flat; above it:
-    further closed), steps + 1 shapes in all.
+    """The quasi-static path of ``pattern`` from its folded form, in steps + 1 shapes.
 
-    ``crease`` is the driven edge of the pattern, by default that of :func:`main_crease`; ``model``
-    defaults to :func:`~miurafab.origami.energy.bar_hinge.sheet_model`. The sheet may bend its
-    facets on their shorter diagonals and never stretches. Raises
+    The fold angle of one crease goes to +-``until`` radians in equal ``steps``: towards flat, or if
+    ``until`` is above the folded angle, further closed. ``crease`` is the driven edge of the
+    pattern, by default that of :func:`main_crease`; ``model`` defaults to
+    :func:`~miurafab.origami.energy.bar_hinge.sheet_model`. Facets may bend on their shorter
+    diagonals; the sheet does not stretch. Raises
     :class:`~miurafab.errors.PatternError` for a pattern without a folded form, and
     :class:`~miurafab.errors.InputError` for an edge that is no crease or is flat.
     """
@@ -202,10 +201,10 @@ def pulled_path(
     steps: int = 40,
     on_progress: Progress | None = None,
 ) -> Path:
-    """The quasi-static path of a sheet whose vertices ``ends`` are drawn apart, until their
-    distance has grown by the fraction ``strain`` (negative: pushed together).
+    """The quasi-static path of a sheet whose vertices ``ends`` are pulled apart.
 
-    ``drives`` are then distances in mm, and ``loads`` forces in the energy's unit per mean edge.
+    At the end their distance has grown by the fraction ``strain``; if negative, they are pushed
+    together. ``drives`` are distances in mm, ``loads`` forces in the energy's unit per mean edge.
     """
     driven = Driven(model, np.array(ends, dtype=np.int64))
     distance = driven.value(driven.rest.points)
@@ -220,8 +219,8 @@ def follow(
 ) -> list[EquilibriumState]:
     """The equilibria at ``drives`` (n,), the first of them near ``start``.
 
-    Each is guessed from the polynomial through the last four. A step that does not converge is
-    halved, up to seven times; the list is shorter than ``drives`` where that does not help.
+    The polynomial through the last four states predicts the next. A step that does not converge is
+    halved, up to seven times; if that fails, the list is shorter than ``drives``.
     """
     known: list[_Known] = []
     states: list[EquilibriumState] = []
@@ -251,7 +250,7 @@ class _Known(NamedTuple):
 
 
 class _Traced(NamedTuple):
-    """A path in the solver's terms; ``place`` is the driven crease's among the model's."""
+    """A path as the solver sees it; ``place`` is the index of the driven crease in the model."""
 
     driven: Driven
     place: int
@@ -273,28 +272,29 @@ def _trace(
     model: BarHingeModel, steps: int, edge: int | None, until: float, on_progress: Progress | None
 ) -> _Traced:
     if steps < 1:
-        raise InputError(f"--steps is {steps}; the path needs at least one.")
+        raise InputError(f"`steps` is {steps}; the path needs at least one.")
     place = main_crease(model) if edge is None else _place_of(model, edge)
     driven = Driven(model, model.creases[place])
     angle = driven.value(driven.rest.points)
     if abs(angle) <= NEARLY_FLAT:
         raise InputError(
             f"The crease at edge {model.creases_edges[place]} is folded by only "
-            f"{math.degrees(abs(angle)):.2g} degrees, too little to be driven; take another one."
+            f"{math.degrees(abs(angle)):.2g} degrees, too little to drive; take another `crease`."
         )
     drives = np.linspace(angle, math.copysign(until, angle), steps + 1)
     states = follow(driven, driven.rest, drives, on_progress)
     if not states:
         raise PatternError(
             "The folded form is not in equilibrium: its facets are not flat, or it has a crease of "
-            "no width; see 'miurafab check'."
+            "no width; check the pattern."
         )
     return _Traced(driven, place, drives, states)
 
 
 def main_crease(model: BarHingeModel) -> int:
-    """The place in ``model.creases`` of the crease driven by default: of those folded at least as
-    much as the median, the one nearest to the middle of the sheet.
+    """The index in ``model.creases`` of the crease that is driven by default.
+
+    It is the crease nearest to the middle of the sheet among those folded by the median or more.
     """
     angles = np.abs(hinge_angles(model.points, model.creases))
     middle = model.points[model.creases[:, :2]].mean(axis=1) - model.points.mean(axis=0)
@@ -303,10 +303,10 @@ def main_crease(model: BarHingeModel) -> int:
 
 
 def _place_of(model: BarHingeModel, edge: int) -> int:
-    found = np.flatnonzero(model.creases_edges == edge)
-    if not len(found):
+    places = np.flatnonzero(model.creases_edges == edge)
+    if not len(places):
         raise InputError(f"Edge {edge} is not a crease between two facets; drive another.")
-    return int(found[0])
+    return int(places[0])
 
 
 def _path(traced: _Traced) -> Path:
@@ -335,9 +335,9 @@ def _stationary(traced: _Traced, path: Path) -> tuple[list[StableState], list[St
             _Known(float(drive), state)
             for drive, state in zip(path.drives[near], traced.states[near], strict=True)
         ]
-        found = _zero_load(traced.driven, known, int(k) - first)
         rising = path.loads[k] * (traced.drives[k + 1] - traced.drives[k]) > 0
-        (maxima if rising else minima).append(found)
+        states = maxima if rising else minima
+        states.append(_zero_load(traced.driven, known, int(k) - first))
     return maxima, minima
 
 

@@ -1,4 +1,4 @@
-"""What a folding motion says beyond its shapes: all fold angles, and where paper meets paper."""
+"""Results of a folding motion besides its shapes: fold angles as CSV, and self-contact."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from miurafab.origami.folding.contact import self_intersections
 from miurafab.origami.folding.kinematics import FoldingMotion
 
 ON_EACH_OTHER = np.pi - 1e-3
-"""Fold angles from here on lay facets on each other; that is being flat-folded and no collision."""
+"""Larger fold angles lay facets on each other: flat-folded, and no collision."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """In ``frame``, at ``state``, paper passes through paper: pairs of ``facets``."""
+    """The pairs of ``facets`` that pass through each other in ``frame``, at ``state``."""
 
     frame: int
     state: float
@@ -28,10 +28,10 @@ def contacts(
 ) -> tuple[Contact, ...]:
     """The frames of ``motion`` in which facets pass through each other.
 
-    Frames in which a crease is folded past :data:`ON_EACH_OTHER` are left out: thin paper that is
-    folded flat lies on itself, and which layer is the upper one no coordinates can tell.
+    Frames in which a crease is folded past :data:`ON_EACH_OTHER` are left out: paper folded flat
+    lies on itself, and coordinates do not tell which layer is above.
     """
-    found = []
+    crossing = []
     for frame, (points, angles) in enumerate(zip(motion.frames, motion.fold_angles, strict=True)):
         if on_progress is not None:
             on_progress(frame / len(motion.frames), "self-contact")
@@ -41,14 +41,14 @@ def contacts(
         pairs = self_intersections(shape)
         if len(pairs):
             named = tuple((int(a), int(b)) for a, b in pairs)
-            found.append(Contact(frame, float(motion.states[frame]), named))
-    return tuple(found)
+            crossing.append(Contact(frame, float(motion.states[frame]), named))
+    return tuple(crossing)
 
 
 def angles_csv(motion: FoldingMotion) -> str:
-    """The fold angle of every crease in every frame, degrees: a row a crease, a column a frame.
+    """The fold angles as CSV, degrees: one row for each crease, one column for each frame.
 
-    A crease is an edge with a facet on either side. Columns are headed by the state.
+    A crease is an edge with a facet on either side. The head of a column is its state.
     """
     pattern = motion.pattern
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))

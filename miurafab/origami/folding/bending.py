@@ -1,8 +1,8 @@
-"""The motion of a sheet that does not fold rigidly: its facets bend as little as they can.
+"""The motion of a sheet that does not fold rigidly: its facets bend as little as possible.
 
-The bar-and-hinge model is driven by one crease from the folded form towards flat, in static
-equilibrium at every step (:mod:`miurafab.origami.energy.path`). Read backwards it is the motion
-from nearly flat, where very many motions meet and none can be singled out, to the folded form.
+One crease of the bar-and-hinge model is driven from the folded form towards flat, in static
+equilibrium at every step (:mod:`miurafab.origami.energy.path`). In reverse order this is the motion
+from nearly flat to the folded form. It does not start at flat, where very many motions meet.
 """
 
 from __future__ import annotations
@@ -24,10 +24,9 @@ def bending_motion(
 ) -> FoldingMotion:
     """The quasi-static motion of ``pattern`` from nearly flat to its folded form.
 
-    ``states`` are tan(rho / 2) over its value in the folded form, rho the driven fold angle, so
-    that they mean what s means in a rigid motion. Where the path could not be followed the motion
-    begins at the state that was reached. Raises what
-    :func:`~miurafab.origami.energy.path.folding_path` raises.
+    ``states`` are tan(rho / 2) over its value in the folded form, with rho the driven fold angle,
+    like s in a rigid motion. If the solver loses the path, the motion begins where it was lost.
+    Raises what :func:`~miurafab.origami.energy.path.folding_path` raises.
     """
     path = folding_path(pattern, steps, on_progress=on_progress)
     model = path.model

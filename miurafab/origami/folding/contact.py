@@ -1,16 +1,18 @@
-"""Where paper meets paper: facets that pass through each other, and facets that lie on each other.
+"""Self-contact of a sheet: facets that pass through each other or lie on each other.
 
-Facets are split into triangles, and two facets meet where the insides of triangles (without sides
-and corners) have a common point. With heights of each triangle's corners over the other's plane:
+Facets are split into triangles. Two facets meet where the insides of triangles (without sides and
+corners) have a common point. It depends on the heights of each triangle's corners over the plane of
+the other triangle:
 
 - all heights of one sign or zero, not all zero: the insides are apart;
-- all zero: the triangles lie in one plane and overlap unless one of their six sides separates them;
-- else each triangle cuts the other's plane in a segment of the line common to both planes, and they
-  cross where the two segments overlap.
+- all zero: the triangles lie in one plane, and overlap unless one of their six sides separates
+  them;
+- else each triangle cuts the plane of the other in a segment of the common line of both planes, and
+  the triangles cross where the two segments overlap.
 
-Facets that share a side or a corner need no case of their own: the height of a shared corner is
-zero, set so and not computed, and touching is not meeting. Sheets folded flat lie on each other;
-without an order of layers that counts as meeting.
+Touching is not meeting. The height of a corner shared by two facets is set to zero, so facets with
+a common side or corner need no special case. Layers of a sheet folded flat count as meeting, since
+no order of layers is known.
 """
 
 from __future__ import annotations
@@ -23,10 +25,10 @@ from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 
 IN_PLANE = 1e-9
-"""Corners nearer to a plane than this part of the mean triangle side lie in it."""
+"""A corner closer to a plane than this part of the mean triangle side lies in the plane."""
 
 TOUCH = 1e-6
-"""Facets that reach into each other by less than this part of the mean side only touch."""
+"""Facets that overlap by less than this part of the mean side only touch."""
 
 _CHUNK = 30_000
 _SIDES = ((0, 1), (1, 2), (2, 0))
@@ -45,10 +47,10 @@ def self_intersections(pattern: CreasePattern) -> Ints:
 def overlaps(pattern: CreasePattern) -> Ints:
     """(n, 2) the pairs of facets of the flat pattern that cover a common area, sorted.
 
-    A facet turned over overlaps its neighbours.
+    A facet that is turned over overlaps its neighbours.
     """
     flat = pattern.vertices_coords
-    return _meeting_facets(pattern, np.concatenate([flat, np.zeros((len(flat), 1))], axis=1))
+    return _meeting_facets(pattern, np.pad(flat, ((0, 0), (0, 1))))
 
 
 def _meeting_facets(pattern: CreasePattern, points: Floats) -> Ints:
@@ -79,7 +81,7 @@ def _meeting_facets(pattern: CreasePattern, points: Floats) -> Ints:
 
 
 class _Triangles:
-    """Triangles with the planes that they lie in. Those without an inside meet nothing."""
+    """Triangles with their planes. Triangles without an inside meet nothing."""
 
     def __init__(self, index: Ints, corners: Floats, normals: Floats, size: float) -> None:
         self.index, self.corners, self.normals, self.size = index, corners, normals, size
@@ -122,8 +124,7 @@ class _Triangles:
         gap = self.corners[one] - self.corners[other][:, :1]
         height = np.einsum("nck,nk->nc", gap, self.normals[other])
         shared = (self.index[one][:, :, None] == self.index[other][:, None, :]).any(axis=2)
-        heights: Floats = np.where(shared | (np.abs(height) <= IN_PLANE * self.size), 0.0, height)
-        return heights
+        return np.where(shared | (np.abs(height) <= IN_PLANE * self.size), 0.0, height)
 
     def _cross(self, one: Ints, other: Ints, above: Floats, below: Floats) -> Bools:
         """Whether triangles that straddle each other's planes cross."""
@@ -134,11 +135,10 @@ class _Triangles:
         low_a, high_a = _segment(self.corners[one] - origin, above, line)
         low_b, high_b = _segment(self.corners[other] - origin, below, line)
         overlap = np.minimum(high_a, high_b) - np.maximum(low_a, low_b)
-        crossing: Bools = overlap > TOUCH * self.size
-        return crossing
+        return np.asarray(overlap > TOUCH * self.size)
 
     def _overlap(self, one: Ints, other: Ints) -> Bools:
-        """Whether triangles in one plane cover a common area: whether none of their sides has the
+        """Whether triangles in one plane cover a common area: no side of either triangle has the
         other triangle wholly on its outer side.
         """
         result = np.zeros(len(one), dtype=bool)
@@ -155,16 +155,15 @@ class _Triangles:
 
 
 def _one_sided(heights: Floats) -> Bools:
-    """Whether a triangle with these corner heights (n, 3) has its inside off the plane."""
+    """Whether the inside of a triangle with these corner heights (n, 3) is off the plane."""
     some = (heights != 0).any(axis=1)
-    one_sided: Bools = some & ((heights >= 0).all(axis=1) | (heights <= 0).all(axis=1))
-    return one_sided
+    return np.asarray(some & ((heights >= 0).all(axis=1) | (heights <= 0).all(axis=1)))
 
 
 def _segment(corners: Floats, heights: Floats, line: Floats) -> tuple[Floats, Floats]:
     """The ends, along ``line`` (n, 3), of the cut of triangles (n, 3, 3) by the plane of height 0.
 
-    The cut ends on corners in the plane and on sides whose ends lie on different sides of it.
+    The cut ends at corners in the plane and on sides that cross the plane.
     """
     along = np.einsum("nck,nk->nc", corners, line)
     low, high = np.full(len(line), np.inf), np.full(len(line), -np.inf)
@@ -181,8 +180,8 @@ def _segment(corners: Floats, heights: Floats, line: Floats) -> tuple[Floats, Fl
 def triangulate(faces: Ints, flat: Floats | None = None) -> tuple[Ints, Ints]:
     """Triangles (T, 3) of polygons (F, k), -1 padded, and the face (T,) of each.
 
-    Polygons are fanned from their first corner. Given their ``flat`` positions (V, 2), those that
-    are not convex there are fanned from another corner or, at need, cut ear by ear instead.
+    Polygons are fanned from their first corner. With ``flat`` positions (V, 2), a polygon that is
+    not convex is fanned from another corner or cut ear by ear.
     """
     faces = faces if flat is None else _fannable(faces, flat)
     k = faces.shape[1]
@@ -206,7 +205,7 @@ def triangulate(faces: Ints, flat: Floats | None = None) -> tuple[Ints, Ints]:
 
 
 def _fannable(faces: Ints, flat: Floats) -> Ints:
-    """Quads turned by one corner where only their second diagonal lies inside."""
+    """``faces`` with quads turned by one corner where only their second diagonal lies inside."""
     quads = (faces >= 0).sum(axis=1) == 4
     if not quads.any():
         return faces

@@ -1,14 +1,14 @@
-"""Rigid folding: every facet stays plane and the creases alone move.
+"""Rigid folding: every facet stays plane and only the creases move.
 
 At a flat-foldable vertex of degree four the tangents of the half fold angles keep their ratios
 (Huffman 1976; Tachi, "Generalization of rigid foldable quadrilateral mesh origami", IASS 2009,
-eqs 1-3), so that one number moves a whole sheet:
+eqs 1-3). One number s therefore moves a whole sheet:
 
     rho_e(s) = 2 atan(s tan(rho_e* / 2)),    s = 0 flat, 1 the folded form, infinity flat-folded
 
-Facets are placed breadth-first from the middle of the sheet, each turned about the crease that it
-shares with the one before. Creases outside that tree are not used: how far their two facets stand
-apart there, the loop mismatch, is the certificate that the sheet folds rigidly.
+Facets are placed breadth-first from the middle of the sheet, each turned about the crease to its
+parent. The other creases are not used: the distance between their two facets, the loop mismatch,
+certifies that the sheet folds rigidly.
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ from scipy.sparse.csgraph import shortest_path
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.polygons import edge_lengths, facet_means
+from miurafab.geometry.polygons import edge_lengths, facet_means, sides_and_diagonals
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.folding.multipliers import fold_speeds
+from miurafab.origami.folding.multipliers import fold_angle_multipliers
 
 RIGID = 1e-6
-"""The loop mismatch, in mean edges, up to which a sheet is said to fold rigidly."""
+"""The loop mismatch, in mean edges, up to which a sheet folds rigidly."""
 
 
 FOLDED_FLAT = np.pi - 1e-6
-"""Fold angles from here on count as 180 degrees, when a file is asked how far its creases fold."""
+"""Larger fold angles in a file count as 180 degrees."""
 
-_POINT = 1e-6  # of the mean edge: a shorter crease has no direction to turn a facet about
+_POINT = 1e-6  # of the mean edge; a shorter crease has no direction
 
 
 @dataclass(frozen=True, eq=False)
 class FoldingMotion:
     """A folding motion of ``pattern`` in T frames.
 
-    ``states`` (T,) float64 are where on the motion the frames lie: s of the closed form, 1 being
-    the folded form. ``frames`` (T, V, 3) float64, mm; ``fold_angles`` (T, E) float64, radians,
-    valley positive. ``mismatch`` (T,) float64 is the loop mismatch of each frame in mean edges, or
-    None where the motion bends its facets and the loops close by construction.
+    ``states`` (T,) float64 are the values of s, 1 in the folded form. ``frames`` (T, V, 3)
+    float64, mm; ``fold_angles`` (T, E) float64, radians, valley positive. ``mismatch`` (T,) float64
+    is the loop mismatch of each frame in mean edges, or None where facets bend and loops close by
+    construction.
     """
 
     pattern: CreasePattern
@@ -60,10 +60,10 @@ class FoldingMotion:
 
 @dataclass(frozen=True, eq=False)
 class FacetPlacement:
-    """Where the facets of T frames stand: a flat point p of facet f goes to turn p + shift.
+    """The places of the facets in T frames: a flat point p of facet f goes to turn p + shift.
 
     ``turn`` (T, F, 3, 3) and ``shift`` (T, F, 3) float64; the facet in the middle keeps its place.
-    ``depth`` (F,) int64 is how many creases away from that facet each was placed.
+    ``depth`` (F,) int64 is the number of creases between a facet and that facet.
     """
 
     turn: Floats
@@ -71,17 +71,16 @@ class FacetPlacement:
     depth: Ints
 
     def points(self, flat: Floats, facets: Ints) -> Floats:
-        """(T, n, 3) where the points ``flat`` (n, 2) of ``facets`` (n,) come to stand."""
+        """(T, n, 3) the places of the points ``flat`` (n, 2) of ``facets`` (n,)."""
         moved = np.einsum("tnij,nj->tni", self.turn[:, facets, :, :2], flat)
-        placed: Floats = moved + self.shift[:, facets]
-        return placed
+        return np.asarray(moved + self.shift[:, facets])
 
 
 def rigid_motion(pattern: CreasePattern, states: ArrayLike) -> FoldingMotion:
     """The rigid motion of ``pattern`` through ``states`` (T,) of s, each in [0, infinity].
 
-    The frame nearest to s = 1 is laid on the folded form (without one, the frame nearest to 0 on
-    the flat pattern) and each further frame on its neighbour, by the best rigid motion.
+    The frame nearest to s = 1 is laid on the folded form (without a folded form, the frame nearest
+    to 0 on the flat pattern) and each other frame on its neighbour, by the best rigid motion.
 
     Raises :class:`~miurafab.errors.PatternError` if the facets are not all joined by creases.
     """
@@ -89,20 +88,10 @@ def rigid_motion(pattern: CreasePattern, states: ArrayLike) -> FoldingMotion:
     if not (s >= 0).all():
         raise PatternError("A state of folding is a number from 0, flat, to infinity, flat-folded.")
     angles = fold_angles_at(pattern, s)
-    return motion_through(pattern, s, angles)
-
-
-def motion_through(pattern: CreasePattern, states: Floats, fold_angles: Floats) -> FoldingMotion:
-    """The motion in which the creases have the ``fold_angles`` (T, E), radians, at ``states``."""
-    placement = place(pattern, fold_angles)
-    frames = placement.points(pattern.vertices_coords, _first_facets(pattern, placement.depth))
-    return FoldingMotion(
-        pattern,
-        states,
-        laid_on_each_other(pattern, states, frames),
-        fold_angles,
-        loop_mismatch(pattern, placement),
-    )
+    placement = place(pattern, angles)
+    frames = placement.points(pattern.vertices_coords, first_facets(pattern, placement.depth))
+    laid = laid_on_each_other(pattern, s, frames)
+    return FoldingMotion(pattern, s, laid, angles, loop_mismatch(pattern, placement))
 
 
 def fold_angles_at(pattern: CreasePattern, states: Floats) -> Floats:
@@ -117,24 +106,23 @@ def fold_angles_at(pattern: CreasePattern, states: Floats) -> Floats:
 def half_tangents(pattern: CreasePattern) -> Floats:
     """(E,) tan(rho / 2) of each crease at s = 1.
 
-    Where all fold angles of the pattern are 180 degrees, as in formats that tell only mountains
-    from valleys, s = 1 is where the median crease is folded by 90 degrees, and the others follow
-    from the sectors (:mod:`miurafab.origami.folding.multipliers`).
+    In formats that tell only mountains from valleys all fold angles are 180 degrees. For such a
+    pattern the median crease has 90 degrees at s = 1, and the others follow from the sector angles
+    (:mod:`miurafab.origami.folding.multipliers`).
     """
     target = pattern.edges_fold_angle
     folding = np.abs(target[target != 0.0])
     if len(folding) and (folding > FOLDED_FLAT).all():
-        return fold_speeds(pattern)
-    # past the float's half circle tan() changes sign, so fold angles stay just inside it
-    half: Floats = np.tan(np.clip(target, -np.pi + 1e-15, np.pi - 1e-15) / 2)
-    return half
+        return fold_angle_multipliers(pattern)
+    # tan() changes sign beyond a half turn, so fold angles stay just below it
+    return np.asarray(np.tan(np.clip(target, -np.pi + 1e-15, np.pi - 1e-15) / 2))
 
 
 def states_between(pattern: CreasePattern, steps: int, last: float = np.inf) -> Floats:
-    """(steps + 1,) states from flat through 1 to ``last``, in even steps of a middling fold angle.
+    """(steps + 1,) states from flat through 1 to ``last``, in even steps of the median fold angle.
 
     s = tan(phi / 2) / tan(phi* / 2) with phi* the median fold angle of the creases that fold. The
-    state 1 is among them whenever it is within reach and there are at least two steps.
+    state 1 is one of them if ``last`` is 1 or more and there are at least two steps.
     """
     half = np.abs(half_tangents(pattern))
     if not (half > 0).any():
@@ -174,7 +162,7 @@ def place(pattern: CreasePattern, fold_angles: Floats) -> FacetPlacement:
     for level in range(1, int(depth.max()) + 1):
         here = np.flatnonzero(depth == level)
         parent, edge = before[here], crease[here]
-        # a valley turns the right facet's normal back about the edge, hence the left one's forward
+        # about the edge, a valley turns the right facet's normal backwards and the left's forwards
         sign = np.where(pattern.edges_faces[edge, 0] == parent, -1.0, 1.0)
         rotation = _rotations(along[edge], sign * fold_angles[:, edge])
         hinge = np.pad(tail[edge], ((0, 0), (0, 1)))
@@ -185,34 +173,30 @@ def place(pattern: CreasePattern, fold_angles: Floats) -> FacetPlacement:
 
 
 def loop_mismatch(pattern: CreasePattern, placement: FacetPlacement) -> Floats:
-    """(T,) how far the two facets of a crease stand apart at its ends, at worst, in mean edges."""
+    """(T,) the largest distance of two facets at the ends of their crease, in mean edges."""
     joined = _joined(pattern)
     ends = pattern.edges_vertices[joined].reshape(-1)
     flat = pattern.vertices_coords[ends]
     left, right = (np.repeat(pattern.edges_faces[joined, side], 2) for side in (0, 1))
     gap = placement.points(flat, left) - placement.points(flat, right)
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
-    worst: Floats = np.linalg.norm(gap, axis=2).max(axis=1, initial=0.0) / mean
-    return worst
+    return np.asarray(np.linalg.norm(gap, axis=2).max(axis=1, initial=0.0) / mean)
 
 
 def facet_strain(pattern: CreasePattern, frames: Floats) -> Floats:
     """(T, F) the largest relative change of each facet's sides and diagonals, from flat.
 
-    ``frames`` (T, V, 3). It shows bending as well as stretching, for a bent quadrilateral has a
-    shorter diagonal. Lengths count from a hundredth of the mean edge.
+    ``frames`` (T, V, 3). Bending counts as well as stretching, since a bent quadrilateral has a
+    shorter diagonal. Changes of short lengths are relative to a hundredth of the mean edge.
     """
     faces = pattern.faces_vertices
     least = 0.01 * float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
     worst = np.zeros((len(frames), len(faces)))
-    for one in range(faces.shape[1]):
-        for other in range(one + 1, faces.shape[1]):
-            real = faces[:, other] >= 0
-            a, b = faces[real, one], faces[real, other]
-            flat = np.linalg.norm(pattern.vertices_coords[b] - pattern.vertices_coords[a], axis=1)
-            length = np.linalg.norm(frames[:, b] - frames[:, a], axis=2)
-            change = np.abs(length - flat) / np.maximum(flat, least)
-            worst[:, real] = np.maximum(worst[:, real], change)
+    for facets, ends in sides_and_diagonals(faces):
+        flat = edge_lengths(pattern.vertices_coords, ends)
+        length = np.linalg.norm(frames[:, ends[:, 1]] - frames[:, ends[:, 0]], axis=2)
+        change = np.abs(length - flat) / np.maximum(flat, least)
+        worst[:, facets] = np.maximum(worst[:, facets], change)
     return worst
 
 
@@ -226,13 +210,13 @@ def _rotations(axis: Floats, angle: Floats) -> Floats:
 
 
 def _joined(pattern: CreasePattern) -> Ints:
-    """The edges that join two facets: not cut, and with a facet on either side."""
+    """The edges that join two facets and are not cut."""
     inner = (pattern.edges_faces >= 0).all(axis=1)
     return np.flatnonzero(inner & ~np.isin(pattern.edges_assignment, ("B", "C")))
 
 
 def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
-    """Breadth-first over the facets from the middle one: (F,) the facet before each, the crease
+    """Breadth-first over the facets from the middle: (F,) the parent of each facet, the crease
     between them, and the number of creases from the middle.
     """
     facets = len(pattern.faces_vertices)
@@ -247,11 +231,11 @@ def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
     if np.isinf(distance).any():
         loose = int(np.isinf(distance).sum())
         raise PatternError(
-            f"{loose} of {facets} facets hang on to the rest by no crease, so the pattern cannot "
-            "be folded as one sheet."
+            f"{loose} of {facets} facets are joined to the rest by no crease, so the pattern "
+            "cannot be folded as one sheet."
         )
-    previous: Ints = np.asarray(before, dtype=np.int64).reshape(facets)
-    depth: Ints = np.asarray(distance, dtype=np.int64).reshape(facets)
+    previous = np.asarray(before, dtype=np.int64).reshape(facets)
+    depth = np.asarray(distance, dtype=np.int64).reshape(facets)
     keys = np.minimum(left, right) * facets + np.maximum(left, right)
     order = np.argsort(keys, kind="stable")
     own = np.arange(facets)
@@ -264,13 +248,13 @@ def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
 
 
 def _middle(pattern: CreasePattern) -> int:
-    """The facet whose corners' mean lies nearest to the middle of the flat pattern."""
+    """The facet nearest to the middle of the flat pattern."""
     means = facet_means(pattern.vertices_coords, pattern.faces_vertices)
     return int(np.argmin(np.linalg.norm(means - means.mean(axis=0), axis=1)))
 
 
-def _first_facets(pattern: CreasePattern, depth: Ints) -> Ints:
-    """(V,) a facet of each vertex, the nearest to the middle; vertices of no facet are refused."""
+def first_facets(pattern: CreasePattern, depth: Ints) -> Ints:
+    """(V,) the facet of each vertex nearest to the middle; refuses vertices of no facet."""
     faces = pattern.faces_vertices
     facet, corner = np.nonzero(faces >= 0)
     outward = np.argsort(-depth[facet], kind="stable")
@@ -283,7 +267,7 @@ def _first_facets(pattern: CreasePattern, depth: Ints) -> Ints:
 
 
 def laid_on_each_other(pattern: CreasePattern, states: Floats, frames: Floats) -> Floats:
-    """``frames`` moved rigidly: one onto the known form, the others each onto its neighbour."""
+    """``frames`` moved rigidly: one onto the known form, each other one onto its neighbour."""
     known = pattern.folded_coords
     if known is None:
         known = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
@@ -308,5 +292,4 @@ def laid_on(points: Floats, onto: Floats) -> Floats:
     centre, goal = points.mean(axis=0), onto.mean(axis=0)
     u, _, vt = np.linalg.svd((points - centre).T @ (onto - goal))
     mirror = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    moved: Floats = (points - centre) @ ((u * mirror) @ vt) + goal
-    return moved
+    return np.asarray((points - centre) @ ((u * mirror) @ vt) + goal)

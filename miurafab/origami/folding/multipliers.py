@@ -1,14 +1,14 @@
-"""How fast each crease folds, where a pattern tells no more than mountains from valleys.
+"""Fold angle multipliers: the ratios of tan(rho / 2), from mountains and valleys alone.
 
-At a flat-foldable vertex of degree four one crease differs in assignment from the three others. It
-and the one opposite fold by equal and opposite angles, the other two by equal ones, and with
-t = tan(rho / 2), a and b the sectors to either side of one of these two,
+At a flat-foldable vertex of degree four one crease differs in assignment from the three others.
+This crease and the opposite crease fold by equal and opposite angles; the other two fold by equal
+angles. With t = tan(rho / 2), and a and b the sectors on both sides of one of the other two,
 
     |t of the unequal pair| / |t of the equal pair| = |sin((a - b) / 2) / sin((a + b) / 2)|
 
-(Tachi, "Generalization of rigid foldable quadrilateral mesh origami", IASS 2009, eq. 1.) In
-logarithms these are linear equations between the creases, which are solved for the whole sheet at
-once. They are consistent only where the sheet folds rigidly: the loop mismatch tells.
+(Tachi, "Generalization of rigid foldable quadrilateral mesh origami", IASS 2009, eq. 1.) The
+logarithms satisfy linear equations between creases, which are solved for the whole sheet at once.
+The equations are consistent only if the sheet folds rigidly, which the loop mismatch shows.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import corner_ring, interior_vertices
 
 
-def fold_speeds(pattern: CreasePattern) -> Floats:
-    """(E,) tan(rho / 2) of each crease when the median crease that folds does so by 90 degrees.
+def fold_angle_multipliers(pattern: CreasePattern) -> Floats:
+    """(E,) tan(rho / 2) of each crease when the median of the folding creases is at 90 degrees.
 
     Mountains are negative; creases that are neither mountain nor valley do not fold. Vertices of
-    another degree than four are passed over. Raises :class:`~miurafab.errors.PatternError` for a
-    vertex whose creases cannot fold at once.
+    other degrees than four are skipped. Raises :class:`~miurafab.errors.PatternError` for a vertex
+    whose creases cannot fold together.
     """
     sign = np.where(pattern.edges_assignment == "V", 1.0, 0.0)
     sign[pattern.edges_assignment == "M"] = -1.0
@@ -50,20 +50,22 @@ def fold_speeds(pattern: CreasePattern) -> Floats:
     stuck = np.flatnonzero(ratio < 1e-9)
     if len(stuck):
         raise PatternError(
-            f"The creases at vertex {vertices[stuck[0]]} fold one pair after the other and not at "
-            "once, so the closed form does not hold for them."
+            f"The creases at vertex {vertices[stuck[0]]} fold one pair after the other and not "
+            "together, so the closed form does not hold for them."
         )
     more = np.concatenate([unequal[0], equal[0], unequal[0]])
     less = np.concatenate([unequal[1], equal[1], equal[0]])
     step = np.concatenate([np.zeros(2 * len(row)), np.log(ratio)])
-    speeds = sign * np.exp(_potential(len(sign), more, less, step))
-    folding = speeds[speeds != 0]
-    return speeds / float(np.median(np.abs(folding))) if len(folding) else speeds
+    multipliers = sign * np.exp(_potential(len(sign), more, less, step))
+    folding = np.abs(multipliers[multipliers != 0])
+    return multipliers / float(np.median(folding)) if len(folding) else multipliers
 
 
 def _vertices_of_four(pattern: CreasePattern) -> tuple[Ints, Floats, Ints]:
-    """The interior vertices of degree four: their edges (n, 4) counter-clockwise, the sector (n, 4)
-    after each edge, radians, and their numbers (n,). All of their edges fold.
+    """The interior vertices of degree four whose edges all fold.
+
+    Returns their edges (n, 4) counter-clockwise, the sector (n, 4) after each edge in radians, and
+    their numbers (n,).
     """
     ring = corner_ring(pattern, np.pad(pattern.vertices_coords, ((0, 0), (0, 1))))
     corners = np.flatnonzero(ring.vertex >= 0)
@@ -81,18 +83,17 @@ def _vertices_of_four(pattern: CreasePattern) -> tuple[Ints, Floats, Ints]:
 
 
 def _potential(count: int, more: Ints, less: Ints, step: Floats) -> Floats:
-    """(count,) w with w[more] - w[less] = step in the least squares, of mean zero in each part."""
+    """(count,) w with w[more] - w[less] = step by least squares, of mean zero in each part."""
     rows = np.tile(np.arange(len(more)), 2)
     ends = np.concatenate([more, less])
     signs = np.repeat([1.0, -1.0], len(more))
     difference = coo_array((signs, (rows, ends)), shape=(len(more), count)).tocsc()
     laplacian = difference.T @ difference
     _, part = connected_components(laplacian, directed=False)
-    # an anchor on the first of each part, which the mean then replaces
+    # the first of each part is anchored at 0; the mean is removed at the end
     anchored = np.zeros(count)
     anchored[np.unique(part, return_index=True)[1]] = 1.0
     system = coo_array((anchored, (np.arange(count), np.arange(count)))).tocsc() + laplacian
     potential = np.asarray(spsolve(system, difference.T @ step))
     mean = np.bincount(part, potential) / np.bincount(part)
-    centred: Floats = potential - mean[part]
-    return centred
+    return np.asarray(potential - mean[part])

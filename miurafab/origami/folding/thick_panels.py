@@ -1,19 +1,19 @@
-"""Thick panels: how far each panel must be cut back so that the sheet still folds.
+"""Thick panels: the distance by which each panel is trimmed so that the sheet still folds.
 
-The creases stay the axes of the motion, in the middle of a panel of thickness t, and so does the
-motion (T. Tachi, "Rigid-foldable thick origami", Origami 5 (2011), tapered panels). Two panels that
-fold by rho about their crease meet in the plane that bisects their angle. Where a facet may fold by
-up to rho, its surface on the side that closes must therefore stay back from the crease by
+The creases stay the axes of the motion, in the middle of a panel of thickness t, so the motion is
+that of thin paper (T. Tachi, "Rigid-foldable thick origami", Origami 5 (2011), tapered panels). Two
+panels that fold by rho about their crease meet in the plane that bisects their angle. The surface
+on the closing side, the top for a valley and the bottom for a mountain, is therefore trimmed back
+from the crease by
 
     d = (t / 2) tan(rho / 2)
 
-on the top for a valley and on the bottom for a mountain; the other side may reach the crease. Made
-of two plies with a film between them, which is the hinge, one ply is cut back by d. Nothing that is
-folded flat can have thickness in this way: d grows without bound.
+and the other surface reaches the crease. A panel of two plies with a film between them as the hinge
+has one ply trimmed by d. A crease that is folded flat can have no thickness: d grows without bound.
 
-With k = tan(rho / 2) of a side that closes and 0 of one that opens, the corner p between two sides
-with inward unit normals m and n moves to p + (t / 2) w with m.w = k_m and n.w = k_n. Corners move
-in proportion to t, which gives the thickness up to which each side keeps a positive length.
+With k = tan(rho / 2) at a side that closes and k = 0 at a side that opens, the corner p between two
+sides with inward unit normals m and n moves to p + (t / 2) w, where m.w = k_m and n.w = k_n.
+Corners move in proportion to t, which gives the thickness up to which each side keeps a length.
 """
 
 from __future__ import annotations
@@ -27,15 +27,16 @@ from numpy.typing import NDArray
 
 from miurafab.errors import InputError
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import next_corners, previous_corners
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.angles_csv import ON_EACH_OTHER
 from miurafab.origami.folding.contact import self_intersections, triangulate
-from miurafab.origami.folding.kinematics import fold_angles_at, place, rigid_motion
+from miurafab.origami.folding.kinematics import first_facets, fold_angles_at, place, rigid_motion
 
 SIDES = ("top", "bottom")
 STATES = (0.05, 0.35, 0.7, 0.999)
-"""Where between flat and the folded form, as parts of the middling fold angle, solids are tested;
-at the ends themselves panels touch all along their sides.
+"""The states at which solids are tested, as parts of the median fold angle. At flat and in the
+folded form panels touch along their sides.
 """
 
 
@@ -43,11 +44,11 @@ at the ends themselves panels touch all along their sides.
 class ThickPanels:
     """``pattern`` made of panels ``thickness_mm`` thick, folding from flat to its folded form.
 
-    ``hinge_side`` (E,) is "top" where the panels close on the top (valleys), "bottom" where they do
-    on the bottom (mountains), "" on borders and flat creases. ``offset_mm`` (E,) is the least
-    distance that the panels' surface on that side keeps from the crease, infinite for a crease
-    folded by 180 degrees. ``limit_mm`` (F,) is the thickness up to which each facet keeps all its
-    sides. ``collisions`` are (state, facet, facet) where trimmed panels still run into each other.
+    ``hinge_side`` (E,) is "top" where the panels close on the top (valleys), "bottom" where they
+    close on the bottom (mountains), "" on borders and flat creases. ``offset_mm`` (E,) is the
+    distance from the crease to the panels' surface on that side, infinite for a crease folded by
+    180 degrees. ``limit_mm`` (F,) is the thickness up to which each facet keeps all its sides.
+    ``collisions`` are (state, facet, facet) where trimmed panels still pass through each other.
     """
 
     pattern: CreasePattern
@@ -64,8 +65,8 @@ class ThickPanels:
 
     @property
     def least_scale(self) -> float:
-        """How many times as large the sheet must at least be for all facets to take the thickness;
-        infinite if a crease is folded flat.
+        """The least factor by which the sheet must be enlarged for the thickness; infinite if a
+        crease is folded flat.
         """
         least = float(self.limit_mm.min())
         return self.thickness_mm / least if least > 0 else np.inf
@@ -83,17 +84,18 @@ def thick_panels(
 ) -> ThickPanels:
     """The panels of ``pattern`` at ``thickness_mm``, and whether they fold to the folded form.
 
-    Raises :class:`~miurafab.errors.InputError` for a thickness that is none, or for a sheet that
-    does not fold rigidly and so cannot be made of panels at all.
+    Raises :class:`~miurafab.errors.InputError` for a thickness that is not positive, or a sheet
+    that does not fold rigidly and so cannot be made of panels.
     """
     if not 0 < thickness_mm < np.inf:
-        raise InputError(f"--thickness is {thickness_mm:g} mm; it must be greater than zero.")
+        raise InputError(f"`thickness` is {thickness_mm:g} mm; it must be greater than zero.")
     motion = rigid_motion(pattern, [0.25, 0.5, 1.0])
     if not motion.is_rigid:
         assert motion.mismatch is not None
         raise InputError(
             "Thick panels cannot bend, and this sheet does not fold rigidly: on the way its facets "
-            f"miss each other by up to {motion.mismatch.max():.2g} mean edges; fit it with --rigid."
+            f"miss each other by up to {motion.mismatch.max():.2g} mean edges; fit it with "
+            "`flat_foldable` exact."
         )
     angle = np.where((pattern.edges_faces >= 0).all(axis=1), pattern.edges_fold_angle, 0.0)
     flat_folded = np.abs(angle) > ON_EACH_OTHER
@@ -109,7 +111,7 @@ def thick_panels(
 def facet_limits(pattern: CreasePattern, angle: Floats) -> Floats:
     """(F,) the thickness, mm, at which each facet loses a side when folded by ``angle`` (E,).
 
-    Infinite for a facet that no side closes on, 0 for one with a crease folded by 180 degrees.
+    Infinite for a facet without a closing side, 0 for a facet with a crease folded by 180 degrees.
     """
     limits = np.full(len(pattern.faces_vertices), np.inf)
     for sign in (1.0, -1.0):
@@ -117,7 +119,7 @@ def facet_limits(pattern: CreasePattern, angle: Floats) -> Floats:
         shut = np.isinf(closing).any(axis=1)
         moves = _corner_moves(pattern, np.where(np.isinf(closing), 0.0, closing))
         along, length = _sides(pattern)
-        shrink = np.einsum("fkd,fkd->fk", moves - _next(pattern, moves), along)
+        shrink = np.einsum("fkd,fkd->fk", moves - _next(pattern.faces_vertices, moves), along)
         with np.errstate(divide="ignore", invalid="ignore"):
             lasts = np.where((shrink > 1e-12) & (length > 0), 2 * length / shrink, np.inf)
         limits = np.minimum(limits, np.where(shut, 0.0, lasts.min(axis=1)))
@@ -129,14 +131,14 @@ def _collisions(
     thickness: float,
     on_progress: Callable[[float, str], None] | None,
 ) -> tuple[tuple[float, int, int], ...]:
-    """Where the trimmed panels, as solids, pass through each other on the way."""
+    """The states and pairs of facets where trimmed panels, as solids, pass through each other."""
     folding = np.abs(pattern.edges_fold_angle[pattern.edges_fold_angle != 0])
     middling = float(np.median(folding))
     states = np.tan(np.array(STATES) * middling / 2) / np.tan(middling / 2)
     found: list[tuple[float, int, int]] = []
     solids = _Solids.of(pattern, thickness)
     placement = place(pattern, fold_angles_at(pattern, states))
-    owner_of_vertex = _any_facet(pattern)
+    owner_of_vertex = first_facets(pattern, placement.depth)
     for frame, state in enumerate(states):
         if on_progress is not None:
             on_progress(frame / len(states), "panels")
@@ -155,7 +157,7 @@ def _collisions(
 @dataclass(frozen=True, eq=False)
 class _Solids:
     """All panels as one mesh: ``corners`` (C, 3) of their tops and bottoms over the flat pattern,
-    and ``triangles`` (n, 3) over the pattern's vertices, which are the hinges, then the corners.
+    and ``triangles`` (n, 3) over the vertices of the pattern (the hinges) and then the corners.
     """
 
     corners: Floats
@@ -170,7 +172,7 @@ class _Solids:
         vertices, count = len(pattern.vertices_coords), len(facet)
         number = np.full(faces.shape, -1, dtype=np.int64)
         number[facet, slot] = np.arange(count)
-        hinge, beside = faces[facet, slot], _next(pattern, faces)[facet, slot]
+        hinge, beside = faces[facet, slot], _next(faces, faces)[facet, slot]
         corners, triangles, owners = [], [], []
         for at, sign in enumerate((1.0, -1.0)):
             moves = _corner_moves(pattern, _closing(pattern, pattern.edges_fold_angle * sign))
@@ -179,7 +181,7 @@ class _Solids:
             shift = vertices + at * count
             cap, owner = triangulate(number, flat)
             corner = number[facet, slot] + shift
-            after = _next(pattern, number)[facet, slot] + shift
+            after = _next(faces, number)[facet, slot] + shift
             walls = ((hinge, beside, after), (hinge, after, corner))
             triangles += [cap + shift, *(np.stack(wall, axis=1) for wall in walls)]
             owners += [owner, facet, facet]
@@ -202,33 +204,22 @@ class _Solids:
         )
 
 
-def _any_facet(pattern: CreasePattern) -> Ints:
-    """(V,) a facet of each vertex."""
-    facet, corner = np.nonzero(pattern.faces_vertices >= 0)
-    found = np.zeros(len(pattern.vertices_coords), dtype=np.int64)
-    found[pattern.faces_vertices[facet, corner]] = facet
-    return found
-
-
 def _closing(pattern: CreasePattern, angle: Floats) -> Floats:
-    """(F, k) tan(rho / 2) of each side that closes; ``angle`` (E,) is positive where it does."""
+    """(F, k) tan(rho / 2) of each closing side, where ``angle`` (E,) is positive; else 0."""
     flat_folded = angle > ON_EACH_OTHER
     reach = np.where(flat_folded, np.inf, np.tan(np.clip(angle, 0.0, ON_EACH_OTHER) / 2))
     return np.where(pattern.faces_edges >= 0, reach[pattern.faces_edges], 0.0)
 
 
-def _next(pattern: CreasePattern, values: NDArray[Any]) -> NDArray[Any]:
-    """``values`` (F, k, ...) of the next corner of each facet."""
-    size = (pattern.faces_vertices >= 0).sum(axis=1)[:, None]
-    slot = np.arange(pattern.faces_vertices.shape[1])[None, :]
-    after = np.where(slot + 1 < size, slot + 1, 0)
-    return values[np.arange(len(values))[:, None], after]
+def _next(faces: Ints, values: NDArray[Any]) -> NDArray[Any]:
+    """``values`` (F, k, ...) at the next corner of each of ``faces`` (F, k)."""
+    return values[np.arange(len(values))[:, None], next_corners(faces)]
 
 
 def _sides(pattern: CreasePattern) -> tuple[Floats, Floats]:
     """(F, k, 2) unit directions from each corner to the next, and their lengths (F, k)."""
     here = pattern.vertices_coords[pattern.faces_vertices]
-    side = _next(pattern, here) - here
+    side = _next(pattern.faces_vertices, here) - here
     length = np.where(pattern.faces_vertices >= 0, np.linalg.norm(side, axis=2), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         along = np.where(length[..., None] > 0, side / length[..., None], 0.0)
@@ -236,11 +227,9 @@ def _sides(pattern: CreasePattern) -> tuple[Floats, Floats]:
 
 
 def _corner_moves(pattern: CreasePattern, closing: Floats) -> Floats:
-    """(F, k, 2) how far each corner moves inwards for half a millimetre of thickness a unit."""
+    """(F, k, 2) w, the inward move of each corner over half the thickness."""
     along, _ = _sides(pattern)
-    size = (pattern.faces_vertices >= 0).sum(axis=1)[:, None]
-    slot = np.arange(pattern.faces_vertices.shape[1])[None, :]
-    before = np.where(slot > 0, slot - 1, size - 1)
+    before = previous_corners(pattern.faces_vertices)
     row = np.arange(len(along))[:, None]
     # u and v point in and out, m and n are their left normals: w = (k_m v - k_n u) / (u x v)
     u, v, k_in, k_out = along[row, before], along, closing[row, before], closing

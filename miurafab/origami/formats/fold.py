@@ -1,12 +1,12 @@
-"""Pattern files: FOLD 1.2 as this house writes it, and any FOLD file that holds a crease pattern.
+"""FOLD 1.2 files: written in one form, and read from any program that stores a crease pattern.
 
 The key frame is the flat crease pattern; ``file_frames[0]`` inherits it and holds the folded form,
-and the frames of a folding motion follow it. In files of other programs the flat pattern may stand
-in any frame, facets may run clockwise or be missing, and angles may have to be taken from the
-folded form (FOLD 1.2, https://github.com/edemaine/fold/blob/main/doc/spec.md).
+and the frames of a folding motion follow. In files of other programs the flat pattern may be in any
+frame, facets may run clockwise or be missing, and fold angles may have to come from the folded form
+(FOLD 1.2, https://github.com/edemaine/fold/blob/main/doc/spec.md).
 
-Numbers are written with as many digits as they need to be read back bit for bit, and the same
-pattern gives the same bytes.
+Numbers have as many digits as are needed to read them back bit for bit. The same pattern gives the
+same bytes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.polygons import filled, signed_areas
+from miurafab.geometry.polygons import filled, reversed_faces, signed_areas
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.formats.planar_graph import faces_of_plane_graph
@@ -34,10 +34,10 @@ _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "u
 
 
 def fold_text(pattern: CreasePattern, title: str = "", motion: FoldingMotion | None = None) -> str:
-    """``pattern`` as the text of a FOLD 1.2 file, one top-level key a line.
+    """``pattern`` as the text of a FOLD 1.2 file, one top-level key in each line.
 
-    The frames of a ``motion`` of the pattern follow the folded form, each a frame that inherits
-    the flat pattern and has its own coordinates and fold angles.
+    The frames of a ``motion`` follow the folded form. Each inherits the flat pattern and has its
+    own coordinates and fold angles.
     """
     keys: dict[str, Any] = {
         "file_spec": 1.2,
@@ -166,7 +166,7 @@ def parse_fold(document: Any) -> CreasePattern:
 
 
 def _frames(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The key frame and ``file_frames``, each with what it inherits filled in."""
+    """The key frame and ``file_frames``, each with its inherited keys."""
     listed = document.get("file_frames", [])
     if not isinstance(listed, list) or not all(isinstance(frame, dict) for frame in listed):
         raise PatternError("'file_frames' is not a list of objects.")
@@ -188,9 +188,9 @@ def _classes(frame: Mapping[str, Any]) -> list[Any]:
 
 
 def _flat_frame(frames: list[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """The frame with the crease pattern: the one that says so, or the first that lies flat."""
-    said = [frame for frame in frames if "creasePattern" in _classes(frame)]
-    for frame in said or [f for f in frames if "foldedForm" not in _classes(f)] or frames:
+    """The frame of class creasePattern, or else the first frame that is flat."""
+    declared = [frame for frame in frames if "creasePattern" in _classes(frame)]
+    for frame in declared or [f for f in frames if "foldedForm" not in _classes(f)] or frames:
         points = _coordinates(frame, "vertices_coords")
         if points.shape[1] == 2 or np.ptp(points[:, 2]) <= 1e-9 * np.ptp(points[:, :2]):
             return frame
@@ -198,22 +198,19 @@ def _flat_frame(frames: list[Mapping[str, Any]]) -> Mapping[str, Any]:
 
 
 def _unit(frame: Mapping[str, Any], default: float) -> float:
-    """Millimetres in the frame's unit; ``default`` if it has none, or none that is a length."""
+    """The frame's unit in millimetres; ``default`` if it has none, or one that is no length."""
     unit = frame.get("frame_unit")
     return _UNITS_MM.get(unit, default) if isinstance(unit, str) else default
 
 
 def _counter_clockwise(flat: Floats, faces: Ints) -> Ints:
-    """``faces`` with the corners of those that run clockwise in reverse order."""
+    """``faces``, with clockwise faces reversed."""
     clockwise = signed_areas(flat[filled(faces)]) < 0
-    size = (faces >= 0).sum(axis=1)[:, None]
-    slot = np.arange(faces.shape[1])[None, :]
-    back = np.take_along_axis(faces, np.where(slot < size, size - 1 - slot, slot), axis=1)
-    return np.where(clockwise[:, None], back, faces)
+    return np.where(clockwise[:, None], reversed_faces(faces), faces)
 
 
 def _walked(flat: Floats, edges: Ints) -> Ints:
-    """The facets that ``edges`` enclose, for a file that lists none."""
+    """The facets that ``edges`` enclose, for a file without facets."""
     if edges.max() >= len(flat):
         raise PatternError("'edges_vertices' refers to a vertex that does not exist.")
     faces = faces_of_plane_graph(flat, edges)
@@ -278,7 +275,7 @@ def _assignments(document: Mapping[str, Any], edges: int) -> NDArray[np.str_]:
 
 
 def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> Floats:
-    """Given angles in radians; without them a mountain is -pi and a valley pi (flat-folded)."""
+    """The file's angles in radians; without angles a mountain has -pi and a valley pi."""
     flat_folded = np.select([assignment == "M", assignment == "V"], [-180.0, 180.0], 0.0)
     given = document.get("edges_foldAngle")
     if given is None:
@@ -293,7 +290,7 @@ def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> F
 
 
 def _folded(frames: list[Mapping[str, Any]], vertices: int, factor: float) -> Floats | None:
-    """The folded form (V, 3), mm, in the first of ``frames`` that says that it is one."""
+    """The folded form (V, 3), mm, from the first of ``frames`` of class foldedForm."""
     for frame in frames:
         if "foldedForm" in _classes(frame):
             points: Floats = _coordinates(frame, "vertices_coords")

@@ -1,12 +1,12 @@
-"""CP, OPX and DXF: crease patterns as bare lines that carry a type and no fold angle.
+"""CP, OPX and DXF: crease patterns as lines with a type and without a fold angle.
 
 ORIPA's type numbers are 0 auxiliary, 1 border or cut, 2 mountain, 3 valley, and its y axis points
-down (ORIPA, ``OriLine.java`` and ``ExporterDXF``, which turns y round). A CP file holds
-``type x0 y0 x1 y1`` a line; an OPX file holds the same as a Java bean in XML. DXF is written as R12
-(AC1009) with LINE entities on the layers CutLine, MountainLine, ValleyLine and AuxLine and with the
-colours that ORIPA reads types from: green, red, blue.
+down (ORIPA, ``OriLine.java`` and ``ExporterDXF``, which reverses y). A CP file has
+``type x0 y0 x1 y1`` in each line; an OPX file has the same as a Java bean in XML. DXF is written as
+R12 (AC1009) with LINE entities on the layers CutLine, MountainLine, ValleyLine and AuxLine, in the
+colours from which ORIPA reads the types: green, red, blue.
 
-Read back, mountains and valleys are folded flat, for none of the three says how far they fold.
+None of the three formats stores fold angles: mountains and valleys are read as folded flat.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def parse_opx(text: str) -> CreaseLines:
     for line in xml_root(text, "an OPX file").iter("object"):
         if line.get("class") != "oripa.OriLineProxy":
             continue
-        # Java leaves out what is zero
+        # Java omits zeros
         values = {"type": 0.0, "x0": 0.0, "y0": 0.0, "x1": 0.0, "y1": 0.0}
         for void in line.findall("void"):
             name = void.get("property")
@@ -99,7 +99,7 @@ def parse_opx(text: str) -> CreaseLines:
 
 
 def xml_root(text: str, what: str) -> ElementTree.Element:
-    """The root of the XML ``text``; entities, which can be made to grow without end, are refused.
+    """The root of the XML ``text``; refuses entities, which can grow without bound.
 
     Raises ``PatternError`` saying that it is not ``what``.
     """
@@ -145,7 +145,7 @@ def parse_dxf(text: str) -> CreaseLines:
                 raise PatternError("a polyline is curved; a crease pattern holds straight lines.")
             xs = [_number(value, "an x") for code, value in tags if code == 10]
             ys = [_number(value, "a y") for code, value in tags if code == 20]
-            if kind == "POLYLINE":  # the polyline itself carries a dummy point
+            if kind == "POLYLINE":  # a polyline has a dummy point of its own
                 xs, ys = xs[-_vertex_count(tags) :], ys[-_vertex_count(tags) :]
             if int(_first(tags, 70)) & 1:
                 xs, ys = xs + xs[:1], ys + ys[:1]
@@ -155,8 +155,9 @@ def parse_dxf(text: str) -> CreaseLines:
 
 
 def _entities(text: str) -> Iterator[tuple[str, list[tuple[int, str]]]]:
-    """Each entity of the ENTITIES section: its kind and its (group code, value) pairs; the vertices
-    of a POLYLINE are joined to it.
+    """The kind and the (group code, value) pairs of each entity of the ENTITIES section.
+
+    The pairs of a POLYLINE include those of its vertices.
     """
     rows = text.splitlines()
     if len(rows) < 4 or rows[0].strip() != "0" or rows[1].strip() != "SECTION":
@@ -189,23 +190,21 @@ def _vertex_count(tags: list[tuple[int, str]]) -> int:
 
 def _dxf_letter(tags: list[tuple[int, str]]) -> str:
     """The assignment by the layer's name, else by the colour, else unassigned."""
-    found = dict(reversed(tags))  # of several tags of one code the first counts
-    layer = found.get(8, "").lower()
+    first = dict(reversed(tags))  # the first tag of each code
+    layer = first.get(8, "").lower()
     for part, letter in (
         ("mountain", "M"), ("valley", "V"), ("cut", "B"), ("border", "B"), ("boundary", "B"),
         ("aux", "F"), ("flat", "F"),
     ):  # fmt: skip
         if part in layer:
             return letter
-    colour = int(_number(found.get(62, "0"), "a colour"))
+    colour = int(_number(first.get(62, "0"), "a colour"))
     return {1: "M", 5: "V", 3: "B"}.get(colour, "U")
 
 
 def _first(tags: list[tuple[int, str]], code: int) -> float:
-    for other, value in tags:
-        if other == code:
-            return _number(value, f"group {code}")
-    return 0.0
+    value = next((value for group, value in tags if group == code), "0")
+    return _number(value, f"group {code}")
 
 
 def _number(text: str, what: str) -> float:
@@ -223,7 +222,7 @@ def _down(lines: CreaseLines) -> Iterator[tuple[int, float, float, float, float]
     for letter, ((x0, y0), (x1, y1)) in zip(
         lines.assignment.tolist(), lines.ends.tolist(), strict=True
     ):
-        # 0.0 - y and not -y, which would write -0.0
+        # 0.0 - y, since -y would give -0.0
         yield _TYPE_OF_LETTER[letter], x0, 0.0 - y0, x1, 0.0 - y1
 
 

@@ -1,11 +1,10 @@
 """OBJ, STL and GLB: a sheet as a mesh of its facets, for renderers, printers and other programs.
 
-OBJ keeps the facets as polygons; STL and GLB hold triangles. A GLB (glTF 2.0 in one binary file,
-Khronos Group, sections 3 and 4) is in metres with y up, as glTF wants it, and shows the two sides
-of the paper in two colours by drawing each triangle twice, once from either side. It carries no
-normals: without them a viewer must shade flat, which is what facets want. A folding motion becomes
-one morph target a frame, played one after another at even intervals; between two frames a viewer
-blends, which is a picture of the motion and not the motion.
+OBJ keeps facets as polygons; STL and GLB hold triangles. GLB (glTF 2.0 in one binary file, Khronos
+Group, sections 3 and 4) is in metres with y up. It contains each triangle twice, once for each side
+of the paper, in two colours. It has no normals, so that a viewer must use flat shading. A folding
+motion has one morph target for each frame, at even intervals. Between two frames a viewer blends,
+which only approximates the motion.
 """
 
 from __future__ import annotations
@@ -121,7 +120,7 @@ def _material(name: str, colour: tuple[float, float, float]) -> dict[str, Any]:
 
 
 class _Binary:
-    """The binary chunk as it grows, with a view and an accessor for each array in it."""
+    """The binary chunk, which grows, with a view and an accessor for each array in it."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -129,7 +128,7 @@ class _Binary:
         self.accessors: list[dict[str, Any]] = []
 
     def add(self, array: NDArray[Any], target: int | None, component: int, kind: str) -> int:
-        """Append ``array``; its accessor's index."""
+        """Append ``array`` and return the index of its accessor."""
         content = array.tobytes()
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content)}
         if target is not None:

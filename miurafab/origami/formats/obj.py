@@ -1,7 +1,7 @@
 """A pattern from two Wavefront OBJ files: the same mesh lying flat and folded.
 
-Many research codes hand their origami on that way. Vertices and facets must come in the same order
-in both; the fold angles follow from the folded form. OBJ has no unit: one unit is read as 1 mm.
+Many research codes store their origami in this way. Both files must list vertices and facets in the
+same order; the fold angles follow from the folded form. OBJ has no unit: one unit is read as 1 mm.
 (Wavefront, Advanced Visualizer manual, appendix B1: the ``v`` and ``f`` statements.)
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.polygons import signed_areas
+from miurafab.geometry.polygons import next_corners, reversed_faces, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.unfold import with_angles_of_the_folded_form
@@ -36,12 +36,12 @@ def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
     across = int(np.argmin(np.ptp(points, axis=0)))
     if np.ptp(points[:, across]) > 1e-9 * np.ptp(points):
         raise PatternError(f"{flat} is not flat: its vertices do not lie in one plane x, y or z.")
-    # the two axes in the order that keeps the view from the positive side of the third
+    # the two axes in the order that is right-handed with the third axis
     plane = np.ascontiguousarray(points[:, [(across + 1) % 3, (across + 2) % 3]])
     triangles, owner = triangulate(faces, plane)
     areas = np.bincount(owner, signed_areas(plane[triangles]), minlength=len(faces))
     if areas.sum() < 0:
-        faces = _reversed(faces)
+        faces = reversed_faces(faces)
     edges = _edges(faces)
     pattern = CreasePattern(
         vertices_coords=plane,
@@ -77,7 +77,7 @@ def _read_obj(path: Path) -> tuple[Floats, Ints]:
                 points.append([x, y, z])
             elif words[:1] == ["f"]:
                 corners = [int(word.split("/")[0]) for word in words[1:]]
-                # from 1 up, or backwards from the last vertex so far
+                # counted from 1, or backwards from the last vertex so far
                 face = [c - 1 if c > 0 else len(points) + c for c in corners]
                 if len(face) < 3 or 0 in corners or min(face) < 0:
                     raise ValueError
@@ -96,17 +96,7 @@ def _read_obj(path: Path) -> tuple[Floats, Ints]:
     return vertices, np.array(padded, dtype=np.int64)
 
 
-def _reversed(faces: Ints) -> Ints:
-    """The facets with their corners in the opposite order, padding last."""
-    sizes = (faces >= 0).sum(axis=1)[:, None]
-    slot = np.broadcast_to(np.arange(faces.shape[1]), faces.shape)
-    backwards = np.where(slot < sizes, sizes - 1 - slot, slot)
-    return np.take_along_axis(faces, backwards, axis=1)
-
-
 def _edges(faces: Ints) -> Ints:
-    sizes = (faces >= 0).sum(axis=1)[:, None]
-    slot = np.broadcast_to(np.arange(faces.shape[1]), faces.shape)
-    after = np.where(slot + 1 < sizes, slot + 1, 0)
-    sides = np.stack([faces, np.take_along_axis(faces, after, axis=1)], axis=-1)
+    ahead = np.take_along_axis(faces, next_corners(faces), axis=1)
+    sides = np.stack([faces, ahead], axis=-1)
     return np.unique(np.sort(sides[faces >= 0], axis=1), axis=0)

@@ -1,8 +1,8 @@
-"""From loose lines to a crease pattern: joined where they meet, split where they cross, and faces.
+"""From lines to a crease pattern: lines are joined where they meet and split where they cross.
 
-Drawings (SVG, CP, OPX, DXF) hold lines and nothing else; two lines meet where their ends lie within
-a tolerance of each other. The plane graph is walked with the usual rule: at the end of a side turn
-to the next side clockwise, so that each facet is gone round counter-clockwise.
+Drawings (SVG, CP, OPX, DXF) hold only lines. Two lines meet where their ends are within a tolerance
+of each other. Facets come from the plane graph: at the end of a side, the next side clockwise
+follows, so that the walk around each facet is counter-clockwise.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ from scipy.spatial import cKDTree
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.boxes import meeting_pairs
 from miurafab.origami.crease_pattern import CreasePattern
 
 TOLERANCE = 1e-4
-"""How near ends count as met, as a part of the median line."""
+"""The distance within which ends meet, as a part of the median line."""
 
 _FAR = 1e9
-# Where two lines lie on each other the one that says more wins.
+# Of two lines on each other, the line of the higher rank is kept.
 _RANK = {"B": 6, "C": 5, "M": 4, "V": 4, "J": 2, "F": 1, "U": 0}
 
 
@@ -32,7 +33,7 @@ class CreaseLines:
     """n straight lines of a drawing, y upwards.
 
     ``ends`` (n, 2, 2) float64, mm; ``assignment`` (n,) letters of FOLD; ``fold_angle`` (n,)
-    float64, radians, NaN where the drawing does not tell.
+    float64, radians, NaN if unknown.
     """
 
     ends: Floats
@@ -53,11 +54,12 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
     """The pattern that ``lines`` draw.
 
     Ends within ``tolerance`` (mm; default :data:`TOLERANCE` of the median line) of each other are
-    one vertex, an end that near to a line lies on it, and crossing lines get a vertex. A mountain
-    or valley of unknown angle is folded flat. Lines that bound no facet are left out.
+    one vertex, an end within ``tolerance`` of a line lies on the line, and crossing lines get a
+    vertex. A mountain or valley of unknown angle is folded flat. Lines that bound no facet are left
+    out.
 
-    Raises :class:`~miurafab.errors.PatternError` if no line encloses anything, or if the drawing
-    falls into pieces.
+    Raises :class:`~miurafab.errors.PatternError` if the lines enclose no facet, or if the drawing
+    has separate pieces.
     """
     if not len(lines.ends):
         raise PatternError("The drawing holds no straight line.")
@@ -74,7 +76,7 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
     if pieces > 1:
         raise PatternError(
             f"The drawing falls into {pieces} pieces that do not touch; put one pattern in a file, "
-            "or give a larger --tolerance."
+            "or give a larger `tolerance`."
         )
     faces = faces_of_plane_graph(points, sides)
     letter = lines.assignment[source]
@@ -83,7 +85,7 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
     keep = count > 0
     sides, source, letter, count = sides[keep], source[keep], letter[keep], count[keep]
     used = np.unique(sides)
-    renumber = np.full(len(points) + 1, -1, dtype=np.int64)  # the last one keeps -1 at -1
+    renumber = np.full(len(points) + 1, -1, dtype=np.int64)  # the last entry maps -1 to -1
     renumber[used] = np.arange(len(used))
     letter = np.where(count == 1, "B", np.where(letter == "B", "C", letter))
     flat_folded = np.select([letter == "M", letter == "V"], [-np.pi, np.pi], 0.0)
@@ -99,9 +101,9 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
 
 
 def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
-    """(F, k) the facets between ``sides`` (E, 2) drawn without crossings at ``points`` (V, 2).
+    """(F, k) the facets between ``sides`` (E, 2) without crossings at ``points`` (V, 2).
 
-    Counter-clockwise, -1 padded, without the outside.
+    Counter-clockwise, filled with -1, without the outside.
     """
     tail = np.concatenate([sides[:, 0], sides[:, 1]])
     head = np.concatenate([sides[:, 1], sides[:, 0]])
@@ -139,7 +141,8 @@ def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
 
 def _split(ends: Floats, near: float) -> tuple[Floats, Ints, Ints]:
     """Vertices (V, 2), sides (m, 2) between them, and the line (m,) that each side is part of."""
-    first, second = _near_pairs(ends, near)
+    low, high = ends.min(axis=1) - near, ends.max(axis=1)
+    first, second = meeting_pairs(*(np.pad(corner, ((0, 0), (0, 1))) for corner in (low, high)))
     a, b = ends[first], ends[second]
     along, across = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0]
     offset = b[:, 0] - a[:, 0]
@@ -172,30 +175,6 @@ def _split(ends: Floats, near: float) -> tuple[Floats, Ints, Ints]:
     return points, np.stack([cuts[:-1], cuts[1:]], axis=1)[joined], lines[1:][joined]
 
 
-def _near_pairs(ends: Floats, near: float) -> tuple[Ints, Ints]:
-    """Pairs of lines whose bounding boxes come within ``near``."""
-    low, high = ends.min(axis=1) - near, ends.max(axis=1)
-    by_x = np.argsort(low[:, 0], kind="stable")
-    low, high = low[by_x], high[by_x]
-    # in order of x a line can only meet those that begin before it ends
-    last = np.searchsorted(low[:, 0], high[:, 0], side="right")
-    found: list[tuple[Ints, Ints]] = []
-    chunk = 512
-    for begin in range(0, len(ends), chunk):
-        stop = min(begin + chunk, len(ends))
-        until = int(last[begin:stop].max())
-        mine, other = np.arange(begin, stop), np.arange(begin, until)
-        meet = (
-            (other[None, :] > mine[:, None])
-            & (other[None, :] < last[mine, None])
-            & (low[other, 1][None, :] <= high[mine, 1][:, None])
-            & (low[mine, 1][:, None] <= high[other, 1][None, :])
-        )
-        i, j = np.nonzero(meet)
-        found.append((by_x[mine[i]], by_x[other[j]]))
-    return np.concatenate([f[0] for f in found]), np.concatenate([f[1] for f in found])
-
-
 def _merged(loose: Floats, near: float) -> tuple[Ints, Floats]:
     """The vertex of each loose point, and the vertices: the first point of each that met."""
     pairs = cKDTree(loose).query_pairs(near, output_type="ndarray")
@@ -216,7 +195,7 @@ def _lies_on(points: Floats, ends: Floats, near: float) -> Bools:
 
 
 def _without_doubles(sides: Ints, source: Ints, assignment: NDArray[np.str_]) -> tuple[Ints, Ints]:
-    """One side between two vertices, the one whose assignment says most."""
+    """One side between two vertices, the side of the highest rank."""
     rank = np.array([_RANK[letter] for letter in assignment.tolist()])
     key = np.sort(sides, axis=1)
     order = np.lexsort((source, -rank[source], key[:, 1], key[:, 0]))
@@ -227,7 +206,7 @@ def _without_doubles(sides: Ints, source: Ints, assignment: NDArray[np.str_]) ->
 
 
 def _without_loose_ends(points: Floats, sides: Ints, source: Ints) -> tuple[Floats, Ints, Ints]:
-    """Without the sides that lead nowhere; points keep their numbers only if all are used."""
+    """Without the sides that end at a vertex of no other side, and without unused points."""
     while True:
         degree = np.bincount(sides.ravel(), minlength=len(points))
         firm = (degree[sides] > 1).all(axis=1)
@@ -241,7 +220,7 @@ def _without_loose_ends(points: Floats, sides: Ints, source: Ints) -> tuple[Floa
 
 
 def _without_holes(faces: Ints, sides: Ints, letter: NDArray[np.str_], vertices: int) -> Ints:
-    """Without the facets that border lines alone enclose, unless nothing else is left."""
+    """Without the facets that only border lines enclose, unless all facets are such."""
     face, side = _face_sides(faces, sides, vertices)
     cut = np.isin(letter[side], ("B", "C"))
     creased = np.bincount(face, ~cut, minlength=len(faces)) > 0
@@ -249,13 +228,13 @@ def _without_holes(faces: Ints, sides: Ints, letter: NDArray[np.str_], vertices:
 
 
 def _sides_of_faces(faces: Ints, sides: Ints, vertices: int) -> Ints:
-    """(E,) how many facets each side has, 0 to 2."""
+    """(E,) the number of facets at each side, 0 to 2."""
     _, side = _face_sides(faces, sides, vertices)
     return np.bincount(side, minlength=len(sides))
 
 
 def _face_sides(faces: Ints, sides: Ints, vertices: int) -> tuple[Ints, Ints]:
-    """The facet and the side of every pair of a facet and a side of it."""
+    """The facet and the side of every pair of a facet and one of its sides."""
     size = (faces >= 0).sum(axis=1)
     face, corner = np.nonzero(faces >= 0)
     tail = faces[face, corner]
@@ -271,5 +250,4 @@ def _graph(pairs: Ints, nodes: int) -> coo_array:
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    turned: Floats = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return turned
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

@@ -1,11 +1,11 @@
-"""SVG crease patterns as Origami Simulator and Rabbit Ear read and write them.
+"""SVG crease patterns in the form of Origami Simulator and Rabbit Ear.
 
 The stroke colour is the assignment: #000 border, #f00 mountain, #00f valley, #0f0 cut, #ff0 facet
 (flat), #f0f hinge (unassigned); the opacity is the fold angle, |angle| = 180 degrees x opacity
 (https://origamisimulator.org, "File > Design Tips"). Origami Simulator joins ends within 3 user
-units, so the drawing is scaled until its shortest line has 10 or more of them; width, height and
-``viewBox`` keep its size in millimetres. Rabbit Ear's ``data-assignment`` and ``data-foldAngle``
-repeat both exactly, and win where they are read back.
+units, so the drawing is scaled until its shortest line has at least 10 user units; width, height
+and ``viewBox`` keep its size in millimetres. Rabbit Ear's ``data-assignment`` and
+``data-foldAngle`` repeat both exactly, and take precedence when read.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Matrix = Floats
 
 
 def svg_text(lines: CreaseLines, title: str = "") -> str:
-    """``lines`` as an SVG drawing, y upwards in ``lines`` and so upright in the drawing."""
+    """``lines``, whose y points up, as an upright SVG drawing."""
     low, high = lines.ends.reshape(-1, 2).min(axis=0), lines.ends.reshape(-1, 2).max(axis=0)
     lengths = np.linalg.norm(lines.ends[:, 1] - lines.ends[:, 0], axis=1)
     real = lengths[lengths > 1e-6 * lengths.mean()]
@@ -78,8 +78,8 @@ def svg_text(lines: CreaseLines, title: str = "") -> str:
 
 @dataclass(frozen=True)
 class _Look:
-    """What an element inherits: the stroke and its opacity, that of the groups that it stands in,
-    and where user units lie.
+    """The inherited style of an element: stroke, opacity of the stroke and of the groups around it,
+    and the matrix from user units to millimetres.
     """
 
     stroke: str
@@ -136,14 +136,14 @@ def _walk(
         style |= rules.get("." + name, {})
     style |= _declarations(element.get("style") or "")
 
-    def said(name: str) -> str | None:
+    def styled(name: str) -> str | None:
         return style.get(name, element.get(name))
 
-    hidden = said("display") == "none" or said("visibility") == "hidden"
+    hidden = styled("display") == "none" or styled("visibility") == "hidden"
     look = _Look(
-        "none" if hidden else (said("stroke") or look.stroke).strip().lower(),
-        _opacity(said("stroke-opacity"), look.stroke_opacity),
-        look.group_opacity * _opacity(said("opacity"), 1.0),
+        "none" if hidden else (styled("stroke") or look.stroke).strip().lower(),
+        _opacity(styled("stroke-opacity"), look.stroke_opacity),
+        look.group_opacity * _opacity(styled("opacity"), 1.0),
         _composed(look.matrix, _transform(element.get("transform") or "")),
     )
     yield element, look
@@ -174,9 +174,9 @@ def _declarations(text: str) -> dict[str, str]:
 
 
 def _assignment(element: Element, look: _Look) -> str | None:
-    said = (element.get("data-assignment") or "").upper()
-    if said in ASSIGNMENTS:
-        return said
+    letter = (element.get("data-assignment") or "").upper()
+    if letter in ASSIGNMENTS:
+        return letter
     colour = _colour(look.stroke)
     if colour is None or look.opacity == 0.0:
         return None
@@ -206,9 +206,9 @@ def _colour(text: str) -> tuple[int, int, int] | None:
 
 
 def _fold_angle(element: Element, look: _Look, letter: str) -> float:
-    said = element.get("data-foldAngle")
-    if said is not None:
-        return math.radians(_value(said, "data-foldAngle"))
+    angle = element.get("data-foldAngle")
+    if angle is not None:
+        return math.radians(_value(angle, "data-foldAngle"))
     if letter in "MV":
         return math.copysign(math.pi * look.opacity, 1.0 if letter == "V" else -1.0)
     return 0.0

@@ -20,7 +20,7 @@ SURFACES = {
     "saddle": {},
     "paraboloid": {},
     "bump": {},
-    "sphere": {"width": 1.0, "height": 1.0},
+    "sphere": {"width": "1rad", "height": "1rad"},
 }
 """Doubly curved targets whose fits are flat-foldable to 2e-2 ... 3e-1 radians."""
 

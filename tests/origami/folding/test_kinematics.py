@@ -118,7 +118,7 @@ def test_states_rise_from_flat_to_the_last(steps: int, last: float) -> None:
 def test_facets_that_hang_on_nothing_are_refused() -> None:
     pattern = regular()
     cut = np.where(pattern.edges_assignment != "B", "C", "B")
-    with pytest.raises(PatternError, match="47 of 48 facets hang on"):
+    with pytest.raises(PatternError, match="47 of 48 facets are joined to the rest by no"):
         rigid_motion(replace(pattern, edges_assignment=cut), [1.0])
 
 
