@@ -8,8 +8,8 @@ import tomllib
 
 import pytest
 from commands import run_line
-from option_tables import CLASSES, TABLE, with_tables
 from pages import PAGES, ROOT, blocks_of, indented_code
+from tables import TABLES, tables_in, with_tables
 
 BLOCKS = [block for page in PAGES for block in blocks_of(page)]
 
@@ -119,8 +119,8 @@ def test_code_is_fenced_and_its_language_known(page):
     assert {block.language for block in blocks_of(page)} <= LANGUAGES
 
 
-def test_the_tables_of_options_are_those_declared():
-    """Written by ``python tests/examples/option_tables.py``."""
+def test_the_tables_are_those_of_the_program():
+    """Written by ``python tests/examples/tables.py``."""
     texts = [page.read_text(encoding="utf-8") for page in PAGES]
     assert [with_tables(text) for text in texts] == texts
-    assert {name for text in texts for _, name in TABLE.findall(text)} == set(CLASSES)
+    assert set().union(*map(tables_in, texts)) == set(TABLES)

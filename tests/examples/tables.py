@@ -1,0 +1,83 @@
+"""The tables of the pages that are made from the program: options, findings.
+
+    python tests/examples/tables.py     writes them anew
+
+A table stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
+"""
+
+import re
+
+from pages import PAGES
+
+from miurafab.errors import spell_options
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.findings import RULES
+from miurafab.options import declared
+from miurafab.origami.fitting.request import FitOptions
+from miurafab.workflow.cut_sheets import CutOptions
+
+_PLACE = re.compile(r"(<!-- table: (\w+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
+
+
+def _flag(name):
+    """An option as the command line writes it."""
+    return f"--{name.replace('_', '-')}"
+
+
+def _options(cls):
+    """The options of ``cls``: a line a group, a line an option."""
+    options = list(declared(cls).values())
+    order = list(dict.fromkeys(option.group for option in options))
+    rows, group = [], None
+    for option in sorted(options, key=lambda option: order.index(option.group)):
+        if option.group != group:
+            group = option.group
+            rows.append((f"**{group}**", "", ""))
+        written = f"{_flag(option.name)} {option.kind.metavar}".strip()
+        meaning = spell_options(option.help, lambda name: f"`{_flag(name)}`")
+        rows.append((f"`{written}`", meaning, option.default_text))
+    return ("option", "meaning", "default"), rows
+
+
+def _findings():
+    rows = [
+        (f"`{code}`", rule.severity, rule.meaning, "yes" if rule.forceable else "")
+        for code, rule in RULES.items()
+    ]
+    return ("code", "severity", "meaning", "`--force`"), rows
+
+
+def _checks():
+    rows = [(f"`{code}`", rule.meaning) for code, rule in RULES.items() if rule.forceable]
+    return ("code", "refused unless forced"), rows
+
+
+TABLES = {
+    "FitOptions": lambda: _options(FitOptions),
+    "LayoutOptions": lambda: _options(LayoutOptions),
+    "CutOptions": lambda: _options(CutOptions),
+    "checks": _checks,
+    "findings": _findings,
+}
+
+
+def _markdown(head, rows):
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(
+        "| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |\n" for line in lines
+    )
+
+
+def with_tables(text):
+    """``text`` of a page with each of its tables as the program has it."""
+    return _PLACE.sub(lambda match: f"{match[1]}\n{_markdown(*TABLES[match[2]]())}\n", text)
+
+
+def tables_in(text):
+    """The names of the tables in ``text``."""
+    return {name for _, name in _PLACE.findall(text)}
+
+
+if __name__ == "__main__":
+    for page in PAGES:
+        page.write_text(with_tables(page.read_text(encoding="utf-8")), encoding="utf-8")
