@@ -4,6 +4,7 @@ The tree (the exit code of the command line in brackets)::
 
     MiurafabError
     ├── InputError [2]          the input is wrong: a file, an option, a value
+    │   ├── UsageError          a command line that is no command of miurafab
     │   ├── OptionError         an option that cannot be taken, by its name
     │   ├── UnitError           a length, angle or feed that cannot be read
     │   ├── ProfileError        a machine or material profile, by file and key
@@ -14,15 +15,28 @@ The tree (the exit code of the command line in brackets)::
     └── MachineError [3]        the machine, its port or its controller failed
         ├── PortError           the port cannot be opened, or went away
         ├── ControllerError     the controller answered an error or an alarm
-        └── JobStopped          the job ended early at somebody's wish
+        └── JobStopped [130]    the job ended early at somebody's wish
 
-Numerical failure is not here: a fit that does not converge is a result with advice.
+Numerical failure is not here: a fit that does not converge is a result with advice. An exception
+outside this tree is a defect of miurafab; the command line turns it into a sentence and a log file.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
+
+DONE, NO, BAD_INPUT, MACHINE_FAILED, DEFECT, WAITING, INTERRUPTED = 0, 1, 2, 3, 4, 5, 130
+EXIT_CODES = {
+    DONE: "done",
+    NO: "the answer is no: a check failed, a limit is not met",
+    BAD_INPUT: "bad input or usage",
+    MACHINE_FAILED: "the machine or its port failed",
+    DEFECT: "a defect of miurafab; the message names a log file",
+    WAITING: "waiting for a person, such as for fresh material",
+    INTERRUPTED: "interrupted by Ctrl-C or at the keyboard",
+}
+"""What each exit code of the command line means."""
 
 _OPTION = re.compile(r"`([a-z][a-z0-9_]*)`")
 
@@ -46,7 +60,7 @@ class MiurafabError(Exception):
     ``sentence`` has them in backticks, for :func:`spell_options`.
     """
 
-    exit_code = 2
+    exit_code = BAD_INPUT
 
     @property
     def sentence(self) -> str:
@@ -59,6 +73,10 @@ class MiurafabError(Exception):
 
 class InputError(MiurafabError):
     """Something the user gave is wrong."""
+
+
+class UsageError(InputError):
+    """A command line that is no command of miurafab."""
 
 
 class OptionError(InputError):
@@ -105,7 +123,7 @@ class GcodeError(InputError):
 class MachineError(MiurafabError):
     """The machine, its port or its controller failed."""
 
-    exit_code = 3
+    exit_code = MACHINE_FAILED
 
 
 class PortError(MachineError):
@@ -118,3 +136,5 @@ class ControllerError(MachineError):
 
 class JobStopped(MachineError):
     """The job was ended early, with the beam off, at somebody's wish."""
+
+    exit_code = INTERRUPTED

@@ -3,8 +3,13 @@ ends programs even where the tests were started to outlive theirs.
 """
 
 import signal
+import sys
 
+import pytest
+from command_line import Done
 from hypothesis import HealthCheck, settings
+
+from miurafab.__main__ import main
 
 settings.register_profile(
     "same-every-time",
@@ -16,3 +21,17 @@ settings.load_profile("same-every-time")
 
 if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+@pytest.fixture
+def run(capsys, monkeypatch, tmp_path):
+    """The command line within this process, in an empty folder."""
+
+    def call(*arguments):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["miurafab", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exited:
+            main()
+        return Done(exited.value.code or 0, *capsys.readouterr())
+
+    return call

@@ -5,28 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.cli.console import Console
+from miurafab.cli.declared import MachineOption, MaterialOption, option
+from miurafab.errors import DONE
+from miurafab.options import File
+
+EXAMPLES = ("miurafab calibrate --machine grbl-laser-400 --material card-250 -o trial",)
 
 
 def calibrate(
-    out: Annotated[Path, typer.Option("-o", "--out", help="The job directory to write.")],
-    machine: Annotated[
-        str | None, typer.Option(help="A machine profile: a shipped name or a TOML file.")
-    ] = None,
-    material: Annotated[
-        str | None, typer.Option(help="The material to begin with: a name or a TOML file.")
-    ] = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    *,
+    out: Annotated[Path, option(File("FOLDER"), "The job directory to write.", "-o", "--out")],
+    machine: MachineOption = None,
+    material: MaterialOption = None,
+    console: Console = Console(),
+) -> int:
     """Make a test sheet: dashes against power and feed, kerf gauge, fold coupon.
 
-    Preview and cut it like any job, then keep what is best with 'miurafab materials add'.
+    Preview and cut it like any job, then keep the best settings with 'miurafab materials add'.
     """
-    console = Console(as_json, quiet)
     with console.progress("drawing the sheet") as progress:
         made = miurafab.calibrate(
             miurafab.DEFAULT_MACHINE if machine is None else machine,
@@ -63,17 +61,12 @@ def calibrate(
     }
 
     def show() -> None:
-        console.facts({key: value for key, value in answer.items() if key not in _LISTS})
-        console.facts(
-            {
-                "flaps": f"{sheet.cells[0].label} to {sheet.cells[-1].label}",
-                "squares": f"{sheet.squares[0].label} to {sheet.squares[-1].label}",
-            }
-        )
+        facts = {key: value for key, value in answer.items() if key not in ("cells", "squares")}
+        facts["flaps"] = f"{sheet.cells[0].label} to {sheet.cells[-1].label}"
+        facts["squares"] = f"{sheet.squares[0].label} to {sheet.squares[-1].label}"
+        console.facts(facts)
         console.line(f"How to read it: {out / 'calibration.pdf'}")
         console.line(f"Look at it first: miurafab preview {out}")
 
     console.answer(answer, show)
-
-
-_LISTS = ("cells", "squares")
+    return DONE

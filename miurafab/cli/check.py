@@ -5,23 +5,25 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.cli.console import Console
+from miurafab.cli.declared import argument
+from miurafab.errors import DONE, NO
 from miurafab.findings import findings_json
+
+EXAMPLES = ("miurafab check hypar.fold", "miurafab check hypar.fold --json")
 
 
 def check(
-    file: Annotated[Path, typer.Argument(help="The FOLD file.")],
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    file: Annotated[Path, argument("FILE", "The pattern, a FOLD file.")],
+    /,
+    *,
+    console: Console = Console(),
+) -> int:
     """Recompute every invariant of a pattern from its file.
 
-    Exit 1 if one fails.
+    Exits with 1 if an invariant does not hold.
     """
-    console = Console(as_json, quiet)
     pattern, surface, findings = miurafab.load_pattern(file)
     result = miurafab.check(pattern, surface)
     findings += result.findings
@@ -33,5 +35,4 @@ def check(
         console.findings(findings)
 
     console.answer(report, show)
-    if not result.valid:
-        raise typer.Exit(1)
+    return DONE if result.valid else NO

@@ -1,7 +1,7 @@
 """How every command speaks: a table for people, one JSON object for machines, progress between.
 
 A command builds its answer once, as a plain mapping; :class:`Console` prints it one way or the
-other. Progress and remarks go to standard error, so that standard output is the answer alone.
+other. Progress and notes go to standard error, so that standard output is the answer alone.
 """
 
 from __future__ import annotations
@@ -9,87 +9,109 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import rich.box
 import rich.console
 import rich.progress
 import rich.table
-import typer
+from cyclopts import Parameter
+from rich.text import Text
 
-from miurafab.errors import spell_options
+from miurafab.cli.declared import EVERY_COMMAND
+from miurafab.cli.ending import spelled
 from miurafab.findings import Finding
 from miurafab.workflow.json_text import json_text
 
-JsonOption = Annotated[
-    bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")
-]
-QuietOption = Annotated[bool, typer.Option("--quiet", help="Print no progress and no remarks.")]
 
-
-def spelled(sentence: str) -> str:
-    """``sentence`` with the options that it names as the command line writes them."""
-    return spell_options(sentence, lambda name: "--" + name.replace("_", "-"))
-
-
+@Parameter(name="*")
+@dataclass(frozen=True)
 class Console:
-    """Where one command's answer, remarks and progress go."""
+    """Where one command's answer, notes and progress go; its fields are options of every command.
 
-    def __init__(self, as_json: bool = False, quiet: bool = False) -> None:
-        self.as_json = as_json
-        self.silent = as_json or quiet
-        self._out = rich.console.Console(highlight=False, soft_wrap=True)
-        self._err = rich.console.Console(stderr=True, highlight=False, soft_wrap=True)
+    ``wants_json`` prints the answer as JSON, ``is_quiet`` leaves out progress and notes.
+    """
+
+    wants_json: Annotated[
+        bool,
+        Parameter(
+            name="--json",
+            help="Print one JSON object on standard output, nothing else.",
+            group=EVERY_COMMAND,
+        ),
+    ] = False
+    is_quiet: Annotated[
+        bool, Parameter(name="--quiet", help="Print no progress and no notes.", group=EVERY_COMMAND)
+    ] = False
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether standard error is for failures alone."""
+        return self.wants_json or self.is_quiet
 
     def answer(self, values: Mapping[str, Any], show: Callable[[], None] | None = None) -> None:
         """Print the answer: ``values`` as JSON, or ``show`` (default: a table of ``values``)."""
-        if self.as_json:
-            sys.stdout.write(json_text(values) + "\n")
+        if self.wants_json:
+            sys.stdout.write(json_text(spelled(values)) + "\n")
         elif show is not None:
             show()
         else:
             self.facts(values)
 
+    def announce(self, address: str) -> None:
+        """Print, at once, the ``address`` that another program waits for."""
+        line = json_text({"address": address}) if self.wants_json else address
+        sys.stdout.write(line + "\n")
+        sys.stdout.flush()
+
     def facts(self, values: Mapping[str, Any], title: str | None = None) -> None:
         """A two-column table of names and values."""
         table = rich.table.Table(
-            title=title, box=None, show_header=False, title_justify="left", title_style="bold"
+            title=title and Text(title),
+            box=None,
+            show_header=False,
+            title_justify="left",
+            title_style="bold",
         )
         table.add_column(style="cyan", no_wrap=True)
         table.add_column(overflow="fold")
         for name, value in values.items():
-            table.add_row(name.replace("_", " "), readable(value))
-        self._out.print(table)
+            table.add_row(name.replace("_", " "), _cell(value))
+        _out().print(table)
 
     def rows(
         self, columns: Sequence[str], rows: Sequence[Sequence[Any]], title: str | None = None
     ) -> None:
         """A table with a header; numbers stand to the right."""
         table = rich.table.Table(
-            title=title, box=rich.box.SIMPLE_HEAD, title_justify="left", title_style="bold"
+            title=title and Text(title),
+            box=rich.box.SIMPLE_HEAD,
+            title_justify="left",
+            title_style="bold",
         )
         for index, column in enumerate(columns):
             numeric = all(isinstance(row[index], int | float) for row in rows)
             justify: Literal["left", "right"] = "right" if numeric and rows else "left"
             table.add_column(column, justify=justify, overflow="fold")
         for row in rows:
-            table.add_row(*(readable(value) for value in row))
-        self._out.print(table)
+            table.add_row(*(_cell(value) for value in row))
+        _out().print(table)
 
     def line(self, text: str) -> None:
         """One line of the readable answer."""
-        self._out.print(text, markup=False)
+        _out().print(spelled(text), markup=False)
 
     def findings(self, findings: Iterable[Finding]) -> None:
         """One line of the readable answer each; a finding that is no note says what it is."""
         for finding in findings:
             weight = "" if finding.severity == "note" else f"{finding.severity} ({finding.code}): "
-            self.line(f"{weight}{spelled(finding.sentence)}")
+            self.line(f"{weight}{finding.sentence}")
 
-    def remark(self, text: str) -> None:
+    def note(self, text: str) -> None:
         """One line on standard error, unless silent."""
-        if not self.silent:
-            self._err.print(spelled(text), markup=False, style="dim")
+        if not self.is_silent:
+            _err().print(spelled(text), markup=False, style="dim")
 
     @contextmanager
     def progress(self, label: str) -> Iterator[Callable[[float, str], None]]:
@@ -100,8 +122,9 @@ class Console:
             rich.progress.TaskProgressColumn(),
             rich.progress.TextColumn("{task.fields[note]}", style="dim"),
         )
+        screen = _err()
         with rich.progress.Progress(
-            *columns, console=self._err, disable=self.silent or not self._err.is_terminal
+            *columns, console=screen, disable=self.is_silent or not screen.is_terminal
         ) as bar:
             task = bar.add_task(label, total=1.0, note="")
 
@@ -109,6 +132,18 @@ class Console:
                 bar.update(task, completed=fraction, note=note)
 
             yield update
+
+
+def _cell(value: Any) -> Text:
+    return Text(readable(spelled(value)))  # as text: a name may hold [brackets]
+
+
+def _out() -> rich.console.Console:
+    return rich.console.Console(highlight=False, soft_wrap=True)
+
+
+def _err() -> rich.console.Console:
+    return rich.console.Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def readable(value: Any) -> str:

@@ -5,50 +5,56 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.units import parse_length
+from miurafab.cli.console import Console
+from miurafab.cli.declared import argument, option
+from miurafab.errors import DONE
+from miurafab.options import Choice, File, length
+
+EXAMPLES = (
+    "miurafab convert hypar.fold hypar.svg",
+    "miurafab convert flat.obj sheet.fold --folded folded.obj",
+)
 
 
 def convert(
-    source: Annotated[
-        Path, typer.Argument(metavar="IN", help="A .fold .svg .dxf .cp .opx or flat .obj file.")
-    ],
+    source: Annotated[Path, argument("IN", "A .fold, .svg, .dxf, .cp, .opx or flat .obj file.")],
     target: Annotated[
         Path,
-        typer.Argument(metavar="OUT", help="A .fold .svg .dxf .cp .opx .obj .stl or .glb file."),
+        argument("OUT", "A .fold, .svg, .dxf, .cp, .opx, .obj, .stl or .glb file."),
     ],
+    /,
+    *,
     folded: Annotated[
-        Path | None, typer.Option(help="The folded form that goes with a flat .obj file.")
+        Path | None, option(File(), "The folded form that belongs to a flat .obj file.")
     ] = None,
     form: Annotated[
         str | None,
-        typer.Option(
-            help="What an .obj, .stl or .glb shows: flat or folded [default: folded if known]."
+        option(
+            Choice(("flat", "folded")),
+            "The form that an .obj, .stl or .glb file shows.",
+            default_text="folded where it is known",
         ),
     ] = None,
     tolerance: Annotated[
-        str | None,
-        typer.Option(
-            help="How near the ends of lines in a drawing count as met "
-            "[default: a ten-thousandth of the median line]."
+        float | None,
+        option(
+            length(above=True),
+            "The largest gap between ends of lines in a drawing that count as one point.",
+            default_text="1/10000 of the median line",
         ),
     ] = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Convert a pattern between FOLD and other formats.
+    console: Console = Console(),
+) -> int:
+    """Convert a pattern from one format to another.
 
-    SVG, DXF, CP, OPX, OBJ, STL and GLB.
+    The endings of the files name the formats: FOLD, SVG, DXF, CP, OPX, OBJ, STL and GLB.
     """
-    console = Console(as_json, quiet)
-    near = None if tolerance is None else parse_length(tolerance)
-    done = miurafab.convert(source, target, folded=folded, form=form, tolerance=near)
+    done = miurafab.convert(source, target, folded=folded, form=form, tolerance=tolerance)
     for remark in done.remarks:
-        console.remark(remark)
+        console.note(remark)
     report = done.report()
     console.answer(
         report, lambda: console.facts({k: v for k, v in report.items() if k != "remarks"})
     )
+    return DONE

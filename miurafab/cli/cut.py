@@ -8,158 +8,150 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.cli.sheets import MachineOption, MaterialOption
-from miurafab.errors import InputError, MachineError
+from miurafab.cli.console import Console
+from miurafab.cli.declared import MachineOption, MaterialOption, argument, option, split, takes
+from miurafab.cli.fit import RigidOption, fit_options
+from miurafab.cli.machine import PORT
+from miurafab.errors import DONE, MACHINE_FAILED, NO, InputError, MachineError, OptionError
 from miurafab.findings import findings_json, refusals
-from miurafab.units import parse_length
+from miurafab.options import File, Flag, Text, Whole, read_options
 
 if TYPE_CHECKING:
     from miurafab.workflow.cut import Prepared
     from miurafab.workflow.cut_sheets import CutOptions, CutSheet, SheetProgress
 
+EXAMPLES = (
+    "miurafab cut jobs/hypar --port /dev/ttyUSB0 --frame",
+    "miurafab cut hypar:height=0.5 --facets 8x8 --size 150mm --port virtual",
+    "miurafab cut jobs/hypar --dry-run",
+)
 
+
+def cut_options() -> type[CutOptions]:
+    """The class that declares how sheets are sent."""
+    from miurafab.workflow.cut_sheets import CutOptions
+
+    return CutOptions
+
+
+@takes(cut_options, fit_options)
 def cut(
     thing: Annotated[
         str,
-        typer.Argument(help="A job directory, a .nc file, a pattern .fold, a design, or a target."),
+        argument("THING", "A job directory, a .nc file, a pattern .fold, a design, or a target."),
     ],
+    /,
+    *,
     port: Annotated[
         list[str] | None,
-        typer.Option(
-            help="A serial device, a pyserial URL (socket://...), or 'virtual'; given more than "
-            "once, the machines share the sheets of a job directory."
-        ),
+        option(Text("PORT"), f"{PORT} May be repeated: the machines share the sheets of a job."),
     ] = None,
     machine: MachineOption = None,
     material: MaterialOption = None,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="The job directory to make [default: jobs/NAME]."),
+        option(
+            File("FOLDER"), "The job directory to make.", "-o", "--out", default_text="jobs/NAME"
+        ),
     ] = None,
     sheet: Annotated[
-        list[int] | None, typer.Option(help="Cut only this sheet, from 1; may be repeated.")
+        list[int] | None, option(Whole(1), "Cut only this sheet, from 1. May be repeated.")
     ] = None,
-    check_mode: Annotated[
-        bool, typer.Option("--check-mode", help="Let the controller only read the job ($C).")
-    ] = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say what would be done; opens no port.")
+        bool, option(Flag(), "Say what would be done, without opening a port.")
     ] = False,
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume", help="Go on with what was interrupted; needs --home or --at, once stopped."
-        ),
-    ] = False,
-    home: Annotated[bool, typer.Option("--home", help="Home the machine first.")] = False,
-    at: Annotated[
-        str | None,
-        typer.Option(help="Where the head stands, in the job's coordinates: 0,0 is its origin."),
-    ] = None,
-    frame: Annotated[
-        bool, typer.Option("--frame", help="Trace the box around each sheet before it, then wait.")
-    ] = False,
-    pointer: Annotated[
-        float, typer.Option(help="Power of the frame in percent, 5 at most; 0 keeps it dark.")
-    ] = 0.0,
-    allow_m3: Annotated[
-        bool, typer.Option("--allow-m3", help="Cut with M3, which burns on if the link is lost.")
-    ] = False,
-    force: Annotated[
-        list[str] | None, typer.Option(help="Override the pre-flight check of this name.")
-    ] = None,
     pause: Annotated[
         bool | None,
-        typer.Option(help="Wait for Enter before each further sheet [default: in a terminal]."),
+        option(
+            Flag(),
+            "Wait for Enter before each further sheet.",
+            "--pause",
+            default_text="in a terminal",
+            negative="--no-pause",
+        ),
     ] = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    rigid: RigidOption = False,
+    console: Console = Console(),
+    **given: str,
+) -> int:
     """Cut a job, making whatever is missing on the way.
 
-    On a machine at a port, or on the virtual one. Ctrl-C stops with the beam off. In a terminal,
-    space holds, r resumes, q aborts, + - 0 change the feed and ] [ p the power.
+    Cuts on a machine at a port, or on the virtual machine. Ctrl-C stops with the beam off. In a
+    terminal, space holds, r resumes, q aborts, + - 0 change the feed and ] [ p the power. The
+    options of a fit are for a target or a design.
     """
-    from miurafab.machine.keys import terminal_keys
-    from miurafab.workflow.cut_sheets import CutOptions
-
-    console = Console(as_json, quiet)
-    options = CutOptions(
-        force=frozenset(force or ()),
-        allow_m3=allow_m3,
-        check_mode=check_mode,
-        home=home,
-        at=None if at is None else parse_point(at),
-        resume=resume,
-        frame=frame,
-        pointer=pointer / 100,
-    )
+    own, given = split(given, cut_options())
+    options: CutOptions = read_options(cut_options(), own)
     if not port and not dry_run:
         raise InputError(
-            "Name the machine's --port ('virtual' needs no machine), or ask for --dry-run."
+            "Name the machine's `port` ('virtual' needs no machine), or ask for `dry_run`."
         )
+    if options.pointer and not options.frame:
+        raise OptionError(
+            "pointer", "is the beam power while a frame is traced; ask for the `frame` as well"
+        )
+    if rigid:
+        given["flat_foldable"] = "exact"
     with console.progress("preparing") as progress:
         prepared = miurafab.prepare(
-            thing, machine=machine, material=material, out=out, on_progress=progress
+            thing, machine=machine, material=material, out=out, options=given, on_progress=progress
         )
         progress(1.0, "")
     if prepared.refusal is not None:
-        _refuse(console, prepared)
-    if dry_run:
-        _report_dry_run(console, prepared, options)
-        return
-    assert port is not None
+        return _refuse(console, prepared)
+    if not port or dry_run:
+        return _report_dry_run(console, prepared, options)
     if len(port) > 1:
-        _share(console, prepared, port, sheet, options)
-        return
+        return _share(console, prepared, port, sheet, options)
     waits = pause if pause is not None else port[0] != "virtual" and sys.stdin.isatty()
-    with _way_on(console, prepared), console.progress("cutting") as bar:
+    done = _stream(console, prepared, port[0], sheet, options, waits)
+    return _report(console, prepared, done, port[0])
+
+
+def _stream(
+    console: Console,
+    prepared: Prepared,
+    port: str,
+    sheet: list[int] | None,
+    options: CutOptions,
+    waits: bool,
+) -> tuple[CutSheet, ...]:
+    """Cut on one machine, with a progress bar and the keys of the terminal."""
+    from miurafab.machine.keys import terminal_keys
+    from miurafab.workflow.dry_run import clock_text
+
+    def before(number: int, count: int) -> None:
+        if waits and number > 1 and not options.resume:
+            console.note(f"Sheet {number} of {count}: {_put_in(prepared, number)}, press Enter.")
+            sys.stdin.readline()
+
+    def after_frame(number: int) -> None:
+        if waits:
+            console.note(f"That is the frame of sheet {number}; Enter cuts, Ctrl-C does not.")
+            sys.stdin.readline()
+
+    with _hint_at_resume(console, prepared), console.progress("cutting") as bar:
 
         def show_progress(now: SheetProgress) -> None:
             bar(
                 now.stroke / max(now.strokes, 1),
                 f"sheet {now.number} of {len(prepared.jobs)}, stroke {now.stroke} of "
-                f"{now.strokes}, {clock(now.seconds_left)} left, {now.stream.state}",
+                f"{now.strokes}, {clock_text(now.seconds_left)} left, {now.stream.state}",
             )
 
-        def before(number: int, count: int) -> None:
-            if waits and number > 1 and not resume:
-                console.remark(
-                    f"Sheet {number} of {count}: {_put_in(prepared, number)}, press Enter."
-                )
-                sys.stdin.readline()
-
-        def after_frame(number: int) -> None:
-            if waits:
-                console.remark(f"That is the frame of sheet {number}; Enter cuts, Ctrl-C does not.")
-                sys.stdin.readline()
-
         with terminal_keys() as keys:
-            done = miurafab.cut(
+            return miurafab.cut(
                 prepared,
-                port=port[0],
+                port=port,
                 sheets=sheet,
                 options=options,
                 keys=keys,
                 before_sheet=before,
                 after_frame=after_frame,
-                on_resume=lambda finding: console.remark(finding.sentence),
+                on_resume=lambda finding: console.note(finding.sentence),
                 on_progress=show_progress,
             )
-    _report(console, prepared, done, port[0])
-
-
-def parse_point(text: str) -> tuple[float, float]:
-    """``X,Y`` in mm or with units, such as ``0,0`` or ``10mm,1in``."""
-    parts = text.split(",")
-    if len(parts) != 2:
-        raise InputError(f"'{text}' is not a point; write X,Y such as 0,0 or 10mm,5mm.")
-    x, y = (float(p) if p.strip() in ("0", "0.0") else parse_length(p) for p in parts)
-    return x, y
 
 
 def _share(
@@ -168,7 +160,7 @@ def _share(
     ports: list[str],
     sheet: list[int] | None,
     options: CutOptions,
-) -> None:
+) -> int:
     """Cut on several machines at once, and say which sheet went where."""
     from miurafab.workflow.multi_machine import share_sheets
 
@@ -187,25 +179,25 @@ def _share(
         },
         lambda: console.rows(("sheet", "port", "what came of it"), rows),
     )
-    if not whole:
-        raise typer.Exit(3)
+    return DONE if whole else MACHINE_FAILED
 
 
-def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -> None:
-    """What would be cut, and what the pre-flight checks say; exit code 1 if they refuse it."""
+def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -> int:
+    """Say what would be cut, and what the pre-flight checks find; no if they refuse it."""
     from miurafab.machine.preflight import require_known
+    from miurafab.workflow.dry_run import clock_text
 
     require_known(options.force)
-    found = [finding for sheet in prepared.dry_runs for finding in sheet.findings]
+    findings = [finding for sheet in prepared.dry_runs for finding in sheet.findings]
     passed = options.force | ({"m3"} if options.allow_m3 else set())
-    refused = any(finding.code not in passed for finding in refusals(found))
+    refused = any(finding.code not in passed for finding in refusals(findings))
     answer = {
         "status": "refused" if refused else "ready",
         "job": prepared.name,
         "machine": prepared.machine.name,
         "seconds": round(sum(sheet.seconds for sheet in prepared.dry_runs), 3),
         "sheets": [sheet.figures() for sheet in prepared.dry_runs],
-        "findings": findings_json(found),
+        "findings": findings_json(findings),
     }
 
     def show() -> None:
@@ -217,21 +209,20 @@ def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -
                     each.lines,
                     round(each.cut_mm / 1000, 2),
                     round(each.travel_mm / 1000, 2),
-                    clock(each.seconds),
+                    clock_text(each.seconds),
                 )
                 for each in prepared.dry_runs
             ],
             title=f"{prepared.name} on {prepared.machine.title}; no port was opened",
         )
-        console.findings(found)
+        console.findings(findings)
 
     console.answer(answer, show)
-    if refused:
-        raise typer.Exit(1)
+    return NO if refused else DONE
 
 
 @contextmanager
-def _way_on(console: Console, prepared: Prepared) -> Iterator[None]:
+def _hint_at_resume(console: Console, prepared: Prepared) -> Iterator[None]:
     """Say, when a machine has failed in mid-job, how the job is taken up again."""
     from miurafab.workflow.cut_sheets import can_go_on
 
@@ -239,9 +230,9 @@ def _way_on(console: Console, prepared: Prepared) -> Iterator[None]:
         yield
     except MachineError:
         if can_go_on(prepared):
-            console.remark(
-                "When the machine is ready again, go on with --resume and --home, or --at X,Y for "
-                "where the head stands then."
+            console.note(
+                "When the machine is ready again, continue with --resume and --home, or with --at "
+                "X,Y, the position of the head then."
             )
         raise
 
@@ -253,15 +244,17 @@ def _put_in(prepared: Prepared, number: int) -> str:
     return "put in fresh material"
 
 
-def _refuse(console: Console, prepared: Prepared) -> None:
+def _refuse(console: Console, prepared: Prepared) -> int:
     console.answer(
         {"status": "refused", "advice": prepared.refusal, "report": prepared.report},
         lambda: console.line(f"{prepared.name} is not cut: {prepared.refusal}"),
     )
-    raise typer.Exit(1)
+    return NO
 
 
-def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], port: str) -> None:
+def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], port: str) -> int:
+    from miurafab.workflow.dry_run import clock_text
+
     layout = prepared.directory.layout if prepared.directory else None
     answer: dict[str, Any] = {"status": "done", "port": port, "machine": prepared.machine.name}
     if prepared.directory is not None:
@@ -296,8 +289,8 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
                     each.lines,
                     round(each.cut_mm / 1000, 2),
                     round(each.travel_mm / 1000, 2),
-                    clock(each.estimated_s),
-                    clock(each.result.seconds),
+                    clock_text(each.estimated_s),
+                    clock_text(each.result.seconds),
                 )
                 for each in done
             ],
@@ -306,11 +299,4 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
             console.findings(each.findings)
 
     console.answer(answer, show)
-    if any(each.result.errors for each in done):
-        raise typer.Exit(1)
-
-
-def clock(seconds: float) -> str:
-    """Minutes and seconds, as on a clock."""
-    whole = round(seconds)
-    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+    return NO if any(each.result.errors for each in done) else DONE

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import typer
-
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.cli.console import Console
+from miurafab.errors import DONE, NO
+
+EXAMPLES = ("miurafab doctor",)
 
 
-def doctor(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
+def doctor(*, console: Console = Console()) -> int:
     """Say what is installed and what would stop a job.
 
-    Sends nothing to any port. Exit 1 if there is anything that would stop a job.
+    Sends nothing to any port. Exits with 1 if anything would stop a job.
     """
-    console = Console(as_json, quiet)
     report = miurafab.examine()
 
     def show() -> None:
@@ -27,5 +27,4 @@ def doctor(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
             console.line("Nothing found that would stop a job.")
 
     console.answer(report.answer(), show)
-    if report.problems:
-        raise typer.Exit(1)
+    return NO if report.problems else DONE

@@ -5,41 +5,53 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.cli.console import Console
+from miurafab.cli.declared import argument, option
+from miurafab.errors import DONE, NO
+from miurafab.options import File, Text, Whole, number
+
+EXAMPLES = (
+    "miurafab energy hypar.fold",
+    "miurafab energy hypar.fold --material card-250 -o energy.csv",
+)
 
 
 def energy(
-    file: Annotated[Path, typer.Argument(help="The FOLD file of the pattern.")],
+    file: Annotated[Path, argument("FILE", "The pattern, a FOLD file.")],
+    /,
+    *,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="Write a plot (.png, .svg) or a table (.csv)."),
+        option(File(), "Write a plot (.png, .svg) or a table (.csv).", "-o", "--out"),
     ] = None,
     material: Annotated[
         str | None,
-        typer.Option(
-            "--material",
-            help="Joules instead of k_f L: a shipped material or a TOML file with a modulus.",
+        option(
+            Text("NAME"),
+            "Give the energy in joules for this material: a shipped name or a TOML file with a "
+            "modulus.",
         ),
     ] = None,
-    steps: Annotated[int, typer.Option(help="Steps from the folded form to flat.")] = 40,
+    steps: Annotated[int, option(Whole(1), "Steps from the folded form to flat.")] = 40,
     crease: Annotated[
         int | None,
-        typer.Option(help="The edge that is driven [default: a crease in the middle]."),
+        option(
+            Whole(),
+            "The edge whose fold angle is driven.",
+            default_text="a crease in the middle",
+        ),
     ] = None,
     crease_ratio: Annotated[
-        float, typer.Option(help="Stiffness of the creases over that of the facets.")
+        float, option(number(0), "Stiffness of the creases over that of the facets.")
     ] = 0.0,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    console: Console = Console(),
+) -> int:
     """Measure the energy on the way from folded to flat.
 
-    The barrier and where it is, the stable states, and the stiffness at the target.
+    Prints the barrier and where it is, the stable states, and the stiffness at the folded form.
+    Exits with 1 if the way to flat was lost.
     """
-    console = Console(as_json, quiet)
     if out is not None:
         miurafab.check_energy_file(out)
     pattern, _, _ = miurafab.load_pattern(file)
@@ -65,5 +77,4 @@ def energy(
         console.line(curve.verdict())
 
     console.answer(answer, show)
-    if not curve.path.converged:
-        raise typer.Exit(1)
+    return DONE if curve.path.converged else NO

@@ -5,44 +5,55 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.units import parse_length
+from miurafab.cli.console import Console
+from miurafab.cli.declared import argument, option
+from miurafab.errors import DONE, NO
+from miurafab.options import Choice, File, Whole, length
+
+EXAMPLES = (
+    "miurafab fold hypar.fold -o hypar.gif",
+    "miurafab fold hypar.fold -o hypar.html --colour strain",
+    "miurafab fold miura.fold --thickness 2mm",
+)
 
 
 def fold(
     file: Annotated[
-        Path, typer.Argument(help="The pattern: .fold, or another format with fold angles or M/V.")
+        Path,
+        argument(
+            "FILE",
+            "The pattern: .fold, or another format with fold angles or mountains and valleys.",
+        ),
     ],
+    /,
+    *,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="The motion: .fold .gif .glb or .html.")
+        Path | None,
+        option(File(), "The motion: .fold, .gif, .glb or .html.", "-o", "--out"),
     ] = None,
-    steps: Annotated[int, typer.Option(help="How many steps the motion has.")] = 40,
+    steps: Annotated[int, option(Whole(1), "The number of steps of the motion.")] = 40,
     csv: Annotated[
-        Path | None, typer.Option(help="Write the fold angle of every crease in every frame.")
+        Path | None, option(File(), "Write the fold angle of every crease in every frame.")
     ] = None,
     colour: Annotated[
-        str, typer.Option(help="What the facets are coloured by: side or strain.")
+        str, option(Choice(("side", "strain")), "Colour the facets by side or by strain.")
     ] = "side",
     thickness: Annotated[
-        str | None,
-        typer.Option(help="Also say how panels of this thickness have to be made; exit 1 if none."),
+        float | None,
+        option(
+            length(above=True),
+            "Also say how to make panels of this thickness; exit 1 if such panels cannot fold.",
+        ),
     ] = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    console: Console = Console(),
+) -> int:
     """Fold a pattern and write its motion.
 
-    Rigidly where it can be, else by bending its facets as little as possible.
+    The pattern folds rigidly if it can; otherwise its facets bend as little as possible.
     """
-    console = Console(as_json, quiet)
-    if colour not in ("side", "strain"):
-        raise typer.BadParameter(f"'{colour}' is neither side nor strain.", param_hint="--colour")
     if out is not None:
         miurafab.check_motion_file(out)
-    panel_mm = None if thickness is None else parse_length(thickness)
     pattern = miurafab.read_pattern(file)
     with console.progress("folding") as progress:
         folding = miurafab.fold(pattern, steps, progress)
@@ -52,19 +63,18 @@ def fold(
             )
         if csv is not None:
             miurafab.write_angles(folding, csv)
-        panels = None if panel_mm is None else miurafab.thick_panels(pattern, panel_mm, progress)
+        panels = None if thickness is None else miurafab.thick_panels(pattern, thickness, progress)
     answer: dict[str, Any] = folding.report()
     answer |= {"file": None if out is None else str(out), "csv": None if csv is None else str(csv)}
     answer["thickness"] = None if panels is None else miurafab.thickness_report(panels)
     if not folding.motion.is_rigid:
-        console.remark(
+        console.note(
             f"The sheet does not fold rigidly (its facets would miss each other by up to "
             f"{folding.mismatch:.2g} mean edges), so its facets bend: from nearly flat to the "
             "folded form."
         )
     console.answer(answer, lambda: _show(console, answer))
-    if panels is not None and not panels.folds:
-        raise typer.Exit(1)
+    return NO if panels is not None and not panels.folds else DONE
 
 
 def _show(console: Console, answer: dict[str, Any]) -> None:
@@ -74,7 +84,7 @@ def _show(console: Console, answer: dict[str, Any]) -> None:
     facts["self_contacts"] = f"in {len(contacts)} frames" if contacts else "none"
     console.facts(facts)
     for run in _runs(contacts):
-        console.line(_of_run(run))
+        console.line(_sentence(run))
     if thick is not None:
         _show_thickness(console, thick)
 
@@ -90,16 +100,16 @@ def _runs(contacts: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
     return runs
 
 
-def _of_run(run: list[dict[str, Any]]) -> str:
+def _sentence(run: list[dict[str, Any]]) -> str:
     first, last = run[0], run[-1]
     frames, states = f"frame {first['frame']}", f"s = {first['state']:.4g}"
     if len(run) > 1:
         frames = f"frames {first['frame']} to {last['frame']}"
         states += f" to {last['state']:.4g}"
     most = max(len(contact["facets"]) for contact in run)
-    one, other = first["facets"][0]
+    a, b = first["facets"][0]
     pairs = "1 pair of facets passes" if most == 1 else f"up to {most} pairs of facets pass"
-    return f"{frames}, {states}: {pairs} through each other, the first being {one} and {other}"
+    return f"{frames}, {states}: {pairs} through each other, the first being {a} and {b}"
 
 
 def _show_thickness(console: Console, thick: dict[str, Any]) -> None:
@@ -125,11 +135,11 @@ def _show_thickness(console: Console, thick: dict[str, Any]) -> None:
             (c["edge"], c["assignment"], c["fold_deg"], c["hinge_side"], c["offset_mm"])
             for c in widest
         ],
-        title="the creases that are cut back most (all of them with --json)",
+        title="the creases that are cut back most (--json lists all)",
     )
     for facet in thick["facets_too_small"][:8]:
         limit = facet["greatest_thickness_mm"]
         console.line(f"facet {facet['facet']} is too small: it can be {limit:.3g} mm thick")
     for collision in thick["collisions"][:8]:
-        one, other = collision["facets"]
-        console.line(f"at s = {collision['state']:.3g} panels {one} and {other} collide")
+        a, b = collision["facets"]
+        console.line(f"at s = {collision['state']:.3g} panels {a} and {b} collide")

@@ -3,110 +3,100 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from cyclopts import Parameter
 
-from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.cli.sheets import MachineOption
-from miurafab.units import parse_feed, parse_length
+from miurafab.cli.console import Console
+from miurafab.cli.declared import MachineOption, argument, option, takes
+from miurafab.errors import DONE
+from miurafab.options import Flag, Text, Whole, feed, length, read_options
 
 if TYPE_CHECKING:
     from miurafab.grbl.events import StatusReport
 
-app = typer.Typer(
-    no_args_is_help=True, help="Look at a machine, keep its settings, home, unlock or move it."
-)
-
-PortOption = Annotated[
-    str, typer.Option("--port", help="A serial device, a pyserial URL (socket://...), 'virtual'.")
-]
-BaudOption = Annotated[int, typer.Option("--baud", help="The speed of a serial line.")]
+PORT = "A serial device, a pyserial URL (socket://HOST:PORT), or 'virtual'."
 
 
-@app.command("list")
-def list_(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Line:
+    """The line to a controller: the options that all actions with a port share."""
+
+    port: Annotated[str, option(Text("PORT"), PORT)]
+    baud: Annotated[int, option(Whole(1), "The speed of a serial line, bits a second.")] = 115_200
+
+
+def list_(*, console: Console = Console()) -> int:
     """List the serial ports of this computer."""
     from miurafab.machine.transport import list_ports
 
-    console = Console(as_json, quiet)
     ports = list_ports()
     console.answer(
         {"ports": [{"device": device, "description": text} for device, text in ports]},
         lambda: console.rows(("port", "what it is"), ports) if ports else console.line("No ports."),
     )
+    return DONE
 
 
-@app.command()
-def info(
-    port: PortOption,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Say what the controller is and how it stands."""
+def info(*, line: Line, console: Console = Console()) -> int:
+    """Say what the controller is and what state it is in."""
     from miurafab.machine import actions
 
-    Console(as_json, quiet).answer(asdict(actions.machine_info(port, baud=baud)))
+    console.answer(asdict(actions.machine_info(line.port, baud=line.baud)))
+    return DONE
 
 
-@app.command()
-def settings(
-    port: PortOption,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+def settings(*, line: Line, console: Console = Console()) -> int:
     """Show the controller's settings with their names."""
     from miurafab.grbl.codes import setting_codes
     from miurafab.machine import actions
 
-    console = Console(as_json, quiet)
-    found = actions.read_settings(port, baud=baud)
+    texts = actions.read_settings(line.port, baud=line.baud).texts
     codes = setting_codes()
     rows = [
         (f"${number}", text, codes[number].unit, codes[number].name)
         if number in codes
         else (f"${number}", text, "", "")
-        for number, text in found.texts.items()
+        for number, text in texts.items()
     ]
     console.answer(
-        {"settings": {f"${number}": text for number, text in found.texts.items()}},
+        {"settings": {f"${number}": text for number, text in texts.items()}},
         lambda: console.rows(("setting", "value", "unit", "what it is"), rows),
     )
+    return DONE
 
 
-@app.command()
 def backup(
-    file: Annotated[Path, typer.Argument(help="The file to write.")],
-    port: PortOption,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Save the controller's settings to a file, as $$ prints them."""
+    file: Annotated[Path, argument("FILE", "The file to write.")],
+    /,
+    *,
+    line: Line,
+    console: Console = Console(),
+) -> int:
+    """Save the controller's settings to a file, as '$$' prints them."""
     from miurafab.machine import actions
 
-    found = actions.read_settings(port, baud=baud)
-    file.write_text(found.dump(), encoding="ascii", newline="\n")
-    Console(as_json, quiet).answer({"file": str(file), "settings": len(found.texts)})
+    read = actions.read_settings(line.port, baud=line.baud)
+    file.write_text(read.dump(), encoding="ascii", newline="\n")
+    console.answer({"file": str(file), "settings": len(read.texts)})
+    return DONE
 
 
-@app.command()
 def restore(
-    file: Annotated[Path, typer.Argument(help="A file that 'backup' wrote.")],
-    port: PortOption,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    file: Annotated[Path, argument("FILE", "A file that 'miurafab machine backup' wrote.")],
+    /,
+    *,
+    line: Line,
+    console: Console = Console(),
+) -> int:
     """Write the settings of a saved file that differ, and read them back."""
     from miurafab.machine import actions
 
-    console = Console(as_json, quiet)
-    changed = actions.write_settings(port, actions.read_dump(file), baud=baud)
+    changed = actions.write_settings(line.port, actions.read_dump(file), baud=line.baud)
     console.answer(
         {"changed": {f"${number}": text for number, text in changed.items()}},
         lambda: (
@@ -115,127 +105,115 @@ def restore(
             else console.line("The controller has these settings already.")
         ),
     )
+    return DONE
 
 
-@app.command()
-def home(
-    port: PortOption,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+def home(*, line: Line, console: Console = Console()) -> int:
     """Run the homing cycle."""
     from miurafab.machine import actions
 
-    _stands(Console(as_json, quiet), actions.home(port, baud=baud))
+    return _answer_state(console, actions.home(line.port, baud=line.baud))
 
 
-@app.command()
-def unlock(
-    port: PortOption,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Open the lock that an alarm left, without homing."""
+def unlock(*, line: Line, console: Console = Console()) -> int:
+    """Unlock the controller after an alarm, without homing."""
     from miurafab.machine import actions
 
-    _stands(Console(as_json, quiet), actions.unlock(port, baud=baud))
+    return _answer_state(console, actions.unlock(line.port, baud=line.baud))
 
 
-@app.command()
 def jog(
-    port: PortOption,
-    x: Annotated[str | None, typer.Option(help="How far along X, such as 10mm or -0.5in.")] = None,
-    y: Annotated[str | None, typer.Option(help="How far along Y.")] = None,
-    feed: Annotated[str, typer.Option(help="How fast.")] = "1000mm/min",
-    to: Annotated[bool, typer.Option("--to", help="Move to X and Y, not by them.")] = False,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    *,
+    x: Annotated[float | None, option(length(-1e6), "Distance along X, as 10mm or -0.5in.")] = None,
+    y: Annotated[float | None, option(length(-1e6), "Distance along Y.")] = None,
+    speed: Annotated[float, option(feed(), "The feed of the move, mm/min.", "--feed")] = 1000.0,
+    to: Annotated[
+        bool, option(Flag(), "Absolute move: X and Y are coordinates, not distances.")
+    ] = False,
+    line: Line,
+    console: Console = Console(),
+) -> int:
     """Move the machine with the beam off."""
     from miurafab.machine import actions
 
-    report = actions.jog(
-        port,
-        x=None if x is None else parse_length(x),
-        y=None if y is None else parse_length(y),
-        feed_mm_min=parse_feed(feed),
-        absolute=to,
-        baud=baud,
-    )
-    _stands(Console(as_json, quiet), report)
+    report = actions.jog(line.port, x=x, y=y, feed_mm_min=speed, absolute=to, baud=line.baud)
+    return _answer_state(console, report)
 
 
-@app.command()
+def _frame_options() -> type:
+    from miurafab.workflow.cut_sheets import CutOptions
+
+    return CutOptions
+
+
+@takes(_frame_options, without=("check_mode", "resume", "frame", "allow_m3", "force"))
 def frame(
-    thing: Annotated[str, typer.Argument(help="A job directory or a G-code file.")],
+    thing: Annotated[str, argument("THING", "A job directory or a G-code file.")],
+    /,
+    *,
     port: Annotated[
         list[str],
-        typer.Option(
-            help="A serial device, a pyserial URL (socket://...), 'virtual'; given more than once, "
-            "the machines trace it in turn."
-        ),
+        option(Text("PORT"), f"{PORT} May be repeated: the machines trace the frame in turn."),
     ],
-    sheet: Annotated[int, typer.Option(help="The sheet of a job directory, from 1.")] = 1,
-    pointer: Annotated[
-        float, typer.Option(help="Power in percent, 5 at most; 0 keeps the beam off.")
-    ] = 0.0,
+    sheet: Annotated[int, option(Whole(1), "The sheet of a job directory, from 1.")] = 1,
     machine: MachineOption = None,
-    home: Annotated[bool, typer.Option("--home", help="Home the machine first.")] = False,
-    at: Annotated[
-        str | None, typer.Option(help="Where the head stands, in the job's coordinates.")
-    ] = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    console: Console = Console(),
+    **given: str,
+) -> int:
     """Trace the box around what a sheet burns, with the beam off or as a pointer."""
     import miurafab
-    from miurafab.cli.cut import parse_point
     from miurafab.workflow import cut_sheets
 
     prepared = miurafab.prepare(thing, machine=machine)
-    options = cut_sheets.CutOptions(
-        home=home, at=None if at is None else parse_point(at), pointer=pointer / 100
-    )
-    console = Console(as_json, quiet)
+    options = read_options(cut_sheets.CutOptions, given)
     for each in port:
         if len(port) > 1:
-            console.remark(f"Tracing the frame at {each}.")
+            console.note(f"Tracing the frame at {each}.")
         cut_sheets.frame(prepared, sheet, port=each, options=options)
     console.answer(
         {
             "sheet": prepared.dry_runs[sheet - 1].name,
             "bounds_mm": prepared.dry_runs[sheet - 1].bounds_mm,
-            "pointer_percent": pointer,
+            "pointer_percent": 100 * options.pointer,
             "ports": port,
         }
     )
+    return DONE
 
 
-@app.command()
-def console(
-    port: PortOption,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+def talk(*, line: Line, console: Console = Console()) -> int:
     """Talk to the controller line by line, until the end of the input (Ctrl-D).
 
-    ?, ! and ~ alone on a line are sent at once, 'reset' resets. The controller is reset at the
-    end unless it stands idle with the beam off.
+    A line with ?, ! or ~ alone is sent at once; 'reset' resets the controller. At the end the
+    controller is reset unless it is idle with the beam off.
     """
     from miurafab.machine import actions
 
-    out = Console(as_json, quiet)
     said: list[str] = []
-    actions.talk(port, sys.stdin, said.append if as_json else out.line, baud=baud)
-    if as_json:
-        out.answer({"said": said})
+    tell = said.append if console.wants_json else console.line
+    actions.talk(line.port, sys.stdin, tell, baud=line.baud)
+    if console.wants_json:
+        console.answer({"said": said})
+    return DONE
 
 
-def _stands(console: Console, report: StatusReport) -> None:
+HELP = "Look at a machine, keep its settings, home, unlock or move it."
+ACTIONS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {
+    "list": (list_, ("miurafab machine list",)),
+    "info": (info, ("miurafab machine info --port virtual",)),
+    "settings": (settings, ("miurafab machine settings --port virtual",)),
+    "backup": (backup, ("miurafab machine backup saved.txt --port virtual",)),
+    "restore": (restore, ("miurafab machine restore saved.txt --port virtual",)),
+    "home": (home, ("miurafab machine home --port /dev/ttyUSB0",)),
+    "unlock": (unlock, ("miurafab machine unlock --port virtual",)),
+    "jog": (jog, ("miurafab machine jog --x 10mm --y -5mm --port virtual",)),
+    "frame": (frame, ("miurafab machine frame jobs/hypar --port virtual",)),
+    "console": (talk, ("miurafab machine console --port virtual",)),
+}
+"""Each action with its examples."""
+
+
+def _answer_state(console: Console, report: StatusReport) -> int:
     answer: dict[str, Any] = {
         "state": report.state,
         "machine_position": report.machine_position,
@@ -243,3 +221,4 @@ def _stands(console: Console, report: StatusReport) -> None:
         "beam_off": report.beam_off,
     }
     console.answer({name: value for name, value in answer.items() if value is not None})
+    return DONE

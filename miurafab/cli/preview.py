@@ -5,35 +5,49 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.cli.sheets import MachineOption
+from miurafab.cli.console import Console
+from miurafab.cli.declared import MachineOption, argument, option
+from miurafab.errors import DONE
+from miurafab.options import File
 
 if TYPE_CHECKING:
     from miurafab.workflow.dry_run import SheetPreview
 
+EXAMPLES = (
+    "miurafab preview jobs/hypar",
+    "miurafab preview jobs/hypar/sheet-01.nc --machine grbl-laser-400",
+)
+
 
 def preview(
-    job: Annotated[Path, typer.Argument(help="A job directory or a G-code file.")],
+    job: Annotated[Path, argument("JOB", "A job directory or a G-code file.")],
+    /,
+    *,
     machine: MachineOption = None,
     settings: Annotated[
         Path | None,
-        typer.Option(help="A file with what '$$' printed; it wins over the machine's profile."),
+        option(
+            File(),
+            "A file with what '$$' printed on the machine; its settings replace the profile's.",
+        ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="Where the pictures go [default: JOB/preview]."),
+        option(
+            File("FOLDER"),
+            "The folder for the pictures.",
+            "-o",
+            "--out",
+            default_text="JOB/preview",
+        ),
     ] = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Show what a job would do; opens no port.
+    console: Console = Console(),
+) -> int:
+    """Show what a job would do, without opening a port.
 
-    Pictures, times, lengths, and what is wrong with it.
+    Prints times, lengths and warnings, and writes pictures and a page.
     """
-    console = Console(as_json, quiet)
     profile = None if machine is None else miurafab.load_machine(machine)
     with console.progress("dry run") as progress:
         seen = miurafab.preview(job, machine=profile, settings_dump=settings, on_progress=progress)
@@ -57,6 +71,7 @@ def preview(
         console.line(f"Open {page} in a browser; pictures are beside it.")
 
     console.answer(answer, show)
+    return DONE
 
 
 def _row(sheet: SheetPreview) -> tuple[str | int, ...]:

@@ -7,67 +7,47 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-import typer.core
-
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.cli.console import Console
+from miurafab.cli.declared import argument, option
+from miurafab.errors import DONE
+from miurafab.options import File, Text, length
 from miurafab.profiles import load_machine, load_material, shipped_names
 from miurafab.profiles.shipped import Kind
 
 NameArgument = Annotated[
-    str | None, typer.Argument(help="A shipped name or a TOML file; without it, list all.")
+    str | None, argument("NAME", "A shipped name or a TOML file; without it, all are listed.")
 ]
 
+PROFILES_EXAMPLES = ("miurafab profiles", "miurafab profiles grbl-laser-400")
 
-def profiles(
-    name: NameArgument = None, as_json: JsonOption = False, quiet: QuietOption = False
-) -> None:
+
+def profiles(name: NameArgument = None, /, *, console: Console = Console()) -> int:
     """List the machine profiles, or show and validate one."""
-    _list_or_show(Console(as_json, quiet), "firmware_profiles", load_machine, name)
+    return _list_or_show(console, "firmware_profiles", load_machine, name)
 
 
-class _MaterialsGroup(typer.core.TyperGroup):
-    """``materials`` alone, or with a name or options, means ``materials show``."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if not args or (args[0] not in self.commands and args[0] != "--help"):
-            args = ["show", *args]
-        return super().parse_args(ctx, args)
+def show_material(name: NameArgument = None, /, *, console: Console = Console()) -> int:
+    """List the materials, or show and validate one."""
+    return _list_or_show(console, "materials", load_material, name)
 
 
-materials = typer.Typer(
-    cls=_MaterialsGroup,
-    help="List the materials, show and validate one, or add one from a calibration.",
-    rich_markup_mode=None,
-)
-
-
-@materials.command("show")
-def show_material(
-    name: NameArgument = None, as_json: JsonOption = False, quiet: QuietOption = False
-) -> None:
-    """List the materials, or show and validate one ('show' may be left out)."""
-    _list_or_show(Console(as_json, quiet), "materials", load_material, name)
-
-
-@materials.command("add")
 def add_material(
-    name: Annotated[str, typer.Argument(help="The new material; NAME.toml is written.")],
+    name: Annotated[str, argument("NAME", "The new material; NAME.toml is written.")],
+    /,
+    *,
     source: Annotated[
-        Path, typer.Option("--from", help="The job directory of the calibration sheet.")
+        Path, option(File("FOLDER"), "The job directory of the calibration sheet.", "--from")
     ],
-    cell: Annotated[str | None, typer.Option(help="The flap that folds best, such as B4.")] = None,
+    cell: Annotated[str | None, option(Text("LABEL"), "The flap that folds best, as B4.")] = None,
     cut: Annotated[
-        str | None, typer.Option(help="The first square that falls out, such as X3.")
+        str | None, option(Text("LABEL"), "The first square that falls out, as X3.")
     ] = None,
-    kerf: Annotated[str | None, typer.Option(help="What the kerf gauge says, as 0.15mm.")] = None,
-    title: Annotated[str | None, typer.Option(help="What the material is called in lists.")] = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Write a material of your own from what was chosen on a calibration sheet."""
-    console = Console(as_json, quiet)
+    kerf: Annotated[float | None, option(length(), "What the kerf gauge reads.")] = None,
+    title: Annotated[str | None, option(Text(), "The material's title in lists.")] = None,
+    console: Console = Console(),
+) -> int:
+    """Write a material of your own from your choices on a calibration sheet."""
     path, made = miurafab.add_material(name, source, cell=cell, cut=cut, kerf=kerf, title=title)
     answer = {"file": str(path), "material": asdict(made)}
 
@@ -75,16 +55,30 @@ def add_material(
         console.line(f"Wrote {path}. Use it with --material {path}.")
 
     console.answer(answer, show)
+    return DONE
+
+
+MATERIALS_HELP = "List the materials, show and validate one, or add one from a calibration."
+MATERIALS_EXAMPLES = ("miurafab materials", "miurafab materials card-250")
+MATERIALS_ACTIONS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {
+    "show": (show_material, ("miurafab materials show card-250",)),
+    "add": (
+        add_material,
+        ("miurafab materials add my-card --from trial --cell B4 --kerf 0.15mm",),
+    ),
+}
+"""Each action with its examples."""
 
 
 def _list_or_show(
     console: Console, kind: Kind, load: Callable[[str], Any], name: str | None
-) -> None:
+) -> int:
     if name is not None:
         console.answer(asdict(load(name)))
-        return
-    found = {stem: load(stem).title for stem in shipped_names(kind)}
+        return DONE
+    titles = {stem: load(stem).title for stem in shipped_names(kind)}
     console.answer(
-        {kind: [{"name": stem, "title": title} for stem, title in found.items()]},
-        lambda: console.rows(("name", "title"), list(found.items())),
+        {kind: [{"name": stem, "title": title} for stem, title in titles.items()]},
+        lambda: console.rows(("name", "title"), list(titles.items())),
     )
+    return DONE

@@ -5,146 +5,58 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.cli.console import Console
+from miurafab.cli.declared import MachineOption, MaterialOption, argument, option, takes
+from miurafab.errors import DONE
+from miurafab.options import File, Text
 
-MachineOption = Annotated[
-    str | None, typer.Option("--machine", help="A machine profile: a shipped name or a TOML file.")
-]
-MaterialOption = Annotated[
-    str | None, typer.Option("--material", help="A material: a shipped name or a TOML file.")
-]
+EXAMPLES = (
+    "miurafab sheets hypar.fold -o jobs/hypar",
+    "miurafab sheets hypar.fold -o jobs/pdf --material paper-100 --format pdf",
+)
 
 
+def _layout_options() -> type:
+    from miurafab.fabrication.options import LayoutOptions
+
+    return LayoutOptions
+
+
+@takes(_layout_options)
 def sheets(
-    file: Annotated[Path, typer.Argument(help="The FOLD file of the pattern.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="The job directory to make.")],
+    file: Annotated[Path, argument("FILE", "The pattern, a FOLD file.")],
+    /,
+    *,
+    out: Annotated[Path, option(File("FOLDER"), "The job directory to make.", "-o", "--out")],
     machine: MachineOption = None,
     material: MaterialOption = None,
     formats: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            Text("FORMAT,..."),
+            "Draw more than SVG: dxf, dxf-r2010, pdf, hpgl, tiled-a4, tiled-a3, tiled-letter, "
+            "tiled-legal (pages to join), picture (of the pattern); comma-separated.",
             "--format",
             "--formats",
-            help="Draw more than SVG: dxf, dxf-r2010, pdf, hpgl, tiled-a4, tiled-a3, tiled-letter, "
-            "tiled-legal (pages to join), picture (of the pattern); several parted by commas.",
         ),
     ] = None,
     design: Annotated[
         Path | None,
-        typer.Option(
-            help="A design file whose [layout] holds options, machine and material; those given "
-            "here win."
+        option(
+            File(),
+            "A design file whose [layout] gives options, machine and material; options given here "
+            "replace them.",
         ),
     ] = None,
-    gap: Annotated[str | None, typer.Option(help="Kept between patches [default: 2mm].")] = None,
-    offcuts: Annotated[
-        str | None, typer.Option(help="Left-over sheets to use up first: 300x200,180x90.")
-    ] = None,
-    max_patch: Annotated[
-        str | None, typer.Option(help="The largest patch, as 300mmx200mm [default: the bed].")
-    ] = None,
-    seam_rows: Annotated[
-        str | None, typer.Option(help="Rows of facets after which to cut in any case: 10,20.")
-    ] = None,
-    seam_columns: Annotated[
-        str | None, typer.Option(help="Columns of facets after which to cut in any case.")
-    ] = None,
-    open_row: Annotated[
-        int | None,
-        typer.Option(help="Open a closed ring after this row of facets, and count rows from it."),
-    ] = None,
-    open_column: Annotated[
-        int | None, typer.Option(help="The same along columns of facets.")
-    ] = None,
-    tab_height: Annotated[
-        str | None, typer.Option(help="Height of the tabs [default: the material's].")
-    ] = None,
-    tab_inset: Annotated[
-        str | None, typer.Option(help="Inset of the tabs [default: the material's].")
-    ] = None,
-    tab_angle: Annotated[
-        str | None,
-        typer.Option(help="Largest inner angle at a tab's base [default: the material's, 75deg]."),
-    ] = None,
-    tab_side: Annotated[
-        str | None,
-        typer.Option(help="The patch that bears the tabs: lower, upper, alternate [lower]."),
-    ] = None,
-    full_facet: Annotated[
-        bool | None, typer.Option("--full-facet", help="Tabs as large as the facets under them.")
-    ] = None,
-    two_sided: Annotated[
-        bool | None, typer.Option("--two-sided", help="Score the valleys from the back.")
-    ] = None,
-    bridges: Annotated[
-        int | None, typer.Option(help="Holding bridges on each outline, 2 or more [default: 0].")
-    ] = None,
-    bridge: Annotated[
-        str | None, typer.Option(help="Length of a holding bridge [default: 0.5mm].")
-    ] = None,
-    spread_heat: Annotated[
-        bool | None,
-        typer.Option("--spread-heat", help="Cut patches beside each other far apart in time."),
-    ] = None,
-    quantity: Annotated[
-        int | None, typer.Option(help="How many of the whole model to make [default: 1].")
-    ] = None,
-    stock: Annotated[
-        Path | None,
-        typer.Option(help="A TOML file with the sheets to use: sizes, quantities, defects."),
-    ] = None,
-    margin: Annotated[
-        str | None, typer.Option(help="Kept free along the sheet's edges [default: the machine's].")
-    ] = None,
-    grain: Annotated[
-        str | None,
-        typer.Option(help="How the sheets' fibres run: x, y, none [default: the material's]."),
-    ] = None,
-    along_grain: Annotated[
-        str | None, typer.Option(help="The pattern's axis to lay along the fibres: x or y [x].")
-    ] = None,
-    rotations: Annotated[
-        str | None,
-        typer.Option(help="Degrees by which patches may be turned [default: 0,90,180,270]."),
-    ] = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    console: Console = Console(),
+    **given: str,
+) -> int:
     """Lay a pattern out on sheets, with drawings and G-code.
 
-    Patches, tabs, perforation, nesting and order, for one machine and one material.
+    Makes patches, tabs, perforation, nesting and order, for one machine and one material.
     """
-    console = Console(as_json, quiet)
-    given = {
-        "gap": gap,
-        "offcuts": offcuts,
-        "max_patch": max_patch,
-        "seam_rows": seam_rows,
-        "seam_columns": seam_columns,
-        "open_row": open_row,
-        "open_column": open_column,
-        "tab_height": tab_height,
-        "tab_inset": tab_inset,
-        "tab_angle": tab_angle,
-        "tab_side": tab_side,
-        "full_facet": full_facet,
-        "two_sided": two_sided,
-        "bridges": bridges,
-        "bridge": bridge,
-        "spread_heat": spread_heat,
-        "quantity": quantity,
-        "stock": None if stock is None else str(stock),
-        "margin": margin,
-        "grain": grain,
-        "along_grain": along_grain,
-        "rotations": rotations,
-    }
-    options = miurafab.layout_options(
-        {key: value for key, value in given.items() if value is not None}, design
-    )
+    options = miurafab.layout_options(given, design)
     named = (None, None) if design is None else miurafab.design_profiles(design)
     # An empty name, as of a variable that is not set, is a mistake and not the usual machine.
     machine = named[0] if machine is None else machine
@@ -191,6 +103,7 @@ def sheets(
     }
 
     console.answer(answer, lambda: _show(console, answer))
+    return DONE
 
 
 def _show(console: Console, answer: dict[str, Any]) -> None:

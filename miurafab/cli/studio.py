@@ -1,18 +1,21 @@
 """``miurafab studio``: serve the local web page until Ctrl-C.
 
-What serves it is handed in by :mod:`miurafab.__main__`: the command line does not know the studio.
+:mod:`miurafab.__main__` hands in what serves it: the command line does not know the studio.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from typing import Annotated, Protocol
 
-import typer
+from cyclopts import Parameter
 
-from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.workflow.json_text import json_text
+from miurafab.cli.console import Console
+from miurafab.cli.declared import argument, option
+from miurafab.errors import DONE
+from miurafab.options import Flag, Whole
+
+EXAMPLES = ("miurafab studio", "miurafab studio hypar:height=0.5 --no-browser")
 
 
 class ServeStudio(Protocol):
@@ -29,38 +32,34 @@ class ServeStudio(Protocol):
 
 
 def studio(
-    context: typer.Context,
     thing: Annotated[
         str | None,
-        typer.Argument(
-            metavar="FILE|TARGET",
-            help="What to begin with: a pattern .fold, a named surface (hypar:height=0.5), a "
-            "design .toml or a mesh.",
+        argument(
+            "FILE|TARGET",
+            "What to begin with: a pattern .fold, a named surface (hypar:height=0.5), a design "
+            ".toml or a mesh.",
         ),
     ] = None,
+    /,
+    *,
+    serve: Annotated[ServeStudio, Parameter(parse=False)],
     port: Annotated[
         int,
-        typer.Option(
-            help="The port on this computer [default: any that is free].", show_default=False
-        ),
+        option(Whole(0, 65535), "The network port on this computer.", default_text="any free port"),
     ] = 0,
-    no_browser: Annotated[
-        bool, typer.Option("--no-browser", help="Print the address and open no browser.")
-    ] = False,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    no_browser: Annotated[bool, option(Flag(), "Print the address and open no browser.")] = False,
+    console: Console = Console(),
+) -> int:
     """Serve a page on this computer: from a surface to sheets in the browser.
 
-    The first line printed is its address, which holds a key: only who has it gets in. Ctrl-C ends
-    it. Nothing is sent to a machine: the page shows the 'miurafab cut' command to paste.
+    The first line printed is the address of the page. It holds a key: nobody gets in without it.
+    Ctrl-C ends the studio. Nothing is sent to a machine: the page shows the 'miurafab cut' command
+    to paste into a terminal.
     """
-    console = Console(as_json, quiet)
-    serve: ServeStudio = context.obj
 
     def announce(address: str) -> None:
-        sys.stdout.write((json_text({"address": address}) if as_json else address) + "\n")
-        sys.stdout.flush()
-        console.remark("The studio is open there; Ctrl-C ends it.")
+        console.announce(address)
+        console.note("The studio is open there; Ctrl-C ends it.")
 
     serve(thing, port=port, open_browser=not no_browser, announce=announce)
+    return DONE

@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from miurafab.cli.console import Console, JsonOption, QuietOption
+from miurafab.cli.console import Console
+from miurafab.errors import DONE
 
 if TYPE_CHECKING:
     from miurafab.surfaces.catalogue import SurfaceParameter
 
 
-def surfaces(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
+EXAMPLES = ("miurafab surfaces", "miurafab surfaces --json")
+
+
+def surfaces(*, console: Console = Console()) -> int:
     """List the built-in targets with their parameters and defaults."""
     from miurafab.surfaces.catalogue import CATALOGUE
 
-    console = Console(as_json, quiet)
     answer = {
         "surfaces": [
             {
@@ -45,6 +48,7 @@ def surfaces(as_json: JsonOption = False, quiet: QuietOption = False) -> None:
         console.line("Give parameters after a colon: miurafab fit hypar:height=0.5 -o hypar.fold")
 
     console.answer(answer, show)
+    return DONE
 
 
 def _defaults(parameters: Mapping[str, SurfaceParameter]) -> str:

@@ -4,76 +4,48 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Annotated
 
 import miurafab
-from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.cli.fit import TargetArgument
-from miurafab.errors import InputError
+from miurafab.cli.console import Console
+from miurafab.cli.declared import TargetArgument, option, takes
+from miurafab.cli.fit import fit_options
+from miurafab.errors import DONE, NO
+from miurafab.options import File
+
+EXAMPLES = (
+    "miurafab tradeoff hypar --sides 4,6,8",
+    "miurafab tradeoff saddle.stl -o tradeoff.csv",
+)
 
 
+def _own_options() -> type:
+    from miurafab.workflow.tradeoff import TradeoffOptions
+
+    return TradeoffOptions
+
+
+@takes(_own_options, fit_options, without=("facets",))
 def tradeoff(
     target: TargetArgument,
+    /,
+    *,
     out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="Write a plot (.png, .svg) or a table (.csv)."),
+        Path | None, option(File(), "Write a plot (.png, .svg) or a table (.csv).", "-o", "--out")
     ] = None,
-    sides: Annotated[
-        str | None,
-        typer.Option(help="Facets along a side, with commas [default: 8,12,16,24,32,48]."),
-    ] = None,
-    weights: Annotated[
-        str | None,
-        typer.Option(help="Weights of effort in the cost, with commas [default: 0.05 to 0.95]."),
-    ] = None,
-    size: Annotated[str | None, typer.Option(help="Longest side of the folded form.")] = None,
-    amplitude: Annotated[
-        str | None, typer.Option(help="As for fit [default: automatic, the same for all].")
-    ] = None,
-    zigzag: Annotated[
-        str | None, typer.Option(help="As for fit [default: automatic, the same for all].")
-    ] = None,
-    flat_foldable: Annotated[
-        str | None, typer.Option(help="exact, off, or a limit [default: off].")
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Processes here [default: one a processor].")
-    ] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(help="Run on the dask cluster at this address (tcp://HOST:8786)."),
-    ] = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    console: Console = Console(),
+    **given: str,
+) -> int:
     """Trade accuracy against effort for a target.
 
-    Fit it with more and more facets and compare distances, area and cost.
+    Fits the target with more and more facets and compares distances, area and cost. Exits with 1
+    if fewer than three sheets were found.
     """
-    console = Console(as_json, quiet)
     if out is not None:
         miurafab.check_tradeoff_file(out)
-    asked: dict[str, Any] = {}
-    if sides is not None:
-        asked["sides"] = _whole_numbers(sides)
-    if weights is not None:
-        asked["weights"] = _numbers(weights)
+    given.setdefault("workers", str(os.cpu_count() or 1))
     with console.progress("fitting") as progress:
-        found = miurafab.tradeoff(
-            target,
-            **asked,
-            options={
-                "size": size,
-                "amplitude": amplitude,
-                "zigzag": zigzag,
-                "flat_foldable": flat_foldable,
-            },
-            workers=workers or os.cpu_count() or 1,
-            cluster=cluster,
-            on_progress=progress,
-        )
+        found = miurafab.tradeoff(target, on_progress=progress, **given)
     answer = found.report()
     if out is not None and (found.curves or out.suffix.lower() == ".csv"):
         miurafab.write_tradeoff(found, out, target)
@@ -99,21 +71,4 @@ def tradeoff(
         console.rows(("weight of effort", "cheapest sheet", "cheapest by the law"), table)
 
     console.answer(answer, show)
-    if not found.curves:
-        raise typer.Exit(1)
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(word) for word in text.split(","))
-    except ValueError:
-        raise InputError(
-            f"--weights is '{text}'; write numbers with commas between, such as 0.2,0.5,0.8."
-        ) from None
-
-
-def _whole_numbers(text: str) -> list[int]:
-    words = [word.strip() for word in text.split(",")]
-    if not all(word.isdigit() for word in words):
-        raise InputError(f"--sides is '{text}'; write whole numbers such as 8,16,32.")
-    return [int(word) for word in words]
+    return DONE if found.curves else NO

@@ -2,49 +2,58 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from miurafab.cli.console import Console, JsonOption, QuietOption
-from miurafab.errors import InputError
+from miurafab.cli.console import Console
+from miurafab.cli.declared import option
+from miurafab.errors import DONE, InputError
+from miurafab.options import File, Flag, Text, number
 from miurafab.simulate.faults import KINDS, parse_faults
-from miurafab.workflow.json_text import json_text
+
+EXAMPLES = (
+    "miurafab virtual --pty",
+    "miurafab virtual --tcp localhost:2323 --settings grbl-laser-400 --speed 20",
+)
 
 
 def virtual(
+    *,
     pty: Annotated[
-        bool, typer.Option("--pty", help="Serve over a pseudo-terminal [the default].")
+        bool, option(Flag(), "Serve over a pseudo-terminal; this is the default.")
     ] = False,
     tcp: Annotated[
-        str | None, typer.Option(help="Serve over TCP at HOST:PORT (port 0: any free one).")
+        str | None,
+        option(Text("HOST:PORT"), "Serve over TCP at this address (port 0: any free port)."),
     ] = None,
     settings: Annotated[
         str,
-        typer.Option(help="'stock', a machine profile, or a file with what $$ answered."),
+        option(
+            Text("SETTINGS"),
+            "The firmware's settings: 'stock' (its own defaults), a machine profile, or a file "
+            "with what '$$' printed.",
+        ),
     ] = "stock",
-    speed: Annotated[float, typer.Option(help="Virtual seconds a real second.")] = 1.0,
+    speed: Annotated[
+        float, option(number(0, above=True), "Virtual seconds in a real second.")
+    ] = 1.0,
     beam_log: Annotated[
-        Path | None, typer.Option(help="Write what the beam burns to this CSV file.")
+        Path | None, option(File(), "Write what the beam burns to this CSV file.")
     ] = None,
     keep_running: Annotated[
         bool,
-        typer.Option(
-            "--keep-running", help="Do not reset when a sender opens the port, as most boards do."
-        ),
+        option(Flag(), "Do not reset when a sender opens the port; most boards reset."),
     ] = False,
     fault: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Let something go wrong: KIND[=VALUE]@WHEN, WHEN being a byte of the sender's or "
-            "a time since its first; may be repeated. KIND is one of " + ", ".join(KINDS) + "."
+        option(
+            Text("KIND[=VALUE]@WHEN"),
+            "Let something go wrong. WHEN is a byte of the sender's, or a time since its first "
+            f"byte. KIND is one of {', '.join(KINDS)}. May be repeated.",
         ),
     ] = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
+    console: Console = Console(),
+) -> int:
     """Run a virtual controller for any sender, until Ctrl-C.
 
     The first line printed is what a sender opens: a path, or a socket:// address. Faults such as
@@ -55,13 +64,10 @@ def virtual(
 
     if pty and tcp is not None:
         raise InputError("Serve over --pty or over --tcp, not both.")
-    console = Console(as_json, quiet)
 
     def announce(address: str) -> None:
-        line = json_text({"address": address}) if as_json else address
-        sys.stdout.write(line + "\n")
-        sys.stdout.flush()
-        console.remark("A virtual controller listens there; Ctrl-C ends it.")
+        console.announce(address)
+        console.note("A virtual controller listens there; Ctrl-C ends it.")
 
     served = serve_virtual(
         tcp=tcp,
@@ -72,7 +78,8 @@ def virtual(
         faults=parse_faults(fault or ()),
         announce=announce,
     )
-    console.remark(
+    console.note(
         f"Ran {served.seconds:.1f} s of its own time, beam on for {served.beam_on_seconds:.1f} s, "
         f"{served.lost_bytes} bytes lost."
     )
+    return DONE

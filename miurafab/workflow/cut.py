@@ -5,11 +5,12 @@ THING is a job directory, a G-code file, a pattern (.fold), a design (.toml) or 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from miurafab.errors import OptionError
 from miurafab.gcode.job import Job
 from miurafab.profiles import MachineProfile, load_machine
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
@@ -57,7 +58,7 @@ def prepare(
     machine: str | None = None,
     material: str | None = None,
     out: Path | None = None,
-    options: dict[str, str | None] | None = None,
+    options: Mapping[str, object] | None = None,
     on_progress: Callable[[float, str], None] | None = None,
 ) -> Prepared:
     """Make whatever is missing between ``thing`` and the G-code of its sheets.
@@ -67,6 +68,9 @@ def prepare(
     Raises :class:`~miurafab.errors.InputError` and its kin for whatever cannot be read or made.
     """
     path = Path(thing)
+    for name in options or {}:
+        if path.is_dir() or path.suffix.lower() in (*GCODE_SUFFIXES, ".fold"):
+            raise OptionError(name, f"is for a target or a design; {thing} is fitted already")
     tell = on_progress or (lambda fraction, note: None)
     if path.is_dir():
         from miurafab.workflow.job_directory import read_job

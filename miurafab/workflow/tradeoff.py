@@ -13,72 +13,128 @@ import io
 import math
 import multiprocessing
 import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from miurafab.errors import InputError
+from miurafab.errors import InputError, OptionError
+from miurafab.options import Text, Whole, Written, declared, option, read_options
 from miurafab.origami.fitting.fit import fit
 from miurafab.origami.tradeoff import WEIGHTS, Sample, Tradeoff, cost, optimal_side, summarise
 from miurafab.workflow import plotting
 from miurafab.workflow.design import design
 
 SIDES = (8, 12, 16, 24, 32, 48)
-Job = tuple[str, dict[str, str | None]]
+Job = tuple[str, dict[str, Any]]
 Progress = Callable[[float, str], None]
 # Colours that colour-blind eyes keep apart (Okabe and Ito, "Color Universal Design", 2008).
 SHEETS, LAW = "#0072b2", "#d55e00"
 
 
+def _read_sides(value: object) -> tuple[int, ...]:
+    words = value.split(",") if isinstance(value, str) else value
+    try:
+        return tuple(Whole(2).read(word) for word in words)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise ValueError(f"is {value!r}; write whole numbers from 2, such as 8,16,32") from None
+
+
+def _read_weights(value: object) -> tuple[float, ...]:
+    words = value.split(",") if isinstance(value, str) else value
+    try:
+        weights = tuple(float(word) for word in words)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        weights = ()
+    if not weights or not all(0 < weight < 1 for weight in weights):
+        raise ValueError(f"is {value!r}; write numbers between 0 and 1, such as 0.2,0.5,0.8")
+    return weights
+
+
+def _listed(values: Sequence[float]) -> str:
+    return ",".join(f"{value:g}" for value in values)
+
+
+@dataclass(frozen=True)
+class TradeoffOptions:
+    """The options of a trade-off beside those of a fit."""
+
+    sides: tuple[int, ...] = option(
+        Written(_read_sides, _listed, "N,N,..."),
+        "Facets along a side, three numbers or more, comma-separated.",
+        default=SIDES,
+    )
+    weights: tuple[float, ...] = option(
+        Written(_read_weights, _listed, "W,W,..."),
+        "Weights of effort in the cost, between 0 and 1, comma-separated.",
+        default=WEIGHTS,
+    )
+    workers: int | None = option(
+        Whole(1),
+        "Processes on this computer.",
+        default_text="one a processor on the command line, 1 in Python",
+    )
+    cluster: str | None = option(
+        Text("ADDRESS"), "Run on the dask cluster at this address (tcp://HOST:8786)."
+    )
+
+    def __post_init__(self) -> None:
+        if len(set(self.sides)) < 3:
+            raise OptionError(
+                "sides", f"is {_listed(self.sides)}; three different numbers or more are needed"
+            )
+
+
 def tradeoff(
     target: str,
-    sides: Sequence[int] = SIDES,
+    sides: Sequence[int] | str | None = None,
     *,
-    options: Mapping[str, str | None] | None = None,
-    weights: tuple[float, ...] = WEIGHTS,
-    workers: int = 1,
-    cluster: str | None = None,
     on_progress: Progress | None = None,
+    **options: Any,
 ) -> Tradeoff:
     """Fit ``target`` with n x n facets for each n of ``sides``, and fit the laws.
 
-    ``options`` are those of :func:`~miurafab.workflow.design.design`; ``workers`` processes run
-    here, or ``cluster`` is the address of a dask scheduler whose workers have miurafab and see the
-    same files. Raises :class:`~miurafab.errors.InputError` for what cannot be asked.
+    Parameters
+    ----------
+    target : str
+        What :func:`~miurafab.workflow.design.design` takes.
+    sides : sequence of int, optional
+        Facets along a side, three numbers or more.
+    on_progress : callable, optional
+        Called with a fraction in 0..1 and a short text.
+    **options
+        ``weights``, ``workers`` and ``cluster`` (:class:`TradeoffOptions`), and the options of a
+        fit. The workers of a cluster need miurafab and must see the same files.
+
+    Raises
+    ------
+    InputError
+        For options that cannot be taken, a target that cannot be read, a cluster that does not
+        answer.
     """
-    if len(set(sides)) < 3 or min(sides) < 2:
-        raise InputError("--sides needs three different numbers of facets a side or more, from 2.")
-    for weight in weights:
-        if not 0 < weight < 1:
-            raise InputError(f"--weights holds {weight:g}; each must lie between 0 and 1.")
-    if workers < 1:
-        raise InputError(f"--workers is {workers}; it must be one or more.")
-    given: dict[str, str | None] = {
-        key: text for key, text in (options or {}).items() if text is not None
-    }
-    ordered = sorted(set(sides))
+    own = {name: options.pop(name) for name in declared(TradeoffOptions) if name in options}
+    asked = read_options(TradeoffOptions, own | {"sides": sides} if sides is not None else own)
+    given = {key: value for key, value in options.items() if value is not None}
+    ordered = sorted(set(asked.sides))
     pilot = ordered[len(ordered) // 2]
     if on_progress is not None:
         on_progress(0.0, f"pilot with {pilot}x{pilot} facets")
     first = sample((target, given | {"facets": f"{pilot}x{pilot}"}))
     if first.status == "converged":
-        held: dict[str, str | None] = {
-            "amplitude": repr(first.amplitude),
-            "zigzag": repr(first.zigzag),
-        }
+        held = {"amplitude": repr(first.amplitude), "zigzag": repr(first.zigzag)}
         given = held | given
     jobs: list[Job] = [(target, given | {"facets": f"{n}x{n}"}) for n in ordered if n != pilot]
     samples = [first]
-    for found in _run(jobs, workers, cluster):
+    for found in _run(jobs, asked.workers or 1, asked.cluster):
         samples.append(found)
         if on_progress is not None:
             word = f"{found.columns}x{found.rows} facets {found.status}"
             on_progress(len(samples) / len(ordered), word)
-    return summarise(samples, weights)
+    return summarise(samples, asked.weights)
 
 
 def sample(job: Job) -> Sample:
@@ -151,14 +207,14 @@ def _deaf_children() -> Iterator[None]:
 def _on_cluster(jobs: list[Job], address: str) -> Iterator[Sample]:
     if importlib.util.find_spec("distributed") is None:
         raise InputError(
-            "--cluster needs dask.distributed; install it with pip install 'miurafab[cluster]'."
+            "`cluster` needs dask.distributed; install it with pip install 'miurafab[cluster]'."
         )
     distributed: Any = importlib.import_module("distributed")
     try:
         client = distributed.Client(address, timeout=10, set_as_default=False)
     except (OSError, ValueError) as fault:
         reason = " ".join(str(fault).split()).rstrip(".")
-        raise InputError(f"--cluster {address} does not answer: {reason}.") from None
+        raise InputError(f"The `cluster` {address} does not answer: {reason}.") from None
     with client:
         if not client.scheduler_info()["workers"]:
             raise InputError(f"The cluster at {address} has no workers; start one and try again.")

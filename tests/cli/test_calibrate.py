@@ -73,7 +73,7 @@ def test_wrong_choices_are_one_sentence(run, sheet, tmp_path):
         (("mine", "--from", "empty", "--cell", "A1"), "holds no calibration"),
         (("there", "--from", "trial", "--cell", "A1"), "exists already"),
         (("my card", "--from", "trial", "--cell", "A1"), "cannot name a material"),
-        (("mine", "--from", "trial", "--kerf", "3mm"), "between 0 and 2"),
+        (("mine", "--from", "trial", "--kerf", "3mm"), "between 0 mm and 2 mm"),
         (("mine", "--from", "trial", "--cell", "A1", "--kerf", "0.9mm"), "cannot be drawn"),
     ):
         assert named in sentence(run("materials", "add", *arguments), 2)

@@ -1,34 +1,169 @@
 """What every command keeps to: help, JSON alone on standard output, exit codes, one sentence."""
 
 import json
+import re
+import shutil
 import subprocess
 import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 from command_line import sentence
 
-from miurafab.cli import app
+import miurafab.cli
+from miurafab.cli.program import COMMANDS, app, examples
+from miurafab.errors import EXIT_CODES
 
-COMMANDS = sorted(command.name for command in app.registered_commands)
+ROWS = [(name,) for name, command in COMMANDS.items() if command.call is not None]
+ROWS += [(name, action) for name, command in COMMANDS.items() for action in command.actions]
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help_and_json(run, command):
-    done = run(command, "--help")
+def words(row):
+    return " ".join(row)
+
+
+def options_of(row):
+    """The options and arguments of a command, as cyclopts sees them."""
+    of = app
+    for name in row:
+        of = of[name]
+    return of.assemble_argument_collection()
+
+
+def test_all_commands_are_in_the_table():
+    assert len(ROWS) >= 28
+    assert {row[0] for row in ROWS} == {name for name in app if not name.startswith("-")}
+
+
+@pytest.mark.parametrize("row", ROWS, ids=words)
+def test_every_command_has_help_json_and_quiet(run, row):
+    done = run(*row, "--help")
     assert done.returncode == 0
-    assert "--json" in done.stdout
-    assert "--quiet" in done.stdout
-    summary = done.stdout.splitlines()[2].strip()
-    assert summary.endswith((".", ";")) or summary, done.stdout
+    usage, blank, summary = done.stdout.splitlines()[:3]
+    assert usage.startswith(f"Usage: miurafab {words(row)}")
+    assert blank == ""
+    assert re.fullmatch(r"[A-Z].*", summary)
+    assert done.stdout.split("\n\n")[1].endswith(".")
+    for option in ("--json", "--quiet", "-h, --help"):
+        assert f"\n  {option}  " in done.stdout
+    assert run(*row, "-h").stdout == done.stdout
+    assert done.stderr == ""
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_an_unknown_option_is_exit_2(run, command):
-    done = run(command, "--no-such-option")
-    assert done.returncode == 2
-    assert "no-such-option" in done.stderr
-    assert "Traceback" not in done.stderr
+@pytest.mark.parametrize("row", ROWS, ids=words)
+def test_the_summary_of_every_command_is_one_sentence_of_one_line(row):
+    of = app
+    for name in row:
+        of = of[name]
+    summary = of.help.partition("\n\n")[0]
+    assert re.fullmatch(r"[A-Z][^.\n]*(\.[^. \n]+)*\.", summary), summary
+    assert len(summary) <= 79
+
+
+@pytest.mark.parametrize("row", ROWS, ids=words)
+def test_an_unknown_option_is_exit_2_in_one_sentence(run, row):
+    done = run(*row, "--no-such-option")
+    assert sentence(done, 2) == f"miurafab: miurafab {words(row)} has no option --no-such-option."
+    assert done.stdout == ""
+    done = run(*row, "--quite", "--json")
+    assert sentence(done, 2).endswith("--quite (did you mean '--quiet'?).")
+    answer = json.loads(done.stdout)
+    assert answer == {"error": done.stderr.removeprefix("miurafab: ").strip(), "kind": "UsageError"}
+
+
+@pytest.mark.parametrize("row", ROWS, ids=words)
+def test_every_option_has_help_and_says_what_a_value_is(row):
+    for entry in options_of(row):
+        if entry.parse and not entry.children:
+            text = entry.parameter.help
+            assert text, entry.name
+            assert text.endswith("."), text
+            assert re.match(r"[A-Z'|.]", text), text
+            assert not re.search(r"\bdefault\b", text.replace("this is the default", "")), text
+            is_flag = bool in (entry.hint, *getattr(entry.hint, "__args__", ()))
+            if entry.name.startswith("-") and not is_flag:
+                assert re.fullmatch(r"[A-Zxa-z0-9|:,.@=\[\]]+", entry.parameter.metavar), entry.name
+
+
+def test_no_default_is_typed_into_a_help_text():
+    for path in Path(miurafab.cli.__file__).parent.glob("*.py"):
+        text = path.read_text()
+        if path.name != "help.py":
+            assert "[default" not in text, path.name
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_help_is_as_wide_as_the_terminal(run, monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", str(width))
+    for arguments in ((), ("fit",), ("sheets",), ("cut",), ("machine",)):
+        lines = run(*arguments, "--help").stdout.partition("Examples:")[0].splitlines()
+        assert max(map(len, lines)) <= width
+        if arguments not in ((), ("machine",)):
+            assert max(map(len, lines)) > 0.8 * width
+
+
+def test_bare_miurafab_is_its_help_with_the_exit_codes(run):
+    done = run()
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == run("--help").stdout == run("-h").stdout
+    for command in COMMANDS:
+        assert f"\n  {command} " in done.stdout
+    for code, meaning in EXIT_CODES.items():
+        assert f"{code}  {meaning}\n" in done.stdout
+    headings = re.findall(r"^([A-Z]\w+)$", done.stdout, re.MULTILINE)
+    assert headings == ["Design", "Make", "Machines", "More", "General"]
+
+
+def test_the_examples_name_commands_and_options_that_exist():
+    for example in examples():
+        program, *arguments = example.split()
+        assert program == "miurafab"
+        assert len(example) <= 76
+        app.parse_args(arguments, exit_on_error=False, print_error=False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("fitt",), "has no command 'fitt' (did you mean 'fit'?)."),
+        (("machine", "hom"), "miurafab machine has no command 'hom' (did you mean 'home'?)."),
+        (("--verbose",), "has no option '--verbose'"),
+        (("fit", "hypar"), "miurafab fit needs -o FILE: The FOLD file to write."),
+        (("fit", "-o", "x.fold"), "miurafab fit needs TARGET"),
+        (("fit", "hypar", "-o"), "-o needs a value, FILE."),
+        (("fit", "hypar", "much", "-o", "x.fold"), "takes no further argument 'much'."),
+        (("fit", "hypar", "-o", "x.fold", "--facet", "3"), "(did you mean '--facets'?)."),
+        (("fit", "hypar", "-o", "x.stl"), "--out is x.stl; a fit writes a FOLD file"),
+        (("fit", "hypar", "-o", "-"), "--out is -; a fit writes a FOLD file"),
+        (("energy", "x.fold", "--steps", "many"), "--steps is 'many', not a whole number."),
+        (("cut", "job", "--pointer", "50", "--port", "virtual"), "between 0 % and 5 %"),
+        (("cut", "job", "--pointer", "3", "--port", "virtual"), "ask for the --frame as well"),
+        (("cut", "job.nc", "--facets", "8x8", "--port", "virtual"), "--facets is for a target"),
+        (("completion", "tcsh"), "'tcsh' is not a shell"),
+    ],
+)
+def test_a_mistake_in_the_command_line_is_one_sentence(run, arguments, named):
+    assert named in sentence(run(*arguments), 2)
+
+
+@pytest.mark.parametrize(
+    ("shell", "check"),
+    [
+        ("bash", ["bash", "-n"]),
+        ("zsh", ["zsh", "-n"]),
+        ("fish", ["fish", "--no-execute"]),
+        ("powershell", None),
+    ],
+)
+def test_completion_knows_commands_and_options(run, tmp_path, shell, check):
+    script = run("completion", shell).stdout
+    for word in ("miurafab", "tradeoff", "calibrate", "min-edge", "check-mode", "baud"):
+        assert word in script
+    assert json.loads(run("completion", shell, "--json").stdout)["script"] + "\n" == script
+    if check is not None and shutil.which(check[0]):
+        (tmp_path / "script").write_text(script)
+        subprocess.run([*check, tmp_path / "script"], check=True)
 
 
 def test_the_version_is_that_of_the_package(run):
@@ -138,7 +273,8 @@ def test_the_module_runs_as_a_process_and_starts_light():
         "import sys; sys.argv = ['miurafab', '--help']\n"
         "from miurafab.__main__ import main\n"
         "try:\n    main()\n"
-        "except SystemExit:\n    assert not {'scipy', 'trimesh', 'shapely'} & set(sys.modules)\n"
+        "except SystemExit:\n"
+        "    assert not {'numpy', 'scipy', 'trimesh', 'shapely'} & set(sys.modules)\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     done = subprocess.run(

@@ -139,7 +139,7 @@ def test_a_signal_to_the_user_interface_alone_is_passed_on_at_once(name: str) ->
         bench.run(lambda b=bench: b"\x18" in b.bytes_came)
         at, virtual, _ = bench.came[-1]
         said = bench.finish(process)
-        assert process.returncode == 3
+        assert process.returncode == 130
         assert name in said or "Ctrl-C" in said
         assert said.endswith("the controller was reset and reports the beam off.\n")
         bench.assert_dark_from(virtual)

@@ -54,7 +54,7 @@ def test_a_signal_puts_a_reset_on_the_wire_at_once(name: str) -> None:
             delay, at = reset_after(bench, process, getattr(signal, name))
             bench.run(lambda p=process: p.poll() is not None)
             said = process.stdout.read()
-        assert process.returncode == 3
+        assert process.returncode == 130
         assert "long.nc was stopped by" in said
         assert said.strip().endswith("the controller was reset and reports the beam off.")
         assert bench.bytes_came.replace(b"?", b"").endswith(b"\x18")

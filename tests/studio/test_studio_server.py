@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 import pytest
 from studios import saddle_obj
 
-from miurafab.cli import app
+from miurafab.cli.program import run as run_command
 from miurafab.errors import InputError, PatternError, PortError, TargetError
 from miurafab.studio.server import serve
 
@@ -113,7 +113,7 @@ def run(folder, command):
     words = shlex.split(command)
     assert words[0] == "miurafab"
     with contextlib.chdir(folder):
-        assert not app([*words[1:], "--quiet"], standalone_mode=False)
+        assert run_command([*words[1:], "--quiet"], serve_studio=serve) == 0
 
 
 def test_the_page_writes_what_the_commands_that_it_shows_write(start, tmp_path):

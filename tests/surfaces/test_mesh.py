@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 from problems import saddle_mesh
-from typer.testing import CliRunner
 
-from miurafab.cli import app
 from miurafab.errors import InputError, TargetError
 from miurafab.surfaces.mesh import MeshChart, load_mesh, mesh_surface
 from miurafab.surfaces.placement import Region
@@ -168,12 +166,12 @@ def test_a_folder_is_no_mesh(tmp_path):
 
 
 @pytest.mark.parametrize("broken", [nan, large_hole, two_pieces], ids=lambda b: b.__name__)
-def test_the_command_line_refuses_without_a_pattern(tmp_path, broken):
+def test_the_command_line_refuses_without_a_pattern(run, tmp_path, broken):
     path = written(tmp_path / "mesh.off", *broken(*square()))
     out = tmp_path / "out.fold"
-    result = CliRunner().invoke(app, ["fit", str(path), "-o", str(out)])
-    assert isinstance(result.exception, TargetError)
-    assert result.exception.exit_code == 2
+    done = run("fit", path, "-o", out, "--json")
+    assert done.returncode == 2
+    assert json.loads(done.stdout)["kind"] == "TargetError"
     assert not out.exists()
 
 
@@ -326,20 +324,19 @@ def test_region_and_rotate_are_for_meshes():
             design("hypar", **{option: value})
 
 
-def test_a_mesh_is_fitted_checked_and_laid_out_again_from_its_file(tmp_path):
+def test_a_mesh_is_fitted_checked_and_laid_out_again_from_its_file(run, tmp_path):
     path = tmp_path / "saddle.ply"
     saddle_mesh(21).export(path)
     out = tmp_path / "saddle.fold"
-    arguments = ["fit", str(path), "-o", str(out), "--facets", "12x12", "--json"]
-    arguments += ["--region", "0.3,0.7,0.3,0.7", "--rotate", "10deg"]
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == 0, result.output
+    placed = ("--region", "0.3,0.7,0.3,0.7", "--rotate", "10deg")
+    result = run("fit", path, "-o", out, "--facets", "12x12", "--json", *placed)
+    assert result.returncode == 0, result
     report = json.loads(result.stdout)
     pattern, _, findings = load_pattern(out)
     assert findings == ()
     assert pattern.target["rotate"] == pytest.approx(10)
-    checked = CliRunner().invoke(app, ["check", str(out), "--json"])
-    assert checked.exit_code == 0
+    checked = run("check", out, "--json")
+    assert checked.returncode == 0
     again = json.loads(checked.stdout)
     for name in ("hausdorff_mm", "hausdorff_midsurface_mm", "area_ratio"):
         assert again[name] == pytest.approx(report[name], rel=1e-9)

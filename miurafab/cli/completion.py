@@ -1,0 +1,44 @@
+"""``miurafab completion``: a script that lets a shell complete commands and options."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from miurafab.cli.console import Console
+from miurafab.cli.declared import ARGUMENTS
+from miurafab.errors import DONE, InputError
+
+EXAMPLES = ("miurafab completion bash", "miurafab completion powershell")
+
+SHELLS = ("bash", "zsh", "fish", "powershell")
+
+
+def completion(
+    shell: Annotated[
+        str, Parameter(name="SHELL", help=f"One of {', '.join(SHELLS)}.", group=ARGUMENTS)
+    ],
+    /,
+    *,
+    program: Annotated[App, Parameter(parse=False)],
+    console: Console = Console(),
+) -> int:
+    """Print a script that completes commands and options in a shell.
+
+    bash: add 'eval "$(miurafab completion bash)"' to ~/.bashrc.
+
+    zsh: write the script to a file named _miurafab in a folder of $fpath.
+
+    fish: write the script to ~/.config/fish/completions/miurafab.fish.
+
+    PowerShell: add 'miurafab completion powershell | Out-String | Invoke-Expression' to $PROFILE.
+    """
+    if shell not in SHELLS:
+        raise InputError(
+            f"'{shell}' is not a shell with completion; there are {', '.join(SHELLS)}."
+        )
+    script = program.generate_completion(shell=shell)  # type: ignore[arg-type]
+    console.answer({"shell": shell, "script": script}, lambda: print(script, file=sys.stdout))
+    return DONE
