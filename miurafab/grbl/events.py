@@ -102,21 +102,6 @@ class Setting(Event):
 
 
 @dataclass(frozen=True, slots=True)
-class StartupLine(Event):
-    """``$N0=G54``, one line of ``$N``."""
-
-    number: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class StartupResult(Event):
-    """``>G54:ok``: the controller ran a startup line after a reset."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class Feedback(Event):
     """``[MSG:Caution: Unlocked]``: a message."""
 
@@ -143,24 +128,8 @@ class Options(Event):
 
 
 @dataclass(frozen=True, slots=True)
-class GCState(Event):
-    """``[GC:G0 G54 ... F0 S0]``: the modal words in force."""
-
-    words: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ParameterReply(Event):
-    """One line of ``$#``: ``[G54:0.000,0.000,0.000]``, ``[TLO:0.000]``, ``[PRB:...:0]``."""
-
-    name: str
-    values: tuple[float, ...]
-    succeeded: bool | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Unknown(Event):
-    """Any other line: noise, or a message of another firmware."""
+    """Any other line: noise, or a message that the sender does not need."""
 
     text: str
 

@@ -20,13 +20,9 @@ from miurafab.grbl.events import (
     Error,
     Event,
     Feedback,
-    GCState,
     Ok,
     Options,
-    ParameterReply,
     Setting,
-    StartupLine,
-    StartupResult,
     StatusReport,
     Unknown,
     Version,
@@ -37,10 +33,6 @@ _ANSWER = re.compile(r"(error|ALARM): ?(.+)")
 _STATUS = re.compile(r"<([A-Z][A-Za-z]*)(?::(\d+))?((?:[|,][^|<>]*)*)>")
 _BRACKET = re.compile(r"\[(\w[\w.]*):(.*)\]")
 _SETTING = re.compile(r"\$(\d+)=([^()]*?)(?: *\(.*\))?")
-_STARTUP = re.compile(r"\$N(\d)=(.*)")
-_STARTUP_RESULT = re.compile(r">(.*):(?:ok|error:\d+)")
-_PARAMETERS = {*(f"G{n}" for n in (54, 55, 56, 57, 58, 59, 28, 30, 92)), "TLO", "PRB"}
-_PARAMETERS |= {"G59.1", "G59.2", "G59.3"}
 
 
 def parse_reply(text: str) -> Event:
@@ -128,13 +120,6 @@ def _bracket(match: re.Match[str]) -> Event | None:
         flags, *numbers = body.split(",")
         planner_blocks, rx_bytes = ([int(n) for n in numbers[:2]] + [None, None])[:2]
         return Options(flags, planner_blocks, rx_bytes)
-    if tag == "GC":
-        return GCState(tuple(body.split()))
-    if tag == "PRB":
-        values, _, flag = body.rpartition(":")
-        return ParameterReply(tag, _numbers(values), flag == "1")
-    if tag in _PARAMETERS:
-        return ParameterReply(tag, _numbers(body))
     return None
 
 
@@ -144,6 +129,4 @@ _FORMS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], Event | None]], .
     (_BRACKET, _bracket),
     (_SETTING, lambda match: Setting(int(match[1]), match[2])),
     (_BANNER, lambda match: Banner(match[1], match[2])),
-    (_STARTUP, lambda match: StartupLine(int(match[1]), match[2])),
-    (_STARTUP_RESULT, lambda match: StartupResult(match[0][1:])),
 )

@@ -37,11 +37,6 @@ class Resend(Reply):
 
 
 @dataclass(frozen=True, slots=True)
-class Busy(Reply):
-    """``echo:busy: processing``: the controller is alive and at work."""
-
-
-@dataclass(frozen=True, slots=True)
 class Started(Reply):
     """``start``: the controller has just started."""
 
@@ -58,7 +53,6 @@ class MarlinError(Reply):
 
 _RESEND = re.compile(r"(?:Resend|rs)\s*:?\s*N?(\d+)", re.IGNORECASE)
 _OK = re.compile(r"ok(?![A-Za-z0-9])", re.IGNORECASE)
-_BUSY = re.compile(r"(?:echo:\s*)?busy\b", re.IGNORECASE)
 _KILLED = re.compile(r"(?:Error:.*(?:kill\(\)|halted))|!!.*(?:KILL|HALT)", re.IGNORECASE)
 _WANTS_AGAIN = re.compile(r"Last Line", re.IGNORECASE)
 _FAULT = re.compile(
@@ -73,8 +67,6 @@ def parse_reply(text: str) -> Reply:
     resend = _RESEND.match(text)
     if resend is not None:
         return Resend(text, int(resend[1]))
-    if _BUSY.match(text):
-        return Busy(text)
     if text == "start":
         return Started(text)
     if _KILLED.match(text):

@@ -39,12 +39,11 @@ class Segment:
     ``cycles`` in total.
 
     ``done`` is the progress before the segment in micro-steps; ``power`` its PWM value;
-    ``follows`` whether the power follows the speed; ``last`` whether it completes its move;
-    ``tick`` the cycles of each interrupt.
+    ``follows`` whether the power follows the speed; ``tick`` the cycles of each interrupt.
     """
 
     __slots__ = (
-        "cycles", "done", "follows", "last", "move", "period", "power", "stride", "tick", "ticks",
+        "cycles", "done", "follows", "move", "period", "power", "stride", "tick", "ticks",
     )  # fmt: skip
 
     def __init__(self, move: Move, done: int, power: int, follows: bool) -> None:
@@ -55,7 +54,6 @@ class Segment:
         self.follows = follows
         self.ticks = self.period = self.cycles = 0
         self.stride = MICRO
-        self.last = False
 
 
 class SegmentGenerator:
@@ -130,7 +128,6 @@ class SegmentGenerator:
             if length > 0.0:
                 self.finished = True
             else:
-                segment.last = True
                 self._end_move()
         return segment
 

@@ -25,33 +25,32 @@ from miurafab.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class FaultKind:
-    """A kind of fault: the ``unit`` of its value ("bytes", "s", "code" or "": none), its default
-    value ``stock`` (None: no default), and its effect ``does``.
+    """A kind of fault: the ``unit`` of its value ("bytes", "s", "code" or "": none), and its
+    default value ``stock`` (None: no default).
     """
 
     unit: str
     stock: float | None
-    does: str
 
 
 _FOR_GOOD = math.inf
 KINDS = MappingProxyType(
     {
-        "drop": FaultKind("bytes", 1, "bytes from the sender are lost"),
-        "drop-reply": FaultKind("bytes", 1, "bytes to the sender are lost"),
-        "corrupt": FaultKind("bytes", 1, "bytes from the sender arrive with one bit changed"),
-        "corrupt-reply": FaultKind("bytes", 1, "bytes to the sender arrive with one bit changed"),
-        "noise": FaultKind("bytes", 8, "random bytes reach the controller"),
-        "noise-reply": FaultKind("bytes", 8, "random bytes reach the sender"),
-        "delay": FaultKind("s", None, "what the sender sends is delayed for that long"),
-        "delay-reply": FaultKind("s", None, "what the controller says is delayed for that long"),
-        "slow": FaultKind("s", None, "from now on every byte takes that longer, both ways"),
-        "disconnect": FaultKind("s", _FOR_GOOD, "the cable comes out, for that long or for good"),
-        "reset": FaultKind("", None, "the controller's reset button is pressed"),
-        "power": FaultKind("", None, "the controller loses power for a moment"),
-        "alarm": FaultKind("code", 1, "the controller stops with that ALARM; 1 is a hard limit"),
-        "stall": FaultKind("s", 0.1, "an EEPROM write: the controller is deaf for that long"),
-        "hang": FaultKind("s", _FOR_GOOD, "the controller hangs, for that long or for good"),
+        "drop": FaultKind("bytes", 1),  # bytes from the sender are lost
+        "drop-reply": FaultKind("bytes", 1),  # bytes to the sender are lost
+        "corrupt": FaultKind("bytes", 1),  # bytes from the sender arrive with one bit changed
+        "corrupt-reply": FaultKind("bytes", 1),  # bytes to the sender arrive with one bit changed
+        "noise": FaultKind("bytes", 8),  # random bytes reach the controller
+        "noise-reply": FaultKind("bytes", 8),  # random bytes reach the sender
+        "delay": FaultKind("s", None),  # what the sender sends is delayed for that long
+        "delay-reply": FaultKind("s", None),  # what the controller says is delayed for that long
+        "slow": FaultKind("s", None),  # from now on every byte takes that longer, both ways
+        "disconnect": FaultKind("s", _FOR_GOOD),  # the cable comes out, for that long or for good
+        "reset": FaultKind("", None),  # the controller's reset button is pressed
+        "power": FaultKind("", None),  # the controller loses power for a moment
+        "alarm": FaultKind("code", 1),  # the controller stops with that ALARM; 1 is a hard limit
+        "stall": FaultKind("s", 0.1),  # an EEPROM write: the controller is deaf for that long
+        "hang": FaultKind("s", _FOR_GOOD),  # the controller hangs, for that long or for good
     }
 )
 """All kinds of faults."""

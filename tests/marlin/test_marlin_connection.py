@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from miurafab.gcode.job import SendLine
 from miurafab.marlin.connection import EMERGENCY, MOST_TRIES, MarlinConnection, framed
 from miurafab.marlin.replies import (
-    Busy,
     Killed,
     MarlinError,
     MarlinOk,
@@ -34,8 +33,8 @@ PARAMETERS = MotionParameters.from_profile(load_machine("marlin-laser-220"))
         ("ok T:20.0 /0.0", MarlinOk),
         ("Resend: 12", Resend),
         ("rs 12", Resend),
-        ("echo:busy: processing", Busy),
-        ("busy: paused for user", Busy),
+        ("echo:busy: processing", Reply),
+        ("busy: paused for user", Reply),
         ("start", Started),
         ("Error:Printer halted. kill() called!", Killed),
         ("!! KILLED", Killed),

@@ -74,7 +74,6 @@ class Dialect:
     report_mask: int = 1
     jogs: bool = True
     sleeps: bool = True
-    laser_mode: bool = True
     deaf_writes: bool = True
 
     def error_text(self, code: int) -> str:
@@ -178,7 +177,6 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             report_mask=3,
             jogs=False,
             sleeps=False,
-            laser_mode=False,
         ),
         "grblhal": Dialect(
             banner="GrblHAL 1.1f ['$' or '$HELP' for help]",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -76,6 +78,13 @@ def test_what_is_no_fault_is_named(text: str, named: str) -> None:
         parse_fault(text)
     assert f"'{text}'" in str(caught.value)
     assert str(caught.value).endswith(".")
+
+
+def test_the_documentation_lists_the_kinds() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "machines.md").read_text(encoding="utf-8")
+    table = page.partition("| KIND |")[2].partition("\n\n")[0]
+    first_cells = [line.split("|")[1] for line in table.splitlines()[2:]]
+    assert [name for cell in first_cells for name in re.findall(r"`(.+?)`", cell)] == list(KINDS)
 
 
 @pytest.mark.parametrize("name", KINDS)
