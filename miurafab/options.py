@@ -300,6 +300,10 @@ class Several(Kind):
             parts = list(value) if isinstance(value, Iterable) else [value]
         return self.collect(_part(self.kind, part, value) for part in parts)
 
+    @property
+    def accepts(self) -> str:
+        return f"each {self.kind.accepts}" if self.kind.accepts else ""
+
     def check(self, inside: Any) -> None:
         for part in inside:
             _check_part(self, part, inside)

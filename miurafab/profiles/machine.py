@@ -77,19 +77,19 @@ class Knife:
     )
     corner_angle: float = option(
         angle(1, 180),
-        "At a corner that turns by more, the blade is swivelled about its tip in fine steps.",
+        "At a corner that turns by more, the blade is turned about its tip in fine steps.",
         math.radians(20),
     )
     overcut_mm: float = option(
-        length(0, 20), "A closed outline is cut on over its beginning by this length.", 0.0
+        length(0, 20), "Closed outlines are cut on over their start by this length.", 0.0
     )
     s_shallow: int | None = option(
         Whole(),
-        "S of a depth that marks the sheet and does not part it, for scores and engravings.",
-        default_text="the knife has no such depth",
+        "S (HPGL: force) that marks the sheet without cutting through, for scores and engravings.",
+        default_text="none",
     )
     leave_out: tuple[str, ...] = option(
-        Several(Choice(OPERATIONS)), "Operations that this knife is not asked to make.", ()
+        Several(Choice(OPERATIONS)), "Operations that this knife does not make.", ()
     )
 
 
@@ -127,7 +127,7 @@ class Controller:
     planner_blocks: int = option(Whole(1, 1024), "Moves that the planner holds.", 15)
     flow_control: str = option(
         Choice(FLOW_CONTROL),
-        "How a machine that answers nothing holds up its sender.",
+        "How a machine that answers nothing pauses its sender.",
         FLOW_CONTROL[0],
     )
 

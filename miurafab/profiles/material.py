@@ -94,7 +94,7 @@ class TabRule:
         angle(5, 180), "Largest inner angle at the base of a tab.", math.radians(75)
     )
     min_area_mm2: float = option(
-        number(0, 1e6, unit=" mm²"), "A tab with less glue than this area in mm² is told.", 10.0
+        number(0, 1e6, unit=" mm²"), "A note names each tab with less glue than this area.", 10.0
     )
 
 

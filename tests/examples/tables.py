@@ -1,4 +1,4 @@
-"""The tables of the pages that are made from the program: options, findings.
+"""The tables of the pages that are made from the program: options, keys of TOML files, findings.
 
     python tests/examples/tables.py     writes them anew
 
@@ -14,6 +14,8 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.findings import RULES
 from miurafab.options import declared
 from miurafab.origami.fitting.request import FitOptions
+from miurafab.profiles.machine import Bed, Controller, Knife, MotionLimits
+from miurafab.profiles.material import Operation, Perforation, TabRule
 from miurafab.workflow.cut_sheets import CutOptions
 
 _PLACE = re.compile(r"(<!-- table: (\w+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
@@ -39,6 +41,19 @@ def _options(cls):
     return ("option", "meaning", "default"), rows
 
 
+def _keys(**tables):
+    """The keys of the TOML ``tables``, each declared by a class."""
+    rows = []
+    for table, cls in tables.items():
+        for key in declared(cls).values():
+            rows.append((table, f"`{key.name}`", key.help, key.kind.accepts, key.default_text))
+    shown = [
+        (f"`[{row[0]}]`" if at == 0 or rows[at - 1][0] != row[0] else "", *row[1:])
+        for at, row in enumerate(rows)
+    ]
+    return ("table", "key", "meaning", "accepted", "default"), shown
+
+
 def _findings():
     rows = [
         (f"`{code}`", rule.severity, rule.meaning, "yes" if rule.forceable else "")
@@ -56,6 +71,8 @@ TABLES = {
     "FitOptions": lambda: _options(FitOptions),
     "LayoutOptions": lambda: _options(LayoutOptions),
     "CutOptions": lambda: _options(CutOptions),
+    "machine": lambda: _keys(bed=Bed, motion=MotionLimits, controller=Controller, tool=Knife),
+    "material": lambda: _keys(perforation=Perforation, tabs=TabRule, operations=Operation),
     "checks": _checks,
     "findings": _findings,
 }
