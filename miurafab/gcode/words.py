@@ -65,7 +65,7 @@ class Claim(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class GcodeCommand:
     """A G or M word: it sets ``slot`` to ``value`` (without a slot it has no effect); its claim."""
 
     group: Group
@@ -82,52 +82,52 @@ PROBES = (140, 141, 142, 143)
 FLOOD, MIST = 1, 2
 
 
-def _g_table() -> dict[tuple[int, int], Command]:
+def _g_table() -> dict[tuple[int, int], GcodeCommand]:
     table = {
-        (10, 0): Command(Group.NON_MODAL, "action", SET_OFFSET, Claim.NON_MODAL),
-        (28, 0): Command(Group.NON_MODAL, "action", GO_G28, Claim.NON_MODAL),
-        (30, 0): Command(Group.NON_MODAL, "action", GO_G30, Claim.NON_MODAL),
-        (92, 0): Command(Group.NON_MODAL, "action", SHIFT, Claim.NON_MODAL),
-        (28, 10): Command(Group.NON_MODAL, "action", STORE_G28),
-        (30, 10): Command(Group.NON_MODAL, "action", STORE_G30),
-        (92, 10): Command(Group.NON_MODAL, "action", UNSHIFT),
-        (4, 0): Command(Group.NON_MODAL, "action", DWELL),
-        (53, 0): Command(Group.NON_MODAL, "action", MACHINE),
-        (80, 0): Command(Group.MOTION, "motion", NO_MOTION),
-        (91, 10): Command(Group.ARC_DISTANCE),
-        (40, 0): Command(Group.CUTTER),
-        (61, 0): Command(Group.PATH),
-        (43, 10): Command(Group.TOOL_LENGTH, "tool_length", 1, Claim.TOOL_LENGTH),
+        (10, 0): GcodeCommand(Group.NON_MODAL, "action", SET_OFFSET, Claim.NON_MODAL),
+        (28, 0): GcodeCommand(Group.NON_MODAL, "action", GO_G28, Claim.NON_MODAL),
+        (30, 0): GcodeCommand(Group.NON_MODAL, "action", GO_G30, Claim.NON_MODAL),
+        (92, 0): GcodeCommand(Group.NON_MODAL, "action", SHIFT, Claim.NON_MODAL),
+        (28, 10): GcodeCommand(Group.NON_MODAL, "action", STORE_G28),
+        (30, 10): GcodeCommand(Group.NON_MODAL, "action", STORE_G30),
+        (92, 10): GcodeCommand(Group.NON_MODAL, "action", UNSHIFT),
+        (4, 0): GcodeCommand(Group.NON_MODAL, "action", DWELL),
+        (53, 0): GcodeCommand(Group.NON_MODAL, "action", MACHINE),
+        (80, 0): GcodeCommand(Group.MOTION, "motion", NO_MOTION),
+        (91, 10): GcodeCommand(Group.ARC_DISTANCE),
+        (40, 0): GcodeCommand(Group.CUTTER),
+        (61, 0): GcodeCommand(Group.PATH),
+        (43, 10): GcodeCommand(Group.TOOL_LENGTH, "tool_length", 1, Claim.TOOL_LENGTH),
     }
     for number in (SEEK, LINEAR, CLOCKWISE, COUNTERCLOCKWISE):
-        table[number, 0] = Command(Group.MOTION, "motion", number, Claim.MOTION)
+        table[number, 0] = GcodeCommand(Group.MOTION, "motion", number, Claim.MOTION)
     for index, probe in enumerate(PROBES):
-        table[38, 20 + 10 * index] = Command(Group.MOTION, "motion", probe, Claim.MOTION)
+        table[38, 20 + 10 * index] = GcodeCommand(Group.MOTION, "motion", probe, Claim.MOTION)
     for slot, group, first, count in (
         ("plane", Group.PLANE, 17, 3),
         ("distance", Group.DISTANCE, 90, 2),
         ("offset", Group.OFFSET, 54, 6),
     ):
         for index in range(count):
-            table[first + index, 0] = Command(group, slot, index)
+            table[first + index, 0] = GcodeCommand(group, slot, index)
     for slot, group, last in (("inverse_time", Group.FEED_MODE, 94), ("inches", Group.UNITS, 21)):
         for value in range(2):
-            table[last - value, 0] = Command(group, slot, value)
+            table[last - value, 0] = GcodeCommand(group, slot, value)
     return table
 
 
 _G = _g_table()
 _M = {
-    0: Command(Group.STOP, "stop", 1),
-    1: Command(Group.STOP),
-    2: Command(Group.STOP, "stop", 2),
-    30: Command(Group.STOP, "stop", 30),
-    3: Command(Group.SPINDLE, "spindle", 3),
-    4: Command(Group.SPINDLE, "spindle", 4),
-    5: Command(Group.SPINDLE, "spindle", 0),
-    7: Command(Group.COOLANT, "coolant", MIST),
-    8: Command(Group.COOLANT, "coolant", FLOOD),
-    9: Command(Group.COOLANT, "coolant", 0),
+    0: GcodeCommand(Group.STOP, "stop", 1),
+    1: GcodeCommand(Group.STOP),
+    2: GcodeCommand(Group.STOP, "stop", 2),
+    30: GcodeCommand(Group.STOP, "stop", 30),
+    3: GcodeCommand(Group.SPINDLE, "spindle", 3),
+    4: GcodeCommand(Group.SPINDLE, "spindle", 4),
+    5: GcodeCommand(Group.SPINDLE, "spindle", 0),
+    7: GcodeCommand(Group.COOLANT, "coolant", MIST),
+    8: GcodeCommand(Group.COOLANT, "coolant", FLOOD),
+    9: GcodeCommand(Group.COOLANT, "coolant", 0),
 }
 _CLAIMING = {0, 1, 2, 3, 38, 43, 49}
 """G words that claim the axis words with any decimals."""
@@ -136,7 +136,7 @@ _POINTED = {28, 30, 38, 43, 61, 90, 91, 92}
 
 
 @lru_cache(maxsize=4096)
-def look_up(letter: str, number: str, mist: bool) -> tuple[Command | Reason, bool]:
+def look_up(letter: str, number: str, mist: bool) -> tuple[GcodeCommand | Reason, bool]:
     """The command of a word, or the reason why there is none; and whether it claims the axis words.
 
     M7 exists only in firmware compiled with ``mist``. The fraction is read in hundredths in single
@@ -151,7 +151,7 @@ def look_up(letter: str, number: str, mist: bool) -> tuple[Command | Reason, boo
         known = _M.get(whole) if mist or whole != 7 else None
         return known or block_errors.UNSUPPORTED, False
     if whole == 49:
-        return Command(Group.TOOL_LENGTH, "tool_length", 0, Claim.TOOL_LENGTH), True
+        return GcodeCommand(Group.TOOL_LENGTH, "tool_length", 0, Claim.TOOL_LENGTH), True
     command = _G.get((whole, hundredths))
     if command is not None:
         return command, command.claim is not Claim.NONE
