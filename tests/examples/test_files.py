@@ -1,16 +1,11 @@
 """The files that come along are examples, too: each is read by what it is for."""
 
-import re
-
 import numpy as np
 import pytest
 from pages import ROOT
 
 import miurafab
-from miurafab.options import declared
 from miurafab.profiles import load_machine, load_material
-from miurafab.profiles.machine import Bed, Controller, Knife, MotionLimits
-from miurafab.profiles.material import Operation, Perforation, TabRule
 
 DESIGNS = sorted((ROOT / "patterns").glob("*.toml"))
 MACHINES = sorted((ROOT / "firmware_profiles").glob("*.toml"))
@@ -44,16 +39,3 @@ def test_the_saddle_is_the_surface_of_its_formula():
     np.testing.assert_allclose(z, (x**2 - y**2) / 250, atol=1e-5)
     assert np.array_equal(np.unique(x), np.linspace(-100, 100, 21))
     assert np.array_equal(np.unique(y), np.linspace(-100, 100, 21))
-
-
-@pytest.mark.parametrize(
-    ("page", "tables"),
-    [
-        ("machines.md", (Bed, MotionLimits, Controller, Knife)),
-        ("layout.md", (Perforation, TabRule, Operation)),
-    ],
-)
-def test_every_key_of_a_profile_stands_on_its_page(page, tables):
-    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
-    for name in {name for table in tables for name in declared(table)}:
-        assert f"`{name}`" in text or re.search(rf"^{name} = ", text, re.MULTILINE), name
