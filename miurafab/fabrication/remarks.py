@@ -7,7 +7,7 @@ import numpy as np
 from miurafab.fabrication.labels import Lettering
 from miurafab.fabrication.nesting import Nesting
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.partition.patch_frame import Framed
+from miurafab.fabrication.partition.patch_frame import FramedPatches
 from miurafab.fabrication.strokes import Drawn
 from miurafab.fabrication.wording import count
 from miurafab.origami.crease_pattern import CreasePattern
@@ -19,7 +19,7 @@ _NAMED = 8
 
 def remarks_on(
     pattern: CreasePattern,
-    framed: Framed,
+    framed: FramedPatches,
     nesting: Nesting,
     lettering: Lettering,
     drawn: Drawn,
@@ -27,7 +27,7 @@ def remarks_on(
     options: LayoutOptions,
 ) -> tuple[str, ...]:
     """The sentences on one layout."""
-    tabs, numbers = framed.pieces.tabs, framed.numbers
+    tabs, numbers = framed.outlined.tabs, framed.numbers
     found = []
     weak = np.sort(numbers[tabs.areas < material.tabs.min_area_mm2]).tolist()
     if weak:

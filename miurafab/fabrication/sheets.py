@@ -1,8 +1,8 @@
 """Sheets: a pattern laid out for a machine and a material, ready to be drawn and posted.
 
 :func:`lay_out` is the one way from a :class:`~miurafab.origami.crease_pattern.CreasePattern` to a
-:class:`Layout`: split into pieces, turned to their smallest box, nested, lettered, and ordered.
-Each piece is moved twice: from the pattern to its own frame, in which its box begins at the
+:class:`Layout`: split into patches, turned to their smallest box, nested, lettered, and ordered.
+Each patch is moved twice: from the pattern to its own frame, in which its box begins at the
 origin, and from there to its sheet. A point p of the pattern lies on the sheet at
 
     R(placement) (R(patch) (p - origin)) + (x, y).
@@ -19,8 +19,14 @@ from miurafab.fabrication.labels import Lettering, place_texts
 from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, nest, turned
 from miurafab.fabrication.open_ring import opened
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.partition.patch_frame import DIGITS, Framed, Patch, copied, frame_patches
-from miurafab.fabrication.partition.patch_outline import Pieces
+from miurafab.fabrication.partition.patch_frame import (
+    DIGITS,
+    FramedPatches,
+    Patch,
+    copied,
+    frame_patches,
+)
+from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.remarks import remarks_on
 from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
 from miurafab.fabrication.seams import all_seams
@@ -158,7 +164,7 @@ def lay_out(
         material = replace(material, kerf_mm=0.0)  # only a beam takes material away
     stock = lay_stock(options, machine.bed, material.grain)
     framed = frame_patches(pattern, stock, material, options)
-    pieces = framed.pieces
+    outlined = framed.outlined
     patches = copied(framed.patches, options.nesting.quantity)
     nesting = nest(
         Problem(
@@ -172,7 +178,7 @@ def lay_out(
     lettering = _lettering(pattern, framed, patches, motion)
     drawn = sheet_strokes(
         pattern,
-        pieces,
+        outlined,
         lettering.texts,
         motion,
         material,
@@ -196,8 +202,8 @@ def lay_out(
         material=material.name,
         patches=patches,
         sheets=sheets,
-        totals=_totals(pattern, pieces, patches, nesting, toolpaths + behind, usable),
-        untabbed=tuple(pieces.untabbed.tolist()),
+        totals=_totals(pattern, outlined, patches, nesting, toolpaths + behind, usable),
+        untabbed=tuple(outlined.untabbed.tolist()),
         unlettered=lettering.left_out,
         remarks=remarks,
         toolpaths=toolpaths,
@@ -207,16 +213,19 @@ def lay_out(
 
 
 def _lettering(
-    pattern: CreasePattern, framed: Framed, patches: tuple[Patch, ...], motion: RigidTransform
+    pattern: CreasePattern,
+    framed: FramedPatches,
+    patches: tuple[Patch, ...],
+    motion: RigidTransform,
 ) -> Lettering:
     """The texts of all copies, each upright as its patch lies."""
-    pieces, count = framed.pieces, len(framed.patches)
+    outlined, count = framed.outlined, len(framed.patches)
     turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
     texts, left_out, unmarked = [], 0, 0
     for first in range(0, len(patches), count):
         names = [patch.label for patch in patches[first : first + count]]
         own = turns[first : first + count]
-        found = place_texts(pattern, pieces.face_patch, names, pieces.tabs, framed.numbers, own)
+        found = place_texts(pattern, outlined.face_patch, names, outlined.tabs, framed.numbers, own)
         texts += [replace(text, patch=text.patch + first) for text in found.texts]
         left_out += found.left_out
         unmarked += found.unmarked
@@ -300,21 +309,21 @@ def _motion(
 
 def _totals(
     pattern: CreasePattern,
-    pieces: Pieces,
+    outlined: OutlinedPatches,
     patches: tuple[Patch, ...],
     nesting: Nesting,
     toolpaths: tuple[Toolpath, ...],
     usable: float,
 ) -> Totals:
-    seams = all_seams(pattern, pieces.face_patch).edges[:, 0]
+    seams = all_seams(pattern, outlined.face_patch).edges[:, 0]
     ends = pattern.vertices_coords[pattern.edges_vertices[seams]]
     area = sum(shapely.Polygon(patch.outline_mm).area for patch in patches)
-    copies = len(patches) // len(pieces.pieces)
+    copies = len(patches) // len(outlined.patches)
     return Totals(
         patches=len(patches),
         sheets=nesting.sheets,
         seam_mm=float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()) * copies,
-        tabs=len(pieces.tabs) * copies,
+        tabs=len(outlined.tabs) * copies,
         density=float(area / usable),
         cut_mm=sum(toolpath.length_of("cut") for toolpath in toolpaths),
         perforated_mm=sum(toolpath.length_of("perforate") for toolpath in toolpaths),

@@ -1,4 +1,4 @@
-"""What is drawn on the pieces: creases, relief holes, texts, and cut lines, on their sheets.
+"""What is drawn on the patches: creases, relief holes, texts, and cut lines, on their sheets.
 
 Everything is made in the pattern's plane, where a crease is one edge, and then moved with its
 piece. A crease within a piece is made there, as the material wants creases of its kind: mountain
@@ -25,7 +25,7 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.bridges import bridged
 from miurafab.fabrication.labels import Text
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.partition.patch_outline import Pieces
+from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
 from miurafab.fabrication.relief import Holes, circles, relief_holes
 from miurafab.fabrication.route.order import HOLE, OUTLINE, StrokeSet
@@ -39,7 +39,7 @@ FOLDED = ("M", "V", "U")
 SLIT = ("B", "C")
 
 _INNER, _WASTE = 1, 2
-"""Ranks among cuts between :data:`HOLE` and :data:`OUTLINE`: slits in a piece, rings of waste."""
+"""Ranks among cuts between :data:`HOLE` and :data:`OUTLINE`: slits in a patch, rings of waste."""
 
 PIN_MM = 2.0
 """The diameter of a registration hole; it lies in the middle of the margin."""
@@ -82,7 +82,7 @@ class RigidTransform:
 
 def sheet_strokes(
     pattern: CreasePattern,
-    pieces: Pieces,
+    outlined: OutlinedPatches,
     texts: Sequence[Text],
     motion: RigidTransform,
     material: Material,
@@ -98,15 +98,15 @@ def sheet_strokes(
     options = options or LayoutOptions()
     if options.two_sided:
         _check_two_sided(material, sheets)
-    creases, holes = _creases(pattern, pieces, material)
-    outlines, unbridged = _outlines(pieces, options, material.kerf_mm)
+    creases, holes = _creases(pattern, outlined, material)
+    outlines, unbridged = _outlines(outlined, options, material.kerf_mm)
     drawn_once = [
         *(_made(creases[kind], kind, material) for kind in CREASE_KINDS),
         _relief(pattern, holes, material),
-        _slits(pattern, pieces),
+        _slits(pattern, outlined),
         outlines,
     ]
-    copies = range(0, len(motion.sheet), len(pieces.pieces))
+    copies = range(0, len(motion.sheet), len(outlined.patches))
     parts = [
         _engraved(texts),
         *(replace(part, patch=part.patch + first) for first in copies for part in drawn_once),
@@ -126,7 +126,7 @@ def sheet_strokes(
         scored = operation == OPERATIONS.index("score")
         folds = pattern.edges_assignment.copy()
         # Where two borders are joined the fold is told by the seam alone.
-        folds[pieces.tabs.edge] = pieces.tabs.seams.fold
+        folds[outlined.tabs.edge] = outlined.tabs.seams.fold
         behind[scored] = folds[edge[scored]] == "V"
 
     side = 2 * motion.sheet[patch] + behind
@@ -249,10 +249,10 @@ class _Creases:
 
 
 def _creases(
-    pattern: CreasePattern, pieces: Pieces, material: Material
+    pattern: CreasePattern, outlined: OutlinedPatches, material: Material
 ) -> tuple[dict[str, _Creases], Holes]:
     """The creases of each kind, shortened where they meet in a relief hole, and the holes."""
-    edges, patch = _inner_edges(pattern, pieces, FOLDED)
+    edges, patch = _inner_edges(pattern, outlined, FOLDED)
     valley = pattern.edges_assignment[edges] == "V"
     kind = np.where(valley, "valley", "mountain")
     made = np.array([material.creases[name].mode != "none" for name in kind.tolist()], dtype=bool)
@@ -265,7 +265,7 @@ def _creases(
     }
     room = np.where(kind == "valley", least["valley"], least["mountain"])
     diameter = material.relief_hole_mm
-    holes = relief_holes(pattern, pieces.face_patch, edges, room, diameter)
+    holes = relief_holes(pattern, outlined.face_patch, edges, room, diameter)
     holed = np.zeros(len(pattern.vertices_coords), dtype=bool)
     holed[holes.vertex] = True
     way = ends[:, 1] - ends[:, 0]
@@ -273,12 +273,12 @@ def _creases(
     back = holed[pattern.edges_vertices[edges]] * (diameter / 2)
     ends = ends + np.stack([way * back[:, :1], -way * back[:, 1:]], axis=1)
 
-    tabs = pieces.tabs.take(np.isin(pieces.tabs.seams.fold, FOLDED))
+    tabs = outlined.tabs.take(np.isin(outlined.tabs.seams.fold, FOLDED))
     base = tabs.points[:, :2]
     along = np.diff(pattern.vertices_coords[pattern.edges_vertices[tabs.edge]], axis=1)[:, 0]
     backwards = np.einsum("ni,ni->n", base[:, 1] - base[:, 0], along) < 0
     base = np.where(backwards[:, None, None], base[:, ::-1], base)
-    owner = pieces.face_patch[tabs.own_face]
+    owner = outlined.face_patch[tabs.own_face]
     found = {
         name: _Creases(ends[kind == name], edges[kind == name], patch[kind == name])
         for name in ("mountain", "valley")
@@ -319,8 +319,8 @@ def _relief(pattern: CreasePattern, holes: Holes, material: Material) -> _Part:
     )
 
 
-def _slits(pattern: CreasePattern, pieces: Pieces) -> _Part:
-    edges, patch = _inner_edges(pattern, pieces, SLIT)
+def _slits(pattern: CreasePattern, outlined: OutlinedPatches) -> _Part:
+    edges, patch = _inner_edges(pattern, outlined, SLIT)
     return _Part(
         operation=OPERATIONS.index("cut"),
         points=pattern.vertices_coords[pattern.edges_vertices[edges]].reshape(-1, 2),
@@ -332,12 +332,12 @@ def _slits(pattern: CreasePattern, pieces: Pieces) -> _Part:
     )
 
 
-def _outlines(pieces: Pieces, options: LayoutOptions, kerf: float) -> tuple[_Part, int]:
+def _outlines(outlined: OutlinedPatches, options: LayoutOptions, kerf: float) -> tuple[_Part, int]:
     """All cut lines, and how many outlines have fewer bridges than wanted."""
     lines, patch, rank, group = [], [], [], []
     rings = unbridged = 0
-    for number, piece in enumerate(pieces.pieces):
-        for place, ring in enumerate(piece.cut_lines):
+    for number, outline in enumerate(outlined.patches):
+        for place, ring in enumerate(outline.cut_lines):
             closed = np.concatenate([ring, ring[:1]])
             # A gap left between two cuts is longer in the path by half a kerf at each end.
             wanted = 0 if place else options.bridges
@@ -361,11 +361,11 @@ def _outlines(pieces: Pieces, options: LayoutOptions, kerf: float) -> tuple[_Par
 
 
 def _inner_edges(
-    pattern: CreasePattern, pieces: Pieces, assignments: Sequence[str]
+    pattern: CreasePattern, outlined: OutlinedPatches, assignments: Sequence[str]
 ) -> tuple[Ints, Ints]:
     """The edges between two facets of one patch that are so assigned, and that patch."""
     faces = pattern.edges_faces
-    patch = np.where(faces >= 0, pieces.face_patch[faces], -1)
+    patch = np.where(faces >= 0, outlined.face_patch[faces], -1)
     inner = (patch[:, 0] == patch[:, 1]) & np.isin(pattern.edges_assignment, assignments)
     edges = np.flatnonzero(inner)
     return edges, patch[edges, 0]

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miurafab.fabrication.kerf import allowance, cut_lines
-from miurafab.fabrication.partition.patch_outline import make_pieces
+from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.sheets import lay_out
 
 
@@ -33,7 +33,7 @@ def test_no_kerf_leaves_the_outline_as_it_is():
 @given(st.floats(0.35, 1.5), st.floats(0.01, 0.4))
 def test_the_beam_burns_up_to_the_piece_and_never_into_it(sector, kerf):
     pattern = zigzag(12, 12, a=15.0, sector=sector)
-    for piece in make_pieces(pattern, 120.0, 90.0, card(kerf=kerf, inset=0.5)).pieces:
+    for piece in outline_patches(pattern, 120.0, 90.0, card(kerf=kerf, inset=0.5)).patches:
         nominal = shapely.Polygon(piece.outline)
         outer, *waste = piece.cut_lines
         path = shapely.LineString(np.concatenate([outer, outer[:1]]))

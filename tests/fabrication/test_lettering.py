@@ -13,7 +13,7 @@ from flat_patterns import bed, card, miura, triangles, zigzag
 from miurafab.errors import LayoutError
 from miurafab.fabrication.labels import CLEARANCE_MM, place_texts
 from miurafab.fabrication.lettering import text_strokes, text_width
-from miurafab.fabrication.partition.patch_outline import make_pieces
+from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tabs import choose_tabs
 
@@ -56,16 +56,16 @@ def test_a_character_that_cannot_be_engraved_is_named():
     ],
 )
 def test_no_text_touches_a_crease_a_cut_or_another_text(pattern):
-    pieces = make_pieces(pattern, 190.0, 140.0, card())
-    names = [f"P{k}" for k in range(len(pieces.pieces))]
-    numbers = np.arange(len(pieces.tabs)) + 1
+    outlined = outline_patches(pattern, 190.0, 140.0, card())
+    names = [f"P{k}" for k in range(len(outlined.patches))]
+    numbers = np.arange(len(outlined.tabs)) + 1
     turns = np.linspace(-1.5, 1.5, len(names))
-    lettering = place_texts(pattern, pieces.face_patch, names, pieces.tabs, numbers, turns)
+    lettering = place_texts(pattern, outlined.face_patch, names, outlined.tabs, numbers, turns)
     texts, left_out = lettering.texts, lettering.left_out
     assert len(texts) + left_out == len(names) + 2 * len(numbers)
     assert len(texts) > 0.8 * (len(names) + 2 * len(numbers))
     creases = shapely.STRtree(shapely.linestrings(pattern.vertices_coords[pattern.edges_vertices]))
-    for patch, piece in enumerate(pieces.pieces):
+    for patch, piece in enumerate(outlined.patches):
         own = [text for text in texts if text.patch == patch]
         shapes = [shapely.MultiLineString([s.tolist() for s in text.strokes]) for text in own]
         outline = shapely.Polygon(piece.outline)
@@ -85,7 +85,7 @@ def test_no_text_touches_a_crease_a_cut_or_another_text(pattern):
             np.testing.assert_allclose(across, [-along[1], along[0]], atol=1e-9)
             tilted = turns[patch] - np.radians(10.0)
             assert along @ np.array([np.cos(tilted), -np.sin(tilted)]) > -1e-6
-    folds = dict(zip(numbers.tolist(), pieces.tabs.seams.fold.tolist(), strict=True))
+    folds = dict(zip(numbers.tolist(), outlined.tabs.seams.fold.tolist(), strict=True))
     marked = {f"{number}{fold}" for number, fold in folds.items()}
     found = Counter(text.text for text in texts if text.text not in names)
     # Each number stands on its tab with the letter of its fold, and bare on the facet under it.

@@ -15,7 +15,7 @@ from miurafab.fabrication.assembly import assembly_order
 from miurafab.fabrication.labels import place_texts
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.partition.patch_outline import make_pieces
+from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.seams import ring_seams
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tabs import inset_of
@@ -98,13 +98,13 @@ def test_each_ring_tab_is_in_its_mate_and_off_everything_else(closed, size, side
     pattern = closed if gridded else without_grid_of(closed)
     material = card()
     options = LayoutOptions(tab_side=side)
-    pieces = make_pieces(pattern, *BEDS[size], material, options)
-    tabs, facets = pieces.tabs, facet_polygons(pattern)
+    outlined = outline_patches(pattern, *BEDS[size], material, options)
+    tabs, facets = outlined.tabs, facet_polygons(pattern)
     across = tabs.seams.edges[:, 0] != tabs.seams.edges[:, 1]
     assert across.sum() == len(ring_seams(pattern))
-    assert not len(pieces.untabbed)
+    assert not len(outlined.untabbed)
     shapes = np.array([shapely.Polygon(tabs.polygon(k)) for k in range(len(tabs))])
-    owner = pieces.face_patch[tabs.own_face]
+    owner = outlined.face_patch[tabs.own_face]
     for k in np.flatnonzero(across).tolist():
         (own, mate), (edge, far) = tabs.seams.faces[k], tabs.seams.edges[k]
         a, b = ends_of(pattern, edge, own)
@@ -120,13 +120,13 @@ def test_each_ring_tab_is_in_its_mate_and_off_everything_else(closed, size, side
                 ring = tabs.glued[other, : tabs.count[other]]
                 assert glued.distance(shapely.Polygon(ring)) >= inset_of(material) - 1e-5
         # In the flat pattern it touches its patch in its base alone, and no tab of that patch.
-        patch = shapely.union_all(facets[pieces.pieces[owner[k]].faces], grid_size=1e-9)
+        patch = shapely.union_all(facets[outlined.patches[owner[k]].faces], grid_size=1e-9)
         base = shapely.LineString(tabs.polygon(k)[:2])
         free = shapely.difference(shapes[k], base.buffer(1e-5))
         assert free.distance(patch) > 0
         same = np.setdiff1d(np.flatnonzero(owner == owner[k]), [k])
         assert (shapely.distance(shapes[k], shapes[same]) > 0).all()
-    for number, piece in enumerate(pieces.pieces):
+    for number, piece in enumerate(outlined.patches):
         outline = shapely.Polygon(piece.outline)
         assert outline.is_valid
         assert outline.area == pytest.approx(
@@ -167,10 +167,10 @@ def test_the_layout_of_a_ring_tells_its_seam(closed, size):
 
 
 def test_both_edges_of_a_ring_seam_are_numbered(closed):
-    pieces = make_pieces(closed, *BEDS["one patch"], card())
-    tabs, facets = pieces.tabs, facet_polygons(closed)
+    outlined = outline_patches(closed, *BEDS["one patch"], card())
+    tabs, facets = outlined.tabs, facet_polygons(closed)
     numbers = np.arange(len(tabs)) + 1
-    lettering = place_texts(closed, pieces.face_patch, ["P1"], tabs, numbers, np.zeros(1))
+    lettering = place_texts(closed, outlined.face_patch, ["P1"], tabs, numbers, np.zeros(1))
     assert lettering.left_out == lettering.unmarked == 0
     where = {
         text.text: shapely.MultiLineString([stroke.tolist() for stroke in text.strokes])

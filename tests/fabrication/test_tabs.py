@@ -13,7 +13,7 @@ from flat_patterns import card, facet_polygons, miura, triangles, zigzag
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miurafab.fabrication.partition.patch_outline import make_pieces
+from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.tabs import MIN_AREA_MM2, MIN_SIDE_MM, choose_tabs, inset_of
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -38,17 +38,17 @@ def common_area(one, other) -> float:
     return shapely.area(shapely.intersection(one, other, grid_size=1e-9))
 
 
-def assert_tabs_are_sound(pattern, pieces, material):
-    tabs, facets = pieces.tabs, facet_polygons(pattern)
-    patches = [shapely.union_all(facets[piece.faces]) for piece in pieces.pieces]
+def assert_tabs_are_sound(pattern, outlined, material):
+    tabs, facets = outlined.tabs, facet_polygons(pattern)
+    patches = [shapely.union_all(facets[piece.faces]) for piece in outlined.patches]
     shapes = np.array([shapely.Polygon(tabs.polygon(i)) for i in range(len(tabs))])
     assert shapely.is_valid(shapes).all()
     assert (shapely.area(shapes) >= MIN_AREA_MM2 - 1e-9).all()
-    owner = pieces.face_patch[tabs.own_face]
+    owner = outlined.face_patch[tabs.own_face]
     for i, shape in enumerate(shapes):
         edge, own, mate = tabs.edge[i], tabs.own_face[i], tabs.mate_face[i]
         assert {own, mate} == set(pattern.edges_faces[edge])
-        assert pieces.face_patch[own] != pieces.face_patch[mate]
+        assert outlined.face_patch[own] != outlined.face_patch[mate]
         # In its mate facet, as far as its inset from every other side.
         seam = shapely.LineString(pattern.vertices_coords[pattern.edges_vertices[edge]])
         assert facets[mate].buffer(1e-9).contains(shape)
@@ -69,43 +69,43 @@ def assert_tabs_are_sound(pattern, pieces, material):
     # Off every other tab, and so far off that the cuts between them stay open.
     met = shapely.STRtree(shapes).query(shapes, predicate="intersects")
     assert (met[0] == met[1]).all()
-    assert all(len(piece.cut_lines) == 1 for piece in pieces.pieces)
+    assert all(len(piece.cut_lines) == 1 for piece in outlined.patches)
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_each_tab_is_in_its_mate_and_off_its_own_patch_and_every_other_tab(name):
     pattern, material = CASES[name]
-    pieces = make_pieces(pattern, 190.0, 140.0, material)
-    assert len(pieces.tabs)
-    assert_tabs_are_sound(pattern, pieces, material)
+    outlined = outline_patches(pattern, 190.0, 140.0, material)
+    assert len(outlined.tabs)
+    assert_tabs_are_sound(pattern, outlined, material)
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_each_seam_edge_has_one_tab_or_is_told(name):
     pattern, material = CASES[name]
-    pieces = make_pieces(pattern, 190.0, 140.0, material)
+    outlined = outline_patches(pattern, 190.0, 140.0, material)
     sides = pattern.edges_faces
     seam = (sides >= 0).all(axis=1)
-    seam &= pieces.face_patch[sides[:, 0]] != pieces.face_patch[sides[:, 1]]
-    told = np.concatenate([pieces.tabs.edge, pieces.untabbed])
+    seam &= outlined.face_patch[sides[:, 0]] != outlined.face_patch[sides[:, 1]]
+    told = np.concatenate([outlined.tabs.edge, outlined.untabbed])
     np.testing.assert_array_equal(np.sort(told), np.flatnonzero(seam))
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_piece_is_its_patch_and_its_tabs(name):
     pattern, material = CASES[name]
-    pieces = make_pieces(pattern, 190.0, 140.0, material)
+    outlined = outline_patches(pattern, 190.0, 140.0, material)
     facets = facet_polygons(pattern)
     seen = []
-    for number, piece in enumerate(pieces.pieces):
+    for number, piece in enumerate(outlined.patches):
         outline = shapely.Polygon(piece.outline)
         assert outline.is_valid
         assert outline.exterior.is_ccw
-        area = shapely.area(facets[piece.faces]).sum() + pieces.tabs.areas[piece.tabs].sum()
+        area = shapely.area(facets[piece.faces]).sum() + outlined.tabs.areas[piece.tabs].sum()
         assert outline.area == pytest.approx(area)
-        assert (pieces.face_patch[pieces.tabs.own_face[piece.tabs]] == number).all()
+        assert (outlined.face_patch[outlined.tabs.own_face[piece.tabs]] == number).all()
         seen += piece.tabs.tolist()
-    assert sorted(seen) == list(range(len(pieces.tabs)))
+    assert sorted(seen) == list(range(len(outlined.tabs)))
 
 
 def test_the_tab_of_a_rectangle_is_the_strip_less_its_insets():
@@ -124,8 +124,8 @@ def test_no_inner_angle_at_a_base_is_larger_than_asked(degrees):
     """Half the pieces of the mild pattern lean outwards by themselves."""
     pattern, material = CASES["mild"]
     assert material.tabs.max_angle == pytest.approx(math.radians(75.0)), "the usual"
-    pieces = make_pieces(pattern, 190.0, 140.0, with_angle(material, math.radians(degrees)))
-    tabs = pieces.tabs
+    outlined = outline_patches(pattern, 190.0, 140.0, with_angle(material, math.radians(degrees)))
+    tabs = outlined.tabs
     largest = 0.0
     for k in range(len(tabs)):
         ring = tabs.polygon(k)
@@ -151,10 +151,10 @@ def test_a_facet_with_two_seam_edges_is_split_on_its_bisector():
 
 def test_glue_area_of_a_mild_pattern_is_at_least_5_mm2_a_mm_of_seam():
     for pattern in (miura(30, 26), flat_patterns.fan(36, 30, radius=250.0)):
-        pieces = make_pieces(pattern, 190.0, 140.0, card())
-        ends = pattern.vertices_coords[pattern.edges_vertices[pieces.tabs.edge]]
+        outlined = outline_patches(pattern, 190.0, 140.0, card())
+        ends = pattern.vertices_coords[pattern.edges_vertices[outlined.tabs.edge]]
         seam = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
-        assert pieces.tabs.areas.sum() / seam >= 5.0
+        assert outlined.tabs.areas.sum() / seam >= 5.0
 
 
 def test_a_tab_too_small_on_one_side_goes_to_the_other():
@@ -206,10 +206,10 @@ def test_a_facet_that_is_not_convex_gets_a_tab_inside_it_or_none():
 
 def test_a_pattern_that_overlaps_itself_has_tabs_that_do_not():
     pattern = flat_patterns.fan(60, 3, cell=10.0, radius=60.0)
-    pieces = make_pieces(pattern, 1000.0, 1000.0, card())
-    for piece in pieces.pieces:
+    outlined = outline_patches(pattern, 1000.0, 1000.0, card())
+    for piece in outlined.patches:
         assert shapely.Polygon(piece.outline).is_valid
-    assert len(pieces.tabs) + len(pieces.untabbed) > 0
+    assert len(outlined.tabs) + len(outlined.untabbed) > 0
 
 
 @settings(derandomize=True, max_examples=40, deadline=None)

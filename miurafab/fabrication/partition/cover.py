@@ -1,21 +1,21 @@
-"""Covers: rectangles of the bed's size, each turned at will, that together hold every facet.
+"""Covers: rectangles of the bed's size, at any angle, that together hold every facet.
 
-If K such rectangles hold every facet whole, K patches are enough: each facet goes to a rectangle
-that holds it, and the patch of a rectangle fits the bed by construction. So few patches are looked
-for among covers, which may overlap and move freely, instead of among cuts. A cover is K *frames*
-(x, y, θ), the centre in mm and the angle of the long side in radians. With the coordinates p' of a
-corner p in its frame, a facet's *excess* over a frame of sides w, h is
+If K such rectangles hold every facet whole, then K patches are enough: assign each facet to a
+rectangle that holds it, and the patch of a rectangle fits the bed. Rectangles may overlap and move
+freely, so it is easier to minimise their number than the number of patches of a cut. A rectangle is
+(x, y, θ), the centre in mm and the angle of the long side in radians. The *excess* of a facet over
+a rectangle of sides w, h, with p' the corner p in the coordinates of the rectangle, is
 
-    max over its corners of max(|p'_x| - w/2, |p'_y| - h/2),
+    max over its corners of max(|p'_x| - w/2, |p'_y| - h/2).
 
-so it lies inside where that is not positive. With e_f the least excess of facet f over all frames,
-a cover is found by lowering
+The facet lies inside if its excess is not positive. With e_f the least excess of facet f over all
+rectangles, a cover is found by minimising
 
     L = Σ_f max(e_f, 0)²
 
-over all frames at once by L-BFGS (Nocedal 1980); its gradient is that of the one corner that is
-farthest out, seen from the nearest frame. Neighbours push each other through the facets between
-them, so that the room that one frame leaves over spreads to where it is missing.
+over all rectangles at once by L-BFGS (Nocedal 1980). The gradient of a term is the gradient of the
+corner farthest outside of the nearest rectangle. Neighbouring rectangles push each other through
+the facets between them, so unused room moves to where room is missing.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import principal_axes
 
 _NEAR = 4
-"""Frames that are tried for each facet."""
+"""The number of rectangles tried for each facet."""
 
 _REACH_MM = 25.0
-"""Facets deeper than this inside a frame are left out until the next look."""
+"""Facets deeper than this inside a rectangle are skipped until the next :meth:`Relaxation.look`."""
 
 _ARM_MM = 250.0
-"""What a radian is worth in mm, about the half of a frame's diagonal, for steps of equal size."""
+"""The length in mm that scales radians, about half the diagonal of a rectangle."""
 
 UNITS = np.array([1.0, 1.0, 1.0 / _ARM_MM])
-"""What a frame is measured in, so that steps of equal size move it equally far."""
+"""The units of (x, y, θ), so that equal steps move a rectangle equally far."""
 
 ENOUGH, _LEFT_MM = 1.0, 0.8
-"""A cover is found when L is no more, in mm², and no facet stands out by more."""
+"""A cover is accepted if L in mm² and the largest excess in mm are at most this."""
 
 _SAMPLE = 12_000
-"""Facets that stand for all during the search."""
+"""The size of the sample of facets that the search uses."""
 
 
-def frame_of(points: Floats, width: float, height: float) -> Floats:
-    """(3,) the frame whose rectangle ``width`` x ``height`` mm holds ``points`` (n, 2) with the
-    least excess, and of all that hold them the one turned to their smallest box.
+def rectangle_around(points: Floats, width: float, height: float) -> Floats:
+    """(3,) the rectangle ``width`` x ``height`` mm with the least excess of ``points`` (n, 2); if
+    several hold them, the rectangle at the angle of their smallest box.
     """
     angles, sizes = boxes_at(points, width, height)
     over = np.maximum(sizes[:, 0] - width, sizes[:, 1] - height)
@@ -66,8 +66,8 @@ def frame_of(points: Floats, width: float, height: float) -> Floats:
 
 
 def brickwork(shapes: Floats, size: tuple[float, float]) -> list[Floats]:
-    """Frames (K, 3) of sides ``size`` in mm laid in rows over facets ``shapes`` (N, c, 2), along
-    and across the longer axis of the whole; those that hold nothing are left out.
+    """Two layouts of rectangles (K, 3) of sides ``size`` in mm, in rows over the facets ``shapes``
+    (N, c, 2) along and across their longer axis, without rectangles that hold nothing.
     """
     centres = shapes.mean(axis=1)
     middle = centres.mean(axis=0)
@@ -89,7 +89,7 @@ def brickwork(shapes: Floats, size: tuple[float, float]) -> list[Floats]:
             )
             if not here.any():
                 continue
-            # Each row begins where its facets begin, and is filled evenly.
+            # Each row starts where its facets start and is divided evenly.
             start, end = placed[here][..., 0].min(), placed[here][..., 0].max()
             count = max(1, int(np.ceil((end - start) / pitch[0])))
             x = start + (np.arange(count) + 0.5) * (end - start) / count
@@ -102,11 +102,11 @@ def brickwork(shapes: Floats, size: tuple[float, float]) -> list[Floats]:
     return found
 
 
-def excess(corners: Floats, frames: Floats, width: float, height: float) -> Floats:
-    """(N,) how far in mm the point sets ``corners`` (N, c, 2) stand out of ``frames`` (N, 3), or
-    of one frame (3,); negative inside.
+def excess(corners: Floats, rectangles: Floats, width: float, height: float) -> Floats:
+    """(N,) the excess in mm of the point sets ``corners`` (N, c, 2) over ``rectangles`` (N, 3) or
+    over one rectangle (3,); negative inside.
     """
-    x, y = _seen(corners[..., 0].T, corners[..., 1].T, frames.T)
+    x, y = _seen(corners[..., 0].T, corners[..., 1].T, rectangles.T)
     long, short = width / 2, height / 2
     return np.asarray(
         np.maximum(
@@ -117,15 +117,17 @@ def excess(corners: Floats, frames: Floats, width: float, height: float) -> Floa
 
 
 def nearest(
-    centres: Floats, frames: Floats, width: float, height: float, most: int
+    centres: Floats, rectangles: Floats, width: float, height: float, most: int
 ) -> tuple[Ints, Floats]:
-    """(N, m) the ``most`` frames that points ``centres`` (N, 2) lie deepest in, and the excess of
-    the points over them in mm, unsorted.
+    """(N, m) the ``most`` rectangles in which the points ``centres`` (N, 2) lie deepest, unsorted,
+    and the excess of the points over them in mm.
     """
-    _, near = scipy.spatial.KDTree(frames[:, :2]).query(centres, k=min(2 * most, len(frames)))
+    _, near = scipy.spatial.KDTree(rectangles[:, :2]).query(
+        centres, k=min(2 * most, len(rectangles))
+    )
     near = near.reshape(len(centres), -1)
     apart = np.stack(
-        [excess(centres[:, None], frames[column], width, height) for column in near.T], axis=1
+        [excess(centres[:, None], rectangles[column], width, height) for column in near.T], axis=1
     )
     if near.shape[1] > most:
         pick = np.argpartition(apart, most - 1, axis=1)[:, :most]
@@ -134,18 +136,19 @@ def nearest(
     return near.astype(np.int64), apart
 
 
-def _seen(x: Floats, y: Floats, frames: Floats) -> tuple[Floats, Floats]:
-    """The points (c, N) in their ``frames``, given as (3, N) or (3,)."""
-    c, s = np.cos(frames[2]), np.sin(frames[2])
-    x, y = x - frames[0], y - frames[1]
+def _seen(x: Floats, y: Floats, rectangles: Floats) -> tuple[Floats, Floats]:
+    """The points (c, N) in the coordinates of ``rectangles`` (3, N) or (3,)."""
+    c, s = np.cos(rectangles[2]), np.sin(rectangles[2])
+    x, y = x - rectangles[0], y - rectangles[1]
     return x * c + y * s, y * c - x * s
 
 
 class Relaxation:
-    """Frames of ``width`` x ``height`` mm moved until they cover the facets ``shapes`` (N, c, 2).
+    """Moves rectangles of ``width`` x ``height`` mm until they cover the facets ``shapes``
+    (N, c, 2).
 
-    It looks at a sample of the facets, to which those are added that a cover of the sample leaves
-    out. ``spent`` counts the evaluations of L, in units of one with 4,000 facets in play.
+    It works on a sample of the facets and adds to it the facets that a cover of the sample misses.
+    ``spent`` counts evaluations of L, in units of an evaluation with 4,000 active facets.
     """
 
     def __init__(self, shapes: Floats, width: float, height: float) -> None:
@@ -163,33 +166,33 @@ class Relaxation:
         self.centres = self.corners.mean(axis=1)
         self.radius = np.linalg.norm(self.corners - self.centres[:, None], axis=2).max(axis=1)
 
-    def look(self, frames: Floats) -> None:
-        """Find the frames near each shape, and leave out what lies deep inside one."""
-        near, apart = nearest(self.centres, frames, *self.size, _NEAR)
+    def look(self, rectangles: Floats) -> None:
+        """Find the rectangles near each shape; shapes deep inside a rectangle become inactive."""
+        near, apart = nearest(self.centres, rectangles, *self.size, _NEAR)
         self.active = np.flatnonzero(apart.min(axis=1) + self.radius > -_REACH_MM)
         self.near = near[self.active]
         self.x = np.ascontiguousarray(self.corners[self.active, :, 0].T)
         self.y = np.ascontiguousarray(self.corners[self.active, :, 1].T)
 
-    def least(self, frames: Floats) -> tuple[Ints, Floats]:
-        """(A,) the frame that holds each active shape best, and the excess over it."""
+    def least(self, rectangles: Floats) -> tuple[Ints, Floats]:
+        """(A,) the rectangle with the least excess for each active shape, and that excess."""
         long, short = self.size[0] / 2 - self.margin, self.size[1] / 2 - self.margin
         over = np.empty(self.near.shape[::-1])
         for row, column in zip(over, self.near.T, strict=True):
-            x, y = _seen(self.x, self.y, frames[column].T)
+            x, y = _seen(self.x, self.y, rectangles[column].T)
             np.maximum(np.abs(x).max(axis=0) - long, np.abs(y).max(axis=0) - short, out=row)
         best = over.argmin(axis=0)
         shape = np.arange(len(best))
         return self.near[shape, best], over[best, shape]
 
     def _loss(self, steps: Floats) -> tuple[float, Floats]:
-        """L / mm² and its gradient over the frames, given as one vector with angles in arms."""
-        frames = steps.reshape(-1, 3) * UNITS
+        """L in mm² and its gradient, for rectangles as one vector in :data:`UNITS`."""
+        rectangles = steps.reshape(-1, 3) * UNITS
         self.spent += 0.2 + len(self.active) / 4000
-        best, over = self.least(frames)
+        best, over = self.least(rectangles)
         out = np.flatnonzero(over > 0)
         over, best = over[out], best[out]
-        x, y = _seen(self.x[:, out], self.y[:, out], frames[best].T)
+        x, y = _seen(self.x[:, out], self.y[:, out], rectangles[best].T)
         along = np.abs(x) - self.size[0] / 2
         across = np.abs(y) - self.size[1] / 2
         corner = np.maximum(along, across).argmax(axis=0)
@@ -197,72 +200,72 @@ class Relaxation:
         x, y = x[corner, row], y[corner, row]
         long = along[corner, row] >= across[corner, row]
         sign = np.where(long, np.sign(x), np.sign(y)) * 2 * over
-        c, s = np.cos(frames[best, 2]), np.sin(frames[best, 2])
-        slope = np.empty_like(frames)
+        c, s = np.cos(rectangles[best, 2]), np.sin(rectangles[best, 2])
+        slope = np.empty_like(rectangles)
         for axis, part in enumerate(
             (np.where(long, -c, s), np.where(long, -s, -c), np.where(long, y, -x))
         ):
-            slope[:, axis] = np.bincount(best, sign * part, len(frames))
+            slope[:, axis] = np.bincount(best, sign * part, len(rectangles))
         return float((over**2).sum()), (slope * UNITS).ravel()
 
     def relax(
-        self, frames: Floats, margins: tuple[float, ...] = (), rounds: int = 4, steps: int = 60
+        self, rectangles: Floats, margins: tuple[float, ...] = (), rounds: int = 4, steps: int = 60
     ) -> tuple[Floats, float]:
-        """The frames moved to a least L nearby, and that L in mm².
+        """The rectangles at a local minimum of L, and L in mm².
 
-        With ``margins`` in mm the facets are first asked to lie so deep inside, one after the
-        other, so that room that is left over is shared out.
+        Each of ``margins`` in mm is tried first: facets must then lie that deep inside, which
+        spreads unused room evenly.
         """
         for margin in margins:
             self.margin = margin
-            self.look(frames)
-            frames = self.descended(frames, steps)
+            self.look(rectangles)
+            rectangles = self.descended(rectangles, steps)
         last = np.inf
         self.margin = 0.0
         for _ in range(rounds):
-            self.look(frames)
-            frames = self.descended(frames, steps)
-            self.look(frames)
-            loss, _ = self._loss((frames / UNITS).ravel())
+            self.look(rectangles)
+            rectangles = self.descended(rectangles, steps)
+            self.look(rectangles)
+            loss, _ = self._loss((rectangles / UNITS).ravel())
             if loss <= ENOUGH or loss > 0.97 * last:
                 break
             last = loss
-        return frames, loss
+        return rectangles, loss
 
-    def descended(self, frames: Floats, steps: int) -> Floats:
-        """The frames at a least L, each facet being held by the frames that were near it."""
+    def descended(self, rectangles: Floats, steps: int) -> Floats:
+        """The rectangles at a minimum of L over the rectangles that are near each facet now."""
         found = scipy.optimize.minimize(
             self._loss,
-            (frames / UNITS).ravel(),
+            (rectangles / UNITS).ravel(),
             jac=True,
             method="L-BFGS-B",
             options={"maxiter": steps, "maxcor": 30},
         )
         return np.asarray(found.x.reshape(-1, 3) * UNITS)
 
-    def settled(self, frames: Floats, margins: tuple[float, ...] = ()) -> tuple[Floats, float]:
-        """The frames relaxed, with what they leave out of all shapes added to the sample."""
-        frames, loss = self.relax(frames, margins)
+    def settled(self, rectangles: Floats, margins: tuple[float, ...] = ()) -> tuple[Floats, float]:
+        """The rectangles relaxed until they cover all shapes, missed shapes added to the sample."""
+        rectangles, loss = self.relax(rectangles, margins)
         for _ in range(4):
             if loss > ENOUGH:
                 break
-            left = self._left_out(frames)
+            left = self._left_out(rectangles)
             if not len(left):
                 break
             self.sample = np.union1d(self.sample, left)
             self._take_sample()
-            frames, loss = self.relax(frames)
+            rectangles, loss = self.relax(rectangles)
         else:
             loss = np.inf
-        return frames, loss
+        return rectangles, loss
 
-    def _left_out(self, frames: Floats) -> Ints:
-        """The shapes that no frame holds."""
+    def _left_out(self, rectangles: Floats) -> Ints:
+        """The shapes that no rectangle holds."""
         corners, centres = self.shapes, self.shapes.mean(axis=1)
-        first, _ = nearest(centres, frames, *self.size, 1)
-        left = np.flatnonzero(excess(corners, frames[first[:, 0]], *self.size) > _LEFT_MM)
+        first, _ = nearest(centres, rectangles, *self.size, 1)
+        left = np.flatnonzero(excess(corners, rectangles[first[:, 0]], *self.size) > _LEFT_MM)
         if len(left):
-            near, _ = nearest(centres[left], frames, *self.size, 2 * _NEAR)
-            over = [excess(corners[left], frames[column], *self.size) for column in near.T]
+            near, _ = nearest(centres[left], rectangles, *self.size, 2 * _NEAR)
+            over = [excess(corners[left], rectangles[column], *self.size) for column in near.T]
             left = left[np.min(over, axis=0) > _LEFT_MM]
         return left

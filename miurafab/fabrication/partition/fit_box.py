@@ -1,16 +1,18 @@
-"""How an outline is turned to fit a rectangle: support values and rotated boxes.
+"""Fit of point sets to a rectangle at any angle: support values and rotated boxes.
 
-A set of points fits a rectangle of width w and height h, turned by -θ, when its extents along
-u(θ) = (cos θ, sin θ) and v(θ) = (-sin θ, cos θ) are at most w and h. Two tools answer that:
+A set of points, turned by -θ, fits a rectangle of width w and height h if its extents along
+u(θ) = (cos θ, sin θ) and v(θ) = (-sin θ, cos θ) are at most w and h. There are two tests:
 
-- *support values*: the largest p·u over the points, for a fixed fan of directions u. The support
-  values of a union are the maxima of those of its parts, so the boxes of all unions that a search
-  meets are maxima of a few arrays. The fan samples the angle: it can miss a fit, never invent one.
-- :func:`best_turn`: exact for one convex hull. Between two angles at which a side of the hull is
-  flush with the box, the supporting corners are fixed, and the extents d·u(θ) and g·v(θ) are
+- *Support values*: the largest p·u over the points, for a fixed fan of directions u. The support
+  values of a union are the maxima of the support values of its parts, so a search computes the
+  boxes of unions as maxima of arrays. The fan samples the angle, so this test can miss a fit; it
+  never accepts a set that does not fit.
+- :func:`best_turn`: exact, for one convex hull. Between two angles at which a side of the hull is
+  parallel to the box, the supporting corners are fixed, and the extents d·u(θ) and g·v(θ) are
   concave. So the larger excess over the rectangle is least at an end of the interval or where both
-  excesses are equal, (d_x - g_y) cos θ + (d_y + g_x) sin θ = w - h; and the area is least at an end
-  of where the box fits, so also where one extent just fills the rectangle. All these are tried.
+  excesses are equal, (d_x - g_y) cos θ + (d_y + g_x) sin θ = w - h. The area is least at an end of
+  the range in which the box fits, so also where an extent equals the side of the rectangle. All
+  these angles are tried.
 """
 
 from __future__ import annotations
@@ -25,20 +27,20 @@ from numpy.typing import NDArray
 from miurafab.geometry.arrays import Bools, Floats
 
 TOLERANCE = 1e-9
-"""How far, in mm, an extent may exceed the rectangle by rounding."""
+"""The excess in mm that is accepted as rounding."""
 
 _ROUNDING = 0.005
 """Room in mm for the rounding of support values in single precision."""
 
 
 _ANGLES = 48
-"""Angles in a right angle at which boxes are tried: steps of 1.9 degrees."""
+"""The number of angles tried in a right angle: steps of 1.9 degrees."""
 
 
 @dataclass(frozen=True)
 class Space:
-    """The rectangle, ``width`` x ``height`` mm, that shapes have to fit, turned at will or by the
-    given quarter ``turns`` alone: 0 as they are, 1 by a right angle.
+    """The rectangle ``width`` x ``height`` mm that shapes must fit, at any angle or by the quarter
+    ``turns`` only (0: not turned, 1: turned by a right angle).
     """
 
     width: float
@@ -47,11 +49,11 @@ class Space:
 
     @property
     def directions(self) -> Floats:
-        """(D, 2) along which support values are taken for :meth:`holds`."""
+        """(D, 2) directions of the support values for :meth:`holds`."""
         return fan(_ANGLES if self.turns is None else 1)
 
     def smaller(self, by: float) -> Space:
-        """The space less ``by`` mm each way."""
+        """The space with ``by`` mm less width and height."""
         return Space(self.width - by, self.height - by, self.turns)
 
     def holds(self, values: NDArray[np.float32]) -> Bools:
@@ -64,8 +66,8 @@ class Space:
         return np.asarray(np.logical_or.reduce(ways))
 
     def turn(self, points: Floats) -> float | None:
-        """The angle θ in radians whose turn by -θ fits ``points`` (n, 2): with the smallest box, or
-        0 where the turns are given; None if none does.
+        """The angle θ in radians such that ``points`` (n, 2) turned by -θ fit: the angle of the
+        smallest box, or 0 if the turns are given; None if they do not fit.
         """
         if self.turns is None:
             return best_turn(points, self.width, self.height)
@@ -76,8 +78,8 @@ class Space:
 
 
 def fan(turns: int) -> Floats:
-    """(4 * turns, 2) unit directions: ``turns`` of them in the first quadrant, then each turned
-    by 90, 180 and 270 degrees.
+    """(4 * turns, 2) unit directions: ``turns`` directions in the first quadrant, then the same
+    turned by 90, 180 and 270 degrees.
     """
     angle = np.arange(turns) * (np.pi / 2 / turns)
     first = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -88,10 +90,10 @@ def fan(turns: int) -> Floats:
 def support(polygons: Floats, present: Bools, directions: Floats) -> NDArray[np.float32]:
     """(N, D) support values in mm of N polygons of up to k corners.
 
-    ``polygons`` (N, k, 2), ``present`` (N, k) whether a corner is real, the first ones first;
-    ``directions`` (D, 2) of :func:`fan`, the second half opposite to the first. A polygon
-    without corners has support -inf, which is neutral in a union. Single precision keeps the
-    search in the cache; its rounding is what :func:`fits` sets aside.
+    ``polygons`` (N, k, 2); ``present`` (N, k) whether a corner is real, real corners first;
+    ``directions`` (D, 2) of :func:`fan`, the second half opposite to the first. A polygon without
+    corners has support -inf, which is neutral in a union. Single precision keeps the search in the
+    cache; :func:`fits` leaves room for its rounding.
     """
     values = np.full((len(directions), len(polygons)), -np.inf, dtype=np.float32)
     filled = np.where(present[..., None], polygons, polygons[:, :1])
@@ -106,10 +108,8 @@ def support(polygons: Floats, present: Bools, directions: Floats) -> NDArray[np.
 
 
 def fits(values: NDArray[np.float32], width: float, height: float) -> Bools:
-    """(...,) whether shapes with support ``values`` (..., 4 * turns) fit the rectangle.
-
-    The sizes in mm; a shape may lie along or across. Extents are compared with
-    room for the rounding of the single precision values.
+    """(...,) whether shapes with support ``values`` (..., 4 * turns) fit ``width`` x ``height`` mm,
+    along or across, with room for the rounding of single precision.
     """
     quarter = values.shape[-1] // 4
     along = values[..., :quarter] + values[..., 2 * quarter : 3 * quarter]

@@ -1,19 +1,19 @@
-"""The split of a grid of facets into few rectangles of facets, each fitting the bed.
+"""Split of a grid of facets into few blocks that each fit the bed, by dynamic programming.
 
-A *band* is a range of facet rows; it is cut into runs of columns, each as long as fits, tabs
-included, which is the fewest runs that the band can have. With runs(r, h, c) the number of runs
-of the h rows from r on over the first c columns, the fewest patches of that prefix are
+A *band* is a range of facet rows. It is cut into runs of columns, each as long as fits with its
+tabs; no other cut of the band has fewer runs. With runs(r, h, c) the number of runs of the h rows
+from row r over the first c columns, the least number of patches of a prefix is
 
     best(0, c) = 0,    best(r, c) = min over h of best(r - h, c) + runs(r - h, h, c).
 
-The same is done with rows and columns exchanged. The prefix gives more than the plain split: for
-each c the columns before c may be cut into bands of rows and those from c on into bands of
-columns (whose fewest patches are a suffix sum of the same kind), and the best c is found by
-adding two arrays. So leftovers of all bands are gathered and cut lengthwise instead of each alone.
-Equal numbers of patches are decided by the length of the seams.
+The same is done with rows and columns exchanged. Prefixes allow more than a plain split: for each
+c, the columns before c are cut into bands of rows and the columns from c on into bands of columns
+(their least number is a suffix sum of the same kind). The best c is found by adding two arrays. So
+the short runs at the ends of all bands are joined and cut lengthwise. Among equal numbers of
+patches, the shortest seams win.
 
-The tab of an edge between two facets is taken to stand on the facet with the lower row or column,
-which is how the tabs are given out later; tabs that share a facet only become smaller.
+The tab of an edge between two facets is assumed to stand on the facet with the lower row or column,
+as the tabs are assigned later. Tabs that share a facet only become smaller.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from numpy.typing import NDArray
 from miurafab.fabrication.partition.fit_box import Space
 from miurafab.geometry.arrays import Floats, Ints
 
-Rectangle = tuple[int, int, int, int]
-"""Rows from, rows to, columns from, columns to; the ends excluded."""
+Block = tuple[int, int, int, int]
+"""First row, end row, first column, end column of a block of facets; the ends are excluded."""
 
 _PATCH = 1e9
-"""What a patch costs in mm of seam: so much that one patch less always wins."""
+"""The cost of a patch in mm of seam: one patch less always wins."""
 
 
 @dataclass(frozen=True, eq=False)
 class GridShape:
-    """What the split must know of R x C facets, as support values of D directions and lengths.
+    """A grid of R x C facets for the split: support values in D directions, and side lengths.
 
-    ``body`` (C, R, D) of the facets; ``right`` and ``top`` (C, R, D) of the tabs that stand on
-    their right and top side; ``right_mm`` and ``top_mm`` (C, R) the lengths of those sides, 0 at
-    the border.
+    ``body`` (C, R, D): support values of the facets; ``right`` and ``top`` (C, R, D): support
+    values of the tabs on their right and top sides; ``right_mm`` and ``top_mm`` (C, R): lengths of
+    these sides, 0 at the border.
     """
 
     body: NDArray[np.float32]
@@ -71,7 +71,7 @@ class GridShape:
         )
 
     def with_every(self, n: int) -> GridShape:
-        """The same grid with every ``n``-th angle alone."""
+        """The same grid with every ``n``-th direction only."""
         here = (slice(None), slice(None), slice(None, None, n))
         return replace(self, body=self.body[here], right=self.right[here], top=self.top[here])
 
@@ -90,11 +90,11 @@ class GridShape:
         )
 
 
-def split_grid(shape: GridShape, space: Space) -> list[Rectangle]:
-    """Rectangles that cover the grid, each fitting ``space`` with its tabs.
+def split_grid(shape: GridShape, space: Space) -> list[Block]:
+    """Blocks that cover the grid and each fit ``space`` with their tabs.
 
-    They come in an order in which of two neighbours the lower or left one is first. Every facet
-    with its tabs must be known to fit alone.
+    Of two neighbouring blocks the lower or left block comes first. Every facet with its tabs must
+    fit alone.
     """
     rows, columns = _Bands(shape, space), _Bands(shape.exchanged(), space)
     by_row = rows.prefixes + columns.suffix_total()
@@ -105,18 +105,18 @@ def split_grid(shape: GridShape, space: Space) -> list[Rectangle]:
     return [(b0, b1, a0, a1) for a0, a1, b0, b1 in _both(columns, rows, at_column)]
 
 
-def _both(first: _Bands, second: _Bands, at: int) -> list[Rectangle]:
-    """Bands of ``first`` over its columns before ``at``, then of ``second`` over the rest."""
-    found = first.rectangles(at)
-    found += [(b0, b1, a0, a1) for a0, a1, b0, b1 in second.rectangles_from(at)]
+def _both(first: _Bands, second: _Bands, at: int) -> list[Block]:
+    """Blocks of ``first`` over its columns before ``at``, then of ``second`` over the rest."""
+    found = first.blocks(at)
+    found += [(b0, b1, a0, a1) for a0, a1, b0, b1 in second.blocks_from(at)]
     return found
 
 
 class _Bands:
     """The cost of every band over every prefix of columns, and the best cuts between bands.
 
-    ``cost[h - 1]`` (C + 1, R - h + 1) is the cost of the bands of h rows, over their first c
-    columns, at [c, first row]; infinite where a column of the band does not fit.
+    ``cost[h - 1][c, r]`` (C + 1, R - h + 1) is the cost of the band of h rows from row r over its
+    first c columns; infinite if a column of the band does not fit.
     """
 
     def __init__(self, shape: GridShape, space: Space) -> None:
@@ -170,8 +170,8 @@ class _Bands:
         return cost
 
     def _cuts(self) -> tuple[Floats, Ints]:
-        """(R + 1, C + 1) the least cost of the first r rows and c columns, and the last band's
-        height there.
+        """(R + 1, C + 1) the least cost of the first r rows and c columns, and the height of the
+        last band.
         """
         best = np.full((self.rows + 1, self.columns + 1), np.inf)
         choice = np.zeros((self.rows + 1, self.columns + 1), dtype=np.int64)
@@ -199,7 +199,7 @@ class _Bands:
                     total[r], choice[r] = value, h
         return total, choice
 
-    def rectangles(self, columns: int) -> list[Rectangle]:
+    def blocks(self, columns: int) -> list[Block]:
         """The best split of the first ``columns`` columns."""
         bands: list[tuple[int, int]] = []
         r = self.rows if columns else 0
@@ -209,18 +209,18 @@ class _Bands:
             r -= h
         return [part for r0, r1 in reversed(bands) for part in self._cut(r0, r1, columns)]
 
-    def rectangles_from(self, row: int) -> list[Rectangle]:
+    def blocks_from(self, row: int) -> list[Block]:
         """The best split of the rows from ``row`` on."""
         _, choice = self._suffix()
-        found: list[Rectangle] = []
+        found: list[Block] = []
         while row < self.rows:
             h = int(choice[row])
             found += self._cut(row, row + h, self.columns)
             row += h
         return found
 
-    def _cut(self, r0: int, r1: int, columns: int) -> list[Rectangle]:
-        """The greedy runs of one band: a new one begins where its cost rises."""
+    def _cut(self, r0: int, r1: int, columns: int) -> list[Block]:
+        """The greedy runs of one band: a run starts where the cost rises."""
         cost = self.cost[r1 - r0 - 1][: columns + 1, r0]
         starts = np.flatnonzero(np.diff(cost) >= _PATCH / 2)
         ends = np.append(starts[1:], columns)

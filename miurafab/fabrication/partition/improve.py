@@ -1,11 +1,11 @@
-"""A valid split made better: fewer patches, then shorter seams, never an invalid one.
+"""Improvement of a valid split: fewer patches, then shorter seams.
 
-Covers with fewer and fewer frames are looked for, beginning with the frames of the patches as they
-are and with brickwork (:mod:`~miurafab.fabrication.partition.cover_search`). Each facet goes to the
-frame that it lies deepest in, and the seams are then cut between the frames
-(:mod:`~miurafab.fabrication.partition.min_cut`). The result counts only if every facet and every
-tab is inside the frame of its patch and every patch is a disk; else the split stays as it was, but
-for its seams where they followed no grid.
+Covers with fewer and fewer rectangles are searched, starting with the rectangles of the current
+patches and with rows of rectangles (:mod:`~miurafab.fabrication.partition.cover_search`). Each
+facet is assigned to the rectangle in which it lies deepest, and the seams are recomputed as minimum
+cuts between rectangles (:mod:`~miurafab.fabrication.partition.min_cut`). The result is used only if
+every facet and every tab lies in the rectangle of its patch and every patch is a disk. Otherwise
+the split keeps its patches; seams that follow no grid may still become shorter.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.partition.cover import brickwork, excess, frame_of, nearest
+from miurafab.fabrication.partition.cover import brickwork, excess, nearest, rectangle_around
 from miurafab.fabrication.partition.cover_search import CoverSearch
 from miurafab.fabrication.partition.min_cut import Recut
 from miurafab.fabrication.tabs import TabRegions
@@ -26,22 +26,19 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
 _EFFORT, _EFFORT_EACH = 500.0, 1.5
-"""Evaluations in a search for one patch less, at most, and for one facet; more facets get more in
-all and fewer each.
-"""
+"""The effort of a search for one patch less is at most ``_EFFORT`` evaluations of L, and
+``_EFFORT_EACH`` times the number of facets to the power 0.6."""
 
 _MORE = 3
-"""Brickwork of so many frames more than there are patches is not tried."""
+"""Rows with this many more rectangles than patches are not tried."""
 
 _LENIENT_MM = 0.6
-"""So much larger than what a patch needs are the frames of a cover; what stands out by that
-is mostly mended when the frames are put about the patches as they are cut.
-"""
+"""Cover rectangles are this much oversize; the overhang is usually removed when rectangles are
+refitted to the final patches."""
 
 _CUTS, _GAIN = 4, 0.001
-"""How often frames are put about their patches anew, and the part of the seams that must be gained
-for another time.
-"""
+"""The number of times rectangles are refitted, and the relative gain in seam cost that is required
+for another time."""
 
 
 def improved(
@@ -56,22 +53,22 @@ def improved(
     *,
     straight: bool,
 ) -> Ints:
-    """(F,) a split no worse than ``patch`` (F,), ids from 0, of which the lower one bears tabs.
+    """(F,) a split no worse than ``patch`` (F,), ids from 0; of two patches the lower bears tabs.
 
-    Patches lie within one ``part`` (F,) of the pattern each, and patches of a lower part have lower
-    numbers. ``size`` is that of the bed in mm, ``ring`` the tabs that stand on the border of the
-    pattern, and no tab stands out of its facet by more than ``depth`` mm. ``straight`` seams, along
-    the lines of a grid, are the easiest to glue: they stay as they are unless a patch is saved.
+    Each patch lies within one ``part`` (F,) of the pattern, and patches of a lower part have lower
+    numbers. ``size`` is the bed in mm, ``ring`` the tabs on the border of the pattern; no tab
+    reaches farther than ``depth`` mm from its facet. ``straight`` seams, along the lines of a grid,
+    are the easiest to glue: they stay unless a patch is saved.
     """
     room = _room(pattern, ring)
     alternate = options.tab_side == "alternate"
 
-    def recut(patch: Ints, frames: Floats) -> Ints | None:
-        """The split with shorter seams, or None if it does not hold."""
+    def recut(patch: Ints, rectangles: Floats) -> Ints | None:
+        """The split with shorter seams, or None if it is invalid."""
         cut = Recut(
             pattern,
             patch,
-            frames,
+            rectangles,
             size,
             room,
             part,
@@ -84,7 +81,7 @@ def improved(
             cut.run(2)
             if turn and cut.seam_cost > (1 - _GAIN) * before and not cut.faults():
                 break
-            cut.reframe()
+            cut.refit()
         return None if cut.faults() or cut.misshapen() else cut.patch
 
     for fewer in _fewer(pattern, part, patch, size, room, (2 if alternate else 1) * depth):
@@ -94,7 +91,7 @@ def improved(
     else:
         if straight:
             return patch
-        found = recut(patch, _frames(room, patch, np.arange(len(patch)), size))
+        found = recut(patch, _rectangles(room, patch, np.arange(len(patch)), size))
         if found is not None and _seam_mm(pattern, found) >= _seam_mm(pattern, patch):
             found = None
     if found is None:
@@ -108,11 +105,13 @@ def _seam_mm(pattern: CreasePattern, patch: Ints) -> float:
     return float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices[seam]).sum())
 
 
-def _frames(room: Floats, patch: Ints, facets: Ints, size: tuple[float, float]) -> Floats:
-    """(K, 3) the frames about the patches that ``facets`` make up, alone."""
+def _rectangles(room: Floats, patch: Ints, facets: Ints, size: tuple[float, float]) -> Floats:
+    """(K, 3) the rectangles around the patches of ``facets``."""
     order = facets[np.argsort(patch[facets], kind="stable")]
     ends = np.flatnonzero(np.diff(patch[order])) + 1
-    return np.array([frame_of(room[f].reshape(-1, 2), *size) for f in np.split(order, ends)])
+    return np.array(
+        [rectangle_around(room[f].reshape(-1, 2), *size) for f in np.split(order, ends)]
+    )
 
 
 def _fewer(
@@ -123,8 +122,8 @@ def _fewer(
     room: Floats,
     depth: float,
 ) -> Iterator[tuple[Ints, Floats]]:
-    """Splits of fewer patches than ``patch``, with their frames, the fewest first; tabs may still
-    stand out.
+    """Splits with fewer patches than ``patch`` and their rectangles, the fewest first; tabs may
+    still reach out of the rectangles.
     """
     shapes = _without_rim(pattern, room, depth / 2)
     small = (size[0] - depth + _LENIENT_MM, size[1] - depth + _LENIENT_MM)
@@ -137,13 +136,13 @@ def _fewer(
         least = math.ceil(area[facets].sum() / (small[0] * small[1]) - 1e-9)
         search = CoverSearch(shapes[facets], *small)
         effort = min(_EFFORT, _EFFORT_EACH * len(facets) ** 0.6)
-        frames = _frames(room, patch, facets, size)
+        rectangles = _rectangles(room, patch, facets, size)
         starts = [
             search.begin(each)
-            for each in (frames, *brickwork(room[facets], small))
-            if len(each) < len(frames) + _MORE
+            for each in (rectangles, *brickwork(room[facets], small))
+            if len(each) < len(rectangles) + _MORE
         ]
-        chain = [starts[0].frames]
+        chain = [starts[0].rectangles]
         while len(chain[-1]) > least:
             cover = search.fewer(starts, len(chain[-1]) - 1, effort)
             if cover is None:
@@ -160,15 +159,15 @@ def _fewer(
         yield found, np.concatenate(covers)
 
 
-def _deepest(room: Floats, frames: Floats, size: tuple[float, float]) -> Ints:
-    """(N,) the frame that each facet lies deepest in."""
-    near, _ = nearest(room.mean(axis=1), frames, *size, 4)
-    over = np.stack([excess(room, frames[column], *size) for column in near.T], axis=1)
+def _deepest(room: Floats, rectangles: Floats, size: tuple[float, float]) -> Ints:
+    """(N,) the rectangle in which each facet lies deepest."""
+    near, _ = nearest(room.mean(axis=1), rectangles, *size, 4)
+    over = np.stack([excess(room, rectangles[column], *size) for column in near.T], axis=1)
     return np.asarray(near[np.arange(len(near)), over.argmin(axis=1)])
 
 
 def _room(pattern: CreasePattern, ring: TabRegions) -> Floats:
-    """(F, c, 2) the corners of each facet and of the tabs that stand on the pattern's border."""
+    """(F, c, 2) the corners of each facet and of its tabs on the border of the pattern."""
     corners = pattern.faces_vertices
     room = pattern.vertices_coords[np.where(corners >= 0, corners, corners[:, :1])]
     order = np.argsort(ring.own_face, kind="stable")
@@ -176,7 +175,7 @@ def _room(pattern: CreasePattern, ring: TabRegions) -> Floats:
     place = np.arange(len(own)) - np.searchsorted(own, own)
     points = np.where(ring.present[..., None], ring.points, ring.points[:, :1])
     for turn in range(int(place.max(initial=-1)) + 1):
-        # One tab of each facet at a time; facets without repeat their first corner.
+        # One tab of each facet at a time; a facet without a tab repeats its first corner.
         tab = order[place == turn]
         tab = tab[ring.count[tab] > 0]
         more = np.repeat(room[:, :1], points.shape[1], axis=1)
@@ -186,8 +185,8 @@ def _room(pattern: CreasePattern, ring: TabRegions) -> Floats:
 
 
 def _without_rim(pattern: CreasePattern, room: Floats, depth: float) -> Floats:
-    """``room`` with the border of the pattern drawn in by ``depth`` mm, but by no more than half
-    the way to the middle of a facet: no tab of another patch is wanted there.
+    """``room`` with the border of the pattern moved inwards by ``depth`` mm, at most half way to
+    the centre of the facet: no tab of another patch stands there.
     """
     border = np.flatnonzero((pattern.edges_faces >= 0).sum(axis=1) == 1)
     face = pattern.edges_faces[border].max(axis=1)

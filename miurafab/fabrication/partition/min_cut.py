@@ -1,20 +1,20 @@
-"""Where the seams run, given the rectangles that the patches must keep to.
+"""The shortest seams between patches that must keep to given rectangles, by minimum cuts.
 
-Each patch has a frame (:mod:`~miurafab.fabrication.partition.cover`), and must keep its facets and
-its tabs inside. Where the frames of two patches A and B overlap, the seam between them is free.
-With a patch l(f) for each facet, what a split costs is
+Each patch has a rectangle (:mod:`~miurafab.fabrication.partition.cover`) and must keep its facets
+and its tabs inside. Where the rectangles of two patches A and B overlap, the seam between them is
+free. The cost of a split is
 
-    E = Σ over seam edges of their length + P (facets outside their frame + tabs outside theirs)
+    E = Σ over seam edges of their length + P (facets and tabs outside the rectangle of their patch)
 
-with P far larger than any length. For one pair of patches, everything else held fast, the least E
-is a minimum cut: facets that both frames hold are nodes, A is the source, B the sink, an edge
-between two of them has as capacity what it costs as a seam of A and B (which is not the same in
-both directions, for it may be A or B that bears the tab), and what a facet costs towards its fixed
-neighbours ties it to source or sink. All pairs in turn, until nothing gains, is the swap algorithm
-of Boykov, Veksler and Zabih (2001). A cut that would leave a patch not a disk is not made.
+with P far larger than any length. For one pair of patches, with everything else fixed, the least E
+is a minimum cut. The facets in both rectangles are the nodes, A is the source and B the sink. The
+capacity between two neighbouring facets is the cost of their edge as a seam of A and B; it depends
+on the direction, because A or B may bear the tab. The cost of a facet towards its fixed neighbours
+is its capacity to the source or the sink. Taking all pairs in turn until none improves is the swap
+algorithm of Boykov, Veksler and Zabih (2001). A cut after which a patch is not a disk is rejected.
 
-Along a grid many stepped seams are equally short; so each grid line has a price of its own, all but
-the same, and a seam keeps to one line as long as it can.
+Along a grid many stepped seams are equally short. So each grid line has a price, which differs a
+little from line to line, and a seam keeps to one line as long as it can.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
-from miurafab.fabrication.partition.cover import excess, frame_of
+from miurafab.fabrication.partition.cover import excess, rectangle_around
 from miurafab.fabrication.partition.fit_box import TOLERANCE
 from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.seams import all_seams, inner_seams
@@ -35,31 +35,32 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
 _FLUSH_MM = TOLERANCE / 2
-"""What stands out no farther is flush with the frame, and :func:`~.boxes.best_turn` will agree."""
+"""An excess that counts as inside; :func:`~.fit_box.best_turn` accepts it, too."""
 
 _UNIT = 1000
-"""So many units of cost are the mean edge length."""
+"""The cost of the mean edge length."""
 
 _PENALTY = 1_000_000
-"""P in units of cost."""
+"""P in the same unit."""
 
 _PRICE = 0.01
-"""The dearest grid line costs so much more than the cheapest, as a part."""
+"""The relative difference between the dearest and the cheapest grid line."""
 
 
 class Recut:
-    """A split under improvement: ``patch`` (F,) the patch of each facet, ``frames`` (K, 3).
+    """A split under improvement: the ``patch`` (F,) of each facet, the ``rectangles`` (K, 3) of the
+    patches.
 
-    ``room`` (F, c, 2) are the corners of each facet and of what stands on it in any case;
-    ``alternate`` tells that a tab may stand on either side of a seam, not only on the lower patch.
-    Facets in different parts (``part`` (F,)) are never joined.
+    ``room`` (F, c, 2) has the corners of each facet and of its tabs on the border. ``alternate``:
+    a tab may stand on either side of a seam, not only on the lower patch. Facets in different parts
+    (``part`` (F,)) are never joined.
     """
 
     def __init__(
         self,
         pattern: CreasePattern,
         patch: Ints,
-        frames: Floats,
+        rectangles: Floats,
         size: tuple[float, float],
         room: Floats,
         part: Ints,
@@ -68,7 +69,7 @@ class Recut:
         full_facet: bool,
         alternate: bool,
     ) -> None:
-        self.pattern, self.patch, self.frames = pattern, patch.copy(), frames.copy()
+        self.pattern, self.patch, self.rectangles = pattern, patch.copy(), rectangles.copy()
         self.size, self.room, self.part = size, room, part
         self.material, self.full_facet, self.alternate = material, full_facet, alternate
         faces = np.arange(len(patch))[:, None]
@@ -84,20 +85,20 @@ class Recut:
         self._make_tabs()
 
     def _hold(self) -> None:
-        """Find which facets each frame holds."""
+        """Find the facets that each rectangle holds."""
         centres = self.room.mean(axis=1)
         radius = np.linalg.norm(self.room - centres[:, None], axis=2).max(axis=1)
         self.held = []
-        for frame in self.frames:
-            middle = excess(centres[:, None], frame, *self.size)
+        for rectangle in self.rectangles:
+            middle = excess(centres[:, None], rectangle, *self.size)
             close = np.flatnonzero(middle <= 0)
             inside = middle[close] <= -radius[close]
             doubtful = close[~inside]
-            inside[~inside] = excess(self.room[doubtful], frame, *self.size) <= _FLUSH_MM
+            inside[~inside] = excess(self.room[doubtful], rectangle, *self.size) <= _FLUSH_MM
             self.held.append(close[inside])
 
     def _make_tabs(self) -> None:
-        """The tabs, on both sides, of all edges where a seam might run."""
+        """Make the tabs on both sides of all edges that may become seams."""
         pattern = self.pattern
         times = np.bincount(np.concatenate(self.held), minlength=len(self.patch))
         pair = pattern.edges_faces
@@ -113,22 +114,22 @@ class Recut:
         self.tab[both, sides] = np.arange(len(both))
         weak = self.tabs.glue < self.material.tabs.min_area_mm2
         self.weak = weak
-        # A corner that is not there is put where one is.
+        # Missing corners repeat the first corner.
         points, present = self.tabs.points, self.tabs.present
         self.tab_points = np.where(present[..., None], points, points[:, :1])
         self.tab_points[~present.any(axis=1)] = np.nan
 
     def _outside(self, tab: Ints, patch: Ints) -> Bools:
-        """Whether each tab, -1 for none, stands out of the frame of ``patch``; same shapes."""
+        """Whether each tab (-1: none) reaches out of the rectangle of ``patch``; same shapes."""
         found = np.zeros(tab.shape, dtype=bool)
         real = np.flatnonzero((tab >= 0).ravel() & (patch >= 0).ravel())
         which, where = tab.ravel()[real], patch.ravel()[real]
-        over = excess(self.tab_points[which], self.frames[where], *self.size)
+        over = excess(self.tab_points[which], self.rectangles[where], *self.size)
         found.ravel()[real] = over > _FLUSH_MM
         return found
 
     def _seam_cost(self, facet: Ints, mine: Ints, theirs: Ints) -> Floats:
-        """(n, k) what the sides of ``facet`` (n,) cost if it is in patch ``mine`` (n,) and its
+        """(n, k) the cost of the sides of ``facet`` (n,) if it is in patch ``mine`` (n,) and its
         neighbours are in ``theirs`` (n, k), -1 for none.
         """
         edges, side = self.pattern.faces_edges[facet], self.side[facet]
@@ -142,7 +143,7 @@ class Recut:
         return np.where(seam, self.cost[edges] + _PENALTY * out, 0.0)
 
     def faults(self) -> int:
-        """How many facets and tabs stand out of the frame of their patch."""
+        """The number of facets and tabs outside the rectangle of their patch."""
         held = np.zeros(len(self.patch), dtype=bool)
         for patch, facets in enumerate(self.held):
             held[facets] |= self.patch[facets] == patch
@@ -154,8 +155,8 @@ class Recut:
         cost = self._seam_cost(seam, self.patch[seam], theirs)
         return int((~held).sum()) + int((cost >= _PENALTY).sum())
 
-    def reframe(self) -> None:
-        """Put each frame about its patch and the tabs on it, with the room left over shared out."""
+    def refit(self) -> None:
+        """Refit each rectangle to its patch with its tabs."""
         near = np.where(self.across >= 0, self.patch[self.across], -1)
         real = self.pattern.faces_edges >= 0
         rim = (real & (near != self.patch[:, None])).any(axis=1)
@@ -178,25 +179,25 @@ class Recut:
                 np.repeat(self.patch[seams.faces[:, 0]], self.tab_points.shape[1]),
             ]
         )
-        owner = np.where(np.isnan(points[:, 0]), len(self.frames), owner)
+        owner = np.where(np.isnan(points[:, 0]), len(self.rectangles), owner)
         order = np.argsort(owner, kind="stable")
-        ends = np.searchsorted(owner[order], np.arange(len(self.frames) + 1)).tolist()
+        ends = np.searchsorted(owner[order], np.arange(len(self.rectangles) + 1)).tolist()
         for patch, (start, end) in enumerate(itertools.pairwise(ends)):
             if end > start:
-                self.frames[patch] = frame_of(points[order[start:end]], *self.size)
+                self.rectangles[patch] = rectangle_around(points[order[start:end]], *self.size)
         self._hold()
         self._make_tabs()
 
     @property
     def seam_cost(self) -> float:
-        """What all seams cost, in thousandths of the mean edge length."""
+        """The cost of all seams, in thousandths of the mean edge length."""
         pair = self.pattern.edges_faces
         seam = (pair >= 0).all(axis=1) & (self.patch[pair[:, 0]] != self.patch[pair[:, 1]])
         return float(self.cost[seam].sum())
 
     def run(self, rounds: int) -> None:
-        """Cut between all pairs of neighbours, up to ``rounds`` times."""
-        fresh = np.ones(len(self.frames), dtype=bool)
+        """Recut all pairs of neighbouring patches, at most ``rounds`` times."""
+        fresh = np.ones(len(self.rectangles), dtype=bool)
         for _ in range(rounds):
             pairs = self._pairs()
             pairs = pairs[fresh[pairs].any(axis=1)]
@@ -208,14 +209,14 @@ class Recut:
                 return
 
     def _pairs(self) -> Ints:
-        """(P, 2) patches next to each other, the lower one first."""
+        """(P, 2) pairs of neighbouring patches, the lower number first."""
         pair = self.pattern.edges_faces[(self.pattern.edges_faces >= 0).all(axis=1)]
         pair = pair[self.part[pair[:, 0]] == self.part[pair[:, 1]]]
         sides = np.sort(self.patch[pair], axis=1)
         return np.unique(sides[sides[:, 0] != sides[:, 1]], axis=0)
 
     def _swap(self, one: int, other: int) -> bool:
-        """Cut anew between two patches; whether anything changed."""
+        """Recut the seam between two patches; whether it changed."""
         zone = np.intersect1d(self.held[one], self.held[other], assume_unique=True)
         zone = zone[(self.patch[zone] == one) | (self.patch[zone] == other)]
         if not len(zone):
@@ -276,7 +277,7 @@ class Recut:
 
 
 def _prices(pattern: CreasePattern) -> Floats:
-    """(E,) what a mm of each edge costs as a seam, 1 or a little more."""
+    """(E,) the price of a mm of each edge as a seam, 1 or a little more."""
     if pattern.grid is None:
         return np.ones(len(pattern.edges_vertices))
     columns = pattern.grid[0]

@@ -1,7 +1,7 @@
-"""Patches: pieces in a frame of their own, and as many of each as there are copies of the model.
+"""Patches in frames of their own, one set for each copy of the model.
 
-A piece is turned to the smallest box that fits its sheet and moved until that box begins at the
-origin. Where it has to lie along the fibres of a sheet it keeps the directions of the pattern.
+An outlined patch is turned to the smallest box that fits its sheet and moved until this box begins
+at the origin. If it must lie along the fibres of a sheet, it keeps the directions of the pattern.
 """
 
 from __future__ import annotations
@@ -15,7 +15,11 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.nesting import turned
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.fit_box import Space
-from miurafab.fabrication.partition.patch_outline import Piece, Pieces, make_pieces
+from miurafab.fabrication.partition.patch_outline import (
+    OutlinedPatch,
+    OutlinedPatches,
+    outline_patches,
+)
 from miurafab.fabrication.stock import LaidStock
 from miurafab.fabrication.tabs import FOLDS, Tab
 from miurafab.geometry.arrays import Floats, Ints
@@ -23,17 +27,17 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
 DIGITS = 6
-"""Decimals of mm that a layout keeps, so that what is written is what was computed."""
+"""Decimals of mm in a layout, so that the written layout equals the computed layout."""
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """One piece, in its own frame. ``faces`` (n,) int64 index the pattern's facets.
+    """One patch in its own frame. ``faces`` (n,) int64 index the facets of the pattern.
 
-    ``outline_mm`` (m, 2) is the cut line with tabs, kerf included, counter-clockwise, and
-    ``waste_mm`` further closed cut lines inside it, around enclosed waste; there rarely are any.
-    A point p of the pattern is R(``rotation_deg``) (p - ``origin_mm``) in this frame. ``copy`` is
-    the number of the model that it belongs to, from 1.
+    ``outline_mm`` (m, 2) is the cut line with tabs and kerf, counter-clockwise; ``waste_mm`` are
+    further closed cut lines inside it, around enclosed waste (rare). A point p of the pattern is
+    R(``rotation_deg``) (p - ``origin_mm``) in this frame. ``copy`` is the number of its model, from
+    1.
     """
 
     id: int
@@ -47,43 +51,43 @@ class Patch:
     copy: int = 1
 
     def from_pattern(self, points: Floats) -> Floats:
-        """``points`` (n, 2) of the pattern in the patch frame."""
+        """``points`` (n, 2) of the pattern, in the frame of the patch."""
         return turned(points - self.origin_mm, self.rotation_deg)
 
 
 @dataclass(frozen=True, eq=False)
-class Framed:
-    """All ``pieces`` of a pattern, the ``numbers`` (N,) int64 of their tabs, and the patches that
-    they are, of one copy of the model.
+class FramedPatches:
+    """The patches of one copy of the model: ``outlined`` in the pattern's plane, ``patches`` in
+    their own frames, and the ``numbers`` (N,) int64 of their tabs.
     """
 
-    pieces: Pieces
+    outlined: OutlinedPatches
     numbers: Ints
     patches: tuple[Patch, ...]
 
 
 def frame_patches(
     pattern: CreasePattern, stock: LaidStock, material: Material, options: LayoutOptions
-) -> Framed:
+) -> FramedPatches:
     """The patches of a pattern, each no larger than the main sheet of ``stock``.
 
     Raises :class:`~miurafab.errors.LayoutError` as
-    :func:`~miurafab.fabrication.partition.patch_outline.make_pieces`.
+    :func:`~miurafab.fabrication.partition.patch_outline.outline_patches`.
     """
     kind = stock.kinds.kinds[stock.main]
     turns = tuple(sorted({turn // 90 % 2 for turn in kind.rotations})) if stock.upright else None
-    pieces = make_pieces(pattern, kind.width, kind.height, material, options, turns=turns)
-    numbers = _numbers(pieces)
+    outlined = outline_patches(pattern, kind.width, kind.height, material, options, turns=turns)
+    numbers = _numbers(outlined)
     space = Space(kind.width, kind.height, turns)
     patches = (
-        _patch(pattern, number, piece, pieces, numbers, space)
-        for number, piece in enumerate(pieces.pieces)
+        _patch(number, patch, outlined, numbers, space)
+        for number, patch in enumerate(outlined.patches)
     )
-    return Framed(pieces, numbers, tuple(patches))
+    return FramedPatches(outlined, numbers, tuple(patches))
 
 
 def copied(patches: tuple[Patch, ...], quantity: int) -> tuple[Patch, ...]:
-    """The patches of ``quantity`` models, model by model; told apart by their ids and labels."""
+    """The patches of ``quantity`` models, model by model, with ids and labels of their own."""
     if quantity == 1:
         return patches
     count = len(patches)
@@ -102,18 +106,18 @@ def copied(patches: tuple[Patch, ...], quantity: int) -> tuple[Patch, ...]:
     )
 
 
-def _numbers(pieces: Pieces) -> Ints:
+def _numbers(outlined: OutlinedPatches) -> Ints:
     """The number of each tab, from 1, patch by patch along the outline."""
-    numbers = np.empty(len(pieces.tabs), dtype=np.int64)
-    order = np.concatenate([piece.tabs for piece in pieces.pieces])
+    numbers = np.empty(len(outlined.tabs), dtype=np.int64)
+    order = np.concatenate([patch.tabs for patch in outlined.patches])
     numbers[order] = np.arange(1, len(order) + 1)
     return numbers
 
 
 def _patch(
-    pattern: CreasePattern, number: int, piece: Piece, pieces: Pieces, numbers: Ints, space: Space
+    number: int, patch: OutlinedPatch, outlined: OutlinedPatches, numbers: Ints, space: Space
 ) -> Patch:
-    line = piece.cut_lines[0]
+    line = patch.cut_lines[0]
     angle = space.turn(line)
     if angle is None:
         raise LayoutError(f"Patch {number} with its tabs does not fit the bed at any angle.")
@@ -124,13 +128,13 @@ def _patch(
     def framed(points: Floats) -> Floats:
         return np.round(turned(points - origin, rotation), DIGITS)
 
-    tabs = pieces.tabs
+    tabs = outlined.tabs
     return Patch(
         id=number,
         label=f"P{number + 1}",
-        faces=piece.faces,
+        faces=patch.faces,
         outline_mm=framed(line),
-        waste_mm=tuple(framed(ring) for ring in piece.cut_lines[1:]),
+        waste_mm=tuple(framed(ring) for ring in patch.cut_lines[1:]),
         origin_mm=(float(origin[0]), float(origin[1])),
         rotation_deg=rotation,
         tabs=tuple(
@@ -138,10 +142,10 @@ def _patch(
                 number=int(numbers[tab]),
                 edge=int(tabs.edge[tab]),
                 mate_edge=int(tabs.seams.edges[tab, 1]),
-                mate_patch=int(pieces.face_patch[tabs.mate_face[tab]]),
+                mate_patch=int(outlined.face_patch[tabs.mate_face[tab]]),
                 polygon_mm=framed(tabs.polygon(tab)),
                 fold=FOLDS.get(str(tabs.seams.fold[tab]), "flat"),
             )
-            for tab in piece.tabs.tolist()
+            for tab in patch.tabs.tolist()
         ),
     )

@@ -1,10 +1,10 @@
-"""A piece: one patch as it is cut out, facets, tabs and cut line, still in the pattern's plane.
+"""Outlines of patches with their tabs, and their cut lines, in the plane of the pattern.
 
-The outline of a piece is the boundary of its patch with each of its own tabs let in on its seam
-edge. Tabs lie in facets of other patches, so this is a simple closed curve, unless the flat pattern
-overlaps itself or a tab stands on the border of the pattern, where nothing keeps it clear of the
-rest; tabs that would collide then are left out by name. A piece that outgrows the bed by tabs put
-on the other side of a seam, or made higher, does without those.
+The outline of a patch is its boundary, with each of its tabs inserted at its seam edge. Tabs lie in
+facets of other patches, so the outline is a simple closed curve. There are two exceptions: the flat
+pattern overlaps itself, or a tab stands on the border of the pattern and meets the patch. Tabs that
+collide there are left out and listed. If a patch exceeds the bed because of tabs on the other side
+of a seam or of higher tabs, it gets standard tabs only.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from miurafab.profiles import Material
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """One patch in the pattern's plane, in mm.
+class OutlinedPatch:
+    """One patch in the plane of the pattern, in mm.
 
-    ``faces`` (n,) int64 are its facets and ``tabs`` (t,) int64 its tabs, in turn along its
-    outline; ``outline`` (m, 2) is the finished piece, counter-clockwise, and ``cut_lines`` what
-    the beam follows: the outer ring first, then rings around enclosed waste.
+    ``faces`` (n,) int64 are its facets, ``tabs`` (t,) int64 its tabs in order along the outline,
+    ``outline`` (m, 2) is the finished outline, counter-clockwise, and ``cut_lines`` are the paths
+    of the beam: the outer ring first, then rings around enclosed waste.
     """
 
     faces: Ints
@@ -42,18 +42,18 @@ class Piece:
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
-    """All pieces of a pattern. ``face_patch`` (F,) is the piece of each facet, ``tabs`` all tabs,
-    and ``untabbed`` (u,) the seam edges where neither side can bear one.
+class OutlinedPatches:
+    """All ``patches`` of a pattern: ``face_patch`` (F,) the patch of each facet, ``tabs`` all tabs,
+    ``untabbed`` (u,) the seam edges where neither side can bear a tab.
     """
 
-    pieces: list[Piece]
+    patches: list[OutlinedPatch]
     face_patch: Ints
     tabs: TabRegions
     untabbed: Ints
 
 
-def make_pieces(
+def outline_patches(
     pattern: CreasePattern,
     width: float,
     height: float,
@@ -61,9 +61,9 @@ def make_pieces(
     options: LayoutOptions | None = None,
     *,
     turns: tuple[int, ...] | None = None,
-) -> Pieces:
-    """The pattern split into pieces that each fit ``width`` x ``height`` mm, cut lines included,
-    turned at will or by quarter ``turns`` alone.
+) -> OutlinedPatches:
+    """The pattern split into patches that each fit ``width`` x ``height`` mm with their cut lines,
+    at any angle or by quarter ``turns`` only.
 
     Raises :class:`~miurafab.errors.LayoutError` as
     :func:`~miurafab.fabrication.partition.split.split`.
@@ -95,14 +95,16 @@ def make_pieces(
     lines = cut_lines(outlines, material.kerf_mm)
     order = np.argsort(face_patch, kind="stable")
     faces = np.split(order, np.flatnonzero(np.diff(face_patch[order])) + 1)
-    pieces = [Piece(*parts) for parts in zip(faces, standing, outlines, lines, strict=True)]
-    return Pieces(pieces, face_patch, tabs, untabbed)
+    patches = [
+        OutlinedPatch(*parts) for parts in zip(faces, standing, outlines, lines, strict=True)
+    ]
+    return OutlinedPatches(patches, face_patch, tabs, untabbed)
 
 
 def _outlines(
     pattern: CreasePattern, face_patch: Ints, around: list[Boundary], tabs: TabRegions
 ) -> tuple[list[Floats], list[Ints]]:
-    """The outline of each patch, and its tabs in turn along it."""
+    """The outline of each patch, and its tabs in order along the outline."""
     tab_of_edge = np.full(len(pattern.edges_vertices), -1)
     tab_of_edge[tabs.edge] = np.arange(len(tabs))
     owner = face_patch[tabs.own_face]
@@ -116,7 +118,7 @@ def _outlines(
         parts = []
         before = 0
         for at in np.flatnonzero(found >= 0).tolist():
-            # The base is the tab's first side; the outline leaves it out and goes around.
+            # The base is the first side of the tab; the outline goes around the tab instead.
             parts += [corners[before : at + 1], np.roll(tabs.polygon(found[at]), -1, axis=0)]
             before = at + 1
         outlines.append(np.concatenate([*parts, corners[before:]]))
@@ -131,7 +133,7 @@ def _without_collisions(
     standing: list[Ints],
     tabs: TabRegions,
 ) -> Bools:
-    """(N,) which tabs may stay."""
+    """(N,) whether each tab is free of collisions."""
     kept = np.ones(len(tabs), dtype=bool)
     valid = shapely.is_valid(np.array([shapely.Polygon(outline) for outline in outlines]))
     for patch in np.flatnonzero(~valid).tolist():
@@ -146,7 +148,7 @@ def _without_collisions(
 
 
 def _meets_in_base(taken: BaseGeometry, tab: shapely.Polygon) -> bool:
-    """Whether ``tab`` touches what is taken in its base alone, its first side."""
+    """Whether ``tab`` touches ``taken`` in its base only, its first side."""
     base = shapely.LineString(shapely.get_coordinates(tab)[:2])
     rest = shapely.difference(tab.exterior, base.buffer(1e-6))
     return bool(shapely.distance(rest, taken) > 0)

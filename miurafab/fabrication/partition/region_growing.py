@@ -1,12 +1,12 @@
-"""The split of any mesh of facets into patches that are never invalid, by growing regions.
+"""Split of any mesh of facets into valid patches, by region growing.
 
-A patch starts at one facet and takes in neighbours one by one. A facet is taken only if the patch
-still fits the bed with its tabs and stays a disk: the sides that the facet shares with the patch
-must form one chain, and the facet must touch the patch in no vertex outside that chain. So no
-patch ever has a hole or a pinched vertex, whatever the mesh: rings, holes, cuts, several pieces.
+A patch starts at one facet and adds neighbours one by one. A facet is added only if the patch still
+fits the bed with its tabs and stays a disk: the sides that the facet shares with the patch must
+form one chain, and the facet must touch the patch in no vertex outside of this chain. So no patch
+has a hole or a pinched vertex, even if the mesh has rings, holes, cuts or several components.
 
-Of two facets the one is taken first that needs the smaller box, of the bed's proportions, from
-the corner where the patch began; afterwards neighbours that fit together are merged.
+Facets are added in the order of the box, of the bed's proportions, that reaches them from the first
+facet; the smallest box comes first. Finally neighbouring patches that fit together are merged.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 
 
 class _Growth:
-    """The state of one split: which patch each facet and vertex belongs to so far."""
+    """The state of a split: the patch of each facet (-1: none yet), the last patch of a vertex."""
 
     def __init__(
         self,
@@ -49,14 +49,14 @@ class _Growth:
         self.rank = _ranks(pattern, space)
 
     def keeps_disk(self, face: int, patch: int) -> bool:
-        """Whether ``patch`` stays a disk when it takes ``face``."""
+        """Whether ``patch`` stays a disk with ``face`` added."""
         shared = [other >= 0 and self.patch[other] == patch for other in self.across[face]]
         chains = sum(here and not shared[k - 1] for k, here in enumerate(shared))
         touched = sum(self.stamp[v] == patch for v in self.corners[face])
         return bool(chains == 1 and touched == sum(shared) + 1)
 
     def grow(self, seed: int, patch: int) -> None:
-        """Grow ``patch`` from ``seed`` as far as it goes."""
+        """Grow ``patch`` from ``seed`` until no neighbour can be added."""
         taken, values = 0, self.reach[seed]
         x0, y0 = self.rank[seed]
         waiting = [(0.0, seed)]
@@ -76,7 +76,7 @@ class _Growth:
             for v in self.corners[face]:
                 self.stamp[v] = patch
             for other in self.across[face]:
-                # A facet that would have closed a ring may be taken once more sides touch it.
+                # A facet that would have closed a ring may be added once more sides touch it.
                 if other >= 0 and self.patch[other] == -1:
                     times = tried.get(other, 0)
                     if times < len(self.corners[other]):
@@ -92,10 +92,10 @@ def grow_patches(
     faces: Ints | None = None,
     most: int | None = None,
 ) -> Ints:
-    """(F,) patch ids from 0 of ``faces`` (all by default), -1 for the others.
+    """(F,) patch ids from 0 of ``faces`` (default: all), -1 for other facets.
 
-    ``reach`` (F, D) are the support values of each facet with all tabs that may stand on it, and
-    every facet must fit ``space`` alone. ``most`` limits the facets of a patch.
+    ``reach`` (F, D) are the support values of each facet with all tabs that may stand on it; every
+    facet must fit ``space`` alone. ``most`` limits the number of facets of a patch.
     """
     total = len(pattern.faces_vertices)
     free = np.ones(total, dtype=bool)
@@ -114,7 +114,7 @@ def grow_patches(
 
 
 def _ranks(pattern: CreasePattern, space: Space) -> Floats:
-    """(F, 2) facet centres in the pattern's principal axes, in units of the bed's sides."""
+    """(F, 2) facet centres along the principal axes of the pattern, in units of the bed's sides."""
     centres = facet_means(pattern.vertices_coords, pattern.faces_vertices)
     centred, axes = centres - centres.mean(axis=0), principal_axes(centres)
     sides = max(space.width, space.height), min(space.width, space.height)
@@ -124,7 +124,7 @@ def _ranks(pattern: CreasePattern, space: Space) -> Floats:
 def _merged(
     pattern: CreasePattern, reach: NDArray[np.float32], space: Space, face_patch: Ints
 ) -> Ints:
-    """Neighbouring patches joined, smallest first, while the union is a disk that fits."""
+    """Neighbouring patches merged, the smallest first, if the union is a disk that fits."""
     count = int(face_patch.max(initial=-1)) + 1
     members = [np.flatnonzero(face_patch == patch) for patch in range(count)]
     values = [reach[faces].max(axis=0) for faces in members]
@@ -163,10 +163,10 @@ def _merged(
 
 
 def is_disk(pattern: CreasePattern, faces: Ints) -> bool:
-    """Whether the facets ``faces`` are connected, without holes and without pinched vertices.
+    """Whether the facets ``faces`` form a disk: connected, no holes, no pinched vertices.
 
-    A boundary that is one simple closed loop of vertices encloses a disk; connected facets with
-    that boundary and Euler characteristic 1 are it.
+    They do if their boundary is one simple closed loop of vertices and their Euler characteristic
+    is 1.
     """
     inside = np.zeros(len(pattern.faces_vertices), dtype=bool)
     inside[faces] = True

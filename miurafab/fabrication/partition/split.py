@@ -1,11 +1,11 @@
-"""The pattern split into patches: connected pieces without holes that fit the bed with their tabs.
+"""Split of a pattern into patches: disks of facets that fit the bed with their tabs.
 
 A pattern that fits is one patch. Otherwise a grid of facets is cut into bands and runs
-(:mod:`~miurafab.fabrication.partition.grid_dp`), and any other mesh is grown into regions
-(:mod:`~miurafab.fabrication.partition.region_growing`). Either is then made better without regard
-to grid lines (:mod:`~miurafab.fabrication.partition.improve`), unless patches have to keep the
-pattern's directions. A flat pattern may overlap itself; a patch may not, and one that does is grown
-again in halves until none does.
+(:mod:`~miurafab.fabrication.partition.grid_dp`), and any other mesh is split by region growing
+(:mod:`~miurafab.fabrication.partition.region_growing`). The split is then improved without regard
+to grid lines (:mod:`~miurafab.fabrication.partition.improve`), unless patches must keep the
+directions of the pattern. A flat pattern may overlap itself, but a patch may not: a patch that does
+is halved until no patch overlaps itself.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.fit_box import Space, box_of, support
-from miurafab.fabrication.partition.grid_dp import GridShape, Rectangle, split_grid
+from miurafab.fabrication.partition.grid_dp import Block, GridShape, split_grid
 from miurafab.fabrication.partition.improve import improved
 from miurafab.fabrication.partition.region_growing import grow_patches, is_disk
 from miurafab.fabrication.seams import inner_seams
@@ -31,13 +31,13 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
 _MANY = 30_000
-"""In grids of more facets only every other angle is tried."""
+"""In grids with more facets only every other angle is tried."""
 
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """The closed boundary of a patch, counter-clockwise: pattern vertex i is followed by pattern
-    edge i. ``vertices`` and ``edges`` (n,) int64.
+    """The closed boundary of a patch, counter-clockwise: ``vertices`` and ``edges`` (n,) int64 of
+    the pattern; edge i follows vertex i.
     """
 
     vertices: Ints
@@ -53,13 +53,13 @@ def split(
     *,
     turns: tuple[int, ...] | None = None,
 ) -> Ints:
-    """(F,) the patch of each facet, from 0, so that each fits ``width`` x ``height`` mm, turned at
-    will or by quarter ``turns`` alone (:class:`~miurafab.fabrication.partition.fit_box.Space`).
+    """(F,) the patch of each facet, from 0.
 
-    Tabs are counted in, and stand on the patch that ``options`` say, usually the one with the
-    lower number. Raises :class:`~miurafab.errors.LayoutError` naming the facet if one is not a
-    simple polygon or does not fit alone, and where ``options`` want seams along grid lines that
-    the pattern does not have.
+    Each patch with its tabs fits ``width`` x ``height`` mm, at any angle or by quarter ``turns``
+    only (:class:`~miurafab.fabrication.partition.fit_box.Space`).
+    Tabs stand on the patch that ``options`` name, by default the patch with the lower number.
+    Raises :class:`~miurafab.errors.LayoutError` naming the facet if a facet is not a simple polygon
+    or does not fit alone, and if ``options`` ask for seams along grid lines that do not exist.
     """
     options = options or LayoutOptions()
     space = Space(width, height, turns)
@@ -77,13 +77,13 @@ def split(
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
     turned = options.tab_side == "upper"
     if turned and cells is not None:
-        # Seen from the other corner of the grid the upper patch is the lower one.
+        # Seen from the opposite corner of the grid, the upper patch is the lower patch.
         cells = cells[::-1, ::-1]
         rows, columns = cells.shape
         blocks = [(rows - r1, rows - r0, columns - c1, columns - c0) for r0, r1, c0, c1 in blocks]
     both = cells is None or options.tab_side == "alternate"
     if cells is None or both:
-        # Which patch bears a tab is not known yet: every tab that may stand is counted in.
+        # It is not known yet which patch bears a tab, so every possible tab is counted.
         edges = np.concatenate([inner, inner])
         sides = np.repeat([0, 1], len(inner))
     else:
@@ -140,8 +140,8 @@ def split(
     return found.max() - found if turned else found
 
 
-def _blocks(cells: Ints | None, options: LayoutOptions) -> list[Rectangle]:
-    """The parts of the grid between the seams that ``options`` ask for."""
+def _blocks(cells: Ints | None, options: LayoutOptions) -> list[Block]:
+    """The blocks of the grid between the seams that ``options`` ask for."""
     wanted = {"row": options.seam_rows, "column": options.seam_columns}
     if cells is None:
         for name, lines in wanted.items():
@@ -181,7 +181,7 @@ def _with_tabs(
 
 
 def _tab_room(pattern: CreasePattern, tabs: TabRegions) -> float:
-    """How far in mm any of the tabs stands out from the facet that bears it."""
+    """The largest distance in mm that a tab reaches from the facet that bears it."""
     base = pattern.vertices_coords[pattern.edges_vertices[tabs.edge]]
     way = base[:, 1] - base[:, 0]
     way /= np.linalg.norm(way, axis=1)[:, None]
@@ -191,10 +191,7 @@ def _tab_room(pattern: CreasePattern, tabs: TabRegions) -> float:
 
 
 def boundaries(pattern: CreasePattern, face_patch: Ints) -> list[Boundary]:
-    """The boundary of each patch of the split ``face_patch`` (F,), by patch id.
-
-    Each begins at its lowest-numbered edge.
-    """
+    """The boundary of each patch of ``face_patch`` (F,), by patch id, from its lowest edge on."""
     face, corner = np.nonzero(pattern.faces_vertices >= 0)
     edge = pattern.faces_edges[face, corner]
     tail = pattern.faces_vertices[face, corner]
@@ -288,7 +285,7 @@ def _grid_shape(
     tabs: TabRegions,
     tab_values: NDArray[np.float32],
 ) -> GridShape:
-    """What the split of the grid needs; ``tabs`` stand on the lower one of two facets."""
+    """The grid with its support values; ``tabs`` stand on the lower of two facets."""
     rows, columns = cells.shape
     place = _places(cells)
     own = place[tabs.own_face]
@@ -314,7 +311,7 @@ def _grid_shape(
 def _check_alone(
     pattern: CreasePattern, doubtful: Bools, tabs: TabRegions, space: Space, options: LayoutOptions
 ) -> None:
-    """Raise a LayoutError for the first ``doubtful`` (F,) facet that does not fit at any angle."""
+    """Raise a LayoutError for the first ``doubtful`` (F,) facet that fits at no angle."""
     for face in np.flatnonzero(doubtful).tolist():
         corners = pattern.faces_vertices[face]
         facet = pattern.vertices_coords[corners[corners >= 0]]
@@ -342,8 +339,8 @@ def _check_alone(
 def _overlapping(pattern: CreasePattern, face_patch: Ints) -> list[int]:
     """The patches whose boundary crosses or touches itself in the plane.
 
-    Facets are counter-clockwise, so a patch is an immersed disk, and it overlaps itself only if
-    its boundary is not a simple closed curve.
+    Facets are counter-clockwise, so a patch is an immersed disk. It overlaps itself only if its
+    boundary is not a simple closed curve.
     """
     rings = [pattern.vertices_coords[b.vertices] for b in boundaries(pattern, face_patch)]
     valid = shapely.is_valid(np.array([shapely.Polygon(ring) for ring in rings]))
@@ -353,12 +350,12 @@ def _overlapping(pattern: CreasePattern, face_patch: Ints) -> list[int]:
 def _without_overlaps(
     pattern: CreasePattern, face_patch: Ints, reach: NDArray[np.float32], space: Space
 ) -> Ints:
-    """The split with every patch that overlaps itself grown again in halves, ids from 0."""
+    """The split with every patch that overlaps itself halved until none does, ids from 0."""
     while True:
         bad = _overlapping(pattern, face_patch)
         if not bad:
             return face_patch
-        # Ids are spread to make room for the parts, so that neighbours keep their order.
+        # Ids are spread to make room for the parts, so that the order of patches stays.
         face_patch = face_patch * len(face_patch)
         for patch in bad:
             faces = np.flatnonzero(face_patch == patch * len(face_patch))

@@ -8,7 +8,13 @@ from flat_patterns import miura
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miurafab.fabrication.partition.cover import Relaxation, brickwork, excess, frame_of, nearest
+from miurafab.fabrication.partition.cover import (
+    Relaxation,
+    brickwork,
+    excess,
+    nearest,
+    rectangle_around,
+)
 from miurafab.fabrication.partition.cover_search import CoverSearch
 from miurafab.fabrication.partition.fit_box import best_turn
 
@@ -30,18 +36,20 @@ def squares(columns: int, rows: int, side: float, turn: float = 0.0) -> np.ndarr
 @settings(derandomize=True, max_examples=100, deadline=None)
 @given(clouds, sides, sides)
 def test_a_frame_holds_points_exactly_if_some_turn_fits_them(points, width, height):
-    frame = frame_of(points, width, height)
-    over = excess(points[None], frame, width, height)[0]
+    rectangle = rectangle_around(points, width, height)
+    over = excess(points[None], rectangle, width, height)[0]
     fits = any(best_turn(points, *size) is not None for size in ((width, height), (height, width)))
     assert (over <= 1e-9) == fits
 
 
 def test_nearest_tells_the_frames_that_a_point_lies_deepest_in():
     rng = np.random.default_rng(1)
-    frames = np.column_stack([rng.uniform(0, 900, (12, 2)), rng.uniform(0, 3, 12)])
+    rectangles = np.column_stack([rng.uniform(0, 900, (12, 2)), rng.uniform(0, 3, 12)])
     points = rng.uniform(0, 900, (200, 2))
-    every = np.stack([excess(points[:, None], frame, 300.0, 200.0) for frame in frames], axis=1)
-    near, apart = nearest(points, frames, 300.0, 200.0, 12)
+    every = np.stack(
+        [excess(points[:, None], rectangle, 300.0, 200.0) for rectangle in rectangles], axis=1
+    )
+    near, apart = nearest(points, rectangles, 300.0, 200.0, 12)
     np.testing.assert_allclose(apart, np.take_along_axis(every, near, axis=1))
     assert (np.sort(near, axis=1) == np.arange(12)).all()
 
@@ -49,10 +57,10 @@ def test_nearest_tells_the_frames_that_a_point_lies_deepest_in():
 def test_the_gradient_of_the_loss_is_its_slope():
     rng = np.random.default_rng(5)
     relaxation = Relaxation(squares(40, 30, 10.0, 0.2), 130.0, 90.0)
-    frames = brickwork(relaxation.shapes, (130.0, 90.0))[0]
-    frames = frames + rng.normal(size=frames.shape) * [6.0, 6.0, 0.02]
-    relaxation.look(frames)
-    steps = (frames * [1.0, 1.0, 250.0]).ravel()
+    rectangles = brickwork(relaxation.shapes, (130.0, 90.0))[0]
+    rectangles = rectangles + rng.normal(size=rectangles.shape) * [6.0, 6.0, 0.02]
+    relaxation.look(rectangles)
+    steps = (rectangles * [1.0, 1.0, 250.0]).ravel()
     _, slope = relaxation._loss(steps)
     for place in range(len(steps)):
         ahead, behind = steps.copy(), steps.copy()
@@ -67,17 +75,17 @@ def test_brickwork_over_whole_rows_is_a_cover(turn):
     shapes = squares(48, 30, 10.0, turn)
     relaxation = Relaxation(shapes, 121.0, 101.0)
     counts = []
-    for frames in brickwork(shapes, (121.0, 101.0)):
-        _, loss = relaxation.relax(frames)
-        counts.append(len(frames))
+    for rectangles in brickwork(shapes, (121.0, 101.0)):
+        _, loss = relaxation.relax(rectangles)
+        counts.append(len(rectangles))
         assert loss <= 1.0
     assert 12 in counts
 
 
 def test_a_needless_frame_is_found_and_left_out():
     shapes = squares(48, 20, 10.0)
-    frames = np.array([[x, y, 0.0] for y in (50.0, 150.0) for x in (60.0, 180.0, 300.0, 420.0)])
-    extra = np.vstack([frames, [200.0, 90.0, 0.7]])
+    rectangles = np.array([[x, y, 0.0] for y in (50.0, 150.0) for x in (60.0, 180.0, 300.0, 420.0)])
+    extra = np.vstack([rectangles, [200.0, 90.0, 0.7]])
     search = CoverSearch(shapes, 122.0, 102.0)
     cover = search.fewer([search.begin(extra)], 8, 200.0)
     assert cover is not None
@@ -95,7 +103,7 @@ def test_the_search_is_the_same_each_time():
     def searched() -> bytes:
         search = CoverSearch(shapes, 150.0, 110.0, seed=3)
         starts = [search.begin(each) for each in brickwork(shapes, (150.0, 110.0))]
-        count = min(len(start.frames) for start in starts)
+        count = min(len(start.rectangles) for start in starts)
         cover = search.fewer(starts, count - 1, 60.0)
         return b"" if cover is None else cover.tobytes()
 

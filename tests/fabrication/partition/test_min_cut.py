@@ -1,4 +1,4 @@
-"""Seams between frames: as short as they can be, and nothing stands out."""
+"""Seams between rectangles: as short as they can be, and nothing stands out."""
 
 from __future__ import annotations
 
@@ -8,16 +8,24 @@ import numpy as np
 import pytest
 from flat_patterns import card, miura, without_grid
 
-from miurafab.fabrication.partition.cover import frame_of
+from miurafab.fabrication.partition.cover import rectangle_around
 from miurafab.fabrication.partition.min_cut import Recut
 from miurafab.fabrication.partition.region_growing import is_disk
 
 
-def recut(pattern, patch, frames, size, tab=3.0):
+def recut(pattern, patch, rectangles, size, tab=3.0):
     room = pattern.vertices_coords[pattern.faces_vertices]
     part = np.zeros_like(patch)
     return Recut(
-        pattern, patch, frames, size, room, part, card(tab=tab), full_facet=False, alternate=False
+        pattern,
+        patch,
+        rectangles,
+        size,
+        room,
+        part,
+        card(tab=tab),
+        full_facet=False,
+        alternate=False,
     )
 
 
@@ -37,11 +45,14 @@ def test_a_seam_with_fjords_is_cut_straight(grid):
     patch = (column >= 10 + 2 * (row % 2)).astype(np.int64)
     points = pattern.vertices_coords
     size = (170.0, 150.0)
-    frames = np.array(
-        [frame_of(points[points[:, 0] <= 164], *size), frame_of(points[points[:, 0] >= 84], *size)]
+    rectangles = np.array(
+        [
+            rectangle_around(points[points[:, 0] <= 164], *size),
+            rectangle_around(points[points[:, 0] >= 84], *size),
+        ]
     )
     before = seam_mm(pattern, patch)
-    cut = recut(pattern, patch, frames, size)
+    cut = recut(pattern, patch, rectangles, size)
     assert cut.faults() == 0
     cut.run(3)
     assert cut.faults() == 0
@@ -51,15 +62,15 @@ def test_a_seam_with_fjords_is_cut_straight(grid):
 
 
 def test_a_cut_is_the_least_of_all_splits():
-    """Against every assignment of the facets that both frames hold."""
+    """Against every assignment of the facets that both rectangles hold."""
     pattern = miura(7, 4, a=10.0, b=12.0, sector=1.1)
     row, column = np.divmod(np.arange(28), 7)
     patch = (column + (row % 2) > 3).astype(np.int64)
     size = (57.0, 49.0)
     left = pattern.vertices_coords[pattern.faces_vertices[column <= 3]].reshape(-1, 2)
     right = pattern.vertices_coords[pattern.faces_vertices[column >= 3]].reshape(-1, 2)
-    frames = np.array([frame_of(left, *size), frame_of(right, *size)])
-    cut = recut(pattern, patch, frames, size)
+    rectangles = np.array([rectangle_around(left, *size), rectangle_around(right, *size)])
+    cut = recut(pattern, patch, rectangles, size)
     free = np.intersect1d(*cut.held)
     assert 3 <= len(free) <= 12
 
@@ -84,5 +95,5 @@ def test_frames_put_about_their_patches_hold_facets_and_tabs():
     size = (180.0, 152.0)
     cut = recut(pattern, patch, np.zeros((2, 3)), size)
     assert cut.faults() > 0
-    cut.reframe()
+    cut.refit()
     assert cut.faults() == 0

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.fit_box import best_turn
-from miurafab.fabrication.partition.patch_outline import make_pieces
+from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.partition.split import boundaries, split
 from miurafab.fabrication.tabs import choose_tabs
@@ -59,24 +59,24 @@ def test_every_facet_is_in_one_patch_and_every_patch_is_a_disk_that_fits(name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_pieces_fit_with_tabs_and_kerf(name):
-    for piece in make_pieces(CASES[name], 190.0, 140.0, card(kerf=0.4)).pieces:
+    for piece in outline_patches(CASES[name], 190.0, 140.0, card(kerf=0.4)).patches:
         assert best_turn(piece.cut_lines[0], 190.0, 140.0) is not None
 
 
 @pytest.mark.parametrize("turns", [(0,), (1,), (0, 1)])
 @pytest.mark.parametrize("name", CASES)
 def test_pieces_that_keep_the_directions_of_the_pattern_fit_as_they_are(name, turns):
-    pieces = make_pieces(CASES[name], 190.0, 140.0, card(kerf=0.4), turns=turns)
-    assert_patches_are_sound(CASES[name], pieces.face_patch, 340.0, 340.0)
+    outlined = outline_patches(CASES[name], 190.0, 140.0, card(kerf=0.4), turns=turns)
+    assert_patches_are_sound(CASES[name], outlined.face_patch, 340.0, 340.0)
     sizes = np.array([(190.0, 140.0), (140.0, 190.0)])[list(turns)] + 1e-6
-    for piece in pieces.pieces:
+    for piece in outlined.patches:
         assert (np.ptp(piece.cut_lines[0], axis=0) <= sizes).all(axis=1).any()
 
 
 def test_a_facet_larger_than_a_patch_may_be_is_named():
     options = LayoutOptions(max_patch_mm=(12.0, 8.0))
     with pytest.raises(LayoutError, match=r"Facet 0 .* fit a patch of 12 mm x 8 mm; .* larger"):
-        make_pieces(miura(8, 10), 190.0, 140.0, card(), options)
+        outline_patches(miura(8, 10), 190.0, 140.0, card(), options)
 
 
 def test_squares_that_keep_their_directions_are_split_into_as_few_patches_as_possible():
@@ -257,12 +257,12 @@ def jobs(draw):
 def test_any_split_is_of_disks_that_fit_with_their_tabs(job):
     pattern, bed, tab_side = job
     options = LayoutOptions(tab_side=tab_side)
-    pieces = make_pieces(pattern, *bed, card(), options)
-    assert_patches_are_sound(pattern, pieces.face_patch, *bed)
-    for piece in pieces.pieces:
+    outlined = outline_patches(pattern, *bed, card(), options)
+    assert_patches_are_sound(pattern, outlined.face_patch, *bed)
+    for piece in outlined.patches:
         assert best_turn(piece.cut_lines[0], *bed) is not None
-    split_again = make_pieces(pattern, *bed, card(), options).face_patch
-    np.testing.assert_array_equal(pieces.face_patch, split_again)
+    split_again = outline_patches(pattern, *bed, card(), options).face_patch
+    np.testing.assert_array_equal(outlined.face_patch, split_again)
 
 
 @pytest.mark.parametrize("tab_side", ["lower", "upper", "alternate"])
