@@ -26,6 +26,24 @@ def regular(columns: int = 9, rows: int = 7) -> CreasePattern:
     return unfold(regular_miura(CELL, columns, rows))
 
 
+def assert_mountains_and_valleys(pattern: CreasePattern) -> None:
+    """A valley raises the facet beyond the crease over the facet before it, a mountain lowers it.
+
+    Facets run counter-clockwise seen from above. Only heights over planes are used, and no angle.
+    """
+    points, faces = pattern.folded_coords, pattern.faces_vertices
+    inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+    near, far = faces[pattern.edges_faces[inner, 0]], faces[pattern.edges_faces[inner, 1]]
+    p = points[near]
+    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    beyond = points[far].mean(axis=1) - points[pattern.edges_vertices[inner, 0]]
+    height = np.einsum("ek,ek->e", normal, beyond)
+    letters, angles = pattern.edges_assignment[inner], pattern.edges_fold_angle[inner]
+    assert set(letters) == {"M", "V"}
+    assert ((height > 0) == (letters == "V")).all()
+    assert ((angles > 0) == (letters == "V")).all()
+
+
 @cache
 def fitted(
     name: str, columns: int = 20, rows: int = 20, flat_foldable: float | None = None

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from problems import assert_mountains_and_valleys
 
 from miurafab.errors import InputError
 from miurafab.fabrication.open_ring import open_ring
@@ -17,6 +18,7 @@ from miurafab.origami.fitting.constraints import OrigamiConstraints
 from miurafab.origami.fitting.fit import fit
 from miurafab.origami.miura import MiuraCell, regular_miura
 from miurafab.origami.tessellation import Tessellation
+from miurafab.origami.unfold import unfold
 from miurafab.origami.verify import audit
 from miurafab.surfaces.analytic import GeneralizedCylinder
 from miurafab.surfaces.catalogue import make_surface
@@ -39,6 +41,27 @@ def test_the_cell_has_the_sides_and_angle_it_was_given(
     assert math.isclose(min(angle, math.pi - angle), alpha, rel_tol=1e-9)
 
 
+@settings(max_examples=50)
+@given(alpha=st.floats(0.3, 1.5), theta=st.floats(0.05, 1.5))
+def test_the_creases_of_a_miura_have_the_fold_angles_of_its_closed_form(
+    alpha: float, theta: float
+) -> None:
+    """2 theta along the rows and 2 atan(cos alpha tan theta) across them.
+
+    Ridges, the rows of odd index, are mountains; across the rows mountains and valleys alternate.
+    """
+    pattern = unfold(regular_miura(MiuraCell(12.0, 10.0, alpha, theta), 5, 6))
+    count = 6 * 4
+    along = pattern.edges_fold_angle[:count].reshape(6, 4)[1:-1]
+    across = pattern.edges_fold_angle[count:].reshape(5, 5)[:, 1:-1]
+    ridge = np.where(np.arange(1, 5) % 2, -1.0, 1.0)
+    assert np.allclose(along, ridge[:, None] * 2 * theta)
+    parity = np.add.outer(np.arange(5), np.arange(1, 4)) % 2
+    slope = 2 * math.atan(math.cos(alpha) * math.tan(theta))
+    assert np.allclose(across, np.where(parity, 1.0, -1.0) * slope)
+    assert_mountains_and_valleys(pattern)
+
+
 @pytest.mark.parametrize("name", ["cylinder", "log-spiral"])
 @pytest.mark.parametrize("level", [0.0, -0.5])
 def test_cylinders_are_exact_and_flat_foldable_without_a_solver(name: str, level: float) -> None:
@@ -47,6 +70,7 @@ def test_cylinders_are_exact_and_flat_foldable_without_a_solver(name: str, level
     sheet = cylinder_on(surface, 41, 41, 0.83, 1.4, level)
     constraints = OrigamiConstraints(sheet.grid, float(sheet.edge_lengths.mean()), True)
     assert np.abs(constraints(sheet.vertices.ravel())[0]).max() < 2e-14
+    assert_mountains_and_valleys(unfold(sheet))
 
 
 def test_the_top_of_a_cylinder_lies_on_it() -> None:

@@ -488,7 +488,7 @@ def test_creases_that_cannot_be_driven_are_refused():
     border = int(np.flatnonzero(pattern.edges_assignment == "B")[0])
     with pytest.raises(InputError, match=f"Edge {border} is not a crease"):
         folding_path(pattern, crease=border)
-    with pytest.raises(InputError, match="--steps is 0"):
+    with pytest.raises(InputError, match="'steps' is 0"):
         folding_path(pattern, 0)
 
 

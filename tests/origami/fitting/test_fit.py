@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from problems import fitted
+from problems import assert_mountains_and_valleys, fitted
 
 from miurafab.errors import InputError
 from miurafab.origami.fitting.fit import FitRequest, FitResult, fit
@@ -31,6 +31,7 @@ def check_valid(result: FitResult, name: str) -> None:
     assert result.pattern is not None
     found = audit(result.pattern, make_surface(name, {})[0])
     assert found.findings == ()
+    assert_mountains_and_valleys(result.pattern)
     m = found.measurements
     assert m.max_planarity is not None
     assert m.max_planarity <= 1e-12
