@@ -55,6 +55,22 @@ def test_a_helicoid_across_its_axis_fits() -> None:
     assert result.measurements.self_intersections == 0
 
 
+@pytest.mark.parametrize(
+    ("name", "given", "facets", "along"),
+    [("helicoid", {"pitch": 6}, 12, 1.15), ("bump", {"height": 0.8}, 10, 1.6)],
+)
+def test_twist_needs_less_stretch_along_the_rows_and_curvature_more(
+    name, given, facets, along
+) -> None:
+    """The first stretch, 1.3, fails on both; a later stretch succeeds from the seed alone."""
+    surface, _ = make_surface(name, given)
+    result = fit(FitRequest(surface=surface, facets=(facets, facets), polish="off"))
+    assert result.status == "converged"
+    assert {attempt.way for attempt in result.attempts} == {"seed"}
+    assert result.attempts[0].corrugation.stretch_along == pytest.approx(1.3)
+    assert result.attempts[-1].corrugation.stretch_along == pytest.approx(along)
+
+
 def test_the_same_request_gives_the_same_sheet() -> None:
     one, other = fit(request("sphere")), fit(request("sphere"))
     assert one.pattern is not None

@@ -13,6 +13,7 @@ from miurafab.origami.fitting.constraints import OrigamiConstraints
 from miurafab.origami.fitting.seed import Corrugation, seed
 from miurafab.origami.fitting.solver import project
 from miurafab.surfaces.catalogue import make_surface
+from miurafab.surfaces.surface import Swapped, tangents, unit
 
 
 @settings(max_examples=30)
@@ -56,3 +57,16 @@ def test_where_the_spacing_grows_to_one_side_the_paper_becomes_a_fan() -> None:
     sheet, _ = seed(surface, 17, 17, Corrugation.from_stretches(1.3, 1.3))
     across = np.linalg.norm(np.diff(sheet.points, axis=0), axis=-1).mean(axis=0)
     assert across[-1] > 1.5 * across[0]  # not the constant length of a rectangle of paper
+
+
+def test_the_upper_layer_slides_by_at_most_60_degrees() -> None:
+    """On a cylinder bent along the rows, neighbouring rows differ by H (N + t tan psi)."""
+    surface = Swapped(make_surface("cylinder", {"angle": "300deg"})[0])
+    sheet, steepest = seed(surface, 21, 6, Corrugation.from_stretches(1.3, 1.3))
+    uv = surface.domain.lattice(21, 5)
+    step = np.diff(sheet.points, axis=0)
+    tangent = unit(tangents(surface, uv)[0])
+    slide = np.einsum("jik,jik->ji", step, tangent)
+    height = np.einsum("jik,jik->ji", step, surface.normal(uv))
+    assert steepest > 3
+    assert np.abs(slide / height).max() == pytest.approx(math.tan(math.radians(60)))
