@@ -9,7 +9,7 @@ import re
 
 from pages import PAGES
 
-from miurafab.errors import spell_options
+from miurafab.errors import EXIT_CODES, spell_options
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.findings import RULES
 from miurafab.options import declared
@@ -67,6 +67,10 @@ def _checks():
     return ("code", "refused unless forced"), rows
 
 
+def _exits():
+    return ("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()]
+
+
 TABLES = {
     "FitOptions": lambda: _options(FitOptions),
     "LayoutOptions": lambda: _options(LayoutOptions),
@@ -75,6 +79,7 @@ TABLES = {
     "material": lambda: _keys(perforation=Perforation, tabs=TabRule, operations=Operation),
     "checks": _checks,
     "findings": _findings,
+    "exits": _exits,
 }
 
 

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 from flat_patterns import card
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from miurafab.errors import LayoutError
@@ -43,6 +43,7 @@ def test_dashes_fill_the_crease_exactly_and_symmetrically(length, cut, gap, brid
     np.testing.assert_allclose(dashes, (length - dashes)[::-1, ::-1], atol=1e-6)
     least = max(least, kerf + MIN_STROKE_MM)
     used = length - 2 * bridge
+    assume(abs(used - least) > 1e-9)  # at the step itself rounding decides
     if used < least:
         assert len(dashes) == 1
         if min(least, length / 2) > kerf + MIN_STROKE_MM:
@@ -52,9 +53,7 @@ def test_dashes_fill_the_crease_exactly_and_symmetrically(length, cut, gap, brid
     assert length - dashes[-1, 1] == pytest.approx(bridge, abs=1e-6)
     np.testing.assert_allclose(gaps, gap, atol=1e-6)
     np.testing.assert_allclose(lengths[1:-1], cut, atol=1e-6)
-    assert lengths.min(
-        initial=np.inf, where=np.arange(len(lengths)) % max(len(lengths) - 1, 1) == 0
-    )
+    assert lengths[[0, -1]].min() >= least - 1e-6
     if len(dashes) == 1:
         assert used < 2 * least + gap + 1e-6
         assert lengths[0] == pytest.approx(used, abs=1e-6)
