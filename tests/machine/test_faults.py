@@ -160,11 +160,10 @@ class Run:
         else:
             assert str(self.error).endswith(".")
             assert "\n" not in str(self.error)
-            assert self.error.exit_code == 3
-            assert not kinds <= HARMLESS or isinstance(self.error, JobStopped)
-            assert self.journal.ended == (
-                "stopped" if isinstance(self.error, JobStopped) else "failed"
-            )
+            stopped = isinstance(self.error, JobStopped)
+            assert self.error.exit_code == (130 if stopped else 3)
+            assert not kinds <= HARMLESS or stopped
+            assert self.journal.ended == ("stopped" if stopped else "failed")
             if self.begun and not kinds & UNREACHABLE:
                 assert self.wire.commands.endswith(b"\x18")
         # Lines went out once each, in order; those taken are the first of them.
