@@ -78,7 +78,7 @@ class Console:
         table.add_column(overflow="fold")
         for name, value in values.items():
             table.add_row(name.replace("_", " "), _cell(value))
-        _out().print(table)
+        Screen().print(table)
 
     def rows(
         self, columns: Sequence[str], rows: Sequence[Sequence[Any]], title: str | None = None
@@ -96,11 +96,11 @@ class Console:
             table.add_column(column, justify=justify, overflow="fold")
         for row in rows:
             table.add_row(*(_cell(value) for value in row))
-        _out().print(table)
+        Screen().print(table)
 
     def line(self, text: str) -> None:
         """One line of the readable answer."""
-        _out().print(spelled(text), markup=False)
+        Screen().print(spelled(text), markup=False)
 
     def findings(self, findings: Iterable[Finding]) -> None:
         """One line of the readable answer each; a finding that is no note says what it is."""
@@ -111,7 +111,7 @@ class Console:
     def note(self, text: str) -> None:
         """One line on standard error, unless silent."""
         if not self.is_silent:
-            _err().print(spelled(text), markup=False, style="dim")
+            Screen(stderr=True).print(spelled(text), markup=False, style="dim")
 
     @contextmanager
     def progress(self, label: str) -> Iterator[Callable[[float, str], None]]:
@@ -122,7 +122,7 @@ class Console:
             rich.progress.TaskProgressColumn(),
             rich.progress.TextColumn("{task.fields[note]}", style="dim"),
         )
-        screen = _err()
+        screen = Screen(stderr=True)
         with rich.progress.Progress(
             *columns, console=screen, disable=self.is_silent or not screen.is_terminal
         ) as bar:
@@ -138,12 +138,15 @@ def _cell(value: Any) -> Text:
     return Text(readable(spelled(value)))  # as text: a name may hold [brackets]
 
 
-def _out() -> rich.console.Console:
-    return rich.console.Console(highlight=False, soft_wrap=True)
+class Screen(rich.console.Console):
+    """A console that hands on that nobody reads it; rich alone would end the process with 1."""
 
+    def __init__(self, *, stderr: bool = False) -> None:
+        super().__init__(stderr=stderr, highlight=False, soft_wrap=True)
 
-def _err() -> rich.console.Console:
-    return rich.console.Console(stderr=True, highlight=False, soft_wrap=True)
+    def on_broken_pipe(self) -> None:
+        """Raise the ``BrokenPipeError`` that is being handled."""
+        raise
 
 
 def readable(value: Any) -> str:

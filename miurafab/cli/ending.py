@@ -67,8 +67,9 @@ def _end_of_os_error(error: OSError) -> int:
 
 
 def _nobody_reads() -> bool:
-    """Whether the reader of standard output has gone away."""
+    """Whether the reader of standard output has gone away, by another attempt to write."""
     try:
+        sys.stdout.write("\n")
         sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -37,6 +37,7 @@ from miurafab.cli import (
     tradeoff,
     virtual,
 )
+from miurafab.cli.console import Screen
 from miurafab.cli.declared import ARGUMENTS, EVERY_COMMAND, OPTIONS
 from miurafab.cli.help import HelpFormatter
 from miurafab.errors import DONE, EXIT_CODES, UsageError
@@ -164,7 +165,9 @@ def run(arguments: Sequence[str], serve_studio: studio.ServeStudio) -> int:
     command raises.
     """
     try:
-        command, bound, wanted = app.parse_args(arguments, exit_on_error=False, print_error=False)
+        command, bound, wanted = app.parse_args(
+            arguments, console=Screen(), exit_on_error=False, print_error=False
+        )
     except CycloptsError as error:
         raise UsageError(_sentence(error)) from None
     handed = {"serve": serve_studio, "program": app}

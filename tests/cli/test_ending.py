@@ -1,0 +1,182 @@
+"""How commands end: defects, Ctrl-C and readers that go away, each in one line and an exit code."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from command_line import sentence
+
+import miurafab
+from miurafab.errors import EXIT_CODES, MiurafabError
+from miurafab.version import __version__
+
+COMMANDS = {
+    "check": ("load_pattern", ("check", "x.fold")),
+    "fit": ("design", ("fit", "hypar", "-o", "x.fold")),
+    "fold": ("read_pattern", ("fold", "x.fold")),
+    "energy": ("load_pattern", ("energy", "x.fold")),
+    "tradeoff": ("tradeoff", ("tradeoff", "hypar")),
+    "convert": ("convert", ("convert", "x.fold", "x.svg")),
+    "sheets": ("write_job", ("sheets", "x.fold", "-o", "job")),
+    "preview": ("preview", ("preview", "job")),
+    "cut": ("prepare", ("cut", "job", "--port", "virtual")),
+    "calibrate": ("calibrate", ("calibrate", "-o", "job")),
+    "doctor": ("examine", ("doctor",)),
+}
+"""The library function of a command, and a call of the command."""
+
+
+@pytest.fixture(autouse=True)
+def state(monkeypatch, tmp_path):
+    """Logs go to a folder of the test."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state" / "miurafab"
+
+
+def failing(error):
+    def fail(*arguments, **options):
+        raise error
+
+    return fail
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_defect_is_one_sentence_with_a_log(run, monkeypatch, state, command, as_json):
+    name, call = COMMANDS[command]
+    monkeypatch.setattr(miurafab, name, failing(RuntimeError("a\nb")), raising=False)
+    done = run(*call, *["--json"] * as_json)
+    text = sentence(done, 4)
+    (log,) = state.iterdir()
+    assert text == (
+        "miurafab: This is a defect of miurafab (RuntimeError: a b); please report it with the log "
+        f"{log}."
+    )
+    held = log.read_text()
+    assert "Traceback" in held
+    assert "in fail" in held
+    assert __version__ in held
+    assert repr(list(call))[1:-1] in held
+    if as_json:
+        answer = json.loads(done.stdout)
+        assert answer == {
+            "error": text.removeprefix("miurafab: "), "kind": "RuntimeError", "log": str(log)
+        }  # fmt: skip
+    else:
+        assert done.stdout == ""
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError(), RecursionError("deep"), KeyError("x"), AssertionError(), ValueError()]
+)
+def test_no_exception_of_python_gets_through(run, monkeypatch, state, error):
+    monkeypatch.setattr(miurafab, "convert", failing(error), raising=False)
+    text = sentence(run("convert", "x.fold", "x.svg"), 4)
+    assert type(error).__name__ in text or "not enough memory" in text
+
+
+def test_a_log_that_cannot_be_written_is_no_second_failure(run, monkeypatch, tmp_path):
+    (tmp_path / "state").write_text("in the way of the folder")
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "state"))
+    monkeypatch.setattr(miurafab, "convert", failing(RuntimeError("x")), raising=False)
+    done = run("convert", "x.fold", "x.svg", "--json")
+    assert "no log could be written" in sentence(done, 4)
+    assert json.loads(done.stdout)["log"] is None
+
+
+def test_a_defect_of_a_process_is_no_traceback(tmp_path):
+    """As a user meets it: with the interpreter's own hooks, at the end of a process."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import miurafab\ndef convert(*a, **k): raise RuntimeError('injected')\n"
+        "miurafab.convert = convert\n"
+    )
+    root = Path(miurafab.__file__).parent.parent
+    paths = os.pathsep.join((str(tmp_path), str(root)))
+    done = subprocess.run(
+        [sys.executable, "-m", "miurafab", "convert", "a.fold", "b.svg"],
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+    )
+    assert "RuntimeError: injected" in sentence(done, 4)
+
+
+def test_ctrl_c_is_one_line(run, monkeypatch):
+    for command in COMMANDS:
+        name, call = COMMANDS[command]
+        monkeypatch.setattr(miurafab, name, failing(KeyboardInterrupt()), raising=False)
+        assert sentence(run(*call), 130) == "miurafab: Interrupted."
+    answer = json.loads(run(*call, "--json").stdout)
+    assert answer == {"error": "Interrupted.", "kind": "Interrupted"}
+
+
+def test_an_interrupted_fit_writes_its_best_sheet(run, monkeypatch, tmp_path):
+    """Ctrl-C comes after the first sheet, which is too far from the target."""
+    asked = miurafab.fit
+    calls = iter([False, False, True])
+
+    def fit(request, on_progress):
+        def interrupt(fraction, note):
+            if next(calls, False):
+                raise KeyboardInterrupt
+
+        return asked(request, interrupt)
+
+    monkeypatch.setattr(miurafab, "fit", fit, raising=False)
+    limits = ("--facets", "6x6", "--max-deviation", "0.001", "--report", "r.json")
+    done = run("fit", "hypar", *limits, "-o", "x.fold", "--json")
+    assert done.returncode == 130
+    answer = json.loads(done.stdout)
+    assert answer["status"] == "interrupted"
+    assert answer == json.loads((tmp_path / "r.json").read_text())
+    assert json.loads(run("check", "x.fold", "--json").stdout)["facets"] == 36
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them on POSIX")
+@pytest.mark.parametrize("seconds", [0.3, 1.5, 4.0])
+def test_ctrl_c_reaches_a_pool_of_processes_and_none_prints(tmp_path, seconds):
+    """While modules load, while the workers start, and while they fit."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "miurafab", "tradeoff", "hypar", "--workers", "2"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        start_new_session=True,
+    ) as process:
+        time.sleep(seconds)
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert (out, err) == ("", "miurafab: Interrupted.\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes as on POSIX")
+@pytest.mark.parametrize("arguments", [("surfaces", "--json"), ("surfaces",), ("fit", "--help")])
+def test_a_reader_that_goes_away_is_no_failure(arguments):
+    command = [sys.executable, "-m", "miurafab", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 0
+
+
+def test_every_exit_code_of_an_error_has_a_meaning():
+    def kinds(of):
+        return {of}.union(*map(kinds, of.__subclasses__()))
+
+    assert {kind.exit_code for kind in kinds(MiurafabError)} <= set(EXIT_CODES) - {0, 1, 4}
+
+
+@pytest.mark.parametrize("name", ["two.obj", "tri.obj"])
+def test_a_mesh_of_one_or_two_facets_is_no_defect(run, tmp_path, name):
+    faces = "f 1 2 3\nf 1 3 4\n" if name == "two.obj" else "f 1 2 3\n"
+    (tmp_path / name).write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n" + faces)
+    done = run("fit", name, "--facets", "4x4", "-o", "x.fold")
+    assert done.returncode in (0, 1, 2)
+    assert "Traceback" not in done.stderr
