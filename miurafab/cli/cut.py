@@ -28,6 +28,22 @@ EXAMPLES = (
 )
 
 
+PortsOption = Annotated[
+    list[str] | None,
+    option(Text("PORT"), f"{PORT} May be repeated: the machines share the sheets of a job."),
+]
+PauseOption = Annotated[
+    bool | None,
+    option(
+        Flag(),
+        "Wait for Enter before each further sheet.",
+        "--pause",
+        default_text="in a terminal",
+        negative="--no-pause",
+    ),
+]
+
+
 def cut_options() -> type[CutOptions]:
     """The class that declares how sheets are sent."""
     from miurafab.workflow.cut_sheets import CutOptions
@@ -43,10 +59,7 @@ def cut(
     ],
     /,
     *,
-    port: Annotated[
-        list[str] | None,
-        option(Text("PORT"), f"{PORT} May be repeated: the machines share the sheets of a job."),
-    ] = None,
+    port: PortsOption = None,
     machine: MachineOption = None,
     material: MaterialOption = None,
     out: Annotated[
@@ -61,16 +74,7 @@ def cut(
     dry_run: Annotated[
         bool, option(Flag(), "Say what would be done, without opening a port.")
     ] = False,
-    pause: Annotated[
-        bool | None,
-        option(
-            Flag(),
-            "Wait for Enter before each further sheet.",
-            "--pause",
-            default_text="in a terminal",
-            negative="--no-pause",
-        ),
-    ] = None,
+    pause: PauseOption = None,
     rigid: RigidOption = False,
     console: Console = Console(),
     **given: str,
@@ -81,21 +85,19 @@ def cut(
     terminal, space holds, r resumes, q aborts, + - 0 change the feed and ] [ p the power. The
     options of a fit are for a target or a design.
     """
-    own, given = split(given, cut_options())
-    options: CutOptions = read_options(cut_options(), own)
+    options, fitting = _read(given, rigid)
     if not port and not dry_run:
         raise InputError(
             "Name the machine's `port` ('virtual' needs no machine), or ask for `dry_run`."
         )
-    if options.pointer and not options.frame:
-        raise OptionError(
-            "pointer", "is the beam power while a frame is traced; ask for the `frame` as well"
-        )
-    if rigid:
-        given["flat_foldable"] = "exact"
     with console.progress("preparing") as progress:
         prepared = miurafab.prepare(
-            thing, machine=machine, material=material, out=out, options=given, on_progress=progress
+            thing,
+            machine=machine,
+            material=material,
+            out=out,
+            options=fitting,
+            on_progress=progress,
         )
         progress(1.0, "")
     if prepared.refusal is not None:
@@ -107,6 +109,17 @@ def cut(
     waits = pause if pause is not None else port[0] != "virtual" and sys.stdin.isatty()
     done = _stream(console, prepared, port[0], sheet, options, waits)
     return _report(console, prepared, done, port[0])
+
+
+def _read(given: dict[str, str], rigid: bool) -> tuple[CutOptions, dict[str, str]]:
+    """How sheets are sent, and the options of a fit."""
+    own, fitting = split(given, cut_options())
+    options: CutOptions = read_options(cut_options(), own)
+    if options.pointer and not options.frame:
+        raise OptionError(
+            "pointer", "is the beam power while a frame is traced; ask for the `frame` as well"
+        )
+    return options, fitting | ({"flat_foldable": "exact"} if rigid else {})
 
 
 def _stream(

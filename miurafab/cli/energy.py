@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option
 from miurafab.errors import DONE, NO
 from miurafab.options import File, Text, Whole, number
+
+if TYPE_CHECKING:
+    from miurafab.origami.energy.path import EnergyCurve
 
 EXAMPLES = (
     "miurafab energy hypar.fold",
@@ -68,13 +71,13 @@ def energy(
     if out is not None:
         miurafab.write_energy(curve, out, file.stem)
         answer["file"] = str(out)
-
-    def show() -> None:
-        console.facts({key: value for key, value in answer.items() if key != "stable_states"})
-        if curve.stable:
-            rows = [(state["angle_deg"], state["energy"]) for state in answer["stable_states"]]
-            console.rows(("stable at (deg)", f"energy ({answer['energy_unit']})"), rows)
-        console.line(curve.verdict())
-
-    console.answer(answer, show)
+    console.answer(answer, lambda: _show(console, curve, answer))
     return DONE if curve.path.converged else NO
+
+
+def _show(console: Console, curve: EnergyCurve, answer: dict[str, Any]) -> None:
+    console.facts({key: value for key, value in answer.items() if key != "stable_states"})
+    if curve.stable:
+        rows = [(state["angle_deg"], state["energy"]) for state in answer["stable_states"]]
+        console.rows(("stable at (deg)", f"energy ({answer['energy_unit']})"), rows)
+    console.line(curve.verdict())

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, MaterialOption, argument, option, takes
 from miurafab.errors import DONE
 from miurafab.options import File, Text
+
+if TYPE_CHECKING:
+    from miurafab.workflow.job_directory import JobDirectory
 
 EXAMPLES = (
     "miurafab sheets hypar.fold -o jobs/hypar",
@@ -71,9 +74,15 @@ def sheets(
             formats=formats or (),
             options=options,
         )
+    answer = _answer(job, out)
+    console.answer(answer, lambda: _show(console, answer))
+    return DONE
+
+
+def _answer(job: JobDirectory, out: Path) -> dict[str, Any]:
     totals = job.layout.totals
     seconds = {each.name: each.seconds for each in job.dry_runs}
-    answer: dict[str, Any] = {
+    return {
         "job": str(out),
         "machine": job.layout.machine,
         "material": job.layout.material,
@@ -101,9 +110,6 @@ def sheets(
         "unlettered": job.layout.unlettered,
         "remarks": list(job.layout.remarks),
     }
-
-    console.answer(answer, lambda: _show(console, answer))
-    return DONE
 
 
 def _show(console: Console, answer: dict[str, Any]) -> None:

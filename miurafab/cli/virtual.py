@@ -19,9 +19,7 @@ EXAMPLES = (
 
 def virtual(
     *,
-    pty: Annotated[
-        bool, option(Flag(), "Serve over a pseudo-terminal; this is the default.")
-    ] = False,
+    pty: Annotated[bool, option(Flag(), "Serve over a pseudo-terminal, as without --tcp.")] = False,
     tcp: Annotated[
         str | None,
         option(Text("HOST:PORT"), "Serve over TCP at this address (port 0: any free port)."),
@@ -34,15 +32,12 @@ def virtual(
             "with what '$$' printed.",
         ),
     ] = "stock",
-    speed: Annotated[
-        float, option(number(0, above=True), "Virtual seconds in a real second.")
-    ] = 1.0,
+    speed: Annotated[float, option(number(0, above=True), "Virtual seconds a real second.")] = 1.0,
     beam_log: Annotated[
         Path | None, option(File(), "Write what the beam burns to this CSV file.")
     ] = None,
     keep_running: Annotated[
-        bool,
-        option(Flag(), "Do not reset when a sender opens the port; most boards reset."),
+        bool, option(Flag(), "Do not reset when a sender opens the port, as most boards do.")
     ] = False,
     fault: Annotated[
         list[str] | None,
@@ -56,9 +51,8 @@ def virtual(
 ) -> int:
     """Run a virtual controller for any sender, until Ctrl-C.
 
-    The first line printed is what a sender opens: a path, or a socket:// address. Faults such as
-    --fault drop@1200 (a byte is lost), --fault reset@3s or --fault disconnect=2s@1200 show what
-    a sender does when things go wrong; docs/machines.md lists them.
+    The first line printed is what a sender opens: a path, or a socket:// address. Faults show what
+    a sender does when things go wrong: --fault drop@1200 loses a byte, --fault reset@3s resets.
     """
     from miurafab.machine.virtual_server import serve_virtual
 

@@ -74,6 +74,11 @@ def preview(
     path = Path(job_path)
     if not path.exists():
         raise InputError(f"{path} does not exist.")
+    if path.suffix.lower() == ".fold":
+        raise InputError(
+            f"{path} is a pattern and no job; make a job with 'miurafab sheets {path} -o JOB', "
+            "then preview JOB."
+        )
     layout = _read_layout(path / "layout.json") if path.is_dir() else None
     files = _job_files(path, layout)
     jobs = [read_gcode(file) for file in files]

@@ -80,7 +80,7 @@ def test_every_option_has_help_and_says_what_a_value_is(row):
             assert text, entry.name
             assert text.endswith("."), text
             assert re.match(r"[A-Z'|.]", text), text
-            assert not re.search(r"\bdefault\b", text.replace("this is the default", "")), text
+            assert not re.search(r"\bdefault\b", text), text
             is_flag = bool in (entry.hint, *getattr(entry.hint, "__args__", ()))
             if entry.name.startswith("-") and not is_flag:
                 assert re.fullmatch(r"[A-Zxa-z0-9|:,.@=\[\]]+", entry.parameter.metavar), entry.name

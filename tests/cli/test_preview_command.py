@@ -106,6 +106,7 @@ def test_a_dump_says_how_fast_the_machine_is(run, file, tmp_path):
     ("arguments", "named"),
     [
         (("gone.nc",), "gone.nc does not exist"),
+        (("a.fold",), "make a job with 'miurafab sheets a.fold -o JOB', then preview JOB"),
         (("empty",), "empty holds no G-code"),
         (("bad.nc",), "bad.nc, line 2"),
         (("good.nc", "--machine", "gone"), "'gone'"),
@@ -117,6 +118,7 @@ def test_bad_input_is_one_sentence(run, tmp_path, arguments, named):
     (tmp_path / "good.nc").write_text(GCODE)
     (tmp_path / "bad.nc").write_text("G21\nG1 X5!\n")
     (tmp_path / "empty").mkdir()
+    (tmp_path / "a.fold").write_text("{}")
     assert named in sentence(run("preview", *arguments, "--quiet"), 2)
     answer = json.loads(run("preview", *arguments, "--json").stdout)
     assert named in answer["error"]
