@@ -1,10 +1,14 @@
 """The wheel carries the shipped files and finds them, as the checkout does."""
 
+import ast
 import json
 import os
+import re
 import subprocess
 import sys
+import tomllib
 import zipfile
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -66,3 +70,30 @@ def test_shipped_files_are_found(installed, tmp_path, place):
     assert machine
     assert material
     assert pattern == "Hyperbolic paraboloid"
+
+
+def test_the_libraries_that_the_package_imports_are_its_dependencies():
+    """Nothing that README shows needs more than ``pip install .`` brings."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    declared = {_plain(re.split(r"[<>=; ]", line)[0]) for line in project["dependencies"]}
+    distributions = packages_distributions()
+    imported = {
+        _plain(distributions[name][0])
+        for path in (ROOT / "miurafab").rglob("*.py")
+        for name in _imports(ast.parse(path.read_text()))
+        if name not in sys.stdlib_module_names and name != "miurafab"
+    }
+    assert imported - {"distributed"} <= declared  # for tradeoff --cluster alone: an extra
+    assert declared - imported == {"networkx"}  # trimesh turns facets the same way with it
+
+
+def _imports(module):
+    for node in ast.walk(module):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield node.module.split(".")[0]
+
+
+def _plain(name):
+    return name.lower().replace("_", "-")
