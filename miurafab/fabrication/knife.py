@@ -33,7 +33,6 @@ ALIGNING_OFFSETS = 20
 _MM = 1e-3  # what is shorter cannot be told apart in the file
 _PUSH = 1e-3  # mm, how far the tip may be pushed back in a swivel
 _STRAIGHT = 1e-9  # rad, below which there is no turn
-_Points = Floats
 
 
 def tip_way(toolpath: Toolpath, knife: Knife, margin_mm: float) -> Toolpath:
@@ -79,7 +78,7 @@ def _overcut(toolpath: Toolpath, overcut: float) -> Toolpath:
     )
 
 
-def _led_on(points: _Points, overcut: float) -> _Points:
+def _led_on(points: Floats, overcut: float) -> Floats:
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     end = min(overcut, float(along[-1]))

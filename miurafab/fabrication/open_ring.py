@@ -1,16 +1,16 @@
-"""Opening: a ring's flat strip, cut along another line of its grid and joined where it was open.
+"""Opening a ring elsewhere: its flat strip is cut along another line and joined at its old ends.
 
-A pattern whose folded form closes upon itself along its rows is a strip of n rows of facets, whose
-last line of vertices P_n comes to lie on its first one, P_0. Opened after row k it is the strip of
-the same facets that begins with row k + 1:
+The pattern of a ring that closes along its rows is a strip of n rows of facets. In the folded form
+its last line of vertices P_n lies on its first line P_0. Opened after row k, it is the strip of the
+same facets that starts with row k + 1:
 
     g P_k, ..., g P_(n-1), P_0, ..., P_k,    g the motion of the plane with g P_n = P_0
 
-Such a motion exists if the two ends are congruent, which they are if the closed sheet is
-developable at its seam: then the flat angles at a vertex on either side of it fill the plane. The
-vertices of the seam become inner ones, and its crease folds as the folded form says; the line after
-row k becomes border. Along columns it is the same with rows and columns exchanged. A pattern that
-is opened after row k and then after row n - k is what it was.
+Such a motion exists if the two ends are congruent. They are if the closed sheet is developable at
+its seam: the flat angles of both sides at each seam vertex sum to 2 pi. The vertices of the old
+seam become inner vertices, and its crease folds as in the folded form; the line after row k becomes
+border. Along columns, rows and columns are exchanged. A pattern opened after row k and then after
+row n - k is the original pattern.
 """
 
 from __future__ import annotations
@@ -29,15 +29,13 @@ from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.unfold import turned_upright, with_angles_of_the_folded_form
 
-Floats = Floats
-Ints = Ints
 _T = TypeVar("_T", np.float64, np.int64)
 
 _AXES = ("row", "column")
 
 
 def opened(pattern: CreasePattern, options: LayoutOptions) -> CreasePattern:
-    """``pattern`` opened where ``options`` say, and as it is where they say nothing.
+    """``pattern`` opened where ``options`` say, unchanged if they say nothing.
 
     Raises :class:`~miurafab.errors.LayoutError` as :func:`open_ring` does.
     """
@@ -99,8 +97,8 @@ def open_ring(pattern: CreasePattern, axis: int, line: int) -> CreasePattern:
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """What a ``grid`` of R x C vertices consists of, each by its number in the pattern: the edges
-    ``along`` its rows (R, C - 1), those ``across`` (R - 1, C), and its ``facets`` (R - 1, C - 1).
+    """The parts of a ``grid`` of R x C vertices by their numbers in the pattern: the edges
+    ``along`` its rows (R, C - 1), the edges ``across`` (R - 1, C), its ``facets`` (R - 1, C - 1).
     """
 
     grid: QuadGrid
@@ -114,7 +112,7 @@ class _Parts:
 
 
 def _parts(pattern: CreasePattern) -> _Parts | None:
-    """What the grid of ``pattern`` consists of; None if it has none, or other edges and facets."""
+    """The parts of the grid of ``pattern``; None if its edges and facets form no grid."""
     if pattern.grid is None:
         return None
     grid = QuadGrid(*pattern.grid)
@@ -124,7 +122,7 @@ def _parts(pattern: CreasePattern) -> _Parts | None:
 
 
 def _placed(grid: QuadGrid, edges: Ints, facets: Ints) -> _Parts:
-    """``edges`` (E,) and ``facets`` (F,), in the order of the grid, by their place in it."""
+    """``edges`` (E,) and ``facets`` (F,) of the order of the grid as its parts."""
     rows, columns = grid.rows, grid.columns
     along, across = np.split(edges, [rows * (columns - 1)])
     return _Parts(
@@ -136,8 +134,8 @@ def _placed(grid: QuadGrid, edges: Ints, facets: Ints) -> _Parts:
 
 
 def _places(found: Ints, wanted: Ints) -> Ints | None:
-    """(n,) where in ``found`` (n, k) each of the sets of vertices ``wanted`` (n, k) stands, or None
-    if they are not the same sets.
+    """(n,) the row of ``found`` (n, k) with the vertices of each row of ``wanted`` (n, k), or None
+    if the sets of vertices differ.
     """
     if found.shape != wanted.shape:
         return None
@@ -151,7 +149,7 @@ def _places(found: Ints, wanted: Ints) -> Ints | None:
 
 
 def _closes(pattern: CreasePattern, parts: _Parts, axis: int) -> bool:
-    """Whether each edge of the first line is glued to that of the last."""
+    """Whether each edge of the first line is glued to its edge of the last line."""
     lines = parts.on_lines(axis)
     wanted = np.sort(lines[[0, -1]].T, axis=1)
     glued = np.sort(ring_seams(pattern).edges, axis=1)
@@ -159,15 +157,15 @@ def _closes(pattern: CreasePattern, parts: _Parts, axis: int) -> bool:
 
 
 def _spliced(beyond: NDArray[_T], before: NDArray[_T], axis: int, line: int) -> NDArray[_T]:
-    """The lines of ``beyond`` from ``line`` on but the last, and those of ``before`` up to it."""
+    """The lines of ``beyond`` from ``line`` to the last but one, then ``before`` up to ``line``."""
     last = beyond.shape[axis] - 1
     parts = beyond.take(range(line, last), axis), before.take(range(line + 1), axis)
     return np.concatenate(parts, axis)
 
 
 def _laid(flat: Floats, axis: int) -> tuple[Floats, float]:
-    """``flat`` (R, C, 2) moved in the plane so that its last line lies on its first, and how far
-    off a vertex of it is at most.
+    """``flat`` (R, C, 2) moved in the plane so that its last line lies on its first line, and the
+    largest distance of two corresponding vertices.
     """
     points = flat @ np.array([1.0, 1.0j])
     first, last = points.take(0, axis), points.take(-1, axis)
@@ -178,8 +176,8 @@ def _laid(flat: Floats, axis: int) -> tuple[Floats, float]:
 
 
 def _edges(parts: _Parts, axis: int, line: int) -> tuple[Ints, Ints, Ints]:
-    """(E,) the edges in the order of the opened grid, and where among them the crease on the
-    former seam (m,) and the two borders along the line (2, m) are.
+    """(E,) the edges in the order of the opened grid, and the places in it of the crease on the old
+    seam (m,) and of the two borders along the line (2, m).
     """
     grid, along, across = parts.grid, parts.along, parts.across
     if axis == 0:

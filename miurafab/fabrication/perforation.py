@@ -1,22 +1,22 @@
-"""Perforation: the dashes that let a crease fold, as real segments.
+"""Perforation: a crease as dashes, real segments.
 
-Along a crease of length L, with u = L - 2 bridge, n dashes and n - 1 gaps fill u exactly, and the
-crease is the same seen from either end. What gives way is the material's choice:
+On a crease of length L, n dashes and n - 1 gaps fill u = L - 2 bridge exactly, symmetric from both
+ends. The material chooses which length is adapted:
 
-* ``centre``: all inner dashes are ``cut`` and all gaps ``gap`` long, and both end dashes of the
-  equal length e >= min_end, u = 2 e + (n - 2) cut + (n - 1) gap. The largest such n is taken, so
+* ``centre``: inner dashes have length ``cut``, gaps length ``gap``, and both end dashes the same
+  length e >= min_end, with u = 2 e + (n - 2) cut + (n - 1) gap. The largest such n is taken, so
   e < min_end + (cut + gap) / 2.
-* ``stretch_cut``: all gaps are ``gap`` long and all dashes c = (u - (n - 1) gap) / n, for the n
-  that brings c nearest to the asked-for dash by whole periods, and c >= min_end.
-* ``stretch_gap``: all dashes are ``cut`` long and all gaps g = (u - n cut) / (n - 1), for the
-  largest n with g >= gap, so that no crease is weaker than asked.
+* ``stretch_cut``: gaps have length ``gap`` and all dashes c = (u - (n - 1) gap) / n, for the n that
+  brings c nearest to ``cut`` by whole periods, with c >= min_end.
+* ``stretch_gap``: dashes have length ``cut`` and all gaps g = (u - n cut) / (n - 1), for the
+  largest n with g >= gap, so that no crease is weaker than asked for.
 
-A crease too short for two dashes has one, which fills u; one too short even for a dash of min_end
-has one in its middle, min_end long but never more than half of L, and the bridges give way. So
-every crease has at least one dash. A crease that is scored or cut has just one.
+A crease too short for two dashes has one dash of length u. A crease too short for a dash of min_end
+has one dash in its middle, min_end long but at most L / 2, and shorter bridges. So every crease has
+at least one dash. A scored or cut crease has exactly one.
 
-All of these are lengths *burnt*. The beam is as wide as the kerf, so a stroke of length s burns
-s + kerf, and each stroke is drawn shorter than its dash by kerf / 2 at both ends.
+All these lengths are lengths *burnt*. The beam is as wide as the kerf, so a stroke of length s
+burns s + kerf: each stroke is drawn shorter than its dash by kerf / 2 at both ends.
 """
 
 from __future__ import annotations
@@ -31,14 +31,13 @@ from miurafab.profiles import Material
 from miurafab.profiles.material import Perforation
 
 MIN_STROKE_MM = 0.05
-"""A shorter stroke is a dot to every controller (GRBL reports and plans to 0.001 mm; judged)."""
+"""A shorter stroke is a dot for every controller (GRBL plans to 0.001 mm; judged)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Dashes:
-    """D dashes of N creases, in order along each crease.
-
-    ``starts`` and ``ends`` (D, 2) in mm, as drawn; ``crease`` (D,) int64, the crease each lies on.
+    """D dashes of N creases, in order along each crease: ``starts`` and ``ends`` (D, 2) in mm, as
+    drawn, and the ``crease`` (D,) int64 of each dash.
     """
 
     starts: Floats
@@ -67,7 +66,7 @@ def perforate(starts: Floats, ends: Floats, material: Material, kind: str = "mou
 
 
 def unbroken(starts: Floats, ends: Floats, material: Material, kind: str = "mountain") -> Dashes:
-    """One stroke along each of N creases of one ``kind``, but for the bridges at its ends."""
+    """One stroke along each of N creases of one ``kind``, except for the bridges at its ends."""
     rule, least = material.perforation_of(kind), material.kerf_mm + MIN_STROKE_MM
     length = np.linalg.norm(ends - starts, axis=1)
     nothing = np.zeros_like(length)
@@ -78,8 +77,8 @@ def unbroken(starts: Floats, ends: Floats, material: Material, kind: str = "moun
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """(N,) of each crease: the number of dashes, the bridge at each end, the length of the end
-    dashes, of the other dashes, and of the gaps.
+    """(N,) for each crease: the number of dashes, the bridge at each end, the lengths of the end
+    dashes, of the inner dashes, and of the gaps.
     """
 
     count: Ints
@@ -98,7 +97,7 @@ def _drawn(starts: Floats, ends: Floats, length: Floats, fit: _Fit, kerf: float)
     at = np.where(index == 0, fit.bridge[crease], inner)
     at = np.where(last, (length - fit.bridge - fit.end)[crease], at)
     to = at + np.where((index == 0) | last, fit.end[crease], fit.cut[crease])
-    # A dash in a crease shorter than two kerfs stays a stroke, in the middle of the crease.
+    # In a crease shorter than two kerfs the dash is a short stroke in the middle.
     shorten = np.minimum(kerf, np.maximum(to - at - MIN_STROKE_MM, 0.0)) / 2
     part = np.stack([at + shorten, to - shorten], axis=1) / length[crease, None]
     along = (ends - starts)[crease]
@@ -107,7 +106,7 @@ def _drawn(starts: Floats, ends: Floats, length: Floats, fit: _Fit, kerf: float)
 
 
 def _single(length: Floats, rule: Perforation, least: float) -> tuple[Floats, Floats]:
-    """(N,) the bridge at each end and the length of a crease's only dash."""
+    """(N,) the bridge at each end and the length of the dash, for creases with one dash."""
     used = length - 2 * rule.bridge_mm
     min_end = max(rule.min_end_mm, least)
     end = np.where(used < min_end, np.minimum(min_end, length / 2), used)
@@ -123,13 +122,13 @@ def _fitted(
     cut: Floats,
     gap: Floats,
 ) -> _Fit:
-    """The fit where it has two dashes or more, a single dash elsewhere."""
+    """The given fit for creases with two dashes or more, a single dash for other creases."""
     bridge, alone = _single(length, rule, least)
     single = count < 2
     return _Fit(np.where(single, 1, count), bridge, np.where(single, alone, end), cut, gap)
 
 
-# The slack keeps a crease that is an exact fit from losing a dash to rounding.
+# The slack keeps an exact fit from losing a dash to rounding.
 _SLACK = 1e-9
 
 

@@ -1,9 +1,10 @@
-"""Relief holes: a small circle burnt out where creases meet, so that no fold tears the paper.
+"""Relief holes: a small circle is burnt out where creases meet, so that folds tear no paper.
 
-A hole of diameter d is a circle of diameter d - kerf for the beam. The creases that meet there
-begin at its rim, d / 2 from the vertex, so nothing is burnt twice. Vertices on the border of a
-patch are opened by its outline already and get none, nor do those where a crease is too short to
-keep a dash and its bridges between the holes; these are counted, never dropped in silence.
+For a hole of diameter d the beam follows a circle of diameter d - kerf. The creases that meet there
+start at its rim, d / 2 from the vertex, so nothing is burnt twice. A vertex on the border of a
+patch gets no hole, because the outline opens it already. A vertex gets none, too, if one of its
+creases is too short for a dash and its bridges between two holes; these vertices are counted and
+reported.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 
 _SIDE_MM = 0.15
-"""The least side of the polygon drawn for a circle: importers merge what is under 0.1 mm."""
+"""The least side of the polygon drawn for a circle: importers merge points below 0.1 mm."""
 
 
 @dataclass(frozen=True, eq=False)
 class Holes:
-    """``vertex`` (H,) int64 the pattern vertices with a hole, ``patch`` (H,) the patch of each and
-    ``edge`` (H,) one of its creases; ``left_out`` is how many found no room.
+    """``vertex`` (H,) int64 the pattern vertices with a hole, ``patch`` (H,) their patches and
+    ``edge`` (H,) a crease of each; ``left_out`` is the number of vertices without room.
     """
 
     vertex: Ints
@@ -37,8 +38,8 @@ def relief_holes(
 ) -> Holes:
     """The holes of ``diameter`` mm where the creases ``edges`` (n,) meet.
 
-    ``face_patch`` (F,) is the patch of each facet, ``room`` (n,) what each crease needs between
-    two holes, in mm.
+    ``face_patch`` (F,) is the patch of each facet, ``room`` (n,) the length in mm that each crease
+    needs between two holes.
     """
     if diameter == 0.0 or not len(edges):
         none = np.empty(0, dtype=np.int64)
@@ -63,8 +64,8 @@ def relief_holes(
 
 
 def circles(centres: Floats, diameter: float) -> tuple[Floats, int]:
-    """The closed polygons drawn for circles of ``diameter`` mm around ``centres`` (n, 2): their
-    points (n * count, 2), first and last of each the same, and the count.
+    """The closed polygons of circles of ``diameter`` mm around ``centres`` (n, 2): their points
+    (n * count, 2), the first point repeated at the end, and the count.
     """
     sides = min(max(int(math.pi * diameter / _SIDE_MM), 6), 48)
     angle = np.arange(sides + 1) % sides * (2 * math.pi / sides)

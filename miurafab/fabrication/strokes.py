@@ -1,17 +1,17 @@
-"""What is drawn on the patches: creases, relief holes, texts, and cut lines, on their sheets.
+"""The strokes of the sheets: creases, relief holes, texts and cut lines.
 
-Everything is made in the pattern's plane, where a crease is one edge, and then moved with its
-piece. A crease within a piece is made there, as the material wants creases of its kind: mountain
-(M, and U, which is not assigned yet) or valley (V). A seam is made on the piece that bears its
-tab, along the tab's base, as the fold of a tab, and cut on the other one; a seam without a tab is
-cut on both. So every crease is made once or not at all, and nothing is drawn twice.
+Strokes are made in the plane of the pattern, where a crease is one edge, and then moved with their
+patch. A crease within a patch is made as the material says for its kind: mountain (M, and U, not
+assigned yet) or valley (V). A seam is folded on the patch that bears its tab, along the base of the
+tab, and cut on the other patch; a seam without a tab is cut on both patches. So every crease is
+made at most once, and nothing is drawn twice.
 
-Flat edges and joins (F, J) are left alone; a cut within a piece (C, or a border between two
-facets) is cut in full.
+Flat edges and joins (F, J) are not drawn. A cut within a patch (C, or a border between two facets)
+is cut in full.
 
-Scored paper folds away from its score, so a valley may be scored from the back. The back of a
-sheet is the sheet turned over about its upright axis, x becoming width - x; it is made first,
-with three holes in the margin by which the sheet is laid down again when it is turned.
+Scored paper folds away from its score, so valleys may be scored from the back. The back of a sheet
+is the sheet turned over about its vertical axis: x becomes width - x. The back is worked first,
+with three registration holes in the margin that locate the sheet after it is turned.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.bridges import bridged
+from miurafab.fabrication.kerf import bridged
 from miurafab.fabrication.labels import Text
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_outline import OutlinedPatches
@@ -57,10 +57,10 @@ class Blank:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """The strokes of each sheet in no order yet, and of each back (None where it is blank).
+    """The unordered strokes of each sheet and of each back (None: nothing on it).
 
-    ``unrelieved`` is how many vertices have no room for their relief hole, and ``unbridged`` how
-    many outlines none for all their holding bridges.
+    ``unrelieved`` is the number of vertices without room for their relief hole, ``unbridged`` the
+    number of outlines without room for all their bridges.
     """
 
     fronts: list[StrokeSet]
@@ -71,8 +71,8 @@ class Drawn:
 
 @dataclass(frozen=True, eq=False)
 class RigidTransform:
-    """Where the P patches go: q = ``matrix`` (P, 2, 2) p + ``shift`` (P, 2) for a point p of the
-    pattern, and the number of the ``sheet`` (P,).
+    """The motions of P patches from the pattern to their sheets: a point p goes to ``matrix``
+    (P, 2, 2) p + ``shift`` (P, 2) on sheet number ``sheet`` (P,).
     """
 
     matrix: Floats
@@ -89,11 +89,11 @@ def sheet_strokes(
     sheets: Sequence[Blank],
     options: LayoutOptions | None = None,
 ) -> Drawn:
-    """The strokes of each sheet, with backs and holding bridges as ``options`` want them.
+    """The strokes of each sheet, with backs and holding bridges as ``options`` say.
 
-    ``motion`` moves all patches of one copy of the model after the other; ``texts`` are on all of
-    them. Raises :class:`~miurafab.errors.LayoutError` where there are none, or no margin for the
-    registration holes.
+    ``motion`` moves the patches of all copies of the model, copy by copy; ``texts`` are the texts
+    of all copies. Raises :class:`~miurafab.errors.LayoutError` if two-sided work is asked for and
+    the material does not score valleys or the margin has no room for registration holes.
     """
     options = options or LayoutOptions()
     if options.two_sided:
@@ -125,7 +125,7 @@ def sheet_strokes(
     if options.two_sided:
         scored = operation == OPERATIONS.index("score")
         folds = pattern.edges_assignment.copy()
-        # Where two borders are joined the fold is told by the seam alone.
+        # Where two borders are joined, only the seam knows the fold.
         folds[outlined.tabs.edge] = outlined.tabs.seams.fold
         behind[scored] = folds[edge[scored]] == "V"
 
@@ -173,22 +173,22 @@ def _check_two_sided(material: Material, sheets: Sequence[Blank]) -> None:
 
 
 def _turned_over(strokes: StrokeSet) -> StrokeSet:
-    """The strokes seen from the back of the sheet, turned over about its upright axis."""
+    """The strokes seen from the back of the sheet, turned over about its vertical axis."""
     front = strokes.toolpath
     points = front.points * np.array([-1.0, 1.0]) + np.array([front.width_mm, 0.0])
     return replace(strokes, toolpath=replace(front, points=points))
 
 
 def pin_centres(width: float, height: float, margin: float) -> Floats:
-    """(3, 2) where the registration holes lie on the front of a sheet, in mm: at unequal distances
-    from all corners, so that a sheet turned over or about in a wrong way does not match.
+    """(3, 2) the centres of the registration holes on the front of a sheet, in mm. Their distances
+    from the corners differ, so a sheet that is turned the wrong way does not match.
     """
     near = margin / 2
     return np.array([[near, near], [width - near, near], [near, height * 0.7]])
 
 
 def _with_pins(back: StrokeSet, blank: Blank, material: Material) -> StrokeSet:
-    """The strokes of a back with its registration holes."""
+    """The strokes of a back, with its registration holes."""
     centres = pin_centres(blank.width, blank.height, blank.margin) * [-1.0, 1.0]
     moved = centres + np.array([blank.width, 0.0])
     points, count = circles(moved, PIN_MM - material.kerf_mm)
@@ -211,7 +211,7 @@ def _with_pins(back: StrokeSet, blank: Blank, material: Material) -> StrokeSet:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """S strokes of one operation in the pattern's plane."""
+    """S strokes of one operation in the plane of the pattern."""
 
     operation: int
     points: Floats
@@ -333,7 +333,7 @@ def _slits(pattern: CreasePattern, outlined: OutlinedPatches) -> _Part:
 
 
 def _outlines(outlined: OutlinedPatches, options: LayoutOptions, kerf: float) -> tuple[_Part, int]:
-    """All cut lines, and how many outlines have fewer bridges than wanted."""
+    """All cut lines, and the number of outlines with fewer bridges than asked for."""
     lines, patch, rank, group = [], [], [], []
     rings = unbridged = 0
     for number, outline in enumerate(outlined.patches):
@@ -363,7 +363,7 @@ def _outlines(outlined: OutlinedPatches, options: LayoutOptions, kerf: float) ->
 def _inner_edges(
     pattern: CreasePattern, outlined: OutlinedPatches, assignments: Sequence[str]
 ) -> tuple[Ints, Ints]:
-    """The edges between two facets of one patch that are so assigned, and that patch."""
+    """The edges with one of ``assignments`` between two facets of one patch, and that patch."""
     faces = pattern.edges_faces
     patch = np.where(faces >= 0, outlined.face_patch[faces], -1)
     inner = (patch[:, 0] == patch[:, 1]) & np.isin(pattern.edges_assignment, assignments)

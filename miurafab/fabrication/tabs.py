@@ -1,22 +1,22 @@
-"""Glue tabs: each is a piece of the facet that it will be glued to.
+"""Glue tabs: a tab is a part of the facet to which it is glued.
 
-The paper is continuous across a seam, so the tab on seam edge e of patch A, glued to facet g of
-patch B, is drawn where g itself lies in the flat pattern; where the seam joins two borders of the
-sheet, where g lies once it is carried there. It is the set of points x of g with
+The paper continues across a seam. So the tab on seam edge e of patch A, glued to facet g of patch
+B, is drawn where g lies in the flat pattern; if the seam joins two borders of the sheet, where g
+lies after it is moved to e. The tab is the set of points x of g with
 
     0 <= d_e(x) <= height,    d_k(x) >= inset  for every other side k of g,
     d_k(x) - d_e(x) >= inset |n_k - n_e|  for every other side k of g that bears a tab too,
 
-where d_k is the distance from the line of side k, inwards, and n_k its inward normal. The last
-line splits g on the bisector of its two seam edges. So a tab touches nothing but its own seam
-edge, in the flat pattern and, after folding, inside g; it crosses no crease of g because g has
-none. For a facet that is not convex the region is smaller than it might be, and still right.
+where d_k is the inward distance from the line of side k and n_k its inward normal. The last line
+splits g on the bisector of its two seam edges. So a tab touches only its own seam edge, both in the
+flat pattern and, after folding, inside g. It crosses no crease, because a facet has none. For a
+facet that is not convex the region is smaller than possible, but valid.
 
-With an asked-for largest angle at the base, the two lines through its ends at that angle bound the
-tab too; a tab that takes the full facet has no height of its own.
+A largest angle at the base, if given, bounds the tab by two lines through the ends of the base at
+that angle. A full-facet tab has no limit to its height.
 
-The base of a tab is the piece of e that it stands on, and its fold; the rest of e is cut. The fold
-goes the way of the crease that the seam runs along.
+The base of a tab is the part of e on which it stands; it is the fold of the tab, and the rest of e
+is cut. The fold has the assignment of the crease along the seam.
 """
 
 from __future__ import annotations
@@ -34,28 +34,28 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
 MIN_SIDE_MM = 1.0
-"""A tab with a shorter base, or lower than that on average, cannot be handled (judged)."""
+"""A tab with a shorter base or a smaller mean height cannot be handled (judged)."""
 
 MIN_AREA_MM2 = 2.0
-"""A tab with less glue area does not hold (judged)."""
+"""A tab with a smaller glue area does not hold (judged)."""
 
 RAISED = 2.0
-"""How many times its usual height a tab may have that would have too little glue (judged)."""
+"""The height of a raised tab over the standard height, at most; weak tabs are raised (judged)."""
 
 FOLDS = {"M": "mountain", "V": "valley", "U": "unassigned"}
-"""Which way the fold of a tab goes, by the assignment of its edge; flat for all others."""
+"""The fold of a tab by the assignment of its edge; flat for other assignments."""
 
 NO_LIMIT = -1e12
-"""A limit below every p·n in mm; finite, so that differences of depths stay numbers."""
+"""A limit below every p·n in mm; finite, so that differences of depths are finite."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tab:
-    """A tab of one patch. ``number`` is engraved on both sides of the seam; ``edge`` is the pattern
-    edge that it stands on and ``mate_edge`` the one that it joins it to, the same one except where
-    two borders of the pattern are joined; ``mate_patch`` is the id of the patch it is glued to, and
-    ``polygon_mm`` (n, 2) its outline in the patch frame, counter-clockwise, the first side being
-    the base. ``fold`` is one of :data:`FOLDS`, or flat.
+    """A tab of one patch. ``number`` is engraved on both sides of the seam. ``edge`` is the pattern
+    edge on which the tab stands and ``mate_edge`` the edge that it is joined to: the same edge,
+    unless two borders of the pattern are joined. ``mate_patch`` is the id of the patch to which it
+    is glued, ``polygon_mm`` (n, 2) its outline in the patch frame, counter-clockwise from the base.
+    ``fold`` is one of :data:`FOLDS`, or flat.
     """
 
     number: int
@@ -68,10 +68,10 @@ class Tab:
 
 @dataclass(frozen=True, eq=False)
 class TabRegions:
-    """N tabs in the pattern's plane, on ``seams`` (N). ``points`` (N, m, 2) in mm,
-    counter-clockwise, the first side being the base; of each only the first ``count`` (N,) corners
-    are real, none if there is no region. ``glued`` (N, m, 2) is where they lie inside the facet
-    that they are glued to.
+    """N tabs in the plane of the pattern, on ``seams`` (N). ``points`` (N, m, 2) in mm are their
+    corners, counter-clockwise from the base; the first ``count`` (N,) corners of each are real,
+    none if there is no region. ``glued`` (N, m, 2) are the same corners in the facet to which the
+    tab is glued.
     """
 
     seams: Seams
@@ -84,17 +84,17 @@ class TabRegions:
 
     @property
     def edge(self) -> Ints:
-        """(N,) the pattern edge that each stands on."""
+        """(N,) the pattern edge on which each tab stands."""
         return self.seams.edges[:, 0]
 
     @property
     def own_face(self) -> Ints:
-        """(N,) the facet that bears it."""
+        """(N,) the facet that bears each tab."""
         return self.seams.faces[:, 0]
 
     @property
     def mate_face(self) -> Ints:
-        """(N,) the facet that it is glued to."""
+        """(N,) the facet to which each tab is glued."""
         return self.seams.faces[:, 1]
 
     def polygon(self, index: int | np.integer) -> Floats:
@@ -108,7 +108,7 @@ class TabRegions:
 
     @property
     def present(self) -> Bools:
-        """(N, m) which corners are real."""
+        """(N, m) whether each corner is real."""
         return np.arange(self.points.shape[1]) < self.count[:, None]
 
     @property
@@ -119,7 +119,7 @@ class TabRegions:
 
     @property
     def usable(self) -> Bools:
-        """(N,) which are long and large enough to hold."""
+        """(N,) whether each tab is long and large enough to hold."""
         base = np.linalg.norm(self.points[:, 1] - self.points[:, 0], axis=1)
         area = self.areas
         large = (base >= MIN_SIDE_MM) & (area >= MIN_SIDE_MM * base) & (area >= MIN_AREA_MM2)
@@ -127,13 +127,13 @@ class TabRegions:
 
     @property
     def glue(self) -> Floats:
-        """(N,) glue areas in mm², 0 where a tab is not usable."""
+        """(N,) glue areas in mm², 0 for tabs that are not usable."""
         return np.where(self.usable, self.areas, 0.0)
 
 
 def inset_of(material: Material) -> float:
-    """The inset in mm that tabs of ``material`` keep: at least so much that the cuts on both
-    sides of a notch stay apart.
+    """The inset in mm of tabs of ``material``; large enough to keep the cuts on both sides of a
+    notch apart.
     """
     return max(material.tabs.inset_mm, material.kerf_mm + 0.05)
 
@@ -147,15 +147,15 @@ def tab_regions(
     full_facet: bool = False,
     raised: Bools | None = None,
 ) -> TabRegions:
-    """The tabs on N ``seams``, where ``raised`` (N,) says so as much higher than the material's as
-    :data:`RAISED` allows and with no limit to their angles.
+    """The tabs on N ``seams``; tabs that are ``raised`` (N,) may be :data:`RAISED` times as high as
+    the material's, at any angle.
 
-    ``bearing`` (F, k) tells which sides of each facet have a tab glued inside them, and so share
-    the facet; without it every tab is computed as if alone, which only makes it larger.
+    ``bearing`` (F, k) marks the sides of each facet inside which a tab is glued; these tabs share
+    the facet. Without it every tab is computed as if it were alone, which only makes it larger.
     """
     mate, count = seams.faces[:, 1], len(seams)
     ends_of = pattern.edges_vertices[seams.edges[:, 1]]
-    a, _, frame = _frames(pattern, seams.edges[:, 1], mate)
+    a, _, frame = _edge_axes(pattern, seams.edges[:, 1], mate)
 
     corners = pattern.faces_vertices[mate]
     real = corners >= 0
@@ -198,7 +198,7 @@ def tab_regions(
         limit = offset[:, k] + inset * np.linalg.norm(towards, axis=1)
         points, sides = clip_convex(points, sides, towards, np.where(shared, limit, NO_LIMIT))
     points, sides = _base_first(points, sides)
-    # Where the facet is not convex at an end of its side, the line of the side runs on inside it.
+    # If the facet is not convex at an end of its side, the line of the side continues inside it.
     length = edge_lengths(pattern.vertices_coords, ends_of)
     for way, reach_out, limit in (
         (1.0, points[:, 0, 0] < -1e-9, zero),
@@ -213,15 +213,15 @@ def tab_regions(
         points, sides = _not_steeper(points, sides, material.tabs.max_angle, free)
     glued = placed = a[:, None] + np.einsum("nij,nki->nkj", frame, points)
     if (seams.edges[:, 0] != seams.edges[:, 1]).any():
-        # The facet that bears the tab has its side running the other way.
-        _, a, frame = _frames(pattern, seams.edges[:, 0], seams.faces[:, 0])
+        # The side of the facet that bears the tab runs the opposite way.
+        _, a, frame = _edge_axes(pattern, seams.edges[:, 0], seams.faces[:, 0])
         placed = a[:, None] - np.einsum("nij,nki->nkj", frame, points)
     return TabRegions(seams, placed, glued, sides)
 
 
-def _frames(pattern: CreasePattern, edges: Ints, faces: Ints) -> tuple[Floats, Floats, Floats]:
-    """Of each of ``edges`` (N,), with its facet in ``faces`` (N,) on the left: the first end and
-    the last (N, 2), and the unit vectors along it and into the facet, (N, 2, 2).
+def _edge_axes(pattern: CreasePattern, edges: Ints, faces: Ints) -> tuple[Floats, Floats, Floats]:
+    """For each of ``edges`` (N,) with its facet in ``faces`` (N,) on the left: its first and last
+    ends (N, 2), and the unit vectors along it and into the facet (N, 2, 2).
     """
     row = np.arange(len(edges))
     backwards = (pattern.edges_faces[edges, 0] != faces).astype(np.int64)
@@ -240,16 +240,16 @@ def choose_tabs(
     options: LayoutOptions | None = None,
     tight: Bools | None = None,
 ) -> tuple[TabRegions, Bools, Ints]:
-    """One tab for each seam of the split ``face_patch`` (F,), the patch id of each facet.
+    """One tab for each seam of ``face_patch`` (F,), the patch id of each facet.
 
-    The patch that ``options`` name bears the tab. Where it would have less glue than the material
-    asks for, the tab goes to the other patch if it is larger there, and if that is not enough it
-    is drawn up to :data:`RAISED` times as high and as wide as its facet lets it. Where a sheet is
-    glued to itself the lower pattern edge counts as the lower patch. Patches that are ``tight``
-    (P,) have no room for any tab that is not as usual.
+    The patch that ``options`` name bears the tab. If the tab has less glue area than the material
+    requires, it goes to the other patch if it is larger there. If that is not enough, it is raised:
+    up to :data:`RAISED` times as high, and as wide as its facet allows. If a patch is glued to
+    itself, the lower pattern edge counts as the lower patch. ``tight`` patches (P,) may carry
+    standard tabs only.
 
-    Returns the tabs, (N,) which of them are not as usual, and (M,) the seam edges where neither
-    patch can bear one. Cuts in the pattern (assignment C) get none.
+    Returns the tabs, (N,) whether each is not standard, and (M,) the seam edges where neither patch
+    can bear a tab. Cuts in the pattern (assignment C) get no tab.
     """
     options = options or LayoutOptions()
     seams = all_seams(pattern, face_patch)
@@ -287,10 +287,10 @@ def ring_tabs(pattern: CreasePattern, material: Material, options: LayoutOptions
 
 
 def _by_lower(patch: Ints, side: str) -> Bools:
-    """(N,) whether the lower one of two patches ``patch`` (N, 2) bears the tab."""
+    """(N,) whether the lower of the two patches ``patch`` (N, 2) bears the tab."""
     if side != "alternate":
         return np.full(len(patch), side == "lower")
-    # Every other edge of each seam, in the order of the edges.
+    # Every second edge of each seam, in the order of the edges.
     order = np.lexsort((np.arange(len(patch)), patch.max(axis=1), patch.min(axis=1)))
     pair = np.sort(patch, axis=1)[order]
     fresh = np.append(True, (pair[1:] != pair[:-1]).any(axis=1))[: len(patch)]
@@ -302,15 +302,15 @@ def _by_lower(patch: Ints, side: str) -> Bools:
 
 
 def _not_steeper(points: Floats, count: Ints, angle: float, free: Bools) -> tuple[Floats, Ints]:
-    """The polygons with their inner angles at the base, on y = 0, cut to ``angle`` at most, but for
-    those that are ``free`` (N,).
+    """The polygons, on the base y = 0, with inner angles at the base cut to at most ``angle``;
+    ``free`` (N,) polygons are not cut.
     """
     c, s = math.cos(angle), math.sin(angle)
     row = np.arange(len(points))
     for end, normal in ((0, np.array([s, -c])), (1, np.array([-s, -c]))):
         beyond = points[row, 2 if end else np.maximum(count, 1) - 1]
         limit = points[:, end] @ normal
-        # Only where the side is too steep: elsewhere the clip would double the corner.
+        # Only sides that are too steep are cut: elsewhere the clip would double the corner.
         steep = ~free & (count >= 3) & (beyond @ normal < limit - 1e-9)
         limit = np.where(steep, limit + 1e-9, NO_LIMIT)
         points, count = clip_convex(points, count, np.broadcast_to(normal, (len(points), 2)), limit)
@@ -319,7 +319,7 @@ def _not_steeper(points: Floats, count: Ints, angle: float, free: Bools) -> tupl
 
 
 def _bearing(pattern: CreasePattern, seams: Seams) -> Bools:
-    """(F, k) which facet sides have a tab glued inside them."""
+    """(F, k) whether a tab is glued inside each side of each facet."""
     found = np.zeros(pattern.faces_edges.shape, dtype=bool)
     mate = seams.faces[:, 1]
     side = (pattern.faces_edges[mate] == seams.edges[:, 1:]).argmax(axis=1)
