@@ -41,7 +41,7 @@ MARKED = ("M", "V")
 
 
 @dataclass(frozen=True, eq=False)
-class Text:
+class PlacedText:
     """A text on a patch, its ``strokes`` (n, 2) in mm in the pattern's plane."""
 
     patch: int
@@ -55,7 +55,7 @@ class Lettering:
     tabs the number stands ``unmarked``, without the letter of its fold.
     """
 
-    texts: list[Text]
+    texts: list[PlacedText]
     left_out: int
     unmarked: int
 
@@ -114,11 +114,11 @@ def place_texts(
 
 def _tab_numbers(
     face_patch: Ints, tabs: TabRegions, numbers: Ints, turns: Floats
-) -> tuple[list[Text], int, int]:
+) -> tuple[list[PlacedText], int, int]:
     """Each tab's number on the tab and on the facet under it, how many of these have no room, and
     how many tabs have none for the letter.
     """
-    texts: list[Text] = []
+    texts: list[PlacedText] = []
     left_out = unmarked = 0
     if not len(tabs):
         return texts, left_out, unmarked
@@ -198,6 +198,6 @@ def _upright(along: Floats, turns: Floats) -> Floats:
     return np.where(forward[:, None] < -1e-9, -along, along)
 
 
-def _written(patch: int, text: str, centre: Floats, along: Floats, height: float) -> Text:
+def _written(patch: int, text: str, centre: Floats, along: Floats, height: float) -> PlacedText:
     frame = height * np.stack([along, np.array([-along[1], along[0]])])
-    return Text(patch, text, tuple(centre + stroke @ frame for stroke in text_strokes(text)))
+    return PlacedText(patch, text, tuple(centre + stroke @ frame for stroke in text_strokes(text)))

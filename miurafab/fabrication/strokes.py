@@ -23,7 +23,7 @@ import numpy as np
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.kerf import bridged
-from miurafab.fabrication.labels import Text
+from miurafab.fabrication.labels import PlacedText
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
@@ -83,7 +83,7 @@ class RigidTransform:
 def sheet_strokes(
     pattern: CreasePattern,
     outlined: OutlinedPatches,
-    texts: Sequence[Text],
+    texts: Sequence[PlacedText],
     motion: RigidTransform,
     material: Material,
     sheets: Sequence[Blank],
@@ -222,7 +222,7 @@ class _Part:
     rank: Ints
 
 
-def _engraved(texts: Sequence[Text]) -> _Part:
+def _engraved(texts: Sequence[PlacedText]) -> _Part:
     strokes = [stroke for text in texts for stroke in text.strokes]
     each = np.array([len(text.strokes) for text in texts], dtype=np.int64)
     patch = np.repeat(np.array([text.patch for text in texts], dtype=np.int64), each)
