@@ -102,7 +102,7 @@ def prepare(
     wanted = design(thing, **(options or {}))
     tell(0.0, "fitting")
     result = fit(wanted.request, lambda fraction, note: tell(0.4 * fraction, note))
-    name = path.stem if path.suffix else wanted.title
+    name = path.stem if path.suffix.lower() == ".toml" else wanted.title
     directory = out or JOBS / name
     if result.pattern is None or result.status != "converged":
         return Prepared(

@@ -51,6 +51,12 @@ def test_a_design_is_cut_in_one_command(run, tmp_path):
     assert '"ended"' in journal
 
 
+def test_a_surface_with_parameters_names_its_job(run, tmp_path):
+    done = run("cut", "hypar:height=0.5", "--facets", "4x4", "--size", "60mm", "--port", "virtual")
+    assert done.returncode == 0, done.stderr
+    assert [path.name for path in (tmp_path / "jobs").iterdir()] == ["hypar"]
+
+
 def test_a_mesh_goes_the_whole_way(run, tmp_path):
     saddle_mesh(15, 30.0).export(tmp_path / "saddle.stl")
     fitted = run("fit", "saddle.stl", "--facets", "6x6", "--size", "80mm", "-o", "saddle.fold")
