@@ -140,7 +140,7 @@ def measure(name: str, facets: int) -> tuple[dict[str, Any], tuple[Toolpath, ...
         "seam_m": totals.seam_mm / 1000,
         "tabs": totals.tabs,
         "untabbed": len(layout.untabbed),
-        "unlettered": layout.unlettered,
+        "findings": [finding.code for finding in layout.findings],
         "density": totals.density,
         "dashes": sum(len(each) for each in dashes),
         "perforate_travel_m": sum(_legs(each).sum() for each in dashes) / 1000,
@@ -323,7 +323,7 @@ def _show(row: dict[str, Any]) -> None:
         f"  {row['patches']} patches, {row['patches'] / math.ceil(bound):.3f} times the bound of "
         f"{math.ceil(bound)}; {row['sheets']} sheets, {row['density']:.0%} of them used\n"
         f"  {row['seam_m']:.1f} m of seams, {row['tabs']:,} tabs, {row['untabbed']} seam edges "
-        f"without, {row['unlettered']} texts without room\n"
+        f"without; findings: {', '.join(row['findings']) or 'none'}\n"
         f"  {row['dashes']:,} dashes, {row['perforate_travel_m']:.2f} m of travel between them, "
         f"{row['perforate_travel_m'] / row['perforate_bound_m']:.4f} times the bound"
     )

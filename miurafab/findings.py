@@ -8,7 +8,7 @@ it is made.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -68,6 +68,15 @@ RULES = {
     # A pattern, folded (miurafab.studio.work)
     "bent-facets": Rule("note", "a pattern that does not fold rigidly"),
     "contacts": Rule("warning", "facets that pass through each other on the way"),
+    # A layout (miurafab.fabrication.layout_findings)
+    "weak-tabs": Rule("warning", "tabs with less glue than the material's `min_area`"),
+    "fold-letters": Rule("note", "tabs without room for the letter of their fold"),
+    "relief-holes": Rule("warning", "vertices whose creases are too short for a relief hole"),
+    "bridges": Rule("warning", "outlines without room for all holding bridges"),
+    "nesting-limit": Rule("note", "a nesting that ended before every order was tried"),
+    "unassigned-creases": Rule("warning", "creases that are neither mountain nor valley"),
+    "untabbed": Rule("warning", "seam edges without room for a tab"),
+    "unlettered": Rule("warning", "names and numbers without room on the sheets"),
     # A job, judged without a machine (miurafab.machine.judge_job)
     "lines": Rule("refusal", "a line too long for the controller, or not printable ASCII"),
     "program": _check("a program that GRBL 1.1 would answer with an error"),
@@ -148,6 +157,15 @@ class Finding:
     def __str__(self) -> str:
         """The sentence, with the names of options in quotes."""
         return spell_options(self.sentence, lambda name: f"'{name}'")
+
+
+def finding_from_json(values: Mapping[str, Any]) -> Finding:
+    """The finding that :meth:`Finding.as_json` wrote; ``KeyError`` for an unknown code."""
+    where = values["where"]
+    place = tuple(int(index) for index in where) if isinstance(where, list) else str(where)
+    found = Finding(str(values["code"]), str(values["sentence"]), place)
+    RULES[found.code]  # an unknown code has no severity
+    return found
 
 
 def refusals(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -100,7 +100,7 @@ def cut(
             on_progress=progress,
         )
         progress(1.0, "")
-    if prepared.refusal is not None:
+    if prepared.refused:
         return _refuse(console, prepared)
     if not port or dry_run:
         return _report_dry_run(console, prepared, options)
@@ -258,9 +258,15 @@ def _put_in(prepared: Prepared, number: int) -> str:
 
 
 def _refuse(console: Console, prepared: Prepared) -> int:
+    advice = " ".join(finding.sentence for finding in prepared.refused)
     console.answer(
-        {"status": "refused", "advice": prepared.refusal, "report": prepared.report},
-        lambda: console.line(f"{prepared.name} is not cut: {prepared.refusal}"),
+        {
+            "status": "refused",
+            "advice": advice,
+            "findings": findings_json(prepared.refused),
+            "report": prepared.report,
+        },
+        lambda: console.line(f"{prepared.name} is not cut: {advice}"),
     )
     return NO
 

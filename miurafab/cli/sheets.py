@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,6 +10,7 @@ import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, MaterialOption, argument, option, takes
 from miurafab.errors import DONE
+from miurafab.findings import Finding, findings_json
 from miurafab.options import File, Text
 
 if TYPE_CHECKING:
@@ -75,7 +77,7 @@ def sheets(
             options=options,
         )
     answer = _answer(job, out)
-    console.answer(answer, lambda: _show(console, answer))
+    console.answer(answer, lambda: _show(console, answer, job.findings))
     return DONE
 
 
@@ -106,15 +108,12 @@ def _answer(job: JobDirectory, out: Path) -> dict[str, Any]:
             "travel_mm": totals.travel_mm,
             "seconds": totals.seconds,
         },
-        "untabbed": list(job.layout.untabbed),
-        "unlettered": job.layout.unlettered,
-        "remarks": list(job.layout.remarks),
+        "findings": findings_json(job.findings),
     }
 
 
-def _show(console: Console, answer: dict[str, Any]) -> None:
+def _show(console: Console, answer: dict[str, Any], findings: Iterable[Finding]) -> None:
     from miurafab.workflow.dry_run import clock_text, length_text
-    from miurafab.workflow.job_directory import GUIDE
 
     totals, sheets = answer["totals"], answer["sheets"]
     facts = {key: answer[key] for key in ("job", "machine", "material")}
@@ -135,13 +134,5 @@ def _show(console: Console, answer: dict[str, Any]) -> None:
         )
     elif len(sheets) > 1:
         console.rows(("sheet", "patches", "machine time"), rows)
-    if answer["untabbed"]:
-        edges = len(answer["untabbed"])
-        console.line(f"No tab could stand on {edges} seam edge{'s' if edges > 1 else ''}.")
-    if answer["unlettered"]:
-        texts = answer["unlettered"]
-        names = "names and numbers" if texts > 1 else "name or number"
-        console.line(f"{texts} {names} found no room on the sheets; go by {GUIDE}.")
-    for remark in answer["remarks"]:
-        console.line(remark)
+    console.findings(findings)
     console.line(f"Look at it first: miurafab preview {answer['job']}")

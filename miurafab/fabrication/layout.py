@@ -18,6 +18,7 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.sheets import Layout, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
+from miurafab.findings import finding_from_json, findings_json
 from miurafab.geometry.arrays import Floats
 
 SCHEMA = "miurafab-layout/1"
@@ -33,9 +34,7 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
         "sheets": [dataclasses.asdict(sheet) for sheet in layout.sheets],
         "patches": [_patch_table(patch) for patch in layout.patches],
         "totals": dataclasses.asdict(layout.totals),
-        "untabbed": list(layout.untabbed),
-        "unlettered": layout.unlettered,
-        "remarks": list(layout.remarks),
+        "findings": findings_json(layout.findings),
     }
     return json.dumps(document, separators=(",", ":")) + "\n"
 
@@ -59,9 +58,7 @@ def read_layout(text: str) -> Layout:
             patches=tuple(_patch(table) for table in document["patches"]),
             sheets=tuple(_sheet(table) for table in document["sheets"]),
             totals=Totals(**document["totals"]),
-            untabbed=tuple(document.get("untabbed", ())),
-            unlettered=document.get("unlettered", 0),
-            remarks=tuple(str(remark) for remark in document.get("remarks", ())),
+            findings=tuple(map(finding_from_json, document.get("findings", ()))),
         )
     except KeyError as fault:
         raise LayoutError(f"The layout lacks {fault}.") from None

@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 
 from miurafab.fabrication.labels import Lettering, place_texts
+from miurafab.fabrication.layout_findings import layout_findings
 from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, nest, turned
 from miurafab.fabrication.open_ring import opened
 from miurafab.fabrication.options import LayoutOptions
@@ -27,12 +28,12 @@ from miurafab.fabrication.partition.patch_frame import (
     frame_patches,
 )
 from miurafab.fabrication.partition.patch_outline import OutlinedPatches
-from miurafab.fabrication.remarks import remarks_on
 from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
 from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.stock import LaidStock, lay_stock
 from miurafab.fabrication.strokes import Blank, RigidTransform, sheet_strokes
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, Material
@@ -104,9 +105,8 @@ class Layout:
     that is worked on; both are empty if the layout was read from a file. ``pattern`` is the one
     whose facets and edges it names, opened where that was asked; None if it was read from a file.
 
-    ``untabbed`` are the pattern edges of seams on which no tab could stand, ``unlettered`` is how
-    many names and numbers found no room, and ``remarks`` are sentences on what else could not be
-    had; all are for the assembly.
+    ``findings`` are for the assembly: options that could not be honoured, and everything that has
+    no room.
     """
 
     machine: str
@@ -114,12 +114,16 @@ class Layout:
     patches: tuple[Patch, ...]
     sheets: tuple[Sheet, ...]
     totals: Totals
-    untabbed: tuple[int, ...] = ()
-    unlettered: int = 0
-    remarks: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     toolpaths: tuple[Toolpath, ...] = ()
     backs: tuple[Toolpath, ...] = ()
     pattern: CreasePattern | None = None
+
+    @property
+    def untabbed(self) -> tuple[int, ...]:
+        """The pattern edges of seams without room for a tab."""
+        edges = (finding.where for finding in self.findings if finding.code == "untabbed")
+        return next((where for where in edges if isinstance(where, tuple)), ())
 
     @property
     def copies(self) -> int:
@@ -196,16 +200,13 @@ def lay_out(
     sheets = tuple(_with_passes(*made) for made in zip(sheets, toolpaths, backs, strict=True))
     behind = tuple(back for back in backs if back is not None)
     usable = sum(stock.kinds.kinds[kind].area for kind in _kinds(nesting))
-    remarks = remarks_on(pattern, framed, nesting, lettering, drawn, material, options)
     return Layout(
         machine=machine.name,
         material=material.name,
         patches=patches,
         sheets=sheets,
         totals=_totals(pattern, outlined, patches, nesting, toolpaths + behind, usable),
-        untabbed=tuple(outlined.untabbed.tolist()),
-        unlettered=lettering.left_out,
-        remarks=remarks,
+        findings=layout_findings(pattern, framed, nesting, lettering, drawn, material, options),
         toolpaths=toolpaths,
         backs=behind,
         pattern=pattern,

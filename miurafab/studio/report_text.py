@@ -121,16 +121,6 @@ def layout_lines(totals: Mapping[str, Any]) -> list[dict[str, str]]:
     return [asdict(line) for line in lines]
 
 
-def layout_warnings(part: Mapping[str, Any]) -> list[str]:
-    """What the maker should know of a layout before it is cut."""
-    said = [f"{sheet['name']}: {text}" for sheet in part["sheets"] for text in sheet["warnings"]]
-    if part["untabbed"]:
-        said.append(f"No tab could stand on {part['untabbed']} seam edges; glue strips across.")
-    if part["unlettered"]:
-        said.append(f"{part['unlettered']} names and numbers found no room on the sheets.")
-    return [*said, *part["remarks"]]
-
-
 def _mm(value: float) -> str:
     return f"{value:.3g} mm" if value >= 0.01 else "less than 0.01 mm"
 

@@ -19,7 +19,7 @@ from miurafab.studio import recipe
 from miurafab.studio.form import by_label
 from miurafab.studio.names import safe_stem, suffix_of
 from miurafab.studio.orders import FitOrder, LayoutOrder
-from miurafab.studio.report_text import headline, layout_lines, layout_warnings, pattern_lines
+from miurafab.studio.report_text import headline, layout_lines, pattern_lines
 from miurafab.studio.work import Order
 from miurafab.studio.worker import News, Running
 from miurafab.surfaces.mesh import MESH_SUFFIXES
@@ -260,7 +260,8 @@ class Bench:
             "id": task.id,
             "name": recipe.job_name(name),
             "lines": layout_lines(part["totals"]),
-            "warnings": [*self._doubts(), *layout_warnings(part)],
+            "doubts": self._doubts(),
+            "findings": self._findings(part),
             "files": self._put_down(task.id, part["files"]),
             "pictures": list(self._put_down(task.id, pictures).values()),
             "command": recipe.both(self._asked.command, sheets, sound=not self._doubts()),

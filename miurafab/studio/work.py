@@ -163,22 +163,11 @@ def _sheets(order: Order, tell: Tell) -> None:
     packed = f"{directory.name}.zip"
     _pack(directory, order.folder / packed)
     shutil.copyfile(directory / GUIDE, order.folder / GUIDE)
-    layout = job.layout
     tell(
         {
             "part": "job",
-            "totals": asdict(layout.totals),
-            "sheets": [
-                {
-                    "name": sheet.name,
-                    "seconds": sheet.seconds,
-                    "warnings": list(sheet.warnings),
-                }
-                for sheet in job.dry_runs
-            ],
-            "untabbed": len(layout.untabbed),
-            "unlettered": layout.unlettered,
-            "remarks": list(layout.remarks),
+            "totals": asdict(job.layout.totals),
+            "findings": findings_json(job.findings),
             "files": {"zip": packed, "guide": GUIDE, "page": page},
             "pictures": pictures,
         }

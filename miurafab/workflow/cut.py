@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from miurafab.errors import OptionError
+from miurafab.findings import Finding
 from miurafab.gcode.job import Job
 from miurafab.profiles import MachineProfile, load_machine
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
@@ -33,8 +34,8 @@ class Prepared:
     """What will be cut: the jobs with their dry runs and the machine, and how they were made.
 
     ``folder`` is where the journals go. ``report`` is that of the fit or the check, None for what
-    came as G-code or a job directory; ``refusal`` says why nothing will be cut (a fit that failed,
-    a pattern that is not valid).
+    came as G-code or a job directory; ``refused`` are the findings of a fit that failed or a
+    pattern that is not valid, for which nothing will be cut.
     """
 
     name: str
@@ -44,7 +45,7 @@ class Prepared:
     directory: JobDirectory | None = None
     folder: Path | None = None
     report: dict[str, Any] | None = None
-    refusal: str | None = None
+    refused: tuple[Finding, ...] = ()
 
     @property
     def most_power(self) -> float:
@@ -97,7 +98,7 @@ def prepare(
         tell(0.1, "checking the pattern")
         checked = audit(pattern, surface)
         return _from_pattern(
-            path, path.stem, checked.report(), checked.valid, machine, material, out, tell
+            path, path.stem, checked.report(), checked.findings, machine, material, out, tell
         )
     wanted = design(thing, **(options or {}))
     tell(0.0, "fitting")
@@ -111,7 +112,7 @@ def prepare(
             (),
             (),
             report=result.report(),
-            refusal=result.advice,
+            refused=result.findings,
         )
     directory.mkdir(parents=True, exist_ok=True)
     fold = directory / f"{name}.fold"
@@ -120,7 +121,7 @@ def prepare(
         fold,
         name,
         result.report(),
-        True,
+        (),
         machine or wanted.machine,
         material or wanted.material,
         directory,
@@ -133,7 +134,7 @@ def _from_pattern(
     fold: Path,
     name: str,
     report: dict[str, Any],
-    valid: bool,
+    faults: tuple[Finding, ...],
     machine: str | None,
     material: str | None,
     out: Path | None,
@@ -141,10 +142,8 @@ def _from_pattern(
     options: LayoutOptions | None = None,
 ) -> Prepared:
     chosen = machine or ASSUMED_MACHINE
-    if not valid:
-        return Prepared(
-            name, load_machine(chosen), (), (), report=report, refusal=str(report["advice"])
-        )
+    if faults:
+        return Prepared(name, load_machine(chosen), (), (), report=report, refused=faults)
     from miurafab.workflow.job_directory import write_job
 
     directory = write_job(

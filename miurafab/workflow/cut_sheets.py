@@ -204,8 +204,9 @@ def _stream(port: str) -> Callable[..., StreamResult]:
 
 
 def _chosen(prepared: Prepared, sheets: Sequence[int] | None) -> list[int]:
-    if prepared.refusal is not None:
-        raise InputError(f"{prepared.name} cannot be cut: {prepared.refusal}")
+    if prepared.refused:
+        why = " ".join(finding.sentence for finding in prepared.refused)
+        raise InputError(f"{prepared.name} cannot be cut: {why}")
     chosen = list(sheets) if sheets else list(range(1, len(prepared.jobs) + 1))
     for number in chosen:
         if not 1 <= number <= len(prepared.jobs):

@@ -21,6 +21,7 @@ from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.layout import read_layout, write_layout
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import Layout, lay_out
+from miurafab.findings import Finding
 from miurafab.gcode.job import Job
 from miurafab.options import read_options
 from miurafab.origami.crease_pattern import CreasePattern
@@ -61,6 +62,11 @@ class JobDirectory:
     most_power: float
     jobs: tuple[Job, ...]
     dry_runs: tuple[SheetPreview, ...]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings on the layout and then on each sheet."""
+        return (*self.layout.findings, *(f for sheet in self.dry_runs for f in sheet.findings))
 
 
 def sheets(

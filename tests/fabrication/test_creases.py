@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import shapely
 from flat_patterns import bed, card, miura, zigzag
+from miurafab.fabrication.bridges import bridged
 from rings import revolved, tube
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.bridges import bridged
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.fit_box import best_turn
 from miurafab.fabrication.sheets import lay_out
@@ -122,8 +122,8 @@ def test_holes_are_circles_on_the_inner_vertices_of_patches_before_everything_el
 
 def test_vertices_without_room_for_a_hole_are_told():
     layout = lay_out(miura(8, 6, 3.0, 12.0), MACHINE, stock(hole=2.5))
-    (remark,) = [text for text in layout.remarks if "relief hole" in text]
-    assert remark == "At 35 vertices a crease is too short for a relief hole."
+    (finding,) = [each for each in layout.findings if each.code == "relief-holes"]
+    assert finding.sentence == "At 35 vertices a crease is too short for a relief hole."
 
 
 def test_two_sided_working_scores_the_valleys_from_the_back():
@@ -256,8 +256,9 @@ def test_as_many_bridges_as_sides_can_bear_one_each_on_its_own():
 
 def test_bridges_that_find_no_room_are_told():
     layout = lay_out(miura(4, 4), MACHINE, card(), options=LayoutOptions(bridges=3, bridge_mm=20.0))
-    (remark,) = layout.remarks
-    assert remark.startswith("1 outline has no room for 3 holding bridges of 20 mm")
+    (finding,) = layout.findings
+    assert finding.code == "bridges"
+    assert finding.sentence.startswith("1 outline has no room for 3 holding bridges of 20 mm")
 
 
 def test_creases_of_no_kind_are_told():
@@ -265,7 +266,9 @@ def test_creases_of_no_kind_are_told():
     letters = pattern.edges_assignment.copy()
     letters[np.flatnonzero(letters == "M")[:2]] = "U"
     layout = lay_out(dataclasses.replace(pattern, edges_assignment=letters), MACHINE, card())
-    assert layout.remarks == ("2 creases are neither mountain nor valley in the pattern.",)
+    (finding,) = layout.findings
+    assert finding.code == "unassigned-creases"
+    assert finding.sentence == "2 creases are neither mountain nor valley in the pattern."
 
 
 def test_the_fold_of_a_tab_is_that_of_its_crease():
@@ -291,9 +294,12 @@ def test_weak_tabs_are_told_by_number():
         if shapely.Polygon(tab.polygon_mm).area < 70.0
     ]
     assert weak
-    (remark,) = layout.remarks
+    (finding,) = layout.findings
+    assert finding.code == "weak-tabs"
     total = layout.totals.tabs
-    assert remark.startswith(f"{len(weak)} of {total} tabs have less than 70 mm2 of glue: number ")
+    assert finding.sentence.startswith(
+        f"{len(weak)} of {total} tabs have less than 70 mm2 of glue: number "
+    )
     assert set(CREASE_KINDS) == {"mountain", "valley", "tab"}
 
 

@@ -26,6 +26,7 @@ from miurafab.fabrication.drawing.tiles import EDGE_MM, PAGES_MM, Tiling, tiled_
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out
+from miurafab.findings import Finding
 from miurafab.profiles import load_machine, load_material
 from miurafab.profiles.material import Crease
 
@@ -221,11 +222,15 @@ def test_the_guide_to_one_patch_says_nothing_of_glue():
 def test_the_guide_says_what_could_not_be_had():
     pattern = regular(61, 41)
     layout = lay_out(pattern, MACHINE, MATERIAL)
-    layout = dataclasses.replace(layout, untabbed=(3, 7), unlettered=5, remarks=("Mind the gap.",))
+    findings = (
+        Finding("untabbed", "2 seam edges bear no tab: use tape there.", (3, 7)),
+        Finding("unlettered", "5 names and numbers found no room. Lay out with `quantity`."),
+    )
+    layout = dataclasses.replace(layout, findings=findings)
+    assert layout.untabbed == (3, 7)
     text = "\n".join(pages_of(assembly_guide(layout, pattern, MACHINE, MATERIAL, "Test")))
     assert "2 seam edges bear no tab: use tape there." in text
-    assert "5 names and numbers found no room" in text
-    assert "Mind the gap." in text
+    assert "5 names and numbers found no room. Lay out with 'quantity'." in text
 
 
 def test_the_guide_tells_how_both_sides_are_made():

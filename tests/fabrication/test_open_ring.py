@@ -371,7 +371,7 @@ def test_the_job_holds_the_pattern_that_its_layout_names(tmp_path):
         assert_tabs(read_fold(file), read_job(folder).layout)
         shown = miurafab.preview(folder)
         assert_same_pattern(shown.pattern, made.layout.pattern)
-        assert not any("not there" in remark for remark in shown.remarks)
+        assert not any("not there" in finding.sentence for finding in shown.findings)
     first, second = (tmp_path / "job" / "layout.json", tmp_path / "layout.json")
     assert first.read_bytes() == second.read_bytes()
 

@@ -209,7 +209,7 @@ def test_a_fit_that_misses_a_limit_says_so(done):
     assert "900 mm asked for" in pattern["advice"]
     done.post("sheets", {"machine": "grbl-laser-400", "material": "card-250"})
     job = done.state()["job"]
-    assert job["warnings"][0] == f"{pattern['headline']} {pattern['advice']}"
+    assert job["doubts"][0] == f"{pattern['headline']} {pattern['advice']}"
     assert " -o plane.fold ; miurafab sheets" in job["command"]  # fit answers no
 
 

@@ -28,7 +28,6 @@ from miurafab.fabrication.drawing.page import (
 )
 from miurafab.fabrication.drawing.views import Views
 from miurafab.fabrication.sheets import Layout
-from miurafab.fabrication.wording import count
 
 _STEP = (ROOM - 12) / 3
 """The width of one step of glueing."""
@@ -88,14 +87,7 @@ class GluePages:
 
     def notes(self) -> list[str]:
         """What could not be had and has to be known."""
-        found = list(self.layout.remarks)
-        if self.layout.untabbed:
-            where = count(len(self.layout.untabbed), "seam edge bears", "seam edges bear")
-            found.append(f"{where} no tab: use tape there.")
-        if self.layout.unlettered:
-            names = count(self.layout.unlettered, "name or number", "names and numbers")
-            found.append(f"{names} found no room on the sheets: go by the pictures.")
-        return found
+        return [str(finding) for finding in self.layout.findings]
 
     def seams_by_pair(self) -> dict[tuple[int, int, bool], list[int]]:
         """The pattern edges of each seam by its two patches and whether it closes the sheet."""

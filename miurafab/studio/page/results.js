@@ -64,8 +64,9 @@ export function showJob(job, pattern) {
     download("Assembly guide .pdf", `${files.guide}?save`),
     download("Pattern .fold", `${pattern.files.fold}?save`),
   );
-  byId("warnings").hidden = job.warnings.length === 0;
-  byId("warnings").lastElementChild.replaceChildren(...items(job.warnings));
+  const warnings = [...job.doubts, ...job.findings.map(({ sentence }) => sentence)];
+  byId("warnings").hidden = warnings.length === 0;
+  byId("warnings").lastElementChild.replaceChildren(...items(warnings));
   byId("dry-run").hidden = !hasWebGl;
   byId("pictures").hidden = hasWebGl;
   if (hasWebGl) load(byId("dry-run"), "src", files.page);

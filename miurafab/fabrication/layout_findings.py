@@ -1,0 +1,77 @@
+"""Findings on a layout: options that could not be honoured, and everything that has no room."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from miurafab.fabrication.labels import Lettering
+from miurafab.fabrication.nesting import Nesting
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.partition.patch_frame import FramedPatches
+from miurafab.fabrication.strokes import Drawn
+from miurafab.fabrication.wording import count
+from miurafab.findings import Finding
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import Material
+
+_NAMED = 8
+"""So many weak tabs are listed by number; the others are counted."""
+
+
+def layout_findings(
+    pattern: CreasePattern,
+    framed: FramedPatches,
+    nesting: Nesting,
+    lettering: Lettering,
+    drawn: Drawn,
+    material: Material,
+    options: LayoutOptions,
+) -> tuple[Finding, ...]:
+    """The findings on one layout; ``where`` of ``untabbed`` is the edges of the pattern."""
+    tabs, numbers = framed.outlined.tabs, framed.numbers
+    findings = []
+    weak = np.sort(numbers[tabs.areas < material.tabs.min_area_mm2]).tolist()
+    if weak:
+        named = ", ".join(str(number) for number in weak[:_NAMED])
+        more = f" and {len(weak) - _NAMED} more" if len(weak) > _NAMED else ""
+        sentence = (
+            f"{len(weak)} of {count(len(numbers), 'tab has', 'tabs have')} less than "
+            f"{material.tabs.min_area_mm2:g} mm2 of glue: number {named}{more}."
+        )
+        findings.append(Finding("weak-tabs", sentence))
+    if lettering.unmarked:
+        texts = count(lettering.unmarked, "tab has", "tabs have")
+        its = "its" if lettering.unmarked == 1 else "their"
+        findings.append(Finding("fold-letters", f"{texts} no room for the letter of {its} fold."))
+    if drawn.unrelieved:
+        places = count(drawn.unrelieved, "vertex", "vertices")
+        sentence = f"At {places} a crease is too short for a relief hole."
+        findings.append(Finding("relief-holes", sentence))
+    if drawn.unbridged:
+        sentence = (
+            f"{count(drawn.unbridged, 'outline has', 'outlines have')} no room for "
+            f"{options.bridges} holding bridges of {options.bridge_mm:g} mm: a side that bears one "
+            "must be over three times as long."
+        )
+        findings.append(Finding("bridges", sentence))
+    if not nesting.finished:
+        sentence = (
+            "The nesting reached its limit of work before it had tried every order of the patches; "
+            "fewer sheets may be possible. Lay out fewer copies at a time with `quantity`."
+        )
+        findings.append(Finding("nesting-limit", sentence))
+    unassigned = int((pattern.edges_assignment == "U").sum())
+    if unassigned:
+        creases = count(unassigned, "crease is", "creases are")
+        sentence = f"{creases} neither mountain nor valley in the pattern."
+        findings.append(Finding("unassigned-creases", sentence))
+    untabbed = framed.outlined.untabbed.tolist()
+    if untabbed:
+        edges = count(len(untabbed), "seam edge bears", "seam edges bear")
+        sentence = f"{edges} no tab, since there is no room: use tape there."
+        findings.append(Finding("untabbed", sentence, tuple(untabbed)))
+    if lettering.left_out:
+        names = count(lettering.left_out, "name or number", "names and numbers")
+        sentence = f"{names} found no room on the sheets: go by the pictures of the assembly guide."
+        findings.append(Finding("unlettered", sentence))
+    return tuple(findings)
