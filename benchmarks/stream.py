@@ -36,7 +36,7 @@ import numpy as np
 import serial
 
 from miurafab.gcode.job import Job
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import Progress, stream_plan
 from miurafab.machine.virtual_server import PtyWire
 from miurafab.profiles import load_machine
@@ -208,7 +208,7 @@ def check_mode(lines: int, speed: float) -> tuple[float, float]:
         peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
     with controller(speed=speed) as address:
-        plan = plan_job(job, load_machine(MACHINE), check_mode=True)
+        plan = plan_job(job, load_machine(MACHINE), SendOptions(check_mode=True))
         result = stream_plan(plan, address, on_progress=note)
     return size / result.seconds / (WIRE_BYTES_S * speed), (peaks[-1] - peaks[0]) / 1024
 

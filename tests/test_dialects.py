@@ -15,7 +15,7 @@ from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.program import strokes
 from miurafab.gcode.reading import read_program
 from miurafab.machine.dialects import virtual_machine
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
@@ -134,7 +134,7 @@ def test_what_speaks_otherwise_is_streamed_in_its_own_way(machine, pattern) -> N
     assert result.lines > 20
     assert device.lost_bytes == 0
     with pytest.raises(InputError, match=f"{machine.name} speaks {machine.dialect}, which has no"):
-        plan_job(job, machine, check_mode=True)
+        plan_job(job, machine, SendOptions(check_mode=True))
 
 
 SQUARE = [(20.0, 20.0), (40.0, 20.0), (40.0, 40.0), (20.0, 40.0), (20.0, 20.0)]

@@ -200,9 +200,9 @@ def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -
     from miurafab.machine.preflight import require_known
     from miurafab.workflow.dry_run import clock_text
 
-    require_known(options.force)
+    require_known(options.send.force)
     findings = [finding for sheet in prepared.dry_runs for finding in sheet.findings]
-    passed = options.force | ({"m3"} if options.allow_m3 else set())
+    passed = options.send.force | ({"m3"} if options.send.allow_m3 else set())
     refused = any(finding.code not in passed for finding in refusals(findings))
     answer = {
         "status": "refused" if refused else "ready",

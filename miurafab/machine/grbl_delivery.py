@@ -58,7 +58,7 @@ class GrblDelivery(Delivery):
             plan.job.name,
             plan.job.send_lines(controller.line_chars),
             send_response=controller.streaming == "send-response",
-            collect_refusals=plan.check_mode,
+            collect_refusals=plan.options.check_mode,
         )
         self.refusals = self._streamer.refusals
 
@@ -78,13 +78,15 @@ class GrblDelivery(Delivery):
         """See :class:`Delivery`."""
         plan, session = self.plan, self._session
         session.greet()
-        if plan.home:
+        if plan.options.home:
             self.at_risk = True
             session.home()
             self.at_risk = False
-        if plan.at is not None:
-            session.command("G92X{:.3f}Y{:.3f}".format(*plan.at))
-        forced = raise_findings(check_status(session.wait_status()), plan.force, ControllerError)
+        if plan.options.at is not None:
+            session.command("G92X{:.3f}Y{:.3f}".format(*plan.options.at))
+        forced = raise_findings(
+            check_status(session.wait_status()), plan.options.force, ControllerError
+        )
         options = (event for event in session.command("$I") if isinstance(event, Options))
         for option in options:
             if self.journal is not None and option.planner_blocks is not None:
@@ -93,8 +95,8 @@ class GrblDelivery(Delivery):
         findings = list(check_settings(plan.machine, settings))
         if plan.program is not None:
             findings.extend(check_travel(plan.program, settings, session.work_offset))
-        forced += raise_findings(findings, plan.force, ControllerError)
-        if plan.check_mode:
+        forced += raise_findings(findings, plan.options.force, ControllerError)
+        if plan.options.check_mode:
             self.at_risk = True
             session.command("$C")
         return forced
@@ -150,7 +152,7 @@ class GrblDelivery(Delivery):
     def part(self) -> tuple[Finding, ...]:
         """See :class:`Delivery`."""
         session = self._session
-        if self.plan.check_mode:
+        if self.plan.options.check_mode:
             session.stop()
         elif self.plan.machine.tool.kind == "laser" and session.wait_status().beam_on:
             session.stop()

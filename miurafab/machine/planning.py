@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from miurafab.errors import GcodeError, InputError
 from miurafab.findings import Finding
@@ -11,9 +12,45 @@ from miurafab.gcode.program import Program
 from miurafab.machine.judge_job import JudgedJob, judge_job
 from miurafab.machine.preflight import raise_findings, require_known
 from miurafab.machine.resume import Resumption
+from miurafab.options import Flag, Pair, Several, Text, check_options, length, option
 from miurafab.profiles import MachineProfile
 
 _NO_CHECK_MODE = ("marlin", "hpgl")
+
+
+@dataclass(frozen=True)
+class SendOptions:
+    """How a job is sent."""
+
+    home: bool = option(
+        Flag(), "Home the machine first, in the same conversation.", default=False, group="Start"
+    )
+    at: tuple[float, float] | None = option(
+        Pair(length(-math.inf), "X,Y", "0,0 or 10mm,5mm"),
+        "Where the head stands, in the job's coordinates: 0,0 is its origin.",
+        group="Start",
+    )
+    check_mode: bool = option(
+        Flag(),
+        "Let the controller only read the job ($C); nothing moves.",
+        default=False,
+        group="Safety",
+    )
+    allow_m3: bool = option(
+        Flag(),
+        "Cut with M3, which burns on if the link is lost.",
+        default=False,
+        group="Safety",
+    )
+    force: frozenset[str] = option(
+        Several(Text("CODE"), frozenset),
+        "Override the pre-flight checks of these codes.",
+        default=frozenset(),
+        group="Safety",
+    )
+
+    def __post_init__(self) -> None:
+        check_options(self)
 
 
 @dataclass(frozen=True)
@@ -28,55 +65,52 @@ class JobPlan:
     machine: MachineProfile
     lines: int
     program: Program | None
-    force: frozenset[str]
-    check_mode: bool
-    home: bool
-    at: tuple[float, float] | None
+    options: SendOptions
     resumption: Resumption | None
     forced: tuple[Finding, ...]
+
+    def with_head_at(self, at: tuple[float, float] | None) -> JobPlan:
+        """The same for a head that stands ``at`` (X, Y in mm)."""
+        return replace(self, options=replace(self.options, at=at))
 
 
 def plan_job(
     job: Job,
     machine: MachineProfile,
+    options: SendOptions | None = None,
     *,
-    force: frozenset[str] = frozenset(),
-    allow_m3: bool = False,
-    check_mode: bool = False,
-    home: bool = False,
-    at: tuple[float, float] | None = None,
     resumption: Resumption | None = None,
     most_power: float = 1.0,
     judged: JudgedJob | None = None,
 ) -> JobPlan:
     """Check ``job`` by itself; raises :class:`~miurafab.errors.InputError` for what is wrong.
 
-    ``force`` names checks to override (:data:`~miurafab.machine.preflight.CHECKS`). With
-    ``check_mode`` the controller only reads the job (``$C``): nothing moves, and the result lists
-    the refused lines. With ``home`` the machine is homed first, in the same conversation: most
-    boards forget where they are when the port is opened. ``at`` states where the head stands (X, Y
-    in mm, in the job's coordinates), for a machine without homing switches. With ``resumption``
-    the rest of ``job`` is sent; it needs ``home`` or ``at``. ``most_power`` is the most that the
-    material takes, as a fraction of full power. ``judged`` is ``job`` as
-    :func:`~miurafab.machine.judge_job.judge_job` read it for ``machine``, if that is known.
+    In check mode the result lists the lines that the controller refuses. Most boards forget where
+    they are when the port is opened: hence ``home``, and ``at`` for a machine without homing
+    switches. With ``resumption`` the rest of ``job`` is sent; it needs ``home`` or ``at``.
+    ``most_power`` is the most that the material takes, as a fraction of full power. ``judged`` is
+    ``job`` as :func:`~miurafab.machine.judge_job.judge_job` read it for ``machine``, if that is
+    known.
     """
+    options = options or SendOptions()
+    placed = options.home or options.at is not None
     if resumption is not None:
-        if check_mode:
+        if options.check_mode:
             raise InputError("A job is resumed or read in check mode, not both.")
-        if not home and at is None:
+        if not placed:
             raise InputError(
                 f"To go on with {job.name} the machine must know where it is: home it first "
                 "(`home`), or put the head at a known place and state it (`at` 0,0 is the origin "
                 "of the job)."
             )
         job, judged = resumption.job, None
-    require_known(force)
-    if check_mode and machine.dialect in _NO_CHECK_MODE:
+    require_known(options.force)
+    if options.check_mode and machine.dialect in _NO_CHECK_MODE:
         raise InputError(
             f"{machine.name} speaks {machine.dialect}, which has no check mode; a `dry_run` reads "
             "the job without a machine."
         )
-    if (home or at is not None) and machine.dialect == "hpgl":
+    if placed and machine.dialect == "hpgl":
         raise InputError(
             f"{machine.name} speaks hpgl, which starts at the origin set at the cutter's panel; "
             "leave `home` and `at` out."
@@ -84,9 +118,7 @@ def plan_job(
     if judged is None:
         judged = judge_job(job, machine, most_power=most_power)
     # In check mode the controller itself is asked what it thinks of every line.
-    passed = {"m3", "program"} if check_mode else {"m3"} if allow_m3 else set()
+    passed = {"m3", "program"} if options.check_mode else {"m3"} if options.allow_m3 else set()
     findings = [finding for finding in judged.findings if finding.code not in passed]
-    forced = raise_findings(findings, force, GcodeError)
-    return JobPlan(
-        job, machine, judged.lines, judged.program, force, check_mode, home, at, resumption, forced
-    )
+    forced = raise_findings(findings, options.force, GcodeError)
+    return JobPlan(job, machine, judged.lines, judged.program, options, resumption, forced)

@@ -92,7 +92,7 @@ def deliver(
         if transcript_path is not None:
             transcript = Transcript(transcript_path, f"{job.name} to {transport.name}")
             at_end.callback(transcript.close)
-        if journal_path is not None and not plan.check_mode:
+        if journal_path is not None and not plan.options.check_mode:
             rest = plan.resumption
             journal = Journal(
                 journal_path,

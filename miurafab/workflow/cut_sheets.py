@@ -6,9 +6,8 @@ each go beside it, and by its journal a sheet that was interrupted goes on.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -18,13 +17,13 @@ from miurafab.gcode.job import Job
 from miurafab.machine.job_process import stream_apart
 from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import Keys
-from miurafab.machine.planning import JobPlan, plan_job
+from miurafab.machine.planning import JobPlan, SendOptions, plan_job
 from miurafab.machine.resume import resume
 from miurafab.machine.sender import Progress as StreamProgress
 from miurafab.machine.sender import StreamResult, stream_plan
 from miurafab.machine.trace_box import MOST_POINTER, frame_job
 from miurafab.machine.transport import VIRTUAL
-from miurafab.options import Flag, Pair, Several, Text, check_options, length, option, percent
+from miurafab.options import Flag, check_options, option, percent
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.dry_run import SheetPreview
@@ -61,24 +60,16 @@ class SheetProgress:
 
 @dataclass(frozen=True)
 class CutOptions:
-    """How sheets are sent; ``at`` is X, Y in mm, ``pointer`` a fraction of full power.
+    """How sheets are cut; ``pointer`` is a fraction of full power.
 
     ``virtual_speed`` is how much faster than real time the virtual machine runs.
     """
 
-    check_mode: bool = option(
-        Flag(), "Let the controller only read the job ($C).", default=False, group="Safety"
-    )
+    send: SendOptions = field(default_factory=SendOptions)
     resume: bool = option(
         Flag(),
         "Go on with what was interrupted; needs `home` or `at`, once stopped.",
         default=False,
-        group="Start",
-    )
-    home: bool = option(Flag(), "Home the machine first.", default=False, group="Start")
-    at: tuple[float, float] | None = option(
-        Pair(length(-math.inf), "X,Y", "0,0 or 10mm,5mm"),
-        "Where the head stands, in the job's coordinates: 0,0 is its origin.",
         group="Start",
     )
     frame: bool = option(
@@ -92,18 +83,6 @@ class CutOptions:
         "Power of the frame in percent; 0 keeps it dark.",
         default=0.0,
         group="Start",
-    )
-    allow_m3: bool = option(
-        Flag(),
-        "Cut with M3, which burns on if the link is lost.",
-        default=False,
-        group="Safety",
-    )
-    force: frozenset[str] = option(
-        Several(Text("CODE"), frozenset),
-        "Override the pre-flight checks of these codes.",
-        default=frozenset(),
-        group="Safety",
     )
     virtual_speed: float | None = None
 
@@ -137,18 +116,23 @@ def cut(
     :func:`~miurafab.machine.sender.stream_plan` raises.
     """
     done = []
-    at = options.at
+    at = options.send.at
     for number, plan in plan_sheets(prepared, sheets, options):
         if before_sheet is not None:
             before_sheet(number, len(prepared.jobs))
         if plan.resumption is not None and on_resume is not None:
             on_resume(plan.resumption.finding)
         if options.frame:
-            frame(prepared, number, port=port, options=replace(options, at=at))
+            frame(
+                prepared,
+                number,
+                port=port,
+                options=replace(options, send=replace(options.send, at=at)),
+            )
             if after_frame is not None:
                 after_frame(number)
         send = partial(_stream(port), keys=keys, virtual_speed=options.virtual_speed)
-        plan = replace(plan, at=at)
+        plan = plan.with_head_at(at)
         done.append(cut_sheet(prepared, number, plan, port, send, on_progress=on_progress))
         at = head_after(prepared, number, at)
     return tuple(done)
@@ -236,11 +220,7 @@ def plan_sheets(
         plan = plan_job(
             job,
             prepared.machine,
-            force=options.force,
-            allow_m3=options.allow_m3,
-            check_mode=options.check_mode,
-            home=options.home,
-            at=options.at,
+            options.send,
             resumption=resumption,
             most_power=prepared.most_power,
             judged=prepared.dry_runs[number - 1].judged,
@@ -268,9 +248,14 @@ def frame(
     if bounds is None:
         raise InputError(f"{name} burns nothing, so there is no frame to trace.")
     box = frame_job(
-        name, bounds, prepared.machine, pointer=options.pointer, back_to=options.at or (0.0, 0.0)
+        name,
+        bounds,
+        prepared.machine,
+        pointer=options.pointer,
+        back_to=options.send.at or (0.0, 0.0),
     )
-    plan = plan_job(box, prepared.machine, force=options.force, home=options.home, at=options.at)
+    start = replace(options.send, check_mode=False, allow_m3=False)
+    plan = plan_job(box, prepared.machine, start)
     return _stream(port)(plan, port, virtual_speed=options.virtual_speed)
 
 

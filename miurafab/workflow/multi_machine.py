@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 from miurafab.errors import InputError, JobStopped, MiurafabError
@@ -116,7 +116,7 @@ class _Work:
 
     def at_machine(self, port: str) -> None:
         """Cut sheets at ``port`` until none is left, or the machine has failed."""
-        at = self._options.at
+        at = self._options.send.at
         send = partial(
             stream_apart, signals=self._signals, virtual_speed=self._options.virtual_speed
         )
@@ -127,7 +127,7 @@ class _Work:
                 return
             name, why = self._prepared.dry_runs[number - 1].name, ""
             try:
-                cut_sheet(self._prepared, number, replace(self._plans[number], at=at), port, send)
+                cut_sheet(self._prepared, number, self._plans[number].with_head_at(at), port, send)
             except MiurafabError as error:
                 why = str(error)
             self.outcome[number] = Shared(name, port, not why, why)

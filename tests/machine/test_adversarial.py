@@ -17,7 +17,7 @@ from wires import FakeWire
 from miurafab.errors import GcodeError, JobStopped, MiurafabError
 from miurafab.gcode.job import Job
 from miurafab.machine.journal import read_journal
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.resume import Resumption, resume
 from miurafab.machine.sender import StreamResult, deliver
 from miurafab.machine.signals import StopSignals
@@ -40,7 +40,7 @@ def new_wire(*faults: str) -> FakeWire:
 def send(
     job: Job, wire: FakeWire, journal: Path | None = None, rest: Resumption | None = None
 ) -> StreamResult:
-    plan = plan_job(job, MACHINE, at=(0.0, 0.0), resumption=rest)
+    plan = plan_job(job, MACHINE, SendOptions(at=(0.0, 0.0)), resumption=rest)
     return deliver(plan, wire, StopSignals(), journal_path=journal)
 
 
@@ -132,7 +132,7 @@ def test_an_error_in_mid_job_is_named_and_dark_at_once(tmp_path: Path) -> None:
     job = Job("bad.nc", text)
     number = text.splitlines().index("G0 X8 Y7 Q1") + 1
     wire = new_wire()
-    plan = plan_job(job, MACHINE, force=frozenset({"program"}))
+    plan = plan_job(job, MACHINE, SendOptions(force=frozenset({"program"})))
     with pytest.raises(MiurafabError, match=rf"bad\.nc, line {number} \('G0X8Y7Q1'\): error:") as e:
         deliver(plan, wire, StopSignals(), journal_path=tmp_path / "journal")
     assert e.value.exit_code == 3

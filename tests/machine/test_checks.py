@@ -7,7 +7,7 @@ from wires import BANNER, FakeWire
 
 from miurafab.errors import MiurafabError
 from miurafab.gcode.job import Job
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.preflight import CHECKS
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
@@ -60,8 +60,7 @@ def attempt(name: str, force: frozenset[str]) -> FakeWire:
     plan = plan_job(
         Job("job.nc", JOBS.get(name, "G0 X5 Y5\n")),
         MACHINE,
-        force=force,
-        allow_m3=name == "dwell",
+        SendOptions(force=force, allow_m3=name == "dwell"),
         most_power=0.5 if name == "material" else 1.0,
     )
     deliver(plan, wire, StopSignals())

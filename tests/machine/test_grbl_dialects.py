@@ -12,7 +12,7 @@ from wires import FakeWire
 from miurafab.errors import ControllerError, JobStopped, MachineError
 from miurafab.gcode.job import Job
 from miurafab.machine.journal import read_journal
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.resume import resume
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
@@ -60,7 +60,7 @@ def test_a_job_is_done_whole_and_no_byte_is_lost(
 ) -> None:
     wire = new_wire(machine, latency=latency)
     job = job_for(machine)
-    plan = plan_job(job, machine, allow_m3=True)
+    plan = plan_job(job, machine, SendOptions(allow_m3=True))
     result = deliver(plan, wire, StopSignals(), journal_path=tmp_path / "j")
     assert result.lines == plan.lines
     assert wire.device.lost_bytes == 0
@@ -85,7 +85,7 @@ def test_the_buffer_is_filled_and_never_overrun(machine: MachineProfile) -> None
         told = machine.dialect in ("grbl-1.1", "grblhal")
         other = replace(machine, controller=replace(machine.controller, rx_bytes=rx_bytes))
         with pytest.raises((JobStopped, ControllerError)):
-            deliver(plan_job(flood, other, allow_m3=True), wire, stop)
+            deliver(plan_job(flood, other, SendOptions(allow_m3=True)), wire, stop)
         assert (wire.device.lost_bytes > 0) == (lost and not told)
 
 
@@ -95,7 +95,7 @@ def test_a_fault_ends_it_and_it_goes_on(
 ) -> None:
     wire, job = new_wire(machine, fault), job_for(machine)
     journal = tmp_path / "journal"
-    plan = plan_job(job, machine, at=(0.0, 0.0), allow_m3=True)
+    plan = plan_job(job, machine, SendOptions(at=(0.0, 0.0), allow_m3=True))
     with pytest.raises(MachineError, match=r"restarted|ALARM|Hard limit|went away|Abort"):
         deliver(plan, wire, StopSignals(), journal_path=journal)
     wire.settle(120.0)
@@ -106,7 +106,7 @@ def test_a_fault_ends_it_and_it_goes_on(
         return
     rest = resume(job, machine, read_journal(journal))
     again = new_wire(machine)
-    plan = plan_job(job, machine, at=(0.0, 0.0), resumption=rest)
+    plan = plan_job(job, machine, SendOptions(at=(0.0, 0.0)), resumption=rest)
     deliver(plan, again, StopSignals(), journal_path=journal)
     counts = burnt(job, [wire.device.beam_log, again.device.beam_log])
     assert all(counts[index] for index in range(STROKES))
@@ -117,7 +117,7 @@ def test_a_fault_ends_it_and_it_goes_on(
 def test_a_refused_line_is_told_in_the_firmwares_own_words() -> None:
     machine = load_machine("grbl09-laser-300")
     job = Job("bad.nc", "G21\nG1 X5 F100\nG99\n")
-    plan = plan_job(job, machine, force=frozenset({"program"}))
+    plan = plan_job(job, machine, SendOptions(force=frozenset({"program"})))
     with pytest.raises(ControllerError, match=r"bad\.nc, line 3 \('G99'\): Unsupported command"):
         deliver(plan, new_wire(machine), StopSignals())
 
@@ -133,7 +133,7 @@ def test_keys_that_a_firmware_does_not_know_are_not_sent(machine: MachineProfile
             return keys
 
     wire = new_wire(machine)
-    plan = plan_job(job_for(machine), machine, allow_m3=True)
+    plan = plan_job(job_for(machine), machine, SendOptions(allow_m3=True))
     result = deliver(plan, wire, StopSignals(), keys=Pressed())
     assert result.lines == plan.lines
     sent = sum(byte >= 0x80 for byte in wire.bytes_written)

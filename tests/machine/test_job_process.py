@@ -14,7 +14,7 @@ from miurafab.errors import ControllerError, MachineError, PortError
 from miurafab.gcode.job import Job
 from miurafab.machine.job_process import stream_apart
 from miurafab.machine.journal import read_journal
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.profiles import load_machine
 
 pytestmark = pytest.mark.skipif(
@@ -33,7 +33,7 @@ def bench():
 def test_it_is_the_same_as_in_one_process(tmp_path: Path) -> None:
     machine = load_machine("grbl-laser-400")
     seen: list[float] = []
-    plan = plan_job(SHORT, machine, force=frozenset({"beam"}))
+    plan = plan_job(SHORT, machine, SendOptions(force=frozenset({"beam"})))
     result = stream_apart(
         plan,
         "virtual",
@@ -52,7 +52,7 @@ def test_its_errors_are_those_of_the_other_process() -> None:
     with pytest.raises(PortError, match=r"/dev/gone does not exist"):
         stream_apart(plan_job(SHORT, machine), "/dev/gone")
     job = Job("bad.nc", "M4 S0\nG1 X5 F600\nG2 X5\nM5\n")
-    plan = plan_job(job, machine, force=frozenset({"program"}))
+    plan = plan_job(job, machine, SendOptions(force=frozenset({"program"})))
     with pytest.raises(ControllerError, match=r"bad\.nc, line 3 .*reports the beam off\.$"):
         stream_apart(plan, "virtual")
 

@@ -14,7 +14,7 @@ from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
 from miurafab.machine.actions import talk
 from miurafab.machine.keys import NoKeys, terminal_keys
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import StreamResult, deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.trace_box import frame_job
@@ -87,7 +87,7 @@ def test_an_abort_comes_to_rest_and_resets(keys: list[tuple[float, str]]) -> Non
 def test_an_abort_of_an_m3_job_is_dark_at_once() -> None:
     """A feed hold would leave the full power standing for $1."""
     wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
-    plan = plan_job(Job("m3.nc", JOB.text.replace("M4", "M3")), MACHINE, allow_m3=True)
+    plan = plan_job(Job("m3.nc", JOB.text.replace("M4", "M3")), MACHINE, SendOptions(allow_m3=True))
     with pytest.raises(JobStopped, match="stopped at the keyboard"):
         deliver(plan, wire, StopSignals(), keys=Script(wire.device, [(4.0, "q")]))
     assert b"!" not in wire.commands
@@ -157,13 +157,13 @@ def test_a_dark_frame_never_arms_and_a_pointer_is_weak() -> None:
 def test_a_dwell_with_the_beam_on_is_refused(text: str, burns: bool) -> None:
     job = Job("dwell.nc", text)
     if not burns:
-        plan_job(job, MACHINE, allow_m3=True)
+        plan_job(job, MACHINE, SendOptions(allow_m3=True))
         return
     with pytest.raises(GcodeError, match=r"waits with the beam on at S500.*'force' dwell"):
-        plan_job(job, MACHINE, allow_m3=True)
+        plan_job(job, MACHINE, SendOptions(allow_m3=True))
     # The virtual controller agrees: there is a standing beam.
     wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
-    plan = plan_job(job, MACHINE, allow_m3=True, force=frozenset({"dwell"}))
+    plan = plan_job(job, MACHINE, SendOptions(allow_m3=True, force=frozenset({"dwell"})))
     deliver(plan, wire, StopSignals())
     assert any(segment.standing for segment in wire.device.beam_log)
 

@@ -11,8 +11,8 @@ import pytest
 from miurafab.gcode import reading
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
-from miurafab.machine import planning
-from miurafab.machine.planning import plan_job
+from miurafab.machine import judge_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import Progress, stream_plan
 from miurafab.profiles import load_machine
 
@@ -30,7 +30,7 @@ def job(lines: int) -> Job:
 
 def streaming_growth(lines: int, folder: Path, *, check_mode: bool) -> int:
     """Bytes that the sender (and the controller in memory) hold more late than early on."""
-    plan = plan_job(job(lines), MACHINE, check_mode=check_mode)
+    plan = plan_job(job(lines), MACHINE, SendOptions(check_mode=check_mode))
     held: list[int] = []
 
     def note(progress: Progress) -> None:
@@ -70,9 +70,9 @@ def test_a_job_is_read_once_from_the_plan_to_the_end(monkeypatch: pytest.MonkeyP
         reads.append(job.name)
         return reading.read_program(job, MACHINE)
 
-    monkeypatch.setattr(planning, "read_program", read)
+    monkeypatch.setattr(judge_job, "read_program", read)
     stream_plan(plan_job(job(20), MACHINE), "virtual")
     assert reads == ["long.nc"]
-    program = reading.read_program(job(20), MACHINE)
-    stream_plan(plan_job(job(20), MACHINE, program=program), "virtual")
-    assert reads == ["long.nc"]
+    judged = judge_job.judge_job(job(20), MACHINE)
+    stream_plan(plan_job(job(20), MACHINE, judged=judged), "virtual")
+    assert reads == ["long.nc"] * 2

@@ -12,7 +12,7 @@ from miurafab.errors import GcodeError
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
 from miurafab.machine.loose_parts import burnt_on_loose_pieces, open_outlines
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.preflight import CHECKS
 from miurafab.profiles import load_machine
 
@@ -138,9 +138,9 @@ def test_each_is_refused_by_its_name_and_forced_by_it(check: str, made: Job) -> 
     with pytest.raises(GcodeError, match=rf"pieces\.nc, line \d+ .*'force' {check} ") as caught:
         plan_job(made, MACHINE)
     assert caught.value.exit_code == 2
-    assert len(plan_job(made, MACHINE, force=frozenset({check})).forced) == 1
+    assert len(plan_job(made, MACHINE, SendOptions(force=frozenset({check}))).forced) == 1
     with pytest.raises(GcodeError, match=f"'force' {check} "):
-        plan_job(made, MACHINE, force=frozenset(CHECKS) - {check})
+        plan_job(made, MACHINE, SendOptions(force=frozenset(CHECKS) - {check}))
 
 
 def test_where_no_operation_is_said_nothing_is_refused() -> None:

@@ -18,7 +18,7 @@ from miurafab.gcode.job import Job
 from miurafab.machine.dialects import make_safe
 from miurafab.machine.faulty import FaultyDevice
 from miurafab.machine.journal import read_journal
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
@@ -97,7 +97,7 @@ def new_device(*, emergency_parser: bool = True) -> VirtualMarlin:
 def send(
     job: Job, wire: VirtualTransport, *, force: frozenset[str] = frozenset(), **options: object
 ) -> StreamResult:
-    return deliver(plan_job(job, MACHINE, force=force), wire, StopSignals(), **options)
+    return deliver(plan_job(job, MACHINE, SendOptions(force=force)), wire, StopSignals(), **options)
 
 
 def assert_dark(device: VirtualMarlin) -> None:
@@ -252,7 +252,9 @@ def test_nothing_that_answers_is_no_marlin() -> None:
 def test_homing_and_a_stated_place_come_first() -> None:
     device = new_device()
     wire = Wire(device)
-    deliver(plan_job(dashes(2), MACHINE, home=True, at=(5.0, 6.0)), wire, StopSignals())
+    deliver(
+        plan_job(dashes(2), MACHINE, SendOptions(home=True, at=(5.0, 6.0))), wire, StopSignals()
+    )
     assert device.homed == 1
     assert wire.written.index(b"G28XY*") < wire.written.index(b"G92X5.000Y6.000*")
 

@@ -12,7 +12,7 @@ from miurafab.errors import InputError, JobStopped, PortError
 from miurafab.gcode.job import Job
 from miurafab.machine.dialects import make_safe, virtual_machine
 from miurafab.machine.journal import read_journal
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.resume import resume
 from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
@@ -131,7 +131,7 @@ def test_a_cutter_that_cannot_be_told_is_told_of() -> None:
 def test_what_a_cutter_cannot_do_is_refused() -> None:
     for options in ({"home": True}, {"at": (0.0, 0.0)}, {"check_mode": True}):
         with pytest.raises(InputError, match="hpgl-cutter-a3 speaks hpgl, which"):
-            plan_job(strokes(), MACHINE, **options)
+            plan_job(strokes(), MACHINE, SendOptions(**options))
     far = Job("far.plt", "IN;PA;PU;PD40000,0;PU;")
     with pytest.raises(InputError, match="off the bed"):
         plan_job(far, MACHINE)

@@ -19,7 +19,7 @@ from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import strokes
 from miurafab.machine.journal import JournalRun, job_digest, read_journal
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.resume import Resumption, resume
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
@@ -41,7 +41,7 @@ def run(
     job: Job, wire: FakeWire, journal: Path | None, resumption: Resumption | None = None
 ) -> None:
     """One run on a machine whose head stands at the origin of the job."""
-    plan = plan_job(job, MACHINE, at=(0.0, 0.0), resumption=resumption)
+    plan = plan_job(job, MACHINE, SendOptions(at=(0.0, 0.0)), resumption=resumption)
     deliver(plan, wire, StopSignals(), journal_path=journal)
 
 
@@ -214,10 +214,10 @@ def test_what_cannot_be_resumed_is_said() -> None:
     with pytest.raises(GcodeError, match=r"shift\.nc, line 3 \(G92X5\)"):
         resume(shifted, MACHINE, [record(shifted, line=200, taken=200)])
     rest = resume(job, MACHINE, [record(job, line=200, taken=200)])
-    with pytest.raises(InputError, match=r"--home.*--at"):
+    with pytest.raises(InputError, match=r"'home'.*'at'"):
         plan_job(job, MACHINE, resumption=rest)
     with pytest.raises(InputError, match="check mode"):
-        plan_job(job, MACHINE, resumption=rest, check_mode=True)
+        plan_job(job, MACHINE, SendOptions(check_mode=True), resumption=rest)
 
 
 @pytest.mark.parametrize("style", ["absolute", "relative"])
@@ -227,7 +227,7 @@ def test_m3_is_armed_in_the_dark(style: str) -> None:
     job = Job("m3.nc", text)
     rest = resume(job, MACHINE, [record(job, line=300, taken=300)])
     wire = FakeWire(new_device())
-    plan = plan_job(job, MACHINE, at=(0.0, 0.0), allow_m3=True, resumption=rest)
+    plan = plan_job(job, MACHINE, SendOptions(at=(0.0, 0.0), allow_m3=True), resumption=rest)
     deliver(plan, wire, StopSignals())
     first = wire.device.beam_log[0]
     x, y, _ = strokes(parse_program(job)).stroke(rest.stroke)[0]

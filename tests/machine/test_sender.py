@@ -21,7 +21,7 @@ from miurafab.errors import (
 from miurafab.gcode.job import Job
 from miurafab.grbl.streamer import LineRefused
 from miurafab.machine.journal import read_journal
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile, load_machine
@@ -55,7 +55,7 @@ def send(
     check_mode: bool = False,
     **options: object,
 ) -> StreamResult:
-    plan = plan_job(job, machine, force=force, check_mode=check_mode)
+    plan = plan_job(job, machine, SendOptions(force=force, check_mode=check_mode))
     try:
         return deliver(plan, wire, StopSignals(), **options)
     finally:
@@ -349,12 +349,12 @@ def test_each_check_of_a_job_has_a_name_that_forces_it(text: str, name: str, sen
     with pytest.raises(GcodeError, match=sentence) as caught:
         plan_job(Job("job.nc", text), MACHINE)
     assert f"'force' {name}" in str(caught.value)
-    plan = plan_job(Job("job.nc", text), MACHINE, force=frozenset({name}))
+    plan = plan_job(Job("job.nc", text), MACHINE, SendOptions(force=frozenset({name})))
     assert len(plan.forced) == 1
 
 
 def test_m3_may_be_allowed() -> None:
-    assert plan_job(Job("a", "M3 S1\nG1X1F9\n"), MACHINE, allow_m3=True).forced == ()
+    assert plan_job(Job("a", "M3 S1\nG1X1F9\n"), MACHINE, SendOptions(allow_m3=True)).forced == ()
 
 
 @pytest.mark.parametrize(
@@ -380,7 +380,7 @@ def test_each_check_of_the_controller_has_a_name_that_forces_it(
 
 def test_an_unknown_name_to_force_is_refused() -> None:
     with pytest.raises(InputError, match=r"'everything' is not a check.*bounds"):
-        plan_job(Job("a", ""), MACHINE, force=frozenset({"everything"}))
+        plan_job(Job("a", ""), MACHINE, SendOptions(force=frozenset({"everything"})))
 
 
 def test_a_line_that_may_not_be_sent_is_refused_before_the_port_is_opened() -> None:
@@ -466,7 +466,7 @@ def test_a_board_at_work_is_left_alone() -> None:
 def test_a_job_that_leaves_the_laser_burning_is_ended_by_a_reset() -> None:
     device = new_device()
     result = deliver(
-        plan_job(Job("forgot.nc", "M3 S500\nG1 X5 F600\n"), MACHINE, allow_m3=True),
+        plan_job(Job("forgot.nc", "M3 S500\nG1 X5 F600\n"), MACHINE, SendOptions(allow_m3=True)),
         FakeWire(device),
         StopSignals(),
     )
@@ -487,7 +487,7 @@ def test_a_machine_with_homing_is_homed_first_if_asked() -> None:
         send(job, wire, force=force)
     assert b"$X" not in wire.bytes_written
     assert b"$H" not in wire.bytes_written
-    plan = plan_job(job, MACHINE, force=force, home=True)
+    plan = plan_job(job, MACHINE, SendOptions(force=force, home=True))
     wire = FakeWire(new_device(**homing))
     assert deliver(plan, wire, StopSignals()).lines == 2
     assert wire.commands.startswith(b"$H\n$I\n$$\nG90\n")
@@ -499,7 +499,7 @@ def test_soft_limits_are_checked_from_where_the_machine_stands() -> None:
     wire = FakeWire(device)
     job = Job("job.nc", "G0 X10\n")
     with pytest.raises(ControllerError, match=r"past its soft limits.*'force' travel"):
-        deliver(plan_job(job, MACHINE, home=True), wire, StopSignals())
+        deliver(plan_job(job, MACHINE, SendOptions(home=True)), wire, StopSignals())
     assert b"G0X10" not in wire.bytes_written
     device = new_device(s20=1, s22=1, s24=500, s25=3000)
     device.receive(b"$X\n")
@@ -508,5 +508,5 @@ def test_soft_limits_are_checked_from_where_the_machine_stands() -> None:
     device.advance(0.5)
     device.power_cycle()
     wire = FakeWire(device)
-    assert deliver(plan_job(job, MACHINE, home=True), wire, StopSignals()).lines == 1
+    assert deliver(plan_job(job, MACHINE, SendOptions(home=True)), wire, StopSignals()).lines == 1
     assert device.position[0] == pytest.approx(-390)

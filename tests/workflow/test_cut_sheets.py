@@ -8,6 +8,7 @@ from small_jobs import dashes, known_toolpath, write_nc
 import miurafab
 from miurafab.errors import GcodeError, InputError
 from miurafab.machine.journal import read_journal
+from miurafab.machine.planning import SendOptions
 from miurafab.workflow.cut_sheets import CutOptions, frame
 
 
@@ -61,7 +62,7 @@ def test_a_plain_file_has_its_journal_beside_it(tmp_path):
 def test_check_mode_leaves_no_journal_to_resume(tmp_path):
     path = write_nc(tmp_path, known_toolpath())
     prepared = miurafab.prepare(str(path))
-    miurafab.cut(prepared, port="virtual", options=CutOptions(check_mode=True))
+    miurafab.cut(prepared, port="virtual", options=CutOptions(send=SendOptions(check_mode=True)))
     assert not path.with_suffix(".journal").exists()
 
 
@@ -70,7 +71,7 @@ def test_a_further_sheet_is_told_where_the_head_was_left(folder):
         file = folder / f"{name}.nc"
         file.write_text(file.read_text() + "G0 X7 Y9\n", newline="\n")
     prepared = miurafab.prepare(str(folder))
-    miurafab.cut(prepared, port="virtual", options=CutOptions(at=(3.0, 4.0)))
+    miurafab.cut(prepared, port="virtual", options=CutOptions(send=SendOptions(at=(3.0, 4.0))))
     for name, where in (("sheet-01", "X3.000Y4.000"), ("sheet-02", "X7.000Y9.000")):
         assert f"G92{where}" in (folder / f"{name}.transcript").read_text()
 
@@ -80,7 +81,7 @@ def test_only_what_was_interrupted_or_never_begun_is_resumed(folder):
     miurafab.cut(prepared, port="virtual", sheets=[1, 2])
     journal = folder / "sheet-02.journal"
     journal.write_text(journal.read_text().partition('{"taken"')[0])
-    options = CutOptions(resume=True, at=(0.0, 0.0))
+    options = CutOptions(send=SendOptions(at=(0.0, 0.0)), resume=True)
     done = miurafab.cut(prepared, port="virtual", options=options)
     assert [sheet.name for sheet in done] == ["sheet-02", "sheet-03"]
     assert [finding.code for finding in done[0].findings] == ["resumed"]
