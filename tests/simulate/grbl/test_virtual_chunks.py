@@ -6,7 +6,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from miurafab.simulate.grbl.controller import VirtualGrbl
@@ -44,7 +44,20 @@ ACTS: list[Callable[[VirtualGrbl], object]] = [
 ]
 
 
+BURNING = [(b"M3S500\n", 50), (b"G1X1F3000\n", 500), (b"S300\nX2\n", 500), (b"M5\n", 50)]
+"""Random scripts hardly ever burn twice."""
+
+
+def test_the_script_that_burns_burns_twice() -> None:
+    device = VirtualGrbl()
+    for data, ticks in BURNING:
+        device.receive(data)
+        device.advance(ticks * TICK)
+    assert len({segment.power for segment in device.beam_log}) == 2
+
+
 @given(scripts, bauds, st.lists(st.sampled_from(ACTS), max_size=20), st.booleans())
+@example(BURNING, None, [], True)
 def test_it_never_raises_and_time_goes_on(
     script: list[tuple[bytes, int]],
     baud: int | None,
