@@ -154,3 +154,26 @@ def facet_polygons(pattern: CreasePattern) -> NDArray[np.object_]:
             for face in pattern.faces_vertices
         ]
     )
+
+
+def fits_turned(points: NDArray[np.float64], width: float, height: float) -> bool:
+    """Whether ``points`` (n, 2) fit ``width`` x ``height`` mm at some angle, within 1e-5 mm.
+
+    Independent of the package: the extents of the convex hull are computed at many angles, and the
+    angle with the least excess is refined.
+    """
+    hull = shapely.get_coordinates(shapely.convex_hull(shapely.MultiPoint(points)))
+
+    def excess(angle: NDArray[np.float64] | float) -> NDArray[np.float64]:
+        c, s = np.cos(angle), np.sin(angle)
+        x = np.multiply.outer(hull[:, 0], c) + np.multiply.outer(hull[:, 1], s)
+        y = np.multiply.outer(hull[:, 1], c) - np.multiply.outer(hull[:, 0], s)
+        return np.maximum(np.ptp(x, axis=0) - width, np.ptp(y, axis=0) - height)
+
+    angles = np.linspace(0.0, np.pi, 7201)
+    best = float(angles[np.argmin(excess(angles))])
+    for _ in range(4):
+        reach = angles[1] - angles[0]
+        angles = np.linspace(best - reach, best + reach, 401)
+        best = float(angles[np.argmin(excess(angles))])
+    return bool(excess(best) <= 1e-5)

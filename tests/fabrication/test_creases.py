@@ -10,13 +10,12 @@ import flat_patterns
 import numpy as np
 import pytest
 import shapely
-from flat_patterns import bed, card, miura, zigzag
-from miurafab.fabrication.bridges import bridged
+from flat_patterns import bed, card, fits_turned, miura, zigzag
 from rings import revolved, tube
 
 from miurafab.errors import LayoutError
+from miurafab.fabrication.kerf import bridged
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.partition.fit_box import best_turn
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.strokes import PIN_MM, pin_centres
 from miurafab.profiles import OPERATIONS
@@ -308,7 +307,7 @@ def sound(pattern, layout, limit):
     facets = flat_patterns.facet_polygons(pattern)
     home = {face: patch.id for patch in layout.patches for face in patch.faces.tolist()}
     for patch in layout.patches:
-        assert best_turn(patch.outline_mm, *(side + 1e-5 for side in limit)) is not None
+        assert fits_turned(patch.outline_mm, *limit)
         for tab in patch.tabs:
             c, s = np.cos(np.radians(patch.rotation_deg)), np.sin(np.radians(patch.rotation_deg))
             points = tab.polygon_mm @ np.array([[c, -s], [s, c]]) + patch.origin_mm

@@ -8,13 +8,12 @@ import flat_patterns
 import numpy as np
 import pytest
 import shapely
-from flat_patterns import card, facet_polygons, miura, triangles, without_grid, zigzag
+from flat_patterns import card, facet_polygons, fits_turned, miura, triangles, without_grid, zigzag
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.partition.fit_box import best_turn
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.partition.split import boundaries, split
@@ -42,7 +41,7 @@ def assert_patches_are_sound(pattern, face_patch, width, height):
         faces = np.flatnonzero(face_patch == patch)
         assert is_disk(pattern, faces)
         ring = pattern.vertices_coords[boundary.vertices]
-        assert best_turn(ring, width, height) is not None
+        assert fits_turned(ring, width, height)
         outline = shapely.Polygon(ring)
         assert outline.is_valid
         assert outline.exterior.is_ccw
@@ -60,7 +59,7 @@ def test_every_facet_is_in_one_patch_and_every_patch_is_a_disk_that_fits(name):
 @pytest.mark.parametrize("name", CASES)
 def test_pieces_fit_with_tabs_and_kerf(name):
     for piece in outline_patches(CASES[name], 190.0, 140.0, card(kerf=0.4)).patches:
-        assert best_turn(piece.cut_lines[0], 190.0, 140.0) is not None
+        assert fits_turned(piece.cut_lines[0], 190.0, 140.0)
 
 
 @pytest.mark.parametrize("turns", [(0,), (1,), (0, 1)])
@@ -228,7 +227,7 @@ def _fits_with_tabs(pattern, face_patch, patch, material) -> bool:
     faces = pattern.faces_vertices[face_patch == patch]
     own = np.flatnonzero(face_patch[tabs.own_face] == patch)
     parts = [pattern.vertices_coords[faces].reshape(-1, 2), *(tabs.polygon(i) for i in own)]
-    return best_turn(np.concatenate(parts), 75.0, 62.0) is not None
+    return fits_turned(np.concatenate(parts), 75.0, 62.0)
 
 
 @st.composite
@@ -260,7 +259,7 @@ def test_any_split_is_of_disks_that_fit_with_their_tabs(job):
     outlined = outline_patches(pattern, *bed, card(), options)
     assert_patches_are_sound(pattern, outlined.face_patch, *bed)
     for piece in outlined.patches:
-        assert best_turn(piece.cut_lines[0], *bed) is not None
+        assert fits_turned(piece.cut_lines[0], *bed)
     split_again = outline_patches(pattern, *bed, card(), options).face_patch
     np.testing.assert_array_equal(outlined.face_patch, split_again)
 
