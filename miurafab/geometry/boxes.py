@@ -1,9 +1,8 @@
 """Pairs of axis-aligned boxes that meet, for many boxes at once: the broad phase of collisions.
 
-Each box is entered in every cell of a uniform grid that it reaches; boxes meet only if they share a
-cell. Boxes much larger than most would fill too many cells, so they go to a coarser grid: boxes are
-sorted into levels by size, cells double from level to level, and a box looks up its own level and
-all coarser ones.
+Each box is entered in every cell of a uniform grid that it reaches. Boxes that meet share a cell.
+Boxes much larger than most would fill too many cells, so boxes are sorted into levels by size. The
+cells double from level to level, and a box is compared in its own level and all coarser levels.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs
 def meeting_pairs(low: Floats, high: Floats) -> tuple[Ints, Ints]:
     """The indices (n,), (n,) of the pairs of closed boxes ``low`` to ``high`` (B, 3) that meet.
 
-    Each pair comes once, the order is the same for the same input.
+    Each pair comes once. The same input gives the same order.
     """
     extent = (high - low).max(axis=1)
     typical = float(np.median(extent)) if len(extent) else 0.0
@@ -46,9 +45,9 @@ def meeting_pairs(low: Floats, high: Floats) -> tuple[Ints, Ints]:
 
 
 def _sharing_cells(first: Ints, last: Ints, large: Bools) -> tuple[Ints, Ints]:
-    """Pairs (a < b) of boxes that share a cell, one of them ``large``. A pair may come again.
+    """Pairs (a < b) of boxes that share a cell, at least one of them ``large``; pairs may repeat.
 
-    ``first`` and ``last`` (B, 3) are each box's range of cells.
+    ``first`` and ``last`` (B, 3) are the range of cells of each box.
     """
     spans = last - first + 1
     counts = spans.prod(axis=1)
@@ -63,7 +62,7 @@ def _sharing_cells(first: Ints, last: Ints, large: Bools) -> tuple[Ints, Ints]:
     order = np.argsort(key, kind="stable")
     key, box = key[order], box[order]
     pairs_a, pairs_b = [], []
-    # the n-th entry after each in the same cell, for n = 1, 2, ... while there are any
+    # the n-th entry after each entry in the same cell, for n = 1, 2, ... while there are any
     here = np.arange(len(key))
     step = 1
     while len(here):

@@ -1,7 +1,7 @@
-"""The audit: every invariant of a pattern recomputed from the file alone, and what it means.
+"""The audit: every invariant of a pattern, recomputed from the pattern alone.
 
-:func:`measure` gives the numbers under the names of the fit report; :func:`audit` adds coded
-findings. A finding says what is wrong and where; it mends nothing.
+:func:`measure` gives the numbers under the names of the fit report; :func:`audit` adds findings,
+which say what is wrong and where. The pattern stays unchanged.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ DEGENERATE = invariants.DEGENERATE
 
 @dataclass(frozen=True)
 class Measurements:
-    """The numbers of the fit report; None where they need a folded form or a target not there.
+    """The numbers of the fit report; None without the folded form or the target that they need.
 
-    Angles in radians, lengths in mm; the docstrings of :mod:`~miurafab.origami.invariants` define
-    each. ``hausdorff_mm`` is the greater of the farthest sheet point from the target and the
-    farthest target point from the sheet; ``hausdorff_midsurface_mm`` the farthest facet mean from
-    the target; ``area_ratio`` the paper's area over the target's.
+    Angles in radians, lengths in mm, as :mod:`~miurafab.origami.invariants` defines them.
+    ``hausdorff_mm`` is the largest distance of a sheet point from the target or of a target point
+    from the sheet; ``hausdorff_midsurface_mm`` the largest distance of a facet mean from the
+    target; ``area_ratio`` the area of the paper over the area of the target.
     """
 
     facets: int

@@ -1,7 +1,7 @@
-"""The named surfaces: each one formula over a parameter rectangle.
+"""The analytic surfaces, one formula each over a parameter rectangle.
 
-Lengths are in the target's own unit; a fit scales them. Rows run along u, and u is, where there
-is a choice, the direction in which the surface bends less (the fit may turn it).
+Lengths are in the target's own unit; a fit scales them. Rows run along u. If there is a choice, u
+is the direction in which the surface bends less (the fit may exchange u and v).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from miurafab.surfaces.surface import Domain, ParametricSurface
 
 @dataclass(frozen=True)
 class GeneralizedCylinder(ParametricSurface):
-    """A profile curve extruded along x: the surfaces that need no solver."""
+    """A profile curve extruded along x. A fit to it needs no solver."""
 
     profile: ProfileCurve = field(kw_only=True)
 
@@ -57,7 +57,7 @@ def saddle(width: float, height: float, rise: float) -> ParametricSurface:
 
 
 def paraboloid(width: float, height: float, rise: float) -> ParametricSurface:
-    """z = -rise * ((2x/width)^2 + (2y/height)^2): a bowl turned over."""
+    """z = -rise * ((2x/width)^2 + (2y/height)^2): a bowl upside down."""
     return _graph(
         width, height, lambda x, y: -rise * ((2 * x / width) ** 2 + (2 * y / height) ** 2)
     )
@@ -90,7 +90,7 @@ def helicoid(radius: float, inner: float, pitch: float, turns: float) -> Paramet
 
 @dataclass(frozen=True)
 class Revolution(ParametricSurface):
-    """``profile`` (r, z) turned through ``angle`` about z: the surfaces that repeat themselves."""
+    """``profile`` (r, z) turned through ``angle`` about z. One period of a fit gives the sheet."""
 
     profile: ProfileCurve = field(kw_only=True)
 

@@ -1,6 +1,6 @@
-"""The targets a user can name, with their parameters, ranges and defaults.
+"""The named targets with their parameters, ranges and defaults.
 
-``hypar:height=0.5`` and a ``[target]`` table of a design file say the same thing; both end here.
+``hypar:height=0.5`` and the ``[target]`` table of a design file both use this catalogue.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Profile curves: the plane curves that cylinders are extruded over and revolutions turned from.
+"""Profile curves: the plane curves of cylinders and of surfaces of revolution.
 
-A curve is a map from a parameter in [0, 1] to the plane, smooth a little beyond both ends.
+A curve is a map from a parameter in [0, 1] to the plane, and is smooth a little beyond both ends.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def arc(radius: float, angle: float) -> ProfileCurve:
 
 
 def log_spiral(start: float, growth: float, turns: float) -> ProfileCurve:
-    """r = start * exp(growth * phi) over ``turns`` turns, walked at constant speed."""
+    """r = start * exp(growth * phi) over ``turns`` turns, at constant speed."""
     swing = 2 * np.pi * turns
     rate = np.expm1(growth * swing)
 
@@ -56,8 +56,8 @@ def log_spiral(start: float, growth: float, turns: float) -> ProfileCurve:
 def capped(radius: float, waist: float, reach: float, angle: float) -> ProfileCurve:
     """A straight waist (r, z) of length ``waist`` at ``radius``, bent at both ends by arcs.
 
-    The arcs have the radius ``reach`` and turn through ``angle``: towards the axis where ``reach``
-    is positive, away from it where it is negative. Walked at constant speed.
+    The arcs have the radius |``reach``| and turn through ``angle``: towards the axis for positive
+    ``reach``, away from it for negative. The speed is constant.
     """
     half, bend = waist / 2, abs(reach) * angle
 
@@ -72,7 +72,7 @@ def capped(radius: float, waist: float, reach: float, angle: float) -> ProfileCu
 
 
 def vase(belly: float, neck: float, height: float) -> ProfileCurve:
-    """A wave (r, z) from under the ``belly`` over it and the ``neck`` to a little flare."""
+    """A cosine wave (r, z) from below the ``belly`` over the ``neck`` to a small flare."""
     start, stop = -0.35 * np.pi, 1.25 * np.pi
 
     def position(t: Floats) -> Floats:
@@ -93,7 +93,7 @@ def hyperbola(waist: float, spread: float, height: float) -> ProfileCurve:
 
 
 def catenary(waist: float, height: float) -> ProfileCurve:
-    """r = waist cosh(z / waist) over ``height``, walked at constant speed."""
+    """r = waist cosh(z / waist) over ``height``, at constant speed."""
     end = np.sinh(height / 2 / waist)
 
     def position(t: Floats) -> Floats:
@@ -134,7 +134,6 @@ def spline(points: Sequence[Sequence[float]]) -> ProfileCurve:
     through = CubicSpline(along, given)
 
     def position(t: Floats) -> Floats:
-        points_at: Floats = through(t)
-        return points_at
+        return np.asarray(through(t))
 
     return ProfileCurve(position)

@@ -1,9 +1,9 @@
 """Mesh targets: a scanned or modelled surface as a smooth map from a rectangle.
 
-The mesh, mended to one disk (:mod:`~miurafab.surfaces.mesh_repair`), is laid flat, a rectangle in
-the layout is the parameter domain, and a smooth spline through the vertices over that rectangle
-gives points and normals. Where the mesh is rough (a scan), it is laid flat a second time as the
-spline has smoothed it. Distances are measured to the triangles themselves, not to the spline.
+The mesh is repaired to one disk (:mod:`~miurafab.surfaces.mesh_repair`) and laid flat. A rectangle
+in the layout is the parameter domain, and a smooth spline through the vertices over the rectangle
+gives points and normals. A rough mesh (a scan) is smoothed by the spline and laid flat again.
+Distances are measured to the triangles, not to the spline.
 """
 
 from __future__ import annotations
@@ -55,16 +55,16 @@ FROM_POINTS = (
 )
 
 ROUGH = 0.03
-"""A mesh is rough where the smooth spline leaves it by this part of its median edge."""
+"""A mesh is rough if it is this part of its median edge away from the smooth spline."""
 
 MARGIN = 0.12
-"""The spline also follows the mesh this part of the rectangle beyond it, where there is any."""
+"""The spline also follows the mesh up to this part of the rectangle's size beyond it."""
 
 FEWEST = 4
 """A rectangle with fewer vertices of the mesh is refused."""
 
 SMOOTHER = 0.03
-"""The stiffness of the alternative that irons out what a scan's noise may have left."""
+"""The stiffness of the smoother alternative for scans with noise."""
 
 _SPANS = 40
 _ROUGH_SPANS = 24
@@ -72,9 +72,10 @@ _ROUGH_SPANS = 24
 
 @dataclass(frozen=True, eq=False)
 class MeshChart:
-    """A mesh laid flat. ``faces`` (F, 3) are all triangles, of which the first ``real`` are of the
-    mesh and the others fill holes; the first ``known`` of ``vertices`` (V, 3) are of the mesh.
-    ``flat`` (V, 2) are their places; ``rough`` says that the mesh is a noisy scan.
+    """A mesh laid flat.
+
+    The first ``real`` of ``faces`` (F, 3) and the first ``known`` of ``vertices`` (V, 3) belong to
+    the mesh, the others fill holes. ``flat`` (V, 2) is the layout; ``rough`` marks a noisy scan.
     """
 
     vertices: Floats
@@ -149,7 +150,7 @@ class MeshSurface:
     free: bool = True
 
     def point(self, uv: Floats) -> Floats:
-        """Within reach the spline, beyond it the spline continued straight on."""
+        """The spline, and beyond its knots its straight continuation."""
         return continued(self.spline, uv)
 
     def normal(self, uv: Floats) -> Floats:

@@ -1,8 +1,8 @@
-"""A triangle mesh made one sheet: merged, oriented, small holes closed, or refused by its fault.
+"""Repair of a triangle mesh to one oriented sheet without holes, or a refusal that names the fault.
 
-What a file holds is seldom a clean disk. Each step takes and gives bare arrays, ``vertices``
-(V, 3) in mm and ``faces`` (F, 3), and raises :class:`~miurafab.errors.TargetError` with one
-sentence that says what is wrong and what to do about it.
+Mesh files are seldom clean disks. Each step takes and returns ``vertices`` (V, 3) in mm and
+``faces`` (F, 3), or raises :class:`~miurafab.errors.TargetError` with one sentence that says what
+is wrong and what to do.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.surfaces.parameterise import border_loops
 
 SMALL_HOLE = 0.15
-"""Holes are filled up to this part of the length of the border."""
+"""A hole is filled if its border is at most this part of the outer border."""
 
 
 def clean(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
@@ -68,7 +68,7 @@ def size_findings(vertices: Floats, name: str) -> tuple[Finding, ...]:
 
 
 def oriented_sheet(vertices: Floats, faces: Ints, name: str) -> Ints:
-    """The triangles oriented alike; refuses what is not one sheet with a border, by its fault."""
+    """The triangles with one orientation; refuses a mesh that is not one sheet with a border."""
     edges, uses = edges_of(faces)
     if (uses > 2).any():
         raise TargetError(
@@ -111,9 +111,9 @@ def oriented_sheet(vertices: Floats, faces: Ints, name: str) -> Ints:
 
 
 def _pinched(faces: Ints, count: int) -> int | None:
-    """A vertex about which the triangles do not form one fan, if there is any."""
+    """A vertex around which the triangles form more than one fan, if there is any."""
     corners = faces.ravel()
-    # corners of neighbouring triangles at one vertex are joined across their common side
+    # corners of neighbouring triangles at a vertex are joined across the common side
     following, previous = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, 1, axis=1).ravel()
     out, back = corners * count + following, corners * count + previous
     order = np.argsort(back)
@@ -129,7 +129,7 @@ def _pinched(faces: Ints, count: int) -> int | None:
 
 
 def fill_holes(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints, int]:
-    """Each small hole closed by a fan about its middle, and their number."""
+    """The mesh with each small hole closed by a fan around its middle, and the number of holes."""
     loops = border_loops(faces)
     lengths = [
         float(np.linalg.norm(vertices[np.roll(loop, -1)] - vertices[loop], axis=1).sum())
@@ -146,7 +146,7 @@ def fill_holes(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints, 
         loop = loops[n]
         middle = np.full(len(loop), len(vertices))
         vertices = np.concatenate([vertices, vertices[loop].mean(axis=0, keepdims=True)])
-        # a border runs with its triangles, so what fills it runs against
+        # a border runs in the direction of its triangles, so the fan runs against it
         faces = np.concatenate([faces, np.stack([np.roll(loop, -1), loop, middle], axis=1)])
     return vertices, faces, len(loops) - 1
 
@@ -160,8 +160,7 @@ def even_triangles(vertices: Floats, faces: Ints) -> Floats:
     if longest.max() <= limit:
         return corners
     points, split = trimesh.remesh.subdivide_to_size(vertices, faces, limit, max_iter=24)
-    fine: Floats = np.asarray(points, dtype=np.float64)[np.asarray(split)]
-    return fine
+    return np.asarray(np.asarray(points, dtype=np.float64)[np.asarray(split)])
 
 
 def edges_of(faces: Ints) -> tuple[Ints, Ints]:
@@ -172,12 +171,12 @@ def edges_of(faces: Ints) -> tuple[Ints, Ints]:
 
 
 def side_lengths(points: Floats, faces: Ints) -> Floats:
+    """(F, 3) the lengths of the sides of triangles."""
     corners = points[faces]
-    lengths: Floats = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    return lengths
+    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2))
 
 
 def doubled_areas(points: Floats, faces: Ints) -> Floats:
+    """(F,) twice the areas of triangles in space."""
     p = points[faces]
-    areas: Floats = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    return areas
+    return np.asarray(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1))

@@ -1,17 +1,17 @@
-"""Laying a disk-shaped triangle mesh into the plane with little stretch.
+"""Parameterisation: a disk-shaped triangle mesh laid into the plane with little stretch.
 
 Three maps, each the start of the next:
 
-- least squares conformal maps (Levy, Petitjean, Ray and Maillot, SIGGRAPH 2002, section 2): for
-  each triangle with local coordinates the map's complex derivative with respect to the conjugate
-  vanishes as nearly as possible, two vertices held fixed;
-- where a triangle turns over in it, Tutte's map: the border on a circle, each other vertex the mean
-  of its neighbours, which never turns a triangle over (Tutte, Proc. London Math. Soc. 13, 1963);
+- the least squares conformal map (Levy, Petitjean, Ray and Maillot, SIGGRAPH 2002, section 2): two
+  vertices are fixed, and in the local coordinates of each triangle the derivative of the map by the
+  complex conjugate is least in the sum of squares;
+- if that turns a triangle over, Tutte's map, which never does (Tutte, Proc. London Math. Soc. 13,
+  1963): the border is on a circle, every other vertex is the mean of its neighbours;
 - as rigid as possible from there (Liu, Zhang, Xu, Gotsman and Gortler, Eurographics SGP 2008,
-  section 4): the rotation nearest to each triangle's map, then the vertices that suit those
-  rotations best, in turn. The matrix stays the same, so it is factorised once.
+  section 4): in turn the rotation nearest to the map of each triangle, and the vertices that fit
+  those rotations best. The matrix is constant and is factored once.
 
-Points of the plane are complex numbers inside.
+Inside, points of the plane are complex numbers.
 """
 
 from __future__ import annotations
@@ -32,9 +32,8 @@ RIGID_ROUNDS = 60
 def flatten(vertices: Floats, faces: Ints) -> Floats:
     """(V, 2) a layout of the disk mesh ``vertices`` (V, 3), ``faces`` (F, 3), in its own lengths.
 
-    No triangle is turned over; the smallest box about the layout is upright, its longer side
-    along x. Triangles must have
-    an area and be oriented alike.
+    No triangle is turned over. The smallest box around the layout is upright, with its longer side
+    along x. Triangles must have an area and the same orientation.
     """
     z = conformal(vertices, faces)
     if turned_over(z, faces).any():
@@ -46,7 +45,7 @@ def flatten(vertices: Floats, faces: Ints) -> Floats:
 def _upright(z: Complexes) -> Floats:
     """(V, 2) the layout turned so that its bounding box is the smallest, the longer side along x.
 
-    The smallest box has a side along one of the convex hull.
+    The smallest box has a side along a side of the convex hull.
     """
     plane = np.stack([z.real, z.imag], axis=1)
     hull = z[ConvexHull(plane).vertices]
@@ -62,12 +61,11 @@ def _upright(z: Complexes) -> Floats:
 def turned_over(z: Complexes, faces: Ints) -> Bools:
     """(F,) which triangles of the layout ``z`` (V,) have no area or the wrong orientation."""
     e1, e2 = z[faces[:, 1]] - z[faces[:, 0]], z[faces[:, 2]] - z[faces[:, 0]]
-    turned: Bools = (e1.conj() * e2).imag <= 0
-    return turned
+    return np.asarray((e1.conj() * e2).imag <= 0)
 
 
 def _local(vertices: Floats, faces: Ints) -> Complexes:
-    """(F, 3) each triangle laid into the plane by itself: one corner at 0, the next on x."""
+    """(F, 3) each triangle in a plane of its own: the first corner at 0, the second on x."""
     corners = vertices[faces]
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     x = np.linalg.norm(e1, axis=1)
@@ -78,10 +76,10 @@ def _local(vertices: Floats, faces: Ints) -> Complexes:
 
 
 def conformal(vertices: Floats, faces: Ints) -> Complexes:
-    """(V,) the least squares conformal layout, in about the mesh's own lengths."""
+    """(V,) the least squares conformal layout, scaled to the area of the mesh."""
     local = _local(vertices, faces)
     area = (local[:, 1].conj() * local[:, 2]).imag
-    # complex weights of the three corners: the opposite side, over the root of twice the area
+    # complex weights of the corners: the opposite side over the root of twice the area
     weights = (np.roll(local, -2, axis=1) - np.roll(local, -1, axis=1)) / np.sqrt(area)[:, None]
     row = np.repeat(np.arange(len(faces)), 3)
     matrix = sparse.coo_array(
@@ -94,7 +92,7 @@ def conformal(vertices: Floats, faces: Ints) -> Complexes:
     normal = (a.conj().T @ a).tocsc()
     z = np.zeros(len(vertices), dtype=complex)
     z[held] = pinned
-    # as real and imaginary parts: SuperLU is an order faster on real matrices of twice the size
+    # in real and imaginary parts: SuperLU is ten times faster on a real matrix of twice the size
     real = sparse.block_array([[normal.real, -normal.imag], [normal.imag, normal.real]]).tocsc()
     right = a.conj().T @ b
     parts = factor_symmetric(real).solve(np.concatenate([right.real, right.imag]))
@@ -114,7 +112,7 @@ def _far_apart(vertices: Floats) -> Ints:
 
 
 def tutte(vertices: Floats, faces: Ints) -> Complexes:
-    """(V,) the layout with the border on a circle by its length, neighbours evenly weighted."""
+    """(V,) Tutte's layout, with the border on a circle by its length and equal weights."""
     loop = border_loops(faces)[0]
     steps = np.linalg.norm(vertices[np.roll(loop, -1)] - vertices[loop], axis=1)
     at = np.concatenate([[0.0], np.cumsum(steps[:-1])]) / steps.sum()
@@ -136,7 +134,7 @@ def tutte(vertices: Floats, faces: Ints) -> Complexes:
 
 
 def border_loops(faces: Ints) -> list[Ints]:
-    """The border of an oriented mesh as loops of vertices, the one of most vertices first."""
+    """The border of an oriented mesh as loops of vertices, the loop of most vertices first."""
     sides = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     count = int(faces.max()) + 1
     keys = sides[:, 0] * count + sides[:, 1]
@@ -154,7 +152,7 @@ def border_loops(faces: Ints) -> list[Ints]:
 
 
 def _rigid(z: Complexes, local: Complexes, faces: Ints) -> Complexes:
-    """The layout made as rigid as possible; the last one in which no triangle is turned over."""
+    """The layout made as rigid as possible: the last in which no triangle is turned over."""
     # side k runs from corner k to the next; its weight is the cotangent of the opposite angle
     side = np.roll(local, -1, axis=1) - local
     to, back = np.roll(local, -2, axis=1), local
@@ -175,16 +173,16 @@ def _rigid(z: Complexes, local: Complexes, faces: Ints) -> Complexes:
     for _ in range(RIGID_ROUNDS):
         turn = (weight * (z[head] - z[tail]) * side.conj()).sum(axis=1)
         turn = turn / np.maximum(np.abs(turn), 1e-300)
-        wanted = weight * turn[:, None] * side
-        right = np.bincount(head.ravel(), wanted.real.ravel(), count) - np.bincount(
-            tail.ravel(), wanted.real.ravel(), count
+        pull = (weight * turn[:, None] * side).ravel()
+        x, y = (
+            factor.solve(
+                np.bincount(head.ravel(), part, count) - np.bincount(tail.ravel(), part, count)
+            )
+            for part in (pull.real, pull.imag)
         )
-        above = np.bincount(head.ravel(), wanted.imag.ravel(), count) - np.bincount(
-            tail.ravel(), wanted.imag.ravel(), count
-        )
-        z = factor.solve(right) + 1j * factor.solve(above)
+        z = x + 1j * y
         if turned_over(z, faces).any():
-            # half the way keeps more of the gain than none of it
+            # half the step keeps part of the gain
             z = (z - z.mean() + best - best.mean()) / 2
             if turned_over(z, faces).any():
                 break
@@ -197,10 +195,10 @@ def _rigid(z: Complexes, local: Complexes, faces: Ints) -> Complexes:
 
 
 def locate(flat: Floats, faces: Ints, points: Floats) -> tuple[Ints, Floats]:
-    """The triangle (n,) of the layout that holds each of ``points`` (n, 2), -1 for none, and the
-    barycentric coordinates (n, 3) in it.
+    """The triangle (n,) of the layout around each of ``points`` (n, 2), or -1, and the barycentric
+    coordinates (n, 3) in the triangle.
 
-    Each triangle is rasterised over the sorted points of its bounding box.
+    Each triangle is compared with the points in its bounding box, which are sorted by x.
     """
     corners = flat[faces]
     low, high = corners.min(axis=1), corners.max(axis=1)
@@ -209,7 +207,7 @@ def locate(flat: Floats, faces: Ints, points: Floats) -> tuple[Ints, Floats]:
     margin = 1e-12 * (high - low).max()
     first = np.searchsorted(sorted_x, low[:, 0] - margin)
     last = np.searchsorted(sorted_x, high[:, 0] + margin, side="right")
-    found = np.full(len(points), -1, dtype=np.int64)
+    holder = np.full(len(points), -1, dtype=np.int64)
     coordinates = np.zeros((len(points), 3))
     for start in range(0, len(faces), 4096):
         block = np.arange(start, min(start + 4096, len(faces)))
@@ -223,9 +221,9 @@ def locate(flat: Floats, faces: Ints, points: Floats) -> tuple[Ints, Floats]:
         triangle, point = triangle[close], point[close]
         weights = _barycentric(corners[triangle], points[point])
         inside = weights.min(axis=1) >= -1e-9
-        found[point[inside]] = triangle[inside]
+        holder[point[inside]] = triangle[inside]
         coordinates[point[inside]] = weights[inside]
-    return found, coordinates
+    return holder, coordinates
 
 
 def _barycentric(corners: Floats, points: Floats) -> Floats:

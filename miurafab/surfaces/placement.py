@@ -1,8 +1,8 @@
-"""Where a sheet's rectangle lies in the flat layout of a mesh.
+"""The placement of a sheet's rectangle in the flat layout of a mesh.
 
-The layout is turned by an angle, and in the turned frame the rectangle is upright. Of the largest
-rectangles at many angles the best is the one that covers much while the spacing of a lattice on it
-stays even: paper is flat, so uneven spacing must be made up by deeper corrugation.
+The layout is turned by an angle, and the rectangle is upright in the turned layout. Of the largest
+rectangles at many angles, the best covers much of the mesh and has evenly spaced lattice points:
+paper is flat, so uneven spacing needs deeper corrugation.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class GridPlacement:
     domain: Domain
 
     def shrunk(self, factor: float) -> GridPlacement:
-        """The same about the same centre, ``factor`` times as wide and high."""
+        """The rectangle with the same centre, ``factor`` times as wide and high."""
         d = self.domain
         u, v = (d.u0 + d.u1) / 2, (d.v0 + d.v1) / 2
         half_u, half_v = factor * d.width / 2, factor * d.height / 2
@@ -85,15 +85,13 @@ class Region:
 def turned(flat: Floats, angle: float) -> Floats:
     """``flat`` (V, 2) in the frame turned by ``angle``."""
     c, s = math.cos(angle), math.sin(angle)
-    frame: Floats = flat @ np.array([[c, -s], [s, c]])
-    return frame
+    return np.asarray(flat @ np.array([[c, -s], [s, c]]))
 
 
 def placements(vertices: Floats, flat: Floats, faces: Ints) -> list[tuple[float, GridPlacement]]:
     """The best placement at each angle with its score, the best first.
 
-    The score is the area times the evenness, the product over both directions of the least over
-    the greatest spacing of a lattice on the rectangle, to the power of a half.
+    The score is the area times the root of the :func:`evenness`.
     """
     found = []
     for angle in ANGLES.tolist():
@@ -102,18 +100,18 @@ def placements(vertices: Floats, flat: Floats, faces: Ints) -> list[tuple[float,
         if domain is not None:
             score = domain.width * domain.height * evenness(vertices, frame, faces, domain) ** 0.5
             found.append((score, GridPlacement(angle, domain)))
-    # what is as good to a hundredth goes to the angle nearest to the axes of the layout
+    # of scores equal to 2 %, the angle nearest to the axes of the layout comes first
     best = max((score for score, _ in found), default=0.0)
     return sorted(found, key=lambda pair: (-math.floor(50 * pair[0] / best), abs(pair[1].angle)))
 
 
 def covered(frame: Floats, faces: Ints, domain: Domain, count: int = 41) -> bool:
-    """Whether all of a lattice over ``domain`` lies in the layout ``frame``."""
+    """Whether all points of a lattice over ``domain`` lie in the layout ``frame``."""
     return bool((_lattice_triangles(frame, faces, domain, count)[0] >= 0).all())
 
 
 def evenness(vertices: Floats, frame: Floats, faces: Ints, domain: Domain) -> float:
-    """The least over the greatest spacing along u, times that along v, in (0, 1]."""
+    """The least over the greatest spacing along u, times the same along v, in (0, 1]."""
     triangle = _lattice_triangles(frame, faces, domain, _SAMPLES)[0]
     triangle = np.unique(triangle[triangle >= 0])
     p, q = vertices[faces[triangle]], frame[faces[triangle]]
@@ -126,14 +124,14 @@ def evenness(vertices: Floats, frame: Floats, faces: Ints, domain: Domain) -> fl
 def _lattice_triangles(
     frame: Floats, faces: Ints, domain: Domain, count: int
 ) -> tuple[Ints, Floats]:
-    """The triangle of each point of a lattice a hair within ``domain``, and its coordinates."""
+    """The triangle of each point of a lattice just inside ``domain``, and its coordinates."""
     lattice = domain.lattice(count, count).reshape(-1, 2)
     centre = np.array([(domain.u0 + domain.u1) / 2, (domain.v0 + domain.v1) / 2])
     return locate(frame, faces, centre + (lattice - centre) * (1 - 2e-6))
 
 
 def largest_rectangle(frame: Floats, faces: Ints) -> Domain | None:
-    """The largest upright rectangle of covered cells of a lattice over the layout, if any."""
+    """The largest upright rectangle of covered points of a lattice over the layout, if any."""
     low, high = frame.min(axis=0), frame.max(axis=0)
     whole = Domain(low[0], high[0], low[1], high[1])
     inside = _lattice_triangles(frame, faces, whole, _LATTICE)[0] >= 0
@@ -147,7 +145,7 @@ def largest_rectangle(frame: Floats, faces: Ints) -> Domain | None:
 def _largest_block(covered: Bools) -> tuple[int, int, int, int]:
     """Column and row range of the largest rectangle of lattice points that are all covered.
 
-    Row by row with the histogram of covered runs above (the stack algorithm).
+    Row by row: the largest rectangle under the histogram of covered runs, with a stack.
     """
     rows, columns = covered.shape
     run = np.zeros(columns, dtype=np.int64)

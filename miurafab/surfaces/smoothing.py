@@ -1,13 +1,13 @@
-"""A smooth surface through scattered points: a penalised tensor spline, as stiff as the data ask.
+"""A smooth surface through scattered points: a tensor spline with a stiffness chosen from the data.
 
-Bicubic spline f over a rectangle, least over all splines of
+The bicubic spline f over a rectangle minimises
 
     (1/n) sum |f(u_k, v_k) - p_k|^2 + stiffness * integral (f_uu^2 + 2 f_uv^2 + f_vv^2),
 
-so that gaps are bridged and noise is ironed out. The stiffness is the one of least generalised
-cross-validation score n RSS / (n - tr A)^2, A being the map from the points to their smoothed
-places (Craven and Wahba, Numer. Math. 31, 1979); its trace is estimated with a few fixed random
-signs (Hutchinson, Commun. Stat. Simul. 18, 1989). Exact data ask for next to no stiffness.
+which bridges gaps and removes noise. The stiffness minimises the generalised cross-validation score
+n RSS / (n - tr A)^2, where A maps the points to the smoothed points (Craven and Wahba, Numer. Math.
+31, 1979). The trace of A is estimated with a few fixed random signs (Hutchinson, Commun. Stat.
+Simul. 18, 1989). Exact data give almost no stiffness.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from miurafab.surfaces.surface import Domain
 _DEGREE = 3
 _PROBES = 8
 _STEPS = np.arange(-6.0, 3.1, 1.0)
-"""Powers of ten of the stiffness tried, over the fourth power of a twentieth of the rectangle."""
+"""Powers of ten of the stiffness, in units of the fourth power of a twentieth of the rectangle."""
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """The ``spline`` (u, v) -> space, the ``stiffness`` chosen, and ``roughness``: the root mean
-    square distance of the points from it.
+    """The ``spline`` (u, v) -> space, its ``stiffness``, and the ``roughness``: the root mean
+    square distance of the points from the spline.
     """
 
     spline: NdBSpline
@@ -46,9 +46,8 @@ def smooth(
     spans: tuple[int, int],
     stiffness: float = 0.0,
 ) -> Smoothed:
-    """The spline with ``spans`` knot intervals along u and v through ``points`` (n, 3) at the
-    parameters ``places`` (n, 2), which lie in ``domain``. The stiffness is the one
-    that the data ask for, but at least ``stiffness``.
+    """The spline with ``spans`` knot intervals along u and v near ``points`` (n, 3) at the
+    parameters ``places`` (n, 2) in ``domain``. Its stiffness is at least ``stiffness``.
     """
     knots = [
         _knots(low, high, span)
@@ -129,8 +128,5 @@ def _products(knots: Floats) -> list[sparse.csr_array]:
     weight = (half * weights).ravel()
     count = len(knots) - _DEGREE - 1
     basis = BSpline(knots, np.eye(count), _DEGREE)
-    found = []
-    for order in range(3):
-        values = basis(at, nu=order)
-        found.append(sparse.csr_array(values.T @ (weight[:, None] * values)))
-    return found
+    derivatives = [basis(at, nu=order) for order in range(3)]
+    return [sparse.csr_array(d.T @ (weight[:, None] * d)) for d in derivatives]

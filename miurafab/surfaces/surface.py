@@ -1,8 +1,7 @@
-"""What a target surface is to the rest of the house: a smooth map from a rectangle to space.
+"""Target surfaces: smooth maps from a rectangle to space.
 
-``TargetSurface`` is the protocol; the free functions below derive tangents, curvature and nearest
-points of any of them from the map alone, by differences of fourth order, so that a new surface is
-one formula.
+``TargetSurface`` is the protocol. The functions below derive tangents, curvature and nearest points
+from the map alone, by differences of fourth order, so that a new surface needs only one formula.
 """
 
 from __future__ import annotations
@@ -44,8 +43,8 @@ class Domain:
 class TargetSurface(Protocol):
     """A target. Parameters are arrays (..., 2), points and unit normals (..., 3).
 
-    ``point`` must accept parameters a little outside ``domain``: the zig-zag of the first and
-    last rows reaches there.
+    ``point`` must accept parameters a little outside ``domain``, where the zig-zag of the first and
+    last rows lies.
     """
 
     @property
@@ -81,7 +80,7 @@ class ParametricSurface:
 
 @dataclass(frozen=True)
 class Swapped:
-    """The same surface with u and v exchanged; the normal turns over with them."""
+    """The same surface with u and v exchanged, and so with the opposite normal."""
 
     surface: TargetSurface
 
@@ -102,10 +101,10 @@ class Swapped:
 
 @dataclass(frozen=True)
 class Bent:
-    """The target bent only part of the way: ``bend`` 0 is flat, 1 the full target.
+    """A blend of plane and target: ``bend`` 0 is flat, 1 is the target.
 
-    The flat end is the tangent plane at the centre with the mean speeds of the parameters, so the
-    blend (1 - bend) * plane + bend * target changes lengths little on the way.
+    The plane is the tangent plane at the centre with the mean speeds of the parameters, so that
+    lengths change little in (1 - bend) * plane + bend * target.
     """
 
     surface: TargetSurface
@@ -129,8 +128,7 @@ class Bent:
             + offset[..., :1] * speed_u * e1
             + offset[..., 1:] * speed_v * e2
         )
-        bent: Floats = (1 - self.bend) * plane + self.bend * self.surface.point(uv)
-        return bent
+        return np.asarray((1 - self.bend) * plane + self.bend * self.surface.point(uv))
 
     def normal(self, uv: Floats) -> Floats:
         along, across = tangents(self, uv)
@@ -142,8 +140,7 @@ class Bent:
 
 def unit(vectors: Floats) -> Floats:
     """(..., 3) vectors scaled to length one."""
-    scaled: Floats = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return scaled
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 def _steps(domain: Domain) -> tuple[Floats, Floats]:
@@ -152,12 +149,12 @@ def _steps(domain: Domain) -> tuple[Floats, Floats]:
 
 def tangents(surface: TargetSurface, uv: Floats) -> tuple[Floats, Floats]:
     """dS/du and dS/dv at ``uv`` (..., 2), each (..., 3), by central differences of order four."""
-    found = []
+    both = []
     for axis, step in enumerate(_steps(surface.domain)):
         near = surface.point(uv + step) - surface.point(uv - step)
         far = surface.point(uv + 2 * step) - surface.point(uv - 2 * step)
-        found.append((8 * near - far) / (12 * step[axis]))
-    return found[0], found[1]
+        both.append((8 * near - far) / (12 * step[axis]))
+    return both[0], both[1]
 
 
 def curvature_along_u(surface: TargetSurface, uv: Floats) -> Floats:
@@ -172,15 +169,14 @@ def curvature_along_u(surface: TargetSurface, uv: Floats) -> Floats:
     second = (16 * near - far - 30 * surface.point(uv)) / (12 * h * h)
     along = tangents(surface, uv)[0]
     bending = np.einsum("...k,...k->...", second, surface.normal(uv))
-    curvature: Floats = bending / np.einsum("...k,...k->...", along, along)
-    return curvature
+    return np.asarray(bending / np.einsum("...k,...k->...", along, along))
 
 
 def closest_parameters(surface: TargetSurface, points: Floats, samples: int) -> Floats:
     """(n, 2) parameters of the nearest surface points to ``points`` (n, 3).
 
-    The nearest of ``samples`` squared lattice points (reaching a tenth beyond the domain) starts a
-    Gauss-Newton iteration on |S(u, v) - p|^2, whose step is capped at two lattice cells.
+    A Gauss-Newton iteration on |S(u, v) - p|^2 starts from the nearest of ``samples`` squared
+    lattice points, which reach a tenth beyond the domain. A step is at most two lattice cells.
     """
     d = surface.domain
     reach_u, reach_v = 0.1 * d.width, 0.1 * d.height
