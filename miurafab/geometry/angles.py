@@ -13,8 +13,7 @@ def angle_between(a: Floats, b: Floats) -> Floats:
     atan2(|a x b|, a . b), which keeps its accuracy near 0 and pi, unlike arccos.
     """
     cross = np.linalg.norm(np.cross(a, b), axis=-1)
-    angle: Floats = np.arctan2(cross, np.einsum("...k,...k->...", a, b))
-    return angle
+    return np.asarray(np.arctan2(cross, np.einsum("...k,...k->...", a, b)))
 
 
 def sectors(a: Floats, b: Floats) -> tuple[Floats, Floats, Floats]:
@@ -24,10 +23,10 @@ def sectors(a: Floats, b: Floats) -> tuple[Floats, Floats, Floats]:
     """
     cross = np.cross(a, b)
     sine = np.linalg.norm(cross, axis=-1)
-    angle: Floats = np.arctan2(sine, np.einsum("...k,...k->...", a, b))
+    angle = np.arctan2(sine, np.einsum("...k,...k->...", a, b))
     n = cross / sine[..., None]
-    to_a: Floats = np.cross(a, n) / np.einsum("...k,...k->...", a, a)[..., None]
-    to_b: Floats = np.cross(n, b) / np.einsum("...k,...k->...", b, b)[..., None]
+    to_a = np.cross(a, n) / np.einsum("...k,...k->...", a, a)[..., None]
+    to_b = np.cross(n, b) / np.einsum("...k,...k->...", b, b)[..., None]
     return angle, to_a, to_b
 
 
@@ -50,5 +49,4 @@ def fold_angles(points: Floats, edges: Ints, left: Floats, right: Floats) -> Flo
     along = points[edges[:, 1]] - points[edges[:, 0]]
     along = along / np.linalg.norm(along, axis=1, keepdims=True)
     sine = np.einsum("ek,ek->e", np.cross(left, right), along)
-    angle: Floats = -np.arctan2(sine, np.einsum("ek,ek->e", left, right))
-    return angle
+    return np.asarray(-np.arctan2(sine, np.einsum("ek,ek->e", left, right)))

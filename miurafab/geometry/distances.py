@@ -98,5 +98,4 @@ def _keep_nearest(
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    product: Floats = np.einsum("nk,nk->n", a, b)
-    return product
+    return np.asarray(np.einsum("nk,nk->n", a, b))

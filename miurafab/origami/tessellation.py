@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from miurafab.geometry.arrays import Floats
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.geometry.quads import QuadGrid
@@ -32,18 +30,9 @@ class Tessellation:
         return self.points.reshape(-1, 3)
 
     @property
-    def facet_count(self) -> int:
-        return len(self.grid.faces_vertices)
-
-    @property
     def edge_lengths(self) -> Floats:
         """(E,) lengths in the order of ``grid.edges_vertices``."""
         return edge_lengths(self.vertices, self.grid.edges_vertices)
-
-    @property
-    def midsurface(self) -> Floats:
-        """(F, 3) the mean of each facet's corners, where the up and down of the rows cancels."""
-        return np.asarray(self.vertices[self.grid.faces_vertices].mean(axis=1))
 
     def scaled(self, factor: float) -> Tessellation:
         """The same tessellation, ``factor`` times as large."""

@@ -89,7 +89,7 @@ def continued(spline: NdBSpline, uv: Floats) -> Floats:
     high = np.array([knots[-1] for knots in spline.t])
     inside = np.clip(uv, low, high)
     beyond = uv - inside
-    points: Floats = spline(inside)
+    points = np.asarray(spline(inside))
     if beyond.any():
         points = points + beyond[..., :1] * spline(inside, nu=(1, 0))
         points = points + beyond[..., 1:] * spline(inside, nu=(0, 1))

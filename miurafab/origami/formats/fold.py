@@ -293,7 +293,7 @@ def _folded(frames: list[Mapping[str, Any]], vertices: int, factor: float) -> Fl
     """The folded form (V, 3), mm, from the first of ``frames`` of class foldedForm."""
     for frame in frames:
         if "foldedForm" in _classes(frame):
-            points: Floats = _coordinates(frame, "vertices_coords")
+            points = _coordinates(frame, "vertices_coords")
             points = points * _unit(frame, factor)
             if points.shape[1] == 2:
                 points = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
