@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.gcode.columns import Columns
+from miurafab.geometry.arrays import Bools, Floats, Ints
 
 RAPID, FEED = 0, 1
 """Values of :attr:`Program.motion`."""
@@ -56,19 +57,19 @@ class Program:
     """
 
     name: str
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
+    start: Floats
+    end: Floats
     motion: NDArray[np.int8]
-    feed_mm_min: NDArray[np.float64]
-    power: NDArray[np.float64]
+    feed_mm_min: Floats
+    power: Floats
     spindle: NDArray[np.int8]
     line: NDArray[np.int32]
     context: NDArray[np.int32]
     contexts: tuple[Context, ...]
-    event_move: NDArray[np.int64]
+    event_move: Ints
     event_kind: NDArray[np.int8]
-    event_seconds: NDArray[np.float64]
-    event_power: NDArray[np.float64]
+    event_seconds: Floats
+    event_power: Floats
     event_line: NDArray[np.int32]
     line_number: NDArray[np.int32]
     line_bytes: NDArray[np.int32]
@@ -79,12 +80,12 @@ class Program:
         return len(self.motion)
 
     @property
-    def beam_on(self) -> NDArray[np.bool_]:
+    def beam_on(self) -> Bools:
         """(n,) whether a move burns."""
         return np.asarray(self.power > 0.0)
 
     @property
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Floats:
         """(n,) lengths of the moves in mm."""
         return np.asarray(np.linalg.norm(self.end - self.start, axis=1), dtype=np.float64)
 
@@ -145,17 +146,17 @@ class Strokes:
     and last move of a stroke in the program; ``context`` (S,) int32 into ``contexts``.
     """
 
-    points: NDArray[np.float64]
-    offsets: NDArray[np.int64]
-    first_move: NDArray[np.int64]
-    last_move: NDArray[np.int64]
+    points: Floats
+    offsets: Ints
+    first_move: Ints
+    last_move: Ints
     context: NDArray[np.int32]
     contexts: tuple[Context, ...]
 
     def __len__(self) -> int:
         return len(self.context)
 
-    def stroke(self, index: int) -> NDArray[np.float64]:
+    def stroke(self, index: int) -> Floats:
         """(k, 3) the points of stroke ``index``."""
         return self.points[self.offsets[index] : self.offsets[index + 1]]
 

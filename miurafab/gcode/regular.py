@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from miurafab.gcode.parser import ModalState
 from miurafab.gcode.words import LINEAR, SEEK
+from miurafab.geometry.arrays import Bools, Floats, Ints
 
 LEAST_RUN = 48
 """The shortest run of regular lines read as an array; shorter runs go to the word parser."""
@@ -52,15 +53,15 @@ class TextLines:
     int64: ``size``, the characters without blanks, ``words``, and ``points``, the decimal points.
     """
 
-    bounds: NDArray[np.int64]
-    values: NDArray[np.float64]
-    regular: NDArray[np.bool_]
-    size: NDArray[np.int64]
-    words: NDArray[np.int64]
-    points: NDArray[np.int64]
+    bounds: Ints
+    values: Floats
+    regular: Bools
+    size: Ints
+    words: Ints
+    points: Ints
 
     @property
-    def commanded(self) -> NDArray[np.bool_]:
+    def commanded(self) -> Bools:
         """(L,) whether a line holds G0 or G1."""
         return np.asarray(~np.isnan(self.values[_G]))
 
@@ -111,9 +112,9 @@ def read_lines(text: str) -> TextLines:
 def _numbers(
     raw: NDArray[np.uint8],
     kind: NDArray[np.uint8],
-    letters: NDArray[np.int64],
-    stops: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    letters: Ints,
+    stops: Ints,
+) -> tuple[Floats, Bools]:
     """(W,) the number between each letter and its stop, and whether it is well formed."""
     digits = np.concatenate([[0], np.cumsum(kind == _DIGIT)])
     points = np.concatenate([[0], np.cumsum(kind == _POINT)])
@@ -153,11 +154,11 @@ class RegularMoves:
     mm/min and ``speed`` in S words (r,) float64; ``changes`` (r,) bool marks each new speed.
     """
 
-    target: NDArray[np.float64]
-    rapid: NDArray[np.bool_]
-    feed: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    changes: NDArray[np.bool_]
+    target: Floats
+    rapid: Bools
+    feed: Floats
+    speed: Floats
+    changes: Bools
 
 
 def regular_moves(
@@ -189,7 +190,7 @@ def regular_moves(
     return RegularMoves(target, rapid, feed, speed, changes)
 
 
-def _filled(values: NDArray[np.float64], before: float) -> NDArray[np.float64]:
+def _filled(values: Floats, before: float) -> Floats:
     """Replace each NaN of ``values`` by the last number before it, at the start by ``before``."""
     index = np.where(np.isnan(values), -1, np.arange(len(values)))
     index = np.maximum.accumulate(index)

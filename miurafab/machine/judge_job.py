@@ -17,13 +17,13 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import GcodeError
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.program import BEAM_M3, DWELL, Program
 from miurafab.gcode.reading import has_laser_mode, read_program
+from miurafab.geometry.arrays import Bools, Floats
 from miurafab.machine.loose_parts import burnt_on_loose_pieces, open_outlines, says_operations
 from miurafab.marlin.connection import FRAME
 from miurafab.profiles import MachineProfile
@@ -114,9 +114,7 @@ def longest_line(machine: MachineProfile) -> int:
     return machine.controller.line_chars - (FRAME if machine.dialect == "marlin" else 0)
 
 
-def first_outside(
-    ends: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
-) -> tuple[int, int] | None:
+def first_outside(ends: Floats, low: Floats, high: Floats) -> tuple[int, int] | None:
     """The index of the first of ``ends`` (n, 2) outside the box and the number of all, or None."""
     outside = ((ends < low - TOLERANCE_MM) | (ends > high + TOLERANCE_MM)).any(axis=1)
     return (int(np.argmax(outside)), int(outside.sum())) if outside.any() else None
@@ -131,7 +129,7 @@ def _in_line(code: str, name: str, line: int, says: str, count: int = 1) -> Find
     return Finding(code, f"{in_line(name, line, count)} {says}", f"{name}:{line}")
 
 
-def _in_moves(code: str, program: Program, mask: NDArray[np.bool_], says: str) -> Finding:
+def _in_moves(code: str, program: Program, mask: Bools, says: str) -> Finding:
     line = int(program.line[np.argmax(mask)])
     return _in_line(code, program.name, line, says, int(mask.sum()))
 

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.gcode.program import Program, Strokes, strokes
+from miurafab.geometry.arrays import Bools, Floats, Ints
 
 CUT = "cut"
 _CLOSED = 0.02  # mm; ends nearer than this meet: G-code has three decimals, kerf is ten times more
@@ -45,7 +45,7 @@ class LooseStroke:
 class _Path:
     """Strokes that follow one another end to end: their points (n, 2), and first and last move."""
 
-    points: NDArray[np.float64]
+    points: Floats
     first_move: int
     last_move: int
 
@@ -107,13 +107,13 @@ def open_outlines(program: Program) -> Iterator[LooseStroke]:
             yield LooseStroke(line, int(program.line[path.first_move]), path.gap)
 
 
-def _through(table: Strokes, program: Program) -> NDArray[np.int64]:
+def _through(table: Strokes, program: Program) -> Ints:
     """Which strokes are cut, or all of them where no operation is said."""
     cut = np.array([c.operation == CUT for c in table.contexts], dtype=bool)
     return np.flatnonzero(cut[table.context] | (not says_operations(program)))
 
 
-def _without_lone_dashes(table: Strokes, chosen: NDArray[np.int64]) -> NDArray[np.int64]:
+def _without_lone_dashes(table: Strokes, chosen: Ints) -> Ints:
     """``chosen`` without the short ones that meet no other in turn: most, and no outline."""
     begin, end = table.offsets[:-1][chosen], table.offsets[1:][chosen]
     first, last = table.points[begin, :2], table.points[end - 1, :2]
@@ -122,7 +122,7 @@ def _without_lone_dashes(table: Strokes, chosen: NDArray[np.int64]) -> NDArray[n
     return chosen[(end - begin > _LEAST_MOVES) | meets[:-1] | meets[1:]]
 
 
-def _paths(table: Strokes, chosen: NDArray[np.int64]) -> list[_Path]:
+def _paths(table: Strokes, chosen: Ints) -> list[_Path]:
     """The ``chosen`` strokes, joined where they meet in turn."""
     paths: list[_Path] = []
     for index in chosen.tolist():
@@ -140,7 +140,7 @@ def _paths(table: Strokes, chosen: NDArray[np.int64]) -> list[_Path]:
     return paths
 
 
-def _rounds(points: NDArray[np.float64], first_move: int) -> Iterator[_Path]:
+def _rounds(points: Floats, first_move: int) -> Iterator[_Path]:
     """A stroke parted where it comes back to its beginning: passes without a travel between."""
     back = np.flatnonzero(np.linalg.norm(points - points[0], axis=1) <= _CLOSED)
     back = back[(back >= _LEAST_MOVES) & (back < len(points) - 1)]
@@ -159,7 +159,7 @@ def _last_passes(outlines: list[_Path]) -> list[_Path]:
     return [outline for outline in last.values() if len(outline.points) > _LEAST_MOVES]
 
 
-def _inside(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _inside(points: Floats, polygon: Floats) -> Bools:
     """(k,) whether ``points`` (k, 2) lie inside ``polygon`` (n, 2), farther than the tolerance from
     its edges: an even-odd count of the edges that a ray along X crosses.
     """

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.gcode.program import DWELL, RAPID, Program
+from miurafab.geometry.arrays import Floats
 from miurafab.motion import cpu
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.motion.planner import Planner
@@ -40,8 +41,8 @@ class Estimate:
 
     seconds: float
     beam_on_seconds: float
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
+    start: Floats
+    end: Floats
 
 
 def estimate(program: Program, parameters: MotionParameters, link: Link | None = None) -> Estimate:

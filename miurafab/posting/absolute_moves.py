@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Ints
 from miurafab.posting.dialects import Words
 from miurafab.posting.strokes import Points
 from miurafab.posting.text import ByteRows, absolute_number, table
 
 
-def hops(points: Points, words: Words) -> tuple[ByteRows, NDArray[np.int64]]:
+def hops(points: Points, words: Words) -> tuple[ByteRows, Ints]:
     """The lines as rows of bytes, and (T,) the row at which each stroke starts.
 
     Every stroke starts with a ``G0``; S and F stand where they change, or in every stroke where
@@ -40,7 +40,7 @@ def hops(points: Points, words: Words) -> tuple[ByteRows, NDArray[np.int64]]:
     return rows, first
 
 
-def _modal_words(words: Words, operation: NDArray[np.int64]) -> tuple[list[str], NDArray[np.int64]]:
+def _modal_words(words: Words, operation: Ints) -> tuple[list[str], Ints]:
     """The S and F words for each pair (operation before, operation now), and each stroke's index
     among them. Row 0 of the pairs is "nothing before".
     """

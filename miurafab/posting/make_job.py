@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import ProfileError
 from miurafab.fabrication.drawing.hpgl import sheet_hpgl
@@ -14,6 +13,7 @@ from miurafab.fabrication.knife import axis_way, tip_way
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
+from miurafab.geometry.arrays import Ints
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.posting.absolute_moves import hops
@@ -75,7 +75,7 @@ def post(
     ]
     labels = patch_labels or {}
 
-    def job(lines: tuple[ByteRows, NDArray[np.int64]], *modes: str) -> Job:
+    def job(lines: tuple[ByteRows, Ints], *modes: str) -> Job:
         foot = [f"{word}\n" for word in (*modes, *words.end)]
         return Job(toolpath.sheet, "".join([*head, *_body(runs, *lines, labels), *foot]))
 
@@ -149,9 +149,7 @@ def _seconds(job: Job, machine: MachineProfile) -> float:
     return estimate(parse_program(job), MotionParameters.from_profile(machine), link).seconds
 
 
-def _body(
-    runs: Runs, rows: ByteRows, row_of_stroke: NDArray[np.int64], labels: Mapping[int, str]
-) -> list[str]:
+def _body(runs: Runs, rows: ByteRows, row_of_stroke: Ints, labels: Mapping[int, str]) -> list[str]:
     """The strokes' lines, a piece a run, with the comments that hold from there on."""
     byte_of_row = np.concatenate([[0], np.cumsum(np.count_nonzero(rows, axis=1))])
     text = rows[rows != 0].tobytes().decode("ascii")

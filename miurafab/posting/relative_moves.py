@@ -10,8 +10,8 @@ at an absolute place, so that nothing adds up over a sheet.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from miurafab.geometry.arrays import Bools, Ints
 from miurafab.posting.dialects import Words
 from miurafab.posting.strokes import Points
 from miurafab.posting.text import ByteRows, absolute_number, relative_number, table
@@ -22,9 +22,7 @@ LONGEST_CHAIN = 64
 """Strokes in one chain at most."""
 
 
-def chains(
-    points: Points, words: Words, run_first: NDArray[np.int64]
-) -> tuple[ByteRows, NDArray[np.int64]]:
+def chains(points: Points, words: Words, run_first: Ints) -> tuple[ByteRows, Ints]:
     """The lines as rows of bytes, and (T,) the row at which each stroke starts.
 
     ``run_first`` are the strokes before which comments stand: a chain begins at each.
@@ -70,22 +68,22 @@ def chains(
     return rows, first
 
 
-def gaps(points: Points) -> NDArray[np.int64]:
+def gaps(points: Points) -> Ints:
     """(T, 2) micrometres from the end of the stroke before to the start of each."""
     gap = np.zeros((len(points.first), 2), dtype=np.int64)
     gap[1:] = points.xy[points.first[1:]] - points.xy[points.last[:-1]]
     return gap
 
 
-def apart(points: Points, run_first: NDArray[np.int64]) -> NDArray[np.bool_]:
+def apart(points: Points, run_first: Ints) -> Bools:
     """(T,) whether a stroke is too far from the one before, or parted by comments, for a chain."""
-    begins: NDArray[np.bool_] = np.linalg.norm(gaps(points), axis=1) > LONGEST_GAP
+    begins: Bools = np.linalg.norm(gaps(points), axis=1) > LONGEST_GAP
     begins[run_first] = True
     return begins
 
 
 def _axis(
-    letter: str, place: NDArray[np.int64], step: NDArray[np.int64], anchor: NDArray[np.bool_]
+    letter: str, place: Ints, step: Ints, anchor: Bools
 ) -> tuple[ByteRows, ByteRows, ByteRows]:
     """A letter with its number: the place at an anchor, the step elsewhere, nothing for no step."""
     said = anchor | (step != 0)

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.toolpath import Toolpath
-from miurafab.geometry.arrays import places_in_runs, run_starts
+from miurafab.geometry.arrays import Bools, Ints, places_in_runs, run_starts
 from miurafab.profiles import OPERATIONS, MachineProfile
 
 
@@ -22,12 +21,12 @@ class Runs:
     ``operation``, ``patch``, ``number`` (1-based) and ``passes`` (R,).
     """
 
-    order: NDArray[np.int64]
-    first: NDArray[np.int64]
-    operation: NDArray[np.int64]
-    patch: NDArray[np.int64]
-    number: NDArray[np.int64]
-    passes: NDArray[np.int64]
+    order: Ints
+    first: Ints
+    operation: Ints
+    patch: Ints
+    number: Ints
+    passes: Ints
 
 
 def runs_of(toolpath: Toolpath, passes_of_operation: Sequence[int]) -> Runs:
@@ -78,13 +77,13 @@ class Points:
     ``starts`` (N,) bool, whether a point is one; ``operation`` (T,) that of each stroke.
     """
 
-    xy: NDArray[np.int64]
-    first: NDArray[np.int64]
-    starts: NDArray[np.bool_]
-    operation: NDArray[np.int64]
+    xy: Ints
+    first: Ints
+    starts: Bools
+    operation: Ints
 
     @property
-    def last(self) -> NDArray[np.int64]:
+    def last(self) -> Ints:
         """(T,) the index of each stroke's last point."""
         return np.append(self.first[1:], len(self.xy))[: len(self.first)] - 1
 
@@ -111,7 +110,7 @@ def points_of(toolpath: Toolpath, machine: MachineProfile) -> Points:
     return Points(xy[keep], run_starts(kept), starts[keep], toolpath.operation)
 
 
-def _microns(toolpath: Toolpath, machine: MachineProfile) -> NDArray[np.int64]:
+def _microns(toolpath: Toolpath, machine: MachineProfile) -> Ints:
     """(N, 2) the points in whole micrometres, all of them on the bed."""
     bed = np.array([machine.bed.width_mm, machine.bed.height_mm])
     micron = np.rint(np.where(np.isfinite(toolpath.points), toolpath.points, -1.0) * 1000.0)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
+from miurafab.geometry.arrays import Ints
 
 LINE_CHARS = 70
 """The longest line written, comments included."""
@@ -35,7 +36,7 @@ _WHOLE = table([str(value) for value in range(20_001)])
 _THOUSANDTHS = table([f".{value:03d}".rstrip(".0") for value in range(1000)])
 
 
-def absolute_number(microns: NDArray[np.int64]) -> ByteRows:
+def absolute_number(microns: Ints) -> ByteRows:
     """(n, width) micrometres written in mm, without trailing zeros."""
     whole, rest = np.divmod(microns, 1000)
     return np.concatenate([_WHOLE[whole], _THOUSANDTHS[rest]], axis=1)
@@ -44,7 +45,7 @@ def absolute_number(microns: NDArray[np.int64]) -> ByteRows:
 _WHOLE_UNLESS_ZERO = table([str(value) if value else "" for value in range(20_001)])
 
 
-def relative_number(microns: NDArray[np.int64]) -> ByteRows:
+def relative_number(microns: Ints) -> ByteRows:
     """(n, width) signed micrometres written in mm as shortly as a controller reads them."""
     whole, rest = np.divmod(np.abs(microns), 1000)
     sign = table(["", "-"])[(microns < 0).astype(np.int64)]

@@ -17,6 +17,7 @@ from miurafab.findings import Finding, findings_json
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program, strokes
 from miurafab.gcode.reading import read_program
+from miurafab.geometry.arrays import Floats
 from miurafab.machine.judge_job import JudgedJob, judge_program
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
@@ -66,7 +67,7 @@ class SheetPreview:
     findings: tuple[Finding, ...]
     program: Program
     layer: NDArray[np.int8]
-    end_seconds: NDArray[np.float64]
+    end_seconds: Floats
     layer_mm: tuple[float, ...]
     layer_strokes: tuple[int, ...]
     paper_mm: tuple[float, float]
@@ -154,7 +155,7 @@ def _layers(program: Program) -> NDArray[np.int8]:
     return np.array(of_context, dtype=np.int8)[program.context]
 
 
-def _box(points: NDArray[np.float64]) -> tuple[float, float, float, float]:
+def _box(points: Floats) -> tuple[float, float, float, float]:
     (x0, y0), (x1, y1) = points[:, :2].min(axis=0).round(3), points[:, :2].max(axis=0).round(3)
     return float(x0), float(y0), float(x1), float(y1)
 

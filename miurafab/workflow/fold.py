@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import InputError, PatternError
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
 from miurafab.origami.folding.bending import bending_motion
@@ -141,7 +141,7 @@ def write_angles(folding: Folding, path: Path) -> None:
     path.write_text(angles_csv(folding.motion), encoding="utf-8", newline="\n")
 
 
-def _strain(motion: FoldingMotion) -> NDArray[np.float64]:
+def _strain(motion: FoldingMotion) -> Floats:
     """Strains as the page shows them: rounding, which a rigid motion has for strain, is none."""
     strain = facet_strain(motion.pattern, motion.frames)
     return np.where(strain < 1e-9, 0.0, strain)

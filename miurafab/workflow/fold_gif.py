@@ -11,13 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.picture import BACK, FRONT, axes, project
-
-Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT = 640, 480
 _FINE = 2  # canvas pixels for one pixel of the picture, along each axis

@@ -8,9 +8,9 @@ left is the dry run's from there on, at the feed that the override leaves.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.gcode.program import strokes
+from miurafab.geometry.arrays import Floats
 from miurafab.machine.sender import Progress
 from miurafab.workflow.dry_run import SheetPreview
 
@@ -50,9 +50,7 @@ class Timeline:
         return done, max(0.0, float(left)) * 100.0 / max(now.feed_override, 1)
 
 
-def _nearest(
-    at: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _nearest(at: Floats, start: Floats, end: Floats) -> tuple[Floats, Floats]:
     """(n,) how far ``at`` is from each of n moves, and (n,) what share of it lies behind."""
     way = end - start
     square = np.maximum((way**2).sum(axis=1), 1e-12)
