@@ -14,7 +14,7 @@ from importlib import resources
 
 import pytest
 
-from miurafab.errors import OptionError
+from miurafab.errors import OptionError, spell_options
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.options import (
     Choice,
@@ -46,6 +46,10 @@ every_option = pytest.mark.parametrize(
 )
 
 
+def flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
 def example(kind: Kind) -> str:
     """A value that is not the default, as a person writes it."""
     if isinstance(kind, Quantity):
@@ -70,8 +74,12 @@ def help_of(command: str) -> str:
 
 
 @every_option
-def test_the_command_line_has_it(cls: type, option: Declared) -> None:
-    assert f"--{option.name.replace('_', '-')}" in help_of(COMMANDS[cls])
+def test_the_command_line_has_it_in_the_words_of_the_declaration(
+    cls: type, option: Declared
+) -> None:
+    default = f" [default: {option.default_text}]" if option.default_text else ""
+    words = f"{flag(option.name)} {option.kind.metavar} {option.help}{default}"
+    assert " ".join(spell_options(words, flag).split()) in " ".join(help_of(COMMANDS[cls]).split())
 
 
 @every_option

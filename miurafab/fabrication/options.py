@@ -45,7 +45,7 @@ class NestingOptions:
 
     quantity: int = option(
         Whole(1, 1000),
-        "How many of the whole model to make.",
+        "Number of copies of the whole model.",
         default=1,
         group="Sheets",
         page="first",
@@ -58,26 +58,26 @@ class NestingOptions:
     )
     margin_mm: float | None = option(
         length(0, 100),
-        "Kept free along the sheet's edges.",
+        "Border of the sheet that stays free.",
         group="Sheets",
         default_text="the machine's",
         page="more",
     )
     grain: str | None = option(
         Choice(GRAINS),
-        "How the fibres run in sheets that do not say so themselves.",
+        "Direction of the fibres, for sheets whose file does not give it.",
         group="Sheets",
         default_text="the material's",
     )
     along_grain: str | None = option(
         Choice(("x", "y")),
-        "The pattern's axis that is laid along the fibres.",
+        "The axis of the pattern that lies along the fibres.",
         group="Sheets",
         default_text="x",
     )
     rotations: tuple[int, ...] = option(
         Several(Whole(0, 359), distinct),
-        "Whole degrees by which patches may be turned on the sheet.",
+        "Allowed turns of a patch on the sheet, in whole degrees.",
         default=(0, 90, 180, 270),
         group="Sheets",
     )
@@ -92,7 +92,7 @@ class LayoutOptions:
 
     gap_mm: float = option(
         length(0, 100),
-        "Kept between patches on a sheet.",
+        "Least distance between patches on a sheet.",
         default=2.0,
         group="Patches",
         page="first",
@@ -113,13 +113,13 @@ class LayoutOptions:
     )
     seam_rows: tuple[int, ...] = option(
         Several(LINES, distinct),
-        "Rows of facets after which the pattern is cut in any case.",
+        "Force a seam after these rows of facets.",
         default=(),
         group="Patches",
     )
     seam_columns: tuple[int, ...] = option(
         Several(LINES, distinct),
-        "Columns of facets after which the pattern is cut in any case.",
+        "Force a seam after these columns of facets.",
         default=(),
         group="Patches",
     )
@@ -178,7 +178,7 @@ class LayoutOptions:
     )
     bridges: int = option(
         Whole(0, 12),
-        "Places in which each outline is left whole so that nothing falls out: 0, or 2 and more.",
+        "Holding bridges on each outline, so that nothing falls out: 0, or 2 and more.",
         default=0,
         group="Cutting",
         page="more",

@@ -183,7 +183,7 @@ class FitOptions:
         default="auto",
         group="Search",
     )
-    seed: int = option(Whole(), "Seed of the random attempts.", default=0, group="Search")
+    seed: int = option(Whole(), "Random seed of the attempts.", default=0, group="Search")
 
     def __post_init__(self) -> None:
         check_options(self)
