@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from miurafab.errors import InputError, OptionError, ProfileError, UnitError
+from miurafab.files import read_bytes
 from miurafab.options import Kind, read_options
 from miurafab.units import parse_length
 
@@ -24,12 +25,7 @@ T = TypeVar("T")
 def read_toml(path: Path, error: type[InputError] = ProfileError) -> dict[str, Any]:
     """The parsed TOML file at ``path``; raises ``error`` if it is missing or not TOML."""
     try:
-        with path.open("rb") as stream:
-            return tomllib.load(stream)
-    except FileNotFoundError:
-        raise error(f"{path} does not exist.") from None
-    except OSError as fault:
-        raise error(f"{path} cannot be read: {fault.strerror}.") from None
+        return tomllib.loads(read_bytes(path, error).decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
         raise error(f"{path} is not valid TOML: {fault}.") from None
 

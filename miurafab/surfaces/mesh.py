@@ -22,6 +22,7 @@ import trimesh
 from scipy.interpolate import NdBSpline
 
 from miurafab.errors import TargetError
+from miurafab.files import read_bytes
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
@@ -224,12 +225,7 @@ def load_mesh(
     """
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise TargetError(f"{path} is not a mesh file; known are {', '.join(MESH_SUFFIXES)}.")
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise TargetError(f"{path} does not exist.") from None
-    except OSError as fault:
-        raise TargetError(f"{path} cannot be read: {fault.strerror}.") from None
+    content = read_bytes(path, TargetError)
     kind = path.suffix[1:].lower()
     try:
         mesh: object = trimesh.load_mesh(io.BytesIO(content), file_type=kind, process=False)

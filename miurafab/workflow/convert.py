@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from miurafab.errors import InputError, PatternError
+from miurafab.files import read_bytes
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.formats.fold import read_fold
@@ -142,12 +143,7 @@ def read_pattern(
         )
     if ending not in DRAWINGS:
         raise InputError(f"{path} does not end in one of {', '.join(READ)}.")
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except FileNotFoundError:
-        raise PatternError(f"{path} does not exist.") from None
-    except OSError as fault:
-        raise PatternError(f"{path} cannot be read: {fault.strerror}.") from None
+    text = read_bytes(path, PatternError).decode("utf-8", errors="replace")
     try:
         return pattern_from_lines(DRAWINGS[ending](text), tolerance)
     except InputError as fault:

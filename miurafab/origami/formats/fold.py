@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
+from miurafab.files import read_text
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import filled, reversed_faces, signed_areas
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
@@ -114,14 +115,7 @@ def read_fold(path: Path) -> CreasePattern:
 
     Raises :class:`~miurafab.errors.PatternError` naming the file and what is wrong with it.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise PatternError(f"{path} does not exist.") from None
-    except OSError as fault:
-        raise PatternError(f"{path} cannot be read: {fault.strerror}.") from None
-    except UnicodeDecodeError:
-        raise PatternError(f"{path} is not a FOLD file: it is not UTF-8 text.") from None
+    text = read_text(path, PatternError, "a FOLD file")
     try:
         document = json.loads(text)
     except json.JSONDecodeError as fault:

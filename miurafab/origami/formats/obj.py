@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from miurafab.errors import PatternError
+from miurafab.files import read_text
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import next_corners, reversed_faces, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
@@ -59,14 +60,7 @@ def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
 
 def _read_obj(path: Path) -> tuple[Floats, Ints]:
     """Vertices (V, 3) and facets (F, k), -1 padded."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise PatternError(f"{path} does not exist.") from None
-    except OSError as fault:
-        raise PatternError(f"{path} cannot be read: {fault.strerror}.") from None
-    except UnicodeDecodeError:
-        raise PatternError(f"{path} is not an OBJ file: it is not UTF-8 text.") from None
+    text = read_text(path, PatternError, "an OBJ file")
     points: list[list[float]] = []
     faces: list[list[int]] = []
     for number, line in enumerate(text.splitlines(), start=1):
