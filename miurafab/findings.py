@@ -1,7 +1,7 @@
 """Findings: what a person should know about a target, a sheet, a layout or a job.
 
 Every room that judges answers with findings. A finding never changes the value that it is about: a
-command shows it, ``--json`` prints it, and a refusal stops the work unless its code is forced.
+command shows it, the JSON answer holds it, and a refusal stops the work unless its code is forced.
 :data:`RULES` lists every code once, with its severity, so that a judgement weighs the same wherever
 it is made.
 """
@@ -121,7 +121,7 @@ class Finding:
     ----------
     code : str
         The name of the judgement, a key of :data:`RULES`. It stays the same from version to
-        version; ``--force CODE`` takes it.
+        version; ``force`` takes it.
     sentence : str
         The whole judgement as one sentence, with the numbers and the way out. The names of options
         stand in backticks (:func:`miurafab.errors.spell_options`).

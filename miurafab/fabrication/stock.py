@@ -134,7 +134,7 @@ def lay_stock(options: LayoutOptions, bed: Bed, grain: str) -> LaidStock:
     if wanted.along_grain is not None and all(way == "none" for way in fibres):
         raise LayoutError(
             f"The pattern's {wanted.along_grain} axis is to lie along the grain, but neither the "
-            "sheets nor the material have any; say which way the fibres run by --grain x or y."
+            "sheets nor the material have any; give the fibre direction, x or y, as `grain`."
         )
     kinds = []
     for sheet, way in zip(sheets, fibres, strict=True):

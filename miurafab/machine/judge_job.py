@@ -1,6 +1,6 @@
 """The judgement of a job: everything that speaks against starting it, without any machine.
 
-``preview``, ``cut --dry-run``, the pre-flight of ``cut`` and the page of a job all show what
+``preview``, the dry run and the pre-flight of ``cut`` and the page of a job all show what
 :func:`judge_job` finds, so that the verdict and the words are the same everywhere. Nothing here
 reads a file or opens a port.
 

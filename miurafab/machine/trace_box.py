@@ -36,7 +36,7 @@ def frame_job(
     if machine.dialect == "hpgl":
         raise InputError(f"{machine.name} speaks hpgl, in which a frame is not traced.")
     if pointer and (machine.tool.kind != "laser" or machine.dialect in ("grbl-0.9", "marlin")):
-        raise InputError(f"{machine.name} has no laser that could point; leave --pointer out.")
+        raise InputError(f"{machine.name} has no laser that could point; leave `pointer` out.")
     x0, y0, x1, y1 = bounds_mm
     corners = ((x1, y0), (x1, y1), (x0, y1), (x0, y0))
     feed = min(_FEED, *machine.motion.max_rate_mm_min)

@@ -52,7 +52,7 @@ def serve(
     :class:`~miurafab.errors.PortError` for a port that cannot be had.
     """
     if not 0 <= port <= 65535:
-        raise InputError(f"--port is {port}; it must lie between 0 (any that is free) and 65535.")
+        raise InputError(f"`port` is {port}; it must lie between 0 (any free port) and 65535.")
     with contextlib.ExitStack() as at_end:
         signals = at_end.enter_context(StopSignals())
         at_end.enter_context(contextlib.suppress(KeyboardInterrupt))
@@ -108,8 +108,8 @@ class _Server(ThreadingHTTPServer):
             super().__init__((ADDRESS, port), _Handler)
         except OSError as fault:
             raise PortError(
-                f"The port {port} cannot be had: {fault.strerror or fault}; choose another with "
-                "--port, or leave it out."
+                f"Cannot listen on port {port}: {fault.strerror or fault}; choose another "
+                "`port`, or leave it out."
             ) from None
 
     def server_bind(self) -> None:

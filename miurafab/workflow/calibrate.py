@@ -132,7 +132,7 @@ def add_material(
     if path.exists():
         raise InputError(f"{path} exists already; choose another name or remove it.")
     if cell is None and cut is None and kerf is None:
-        raise InputError("Nothing was chosen; give a --cell, a --cut or a --kerf.")
+        raise InputError("Nothing was chosen; give a `cell`, a `cut` or a `kerf`.")
     choices = _choices(directory)
     own = directory / f"{choices['material']}.toml"
     base = own if own.is_file() else find_file("materials", str(choices["material"]))

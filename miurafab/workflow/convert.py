@@ -65,7 +65,7 @@ class Conversion:
     remarks: tuple[str, ...]
 
     def report(self) -> dict[str, Any]:
-        """The answer of ``convert --json``."""
+        """The JSON answer of ``convert``."""
         letters = self.pattern.edges_assignment
         return {
             "file": str(self.target),
@@ -103,7 +103,7 @@ def convert(
     if ending not in WRITTEN:
         raise InputError(f"{target} does not end in one of {', '.join(WRITTEN)}.")
     if form not in (None, "flat", "folded"):
-        raise InputError(f"--form is '{form}'; it is flat or folded.")
+        raise InputError(f"`form` is '{form}'; it is flat or folded.")
     pattern = read_pattern(source, folded=folded, tolerance=tolerance)
     remarks = [] if source.suffix.lower() == ".fold" else _said_nothing_of(source, pattern)
     if ending in (".obj", ".stl", ".glb"):
@@ -126,13 +126,13 @@ def read_pattern(
     """The pattern in ``path``, in any format that holds one; arguments as for :func:`convert`."""
     ending = path.suffix.lower()
     if folded is not None and ending != ".obj":
-        raise InputError(f"--folded goes with a flat .obj file, and {path} is none.")
+        raise InputError(f"`folded` goes with a flat .obj file, and {path} is none.")
     if ending == ".fold":
         return read_fold(path)
     if ending == ".obj":
         if folded is None:
             raise InputError(
-                f"{path} is one shape; give its other form with --folded FOLDED.obj to make a "
+                f"{path} is one shape; give its folded form (.obj) as `folded` to make a "
                 "pattern of the two, or fit it as a surface with 'miurafab fit'."
             )
         return pattern_from_obj_pair(path, Path(folded))
@@ -167,7 +167,7 @@ def _with_mesh_beside(pattern: CreasePattern, source: Path) -> CreasePattern:
 
 def _write_solid(pattern: CreasePattern, path: Path, form: str | None) -> None:
     if form == "folded" and pattern.folded_coords is None:
-        raise InputError("The pattern has no folded form to write; leave out --form folded.")
+        raise InputError("The pattern has no folded form to write; leave `form` out.")
     if pattern.folded_coords is None or form == "flat":
         points = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
     else:

@@ -84,7 +84,7 @@ class SheetPreview:
         return JudgedJob(len(self.program.line_number), self.program, self.findings)
 
     def figures(self) -> dict[str, Any]:
-        """The figures as ``preview --json`` gives them."""
+        """The figures in the JSON answer of ``preview``."""
         return {
             "name": self.name,
             "lines": self.lines,

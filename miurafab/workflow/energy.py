@@ -36,14 +36,14 @@ def energy(
     what :func:`~miurafab.origami.energy.path.energy_curve` raises.
     """
     if not 0 <= crease_ratio < math.inf:
-        raise InputError(f"--crease-ratio is {crease_ratio:g}; it must be zero or more.")
+        raise InputError(f"`crease_ratio` is {crease_ratio:g}; it must be zero or more.")
     paper = None
     if material is not None:
         material = load_material(material) if isinstance(material, str) else material
         if material.modulus_pa is None:
             raise InputError(
                 f"The material '{material.name}' gives no modulus; add a line such as "
-                'modulus = "3GPa" to its file, or leave --material out.'
+                'modulus = "3GPa" to its file, or leave `material` out.'
             )
         paper = Paper(material.thickness_mm, material.modulus_pa)
     model = sheet_model(pattern, paper=paper, crease_ratio=crease_ratio)

@@ -51,7 +51,7 @@ class Folding:
     mismatch: float
 
     def report(self) -> dict[str, Any]:
-        """The answer of ``fold --json``; ``states`` are null where they are infinite."""
+        """The JSON answer of ``fold``; ``states`` are null where they are infinite."""
         motion = self.motion
         strain = facet_strain(motion.pattern, motion.frames)
         return {
@@ -80,7 +80,7 @@ def fold(
     :class:`~miurafab.errors.InputError` for a number of steps that is none.
     """
     if not 2 <= steps <= 1000:
-        raise InputError(f"--steps is {steps}; a motion has between 2 and 1000 steps.")
+        raise InputError(f"`steps` is {steps}; a motion has between 2 and 1000 steps.")
     motion = rigid_motion(pattern, states_between(pattern, steps))
     assert motion.mismatch is not None
     mismatch = float(motion.mismatch.max())
@@ -161,7 +161,7 @@ def _names(motion: FoldingMotion) -> tuple[str, ...]:
 
 
 def thickness_report(panels: ThickPanels) -> dict[str, Any]:
-    """The part of ``fold --json`` about thick panels."""
+    """The part of the JSON answer of ``fold`` about thick panels."""
     pattern = panels.pattern
     creases = np.flatnonzero(panels.hinge_side != "")
     finite = panels.offset_mm[creases][np.isfinite(panels.offset_mm[creases])]

@@ -64,7 +64,7 @@ def share_sheets(
     if options.frame:
         raise InputError(
             "A frame is looked at before its sheet is cut, and machines that share sheets do not "
-            "wait: first trace it at each with 'miurafab machine frame' and the same --port."
+            "wait: first trace it at each with 'miurafab machine frame' and the same `port`."
         )
     twice = {port for port in ports if ports.count(port) > 1 and port != "virtual"}
     if twice:
@@ -111,7 +111,7 @@ class _Work:
             if plans[number].resumption is not None:
                 raise InputError(
                     f"{prepared.dry_runs[number - 1].name} was interrupted at a machine that is "
-                    "not named now; name its --port too, or resume it with that port alone."
+                    "not named now; name its `port` too, or resume it with that port alone."
                 )
 
     def at_machine(self, port: str) -> None:

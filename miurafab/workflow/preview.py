@@ -44,7 +44,7 @@ class Preview:
         return sum(sheet.seconds for sheet in self.sheets)
 
     def as_dict(self) -> dict[str, Any]:
-        """The answer of ``preview --json``."""
+        """The JSON answer of ``preview``."""
         return {
             "job": self.name,
             "machine": self.machine.name,

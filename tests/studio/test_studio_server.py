@@ -270,8 +270,8 @@ def test_only_this_computer_and_only_with_the_key(start):
         ("gone.toml", 0, TargetError, "gone"),
         ("hyppar", 0, TargetError, "did you mean 'hypar'"),
         ("hypar:height=tall", 0, TargetError, "not a number"),
-        (None, 70000, InputError, "--port is 70000"),
-        (None, -1, InputError, "--port is -1"),
+        (None, 70000, InputError, "'port' is 70000"),
+        (None, -1, InputError, "'port' is -1"),
     ],
 )
 def test_what_cannot_be_served_is_a_sentence(thing, port, error, named):
@@ -282,7 +282,7 @@ def test_what_cannot_be_served_is_a_sentence(thing, port, error, named):
 def test_a_port_that_is_taken_is_a_sentence():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(PortError, match=f"The port {port} cannot be had: .*--port"):
+        with pytest.raises(PortError, match=f"Cannot listen on port {port}: .*'port'"):
             serve(port=port, open_browser=False, announce=pytest.fail)
 
 

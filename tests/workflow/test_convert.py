@@ -83,10 +83,10 @@ def test_a_mesh_target_is_still_found_from_another_folder(tmp_path: Path) -> Non
     [
         ("sheet.fold", "a.pdf", {}, "does not end in one of"),
         ("sheet.fold", "a.obj", {"form": "round"}, "flat or folded"),
-        ("sheet.fold", "a.cp", {"folded": "b.obj"}, "--folded goes with"),
+        ("sheet.fold", "a.cp", {"folded": "b.obj"}, "'folded' goes with"),
         ("sheet.txt", "a.cp", {}, "does not end in one of"),
         ("sheet.stl", "a.fold", {}, "no crease pattern"),
-        ("sheet.obj", "a.fold", {}, "--folded FOLDED.obj"),
+        ("sheet.obj", "a.fold", {}, "as 'folded'"),
         ("none.svg", "a.fold", {}, "does not exist"),
     ],
 )

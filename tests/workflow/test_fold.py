@@ -90,7 +90,7 @@ def test_what_neither_folds_nor_bends_says_both() -> None:
     published = read_pattern(DATA / "peaks_coarse_flat.obj", folded=DATA / "peaks_coarse_fold.obj")
     with pytest.raises(PatternError, match=r"does not fold rigidly.*cannot be bent either"):
         fold(published, 8)
-    with pytest.raises(InputError, match="--steps is 1"):
+    with pytest.raises(InputError, match="'steps' is 1"):
         fold(regular(), 1)
 
 
