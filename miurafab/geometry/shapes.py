@@ -1,4 +1,4 @@
-"""Shapely shapes: what GEOS needs to be told."""
+"""Areas of Shapely shapes, with a workaround for a fault of GEOS."""
 
 from __future__ import annotations
 

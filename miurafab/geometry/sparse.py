@@ -1,8 +1,8 @@
-"""Factors of sparse symmetric matrices: the one place that knows which library makes them.
+"""Factors of sparse symmetric matrices; no other module calls the library that makes them.
 
-The matrices are positive definite, or so nearly that their diagonal serves as it stands. So no
-rows are exchanged for the sake of rounding, and a fill-reducing order may be chosen beforehand.
-The library is SuperLU (X. S. Li, ACM Trans. Math. Softw. 31 (2005)).
+The matrices are positive definite or nearly so, and need no pivoting. A fill-reducing order can
+therefore be chosen before the factorisation. The library is SuperLU (X. S. Li, ACM Trans. Math.
+Softw. 31 (2005)).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Factor(Protocol):
 def factor_symmetric(matrix: sparse.csc_array, *, reorder: bool = True) -> Factor:
     """The factor of a symmetric ``matrix``.
 
-    Its rows are eliminated in the order of minimum degree, or without ``reorder`` as they stand.
+    Rows are eliminated in the order of minimum degree, or without ``reorder`` in their own order.
     Raises ``RuntimeError`` where the matrix is singular to the last digit.
     """
     return _factor(matrix, reorder)

@@ -41,31 +41,31 @@ def cylinder_over(profile: ProfileCurve, length: float) -> GeneralizedCylinder:
     return GeneralizedCylinder(position, domain, profile=profile)
 
 
-def plane(width: float, height: float) -> ParametricSurface:
+def plane(width: float, depth: float) -> ParametricSurface:
     """A flat rectangle in z = 0."""
-    return _graph(width, height, lambda x, y: np.zeros_like(x))
+    return _graph(width, depth, lambda x, y: np.zeros_like(x))
 
 
-def hyperbolic_paraboloid(width: float, height: float, rise: float) -> ParametricSurface:
-    """z = rise * (2x/width) (2y/height): the ruled form, the corners at +-rise."""
-    return _graph(width, height, lambda x, y: rise * (2 * x / width) * (2 * y / height))
+def hyperbolic_paraboloid(width: float, depth: float, height: float) -> ParametricSurface:
+    """z = height * (2x/width) (2y/depth): the ruled form, the corners at +-height."""
+    return _graph(width, depth, lambda x, y: height * (2 * x / width) * (2 * y / depth))
 
 
-def saddle(width: float, height: float, rise: float) -> ParametricSurface:
-    """z = rise * ((2x/width)^2 - (2y/height)^2)."""
-    return _graph(width, height, lambda x, y: rise * ((2 * x / width) ** 2 - (2 * y / height) ** 2))
+def saddle(width: float, depth: float, height: float) -> ParametricSurface:
+    """z = height * ((2x/width)^2 - (2y/depth)^2)."""
+    return _graph(width, depth, lambda x, y: height * ((2 * x / width) ** 2 - (2 * y / depth) ** 2))
 
 
-def paraboloid(width: float, height: float, rise: float) -> ParametricSurface:
-    """z = -rise * ((2x/width)^2 + (2y/height)^2): a bowl upside down."""
+def paraboloid(width: float, depth: float, height: float) -> ParametricSurface:
+    """z = -height * ((2x/width)^2 + (2y/depth)^2): a bowl upside down."""
     return _graph(
-        width, height, lambda x, y: -rise * ((2 * x / width) ** 2 + (2 * y / height) ** 2)
+        width, depth, lambda x, y: -height * ((2 * x / width) ** 2 + (2 * y / depth) ** 2)
     )
 
 
-def bump(width: float, height: float, rise: float, spread: float) -> ParametricSurface:
-    """A Gaussian bump z = rise * exp(-(x^2 + y^2) / spread^2)."""
-    return _graph(width, height, lambda x, y: rise * np.exp(-(x**2 + y**2) / spread**2))
+def bump(width: float, depth: float, height: float, spread: float) -> ParametricSurface:
+    """A Gaussian bump z = height * exp(-(x^2 + y^2) / spread^2)."""
+    return _graph(width, depth, lambda x, y: height * np.exp(-(x**2 + y**2) / spread**2))
 
 
 def sphere_patch(radius: float, width: float, height: float) -> ParametricSurface:
@@ -116,8 +116,8 @@ def revolution(profile: ProfileCurve, angle: float) -> Revolution:
     return Revolution(position, Domain(0.0, 1.0, -angle / 2, angle / 2), profile=profile)
 
 
-def _graph(width: float, height: float, z: Callable[[Floats, Floats], Floats]) -> ParametricSurface:
+def _graph(width: float, depth: float, z: Callable[[Floats, Floats], Floats]) -> ParametricSurface:
     def position(u: Floats, v: Floats) -> Floats:
         return np.stack([u, v, z(u, v)], axis=-1)
 
-    return ParametricSurface(position, Domain(-width / 2, width / 2, -height / 2, height / 2))
+    return ParametricSurface(position, Domain(-width / 2, width / 2, -depth / 2, depth / 2))

@@ -83,30 +83,15 @@ def _revolution(angle: float, profile: Any = None) -> TargetSurface:
     return _turned("revolution", curves.spline(_VASE if profile is None else profile), angle)
 
 
-def _pill(radius: float, waist: float, caps: float, angle: float) -> TargetSurface:
-    return _turned("pill", curves.capped(radius, waist, radius, caps), angle)
+def _revolving(
+    name: str, curve: Callable[..., curves.ProfileCurve]
+) -> Callable[..., TargetSurface]:
+    """How to make the revolution of a ``curve``, which takes all parameters but ``angle``."""
 
+    def make(angle: float, **shape: float) -> TargetSurface:
+        return _turned(name, curve(**shape), angle)
 
-def _candlestick(
-    radius: float, waist: float, flare: float, caps: float, angle: float
-) -> TargetSurface:
-    return _turned("candlestick", curves.capped(radius, waist, -flare, caps), angle)
-
-
-def _vase(belly: float, neck: float, height: float, angle: float) -> TargetSurface:
-    return _turned("vase", curves.vase(belly, neck, height), angle)
-
-
-def _hyperboloid(waist: float, spread: float, height: float, angle: float) -> TargetSurface:
-    return _turned("hyperboloid", curves.hyperbola(waist, spread, height), angle)
-
-
-def _catenoid(waist: float, height: float, angle: float) -> TargetSurface:
-    return _turned("catenoid", curves.catenary(waist, height), angle)
-
-
-def _ellipsoid(radius: float, height: float, latitude: float, angle: float) -> TargetSurface:
-    return _turned("ellipsoid", curves.ellipse(radius, height, latitude), angle)
+    return make
 
 
 _ENTRIES = (
@@ -114,7 +99,7 @@ _ENTRIES = (
         "plane",
         "a flat rectangle: the regular Miura-ori",
         _SIDES,
-        lambda width, depth: analytic.plane(width, depth),
+        analytic.plane,
     ),
     NamedSurface(
         "cylinder",
@@ -146,25 +131,25 @@ _ENTRIES = (
             "width": _angle(80, "longitude covered", 350),
             "height": _angle(80, "latitude covered", 170),
         },
-        lambda radius, width, height: analytic.sphere_patch(radius, width, height),
+        analytic.sphere_patch,
     ),
     NamedSurface(
         "hypar",
         "a hyperbolic paraboloid z = height x y, ruled along x and y",
         {**_SIDES, "height": _signed(0.5, "height of the corners over the centre")},
-        lambda width, depth, height: analytic.hyperbolic_paraboloid(width, depth, height),
+        analytic.hyperbolic_paraboloid,
     ),
     NamedSurface(
         "saddle",
         "a hyperbolic paraboloid z = height (x^2 - y^2)",
         {**_SIDES, "height": _signed(0.4, "height of the middles of the sides")},
-        lambda width, depth, height: analytic.saddle(width, depth, height),
+        analytic.saddle,
     ),
     NamedSurface(
         "paraboloid",
         "a bowl z = -height (x^2 + y^2)",
         {**_SIDES, "height": _signed(0.3, "drop at the middles of the sides")},
-        lambda width, depth, height: analytic.paraboloid(width, depth, height),
+        analytic.paraboloid,
     ),
     NamedSurface(
         "bump",
@@ -174,7 +159,7 @@ _ENTRIES = (
             "height": _signed(0.4, "height of the bump"),
             "spread": _length(0.7, "radius at which it falls to 1/e"),
         },
-        lambda width, depth, height, spread: analytic.bump(width, depth, height, spread),
+        analytic.bump,
     ),
     NamedSurface(
         "helicoid",
@@ -185,7 +170,7 @@ _ENTRIES = (
             "pitch": _length(3.0, "rise in one turn"),
             "turns": SurfaceParameter(number(0.02, 20), 0.5, "number of turns"),
         },
-        lambda radius, inner, pitch, turns: analytic.helicoid(radius, inner, pitch, turns),
+        analytic.helicoid,
     ),
     NamedSurface(
         "pill",
@@ -196,7 +181,7 @@ _ENTRIES = (
             "caps": _angle(60, "latitude that each cap reaches", 85),
             **_TURN,
         },
-        _pill,
+        _revolving("pill", lambda radius, waist, caps: curves.capped(radius, waist, radius, caps)),
     ),
     NamedSurface(
         "candlestick",
@@ -208,7 +193,10 @@ _ENTRIES = (
             "caps": _angle(60, "angle through which each end bends outwards", 85),
             **_TURN,
         },
-        _candlestick,
+        _revolving(
+            "candlestick",
+            lambda radius, waist, flare, caps: curves.capped(radius, waist, -flare, caps),
+        ),
     ),
     NamedSurface(
         "vase",
@@ -219,7 +207,7 @@ _ENTRIES = (
             "height": _length(2.2, "height"),
             **_TURN,
         },
-        _vase,
+        _revolving("vase", curves.vase),
     ),
     NamedSurface(
         "hyperboloid",
@@ -230,7 +218,7 @@ _ENTRIES = (
             "height": _length(2.0, "height"),
             **_TURN,
         },
-        _hyperboloid,
+        _revolving("hyperboloid", curves.hyperbola),
     ),
     NamedSurface(
         "catenoid",
@@ -240,7 +228,7 @@ _ENTRIES = (
             "height": _length(1.6, "height"),
             **_TURN,
         },
-        _catenoid,
+        _revolving("catenoid", curves.catenary),
     ),
     NamedSurface(
         "ellipsoid",
@@ -251,7 +239,7 @@ _ENTRIES = (
             "latitude": _angle(60, "parametric latitude reached on both sides", 85),
             **_TURN,
         },
-        _ellipsoid,
+        _revolving("ellipsoid", curves.ellipse),
     ),
     NamedSurface(
         "revolution",

@@ -40,7 +40,7 @@ class GridPlacement:
 
 @dataclass(frozen=True)
 class Region:
-    """What a user asks for: u0, u1, v0, v1 from the lower left corner of the layout's bounding box,
+    """A rectangle u0, u1, v0, v1 from the lower left corner of the layout's bounding box,
     as fractions of it or as lengths.
     """
 

@@ -292,9 +292,9 @@ def _trace(
 
 
 def main_crease(model: BarHingeModel) -> int:
-    """The index in ``model.creases`` of the crease that is driven by default.
+    """The index in ``model.creases`` of the default driven crease.
 
-    It is the crease nearest to the middle of the sheet among those folded by the median or more.
+    Of the creases folded by the median fold angle or more, it is the nearest to the middle.
     """
     angles = np.abs(hinge_angles(model.points, model.creases))
     middle = model.points[model.creases[:, :2]].mean(axis=1) - model.points.mean(axis=0)

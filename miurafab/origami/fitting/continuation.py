@@ -62,7 +62,7 @@ def bend(
 def refine(
     surface: TargetSurface, columns: int, rows: int, corrugation: Corrugation, level: float
 ) -> tuple[Unknowns, Projection]:
-    """From the solution on a coarse grid to grids twice as fine, until the grid asked for."""
+    """From the solution on a coarse grid to grids twice as fine, up to ``columns`` x ``rows``."""
     iterations = 0
     if min(columns, rows) > COARSEST:
         few, fewer = (max(n // 2, COARSEST // 2) + 1 for n in (columns - 1, rows - 1))

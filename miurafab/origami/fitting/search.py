@@ -135,7 +135,7 @@ def _deviation(result: FitResult) -> float:
 
 
 def _miss(request: FitRequest) -> Callable[[FitResult], tuple[bool, float]]:
-    """The order of results: those without self-crossings first, then by the factor over a limit."""
+    """The key of the order of results: self-crossings, then the largest factor over a limit."""
 
     def miss(result: FitResult) -> tuple[bool, float]:
         m = result.measurements

@@ -280,7 +280,7 @@ def strategies_for(request: FitRequest) -> Iterator[Strategy]:
 
 
 def _oriented(surface: TargetSurface) -> list[tuple[TargetSurface, str]]:
-    """Both directions of the rows, the one along which the normal turns less first."""
+    """Both directions of the rows; first the direction along which the normal turns less."""
     both: list[tuple[TargetSurface, str]] = [(surface, "u"), (Swapped(surface), "v")]
     return sorted(both, key=lambda pair: _turning(pair[0]))
 
@@ -379,11 +379,11 @@ def _faults(
         pairs = f"{measured.overlaps} pairs of facets"
         yield Finding("overlap", f"{pairs} overlap in the flat pattern; lower `zigzag`.")
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
-    wanted = request.min_edge_mm or DEGENERATE * mean
-    if measured.min_edge_mm < wanted:
+    least = request.min_edge_mm or DEGENERATE * mean
+    if measured.min_edge_mm < least:
         yield Finding(
             "min-edge",
-            f"The shortest edge is {measured.min_edge_mm:.3g} mm, under the {wanted:.3g} mm asked "
+            f"The shortest edge is {measured.min_edge_mm:.3g} mm, under the {least:.3g} mm asked "
             "for; ask for fewer `facets` or a larger `size`.",
         )
     if request.max_deviation_mm is not None and deviation > request.max_deviation_mm:

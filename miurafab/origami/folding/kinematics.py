@@ -267,7 +267,7 @@ def first_facets(pattern: CreasePattern, depth: Ints) -> Ints:
 
 
 def laid_on_each_other(pattern: CreasePattern, states: Floats, frames: Floats) -> Floats:
-    """``frames`` moved rigidly: one onto the known form, each other one onto its neighbour."""
+    """``frames`` moved rigidly, the first onto the known form and the rest onto neighbours."""
     known = pattern.folded_coords
     if known is None:
         known = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))

@@ -16,10 +16,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import spsolve
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.sparse import factor_symmetric
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import corner_ring, interior_vertices
 
@@ -94,6 +94,6 @@ def _potential(count: int, more: Ints, less: Ints, step: Floats) -> Floats:
     anchored = np.zeros(count)
     anchored[np.unique(part, return_index=True)[1]] = 1.0
     system = coo_array((anchored, (np.arange(count), np.arange(count)))).tocsc() + laplacian
-    potential = np.asarray(spsolve(system, difference.T @ step))
+    potential = factor_symmetric(system).solve(difference.T @ step)
     mean = np.bincount(part, potential) / np.bincount(part)
     return np.asarray(potential - mean[part])
