@@ -8,7 +8,7 @@ import tomllib
 
 import pytest
 from commands import run_line
-from pages import PAGES, ROOT, blocks_of, indented_code
+from pages import PAGES, ROOT, blocks_of, indented_code, prose_of
 from tables import TABLES, tables_in, with_tables
 
 BLOCKS = [block for page in PAGES for block in blocks_of(page)]
@@ -124,3 +124,21 @@ def test_the_tables_are_those_of_the_program():
     texts = [page.read_text(encoding="utf-8") for page in PAGES]
     assert [with_tables(text) for text in texts] == texts
     assert set().union(*map(tables_in, texts)) == set(TABLES)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose_of(page)):
+        name, _, heading = link.partition("#")
+        assert not name.startswith("/")
+        if "://" not in name:
+            linked = page.parent / name if name else page
+            assert linked.is_file(), link
+            if heading:
+                assert heading in headings_of(linked), link
+
+
+def headings_of(page):
+    """The anchors of the headings of ``page``."""
+    titles = re.findall(r"^#+ (.*)$", prose_of(page), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
