@@ -1,7 +1,7 @@
-"""Quantities as people write them, turned into the floats that the inside computes with.
+"""Quantities as people write them, turned into floats.
 
-Inside, everything is millimetres, seconds, radians and millimetres a minute for feeds
-(``feed_mm_min``). This is the only place that knows a unit's name.
+Inside, lengths are millimetres, times seconds, angles radians, and feeds millimetres a minute
+(``feed_mm_min``). No other module knows the names of units.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""A machine: what its bed, motion, beam and controller can do, as one strict TOML file.
+"""A machine in one strict TOML file: its bed, motion, tool and controller.
 
-The limits of the ranges below are those of the firmware or of physics, not of taste: they are
-there to catch a wrong unit (a 40 m bed) and not to forbid an unusual machine.
+The ranges below are wide: they catch a wrong unit (a bed of 40 m) and allow an unusual machine.
 """
 
 from __future__ import annotations

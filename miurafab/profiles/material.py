@@ -1,7 +1,7 @@
-"""A material: how it is creased, cut and glued, as one strict TOML file.
+"""A material in one strict TOML file: how to crease, cut and glue it.
 
-Powers are fractions of the laser's full power, so that one material file serves machines with
-different S ranges; the profile of the machine turns them into S words.
+Powers are fractions of the laser's full power, so that one file serves machines with different S
+ranges; the machine profile turns them into S words.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from miurafab.profiles.shipped import find_file
 from miurafab.profiles.table import Table, read_toml
 
 OPERATIONS = ("engrave", "score", "perforate", "cut")
-"""The operations in the order they are made on a sheet: what loosens the sheet comes last."""
+"""The operations in the order in which a sheet is made; cuts, which loosen it, come last."""
 
 
 CREASE_KINDS = ("mountain", "valley", "tab")
-"""The kinds of crease that may be made differently; the fold of a tab is of its own kind."""
+"""The kinds of crease, which may be made differently; ``tab`` is the fold of a tab."""
 
 MODES = ("perforate", "score", "cut", "none")
 MIN_HOLE_PATH_MM = 0.1
-"""A circle of a smaller diameter is a dot to a beam and its controller (judged)."""
+"""A beam and its controller make a dot of a circle with a smaller diameter (judged)."""
 
 GRAINS = ("none", "x", "y")
-"""Which way the fibres of a sheet run as it lies on the bed, if any."""
+"""The direction of the fibres of a sheet on the bed, if it has any."""
 
 START_ENDS = ("bridge", "cut")
 FITS = ("centre", "stretch_cut", "stretch_gap")

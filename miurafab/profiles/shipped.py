@@ -1,7 +1,7 @@
 """Where the files that come with miurafab are: machine profiles, materials, patterns.
 
-In a checkout they stand at the top level, where people edit them; in a wheel they lie in
-``miurafab/shipped``. The two are told apart by what is there, and nothing else may differ.
+In a checkout they are at the top level, where people edit them; in a wheel they are in
+``miurafab/shipped``.
 """
 
 from __future__ import annotations
@@ -31,10 +31,9 @@ def shipped_names(kind: Kind, suffix: str = ".toml") -> list[str]:
 def find_file(
     kind: Kind, name: str, suffix: str = ".toml", error: type[InputError] = ProfileError
 ) -> Path:
-    """The file that a user means by ``name``: a path of their own, or a shipped name, which may be
-    written with or without the ``suffix``.
+    """The file that ``name`` means: a path, or a shipped name with or without ``suffix``.
 
-    Raises ``error`` when there is neither, with the nearest names that exist.
+    Raises ``error`` if neither exists, with the nearest shipped name.
     """
     own = Path(name)
     if own.is_file():

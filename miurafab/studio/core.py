@@ -4,14 +4,14 @@
 address         method answers
 =============== ====== ==========================================================================
 (empty)         GET    the page; its styles and scripts by their names
-catalogue       GET    surfaces, machines and materials that can be chosen, limits, defaults
-state           GET    what lies on the bench, and how far the task is
-files/N/NAME    GET    something that was computed; with ``?save`` to be saved
+catalogue       GET    surfaces, machines and materials to choose from, limits, defaults
+state           GET    the pattern and the job on the bench, and the progress of the task
+files/N/NAME    GET    a computed file; with ``?save`` to save it
 design.toml     GET    the design file of the pattern
 upload          POST   keeps a file (its name in ``X-File-Name``, percent-encoded)
-fit, open       POST   begins to make or read a pattern
-sheets          POST   begins to lay it out
-cancel          POST   ends what is being done
+fit, open       POST   starts to make or read a pattern
+sheets          POST   starts to lay it out
+cancel          POST   ends the task
 =============== ====== ==========================================================================
 
 All addresses lie behind the key (:mod:`~miurafab.studio.guard`). A refusal is a sentence:
@@ -43,7 +43,7 @@ PARTS = ("icon.svg", "studio.css", "tools.js", "choices.js", "results.js", "stud
 
 
 class Studio:
-    """Answers requests. ``first`` is what the page starts with: a choice of target, if any."""
+    """Answers requests. ``first`` is the target with which the page starts, if any."""
 
     def __init__(self, bench: Bench, guard: Guard, first: dict[str, Any] | None = None) -> None:
         self.bench = bench
@@ -53,7 +53,7 @@ class Studio:
         self._catalogue = _catalogue()
 
     def handle(self, request: HttpRequest) -> Response:
-        """The answer to ``request``; what is not let in or is wrong is refused in a sentence."""
+        """The answer to ``request``, or its refusal in a sentence."""
         refused = self.guard.refuse(request.method, request.path, request.headers)
         if refused is not None:
             return refused
@@ -86,7 +86,7 @@ class Studio:
         number, _, name = rest.partition("/")
         path = self.bench.files.get((number, unquote(name))) if kind == "files" else None
         if path is None:
-            return refusal(404, "There is nothing at this address (any more).")
+            return refusal(404, "Nothing is at this address, or no longer.")
         return made_file(path, download=query == "save")
 
     def _post(self, route: str, request: HttpRequest) -> Response:
@@ -104,12 +104,12 @@ class Studio:
         elif route == "cancel":
             bench.cancel()
         else:
-            return refusal(404, "There is nothing to be done at this address.")
+            return refusal(404, "No task starts at this address.")
         return answer(bench.state())
 
 
 def _catalogue() -> dict[str, Any]:
-    """All that can be chosen on the page."""
+    """What the page offers."""
     return {
         "version": miurafab.__version__,
         "surfaces": [_surface(entry) for entry in CATALOGUE.values()],

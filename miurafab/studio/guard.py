@@ -1,13 +1,14 @@
-"""Who may ask: decided from the first line and the headers alone, before a body is read.
+"""Which requests are let in, judged by the first line and the headers before a body is read.
 
-The server listens on this computer only, but other pages in the browser and other people on the
+The server listens on this computer only. Other pages in the browser and other people on the
 computer can reach it, too. Against them:
 
-- the ``Host`` must be this server's, or another site has pointed its own name here (DNS rebinding);
-- every address begins with a key of 192 random bits that only the printed address tells;
-- what changes anything (POST) must come from this page by its ``Origin``, and repeat the key in a
-  header, which no form and no other site can send unasked;
-- a body must say its length, and the length has a limit.
+- the ``Host`` must be this server's; otherwise another site has pointed its own name here (DNS
+  rebinding);
+- every address begins with a key of 192 random bits, which only the printed address contains;
+- a request that changes anything (POST) must have this page's ``Origin``, and repeat the key in a
+  header, which neither a form nor another site can send;
+- a body must state its length, and the length has a limit.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ from dataclasses import dataclass
 from miurafab.studio.messages import Response, refusal
 
 ADDRESS = "127.0.0.1"
-"""The only address that is listened on."""
+"""The only address on which the server listens."""
 
 TOKEN_HEADER = "x-studio-key"
 FILE_LIMIT = 64 * 2**20
-"""How many bytes a file may have that is given to the page: a scan of a million triangles."""
+"""The most bytes of an uploaded file: a scan of a million triangles."""
 
 ORDER_LIMIT = 2**16
-"""How many bytes any other body may have."""
+"""The most bytes of any other body."""
 
 UPLOAD = "upload"
 
@@ -48,16 +49,16 @@ class Guard:
         return tuple(f"{name}:{self.port}" for name in (ADDRESS, "localhost"))
 
     def route(self, path: str) -> str | None:
-        """``path`` behind the key, without its query; None if the key is not the right one."""
+        """The part of ``path`` after the key, without its query; None if the key is wrong."""
         first, slash, rest = path.partition("?")[0].removeprefix("/").partition("/")
         return rest if slash and _same(first, self.key) else None
 
     def refuse(self, method: str, path: str, headers: Mapping[str, str]) -> Response | None:
-        """Why the request is not let in, or None if it is. ``headers`` have small names."""
+        """The refusal of the request, or None to let it in. Names of ``headers`` are lower case."""
         if headers.get("host", "").lower() not in self._hosts:
             return refusal(421, f"This server answers to {self._hosts[0]} only.")
         if method not in ("GET", "HEAD", "POST"):
-            return refusal(405, f"There is nothing to be had by {method[:16]!r} here.")
+            return refusal(405, f"This server does not answer the method {method[:16]!r}.")
         route = self.route(path)
         if route is None:
             return refusal(404, "Open the address that 'miurafab studio' printed, with its key.")
@@ -70,13 +71,13 @@ class Guard:
             return refusal(403, "The request does not carry the studio's key; reload the page.")
         length = headers.get("content-length", "")
         if "transfer-encoding" in headers or not (length.isascii() and length.isdigit()):
-            return refusal(411, "The request does not say how long it is.")
+            return refusal(411, "The request does not state its length.")
         limit = FILE_LIMIT if route == UPLOAD else ORDER_LIMIT
         if len(length) > 18 or int(length) > limit:
-            return refusal(413, f"That is larger than the {limit // 2**10:,} KiB that are taken.")
+            return refusal(413, f"The request is larger than the limit of {limit // 2**10:,} KiB.")
         return None
 
 
 def _same(given: str, wanted: str) -> bool:
-    """Equality that takes the same time wherever the difference is."""
+    """Compare in a time that does not depend on where the texts differ."""
     return hmac.compare_digest(given.encode("utf-8", "surrogateescape"), wanted.encode("ascii"))

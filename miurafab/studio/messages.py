@@ -1,9 +1,9 @@
-"""Requests and responses as values, so that everything between them can be tried without a socket.
+"""Requests and responses as values, so that tests need no socket.
 
-Every response says that nothing may be kept, guessed or framed by others, and from where the page
-may load what: from this server alone. What is computed (drawings, the pages of
-:mod:`miurafab.workflow.page`) is shown as a document without rights: it has no origin, and so
-cannot ask this server for anything.
+The headers of every response forbid browsers to cache it, to guess its type and to frame it in
+other pages, and let the page load from this server only. Results (drawings, the pages of
+:mod:`miurafab.workflow.page`) are shown as documents without rights: they have no origin, and so
+can request nothing from this server.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MADE_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'self'; sandbox allow-scripts"
 )
-"""For what was computed. A page of :mod:`miurafab.workflow.page` narrows it to its own hashes."""
+"""For computed files. A page of :mod:`miurafab.workflow.page` narrows it to its own hashes."""
 
 TYPES = {
     ".css": "text/css; charset=utf-8",
@@ -50,7 +50,7 @@ TYPES = {
 
 @dataclass(frozen=True)
 class HttpRequest:
-    """What was asked: ``path`` as it was sent, with its query; names of ``headers`` are small."""
+    """A request: ``path`` as sent, with its query; names of ``headers`` are lower case."""
 
     method: str
     path: str
@@ -60,7 +60,7 @@ class HttpRequest:
 
 @dataclass(frozen=True)
 class Response:
-    """What is answered; a ``body`` that is a path is sent from that file."""
+    """A response; a ``body`` that is a path is sent from that file."""
 
     status: int
     content_type: str
@@ -69,7 +69,7 @@ class Response:
 
     @property
     def all_headers(self) -> dict[str, str]:
-        """Those that every response has, and its own."""
+        """The headers of every response, and its own."""
         policy = {"Content-Security-Policy": OWN_POLICY}
         return {"Content-Type": self.content_type, **_ALWAYS, **policy, **self.headers}
 
@@ -86,7 +86,7 @@ def answer(value: Any, status: int = 200) -> Response:
 
 
 def refusal(status: int, sentence: str) -> Response:
-    """An answer that says in one sentence why it is none."""
+    """A refusal in one sentence."""
     return answer({"error": sentence}, status)
 
 
@@ -96,7 +96,7 @@ def own_file(name: str, content: bytes) -> Response:
 
 
 def made_file(path: Path, *, download: bool) -> Response:
-    """Something that was computed, to be shown or, with ``download``, to be saved."""
+    """A computed file, to show or, with ``download``, to save."""
     headers = {"Content-Security-Policy": MADE_POLICY}
     if download:
         headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(path.name)}"

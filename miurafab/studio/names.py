@@ -1,4 +1,4 @@
-"""File names that come from elsewhere, made harmless: no path, no blank, no option, no device."""
+"""Safe names for uploaded files: no path, blank, option or device."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|(com|lpt)[0-9])(\..*)?", re.IGNORECASE)
 def safe_stem(name: str) -> str:
     """The part of ``name`` before its ending, in letters, digits, dots, dashes and underscores.
 
-    It is never empty, begins with a letter or digit, and is no device of Windows.
+    The result is never empty, begins with a letter or digit, and names no device of Windows.
     """
     base = re.split(r"[/\\]", name)[-1]
     stem = unicodedata.normalize("NFKD", base.rpartition(".")[0] or base)
@@ -22,6 +22,6 @@ def safe_stem(name: str) -> str:
 
 
 def suffix_of(name: str) -> str:
-    """The ending of ``name`` with its dot, in small letters; empty if it has none."""
+    """The ending of ``name`` with its dot, in lower case; empty if it has none."""
     _, dot, ending = re.split(r"[/\\]", name)[-1].rpartition(".")
     return f".{ending.lower()}" if dot else ""

@@ -1,9 +1,8 @@
-"""What the page asks for, read strictly: known keys, short texts, names from our own lists.
+"""The orders of the page, read strictly: known keys, short texts, names from lists.
 
-Nothing that comes from the browser is ever taken for a path. A surface, a machine or a material is
-one of those that are listed, its parameters are numbers, and a file is the number of one that was
-given to the studio before. Options are those that the page has a field for
-(:mod:`~miurafab.studio.form`); none of them names a file.
+Nothing that the browser sends is taken for a path. Surfaces, machines and materials are those of
+the lists, parameters are numbers, and a file is the number of an upload. Options are those with a
+field on the page (:mod:`~miurafab.studio.form`); none of them names a file.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ class FitOrder:
 
 @dataclass(frozen=True)
 class LayoutOrder:
-    """A layout for a ``machine`` and a ``material``, both shipped, with options as in a design."""
+    """A layout for a shipped ``machine`` and ``material``, with options as in a design file."""
 
     machine: str
     material: str
@@ -52,7 +51,7 @@ class LayoutOrder:
 
 
 def read_fit(body: bytes) -> FitOrder:
-    """The fit that is asked for in ``body``, JSON; a named surface is made here already.
+    """The fit that ``body``, JSON, asks for. A named surface is made here, to find faults early.
 
     Raises :class:`~miurafab.errors.InputError` or ``TargetError``.
     """
@@ -75,12 +74,12 @@ def _named(surface: str, parameters: Any, options: Mapping[str, Value]) -> FitOr
 
 
 def read_source(body: bytes) -> str:
-    """The source that is to be opened. Raises :class:`~miurafab.errors.InputError`."""
+    """The source to open. Raises :class:`~miurafab.errors.InputError`."""
     return _text("source", _read(body, ("source",)).get("source"))
 
 
 def read_layout(body: bytes) -> LayoutOrder:
-    """The layout that is asked for in ``body``, JSON; its options are read here already.
+    """The layout that ``body``, JSON, asks for. Its options are read here, to find faults early.
 
     Raises :class:`~miurafab.errors.InputError`.
     """
@@ -93,7 +92,7 @@ def read_layout(body: bytes) -> LayoutOrder:
 
 
 def _options(given: Any, fields: Mapping[str, Declared]) -> dict[str, Value]:
-    """The options that were filled in, as a design file writes them."""
+    """The options with a value, as a design file writes them."""
     options: dict[str, Value] = {}
     for name, value in _table(given, "The options").items():
         if name not in fields:
@@ -118,7 +117,7 @@ def _read(body: bytes, keys: tuple[str, ...]) -> dict[str, Any]:
     table = _table(order, "The order")
     for key in table:
         if key not in keys:
-            raise InputError(f"The page asked for '{key[:40]}', which is not known; reload it.")
+            raise InputError(f"The studio does not know '{key[:40]}'; reload the page.")
     return table
 
 

@@ -1,7 +1,6 @@
-"""The same again without the page: the command lines, and the design file, for what was done.
+"""Command lines and a design file that repeat, without the page, what the page has done.
 
-Command lines are quoted as a POSIX shell reads them; Windows differs only where a value holds a
-blank.
+Command lines are quoted for a POSIX shell; Windows differs only where a value contains a blank.
 """
 
 from __future__ import annotations
@@ -11,13 +10,13 @@ import shlex
 from collections.abc import Mapping
 
 PORT = "/dev/ttyUSB0"
-"""The port in the command that is to be pasted: it is for the reader to change."""
+"""The port in the command for cutting; readers put their own in its place."""
 
 Value = str | int | bool
 
 
 def fit_command(target: str, options: Mapping[str, Value], name: str) -> str:
-    """``miurafab fit`` for what the page was asked."""
+    """``miurafab fit`` with the options of the page."""
     return shlex.join(["miurafab", "fit", target, *_words(options), "-o", f"{name}.fold"])
 
 
@@ -29,24 +28,24 @@ def check_command(file: str) -> str:
 def sheets_command(
     file: str, name: str, machine: str, material: str, options: Mapping[str, Value]
 ) -> str:
-    """``miurafab sheets`` for what the page was asked."""
+    """``miurafab sheets`` with the options of the page."""
     words = ["miurafab", "sheets", file, "-o", job_name(name)]
     words += ["--machine", machine, "--material", material, *_words(options)]
     return shlex.join(words)
 
 
 def both(first: str, second: str, *, sound: bool) -> str:
-    """One line for two commands; the second runs even if the first answers no and not ``sound``."""
+    """Two commands in one line. The second runs only if the first answers yes, where ``sound``."""
     return f"{first} {'&&' if sound else ';'} {second}"
 
 
 def cut_command(name: str) -> str:
-    """What cuts the job once it is unpacked; the port is to be replaced."""
+    """``miurafab cut`` for the unpacked job, with :data:`PORT`."""
     return shlex.join(["miurafab", "cut", job_name(name), "--port", PORT])
 
 
 def job_name(name: str) -> str:
-    """What the job directory of the pattern ``name`` is called."""
+    """The name of the job directory of the pattern ``name``."""
     return f"{name}-job"
 
 
@@ -65,7 +64,7 @@ def design_text(
 
 
 def _lines(values: Mapping[str, Value]) -> list[str]:
-    # JSON's texts, numbers and truth values are TOML's, once nothing but ASCII is left
+    # In ASCII, texts, numbers and truth values are written in TOML as in JSON.
     return [f"{key} = {json.dumps(value)}" for key, value in values.items()]
 
 

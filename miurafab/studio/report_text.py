@@ -1,7 +1,7 @@
-"""The figures of a report in words: what a maker wants to know, each with what it means.
+"""The figures of a report as lines of the page, each with what it means.
 
-A line is a name, a value, a remark and a mark: ``good``, ``bad``, or nothing where it is a matter
-of taste. Numbers that are exact to rounding are called so; the report itself has every digit.
+A line has a name, a value, a remark and a mark: ``good``, ``bad``, or none for a matter of taste.
+A residual within rounding is shown as "exact"; the report itself has every digit.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ class ReportLine:
 
 
 def headline(status: str, *, opened: bool = False) -> str:
-    """One sentence on the whole."""
+    """One sentence on the whole pattern."""
     if opened and status == "converged":
         return "This pattern is sound."
     return HEADLINES.get(status, status)
 
 
 def pattern_lines(report: Mapping[str, Any]) -> list[dict[str, str]]:
-    """The lines of a fit report or of a check; what was not measured is left out."""
+    """The lines of a fit report or of a check; figures that were not measured are left out."""
     lines = [*_shape(report), *_exactness(report), *_clashes(report)]
     if report.get("min_edge_mm") is not None:
         lines.append(ReportLine("Shortest edge", _mm(report["min_edge_mm"])))

@@ -1,8 +1,8 @@
 """The server: sockets on one side, :class:`~miurafab.studio.core.Studio` on the other.
 
-It listens on 127.0.0.1 and nowhere else. One request at a time reaches the studio, which never
-takes long: what takes time is done by another process. Everything that is computed or given lies
-in a temporary folder that goes when the server ends.
+It listens on 127.0.0.1 only. The studio answers one request at a time and quickly; long work runs
+in another process. Uploads and results lie in a temporary folder, which is deleted when the server
+ends.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from miurafab.surfaces.mesh import MESH_SUFFIXES
 from miurafab.workflow.design import design
 
 _IDLE_S = 60.0
-"""How long a connection that says nothing is kept."""
+"""An idle connection is closed after this time."""
 
 
 def serve(
@@ -46,10 +46,10 @@ def serve(
 ) -> None:
     """Serve the page until Ctrl-C, SIGTERM or SIGHUP.
 
-    ``thing`` is what it starts with: a pattern (.fold), which is opened, or a TARGET, which is
-    chosen. ``port`` 0 is any that is free. ``announce`` is called with the address when it can be
-    opened. Raises :class:`~miurafab.errors.InputError` for a thing that cannot be read,
-    :class:`~miurafab.errors.PortError` for a port that cannot be had.
+    The page starts with ``thing``: it opens a pattern (.fold), and chooses a TARGET. ``port`` 0 is
+    any free port. ``announce`` is called with the address once the page can be opened. Raises
+    :class:`~miurafab.errors.InputError` for a thing that cannot be read, and
+    :class:`~miurafab.errors.PortError` for a port that cannot be opened.
     """
     if not 0 <= port <= 65535:
         raise InputError(f"`port` is {port}; it must lie between 0 (any free port) and 65535.")
@@ -75,7 +75,7 @@ def serve(
 
 
 def _put_on(bench: Bench, thing: str) -> dict[str, Any]:
-    """Put what was named on the command line on the bench; how the page is to begin."""
+    """Add what the command line names to the bench. Returns how the page starts."""
     path = Path(thing)
     suffix = path.suffix.lower()
     if suffix == DESIGN_SUFFIX:
@@ -95,10 +95,10 @@ def _put_on(bench: Bench, thing: str) -> dict[str, Any]:
 
 
 class _Server(ThreadingHTTPServer):
-    """Listens on this computer only; a name is never looked up."""
+    """Listens on this computer only, and looks no name up."""
 
     daemon_threads = True
-    allow_reuse_address = os.name == "posix"  # elsewhere it would share the port with others
+    allow_reuse_address = os.name == "posix"  # elsewhere other servers could share the port
     studio: Studio
 
     def __init__(self, port: int, check: Callable[[], None]) -> None:
@@ -119,18 +119,18 @@ class _Server(ThreadingHTTPServer):
         self.server_name, self.server_port = ADDRESS, self.server_address[1]
 
     def service_actions(self) -> None:
-        """Several times a second: a signal whose exception was lost is raised again."""
+        """Several times a second: raise again a signal whose exception was lost."""
         self._check()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that goes away is no fault; anything else is told in one line."""
+        """Print other faults than that the browser closed the connection, each in one line."""
         fault = sys.exc_info()[1]
         if not isinstance(fault, ConnectionError | TimeoutError):
             sys.stderr.write(f"miurafab: a request failed ({type(fault).__name__}: {fault}).\n")
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """Reads one request after the other, has it answered, and writes the answer."""
+    """Reads requests one after another, has the studio answer them, and writes the answers."""
 
     protocol_version = "HTTP/1.1"
     timeout = _IDLE_S
@@ -145,7 +145,7 @@ class _Handler(BaseHTTPRequestHandler):
         return "miurafab-studio"
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing is written down of who asks for what."""
+        """Log no request."""
 
     def _answer(self) -> None:
         headers = {name.lower(): value for name, value in self.headers.items()}
@@ -171,7 +171,7 @@ class _Handler(BaseHTTPRequestHandler):
         if isinstance(body, Path):
             try:
                 body = body.read_bytes()
-            except OSError:  # another result has just taken its place
+            except OSError:  # a newer result has just replaced it
                 response = refusal(404, "There is nothing at this address any more.")
                 body = response.body
         assert isinstance(body, bytes)

@@ -1,8 +1,8 @@
-"""What lies on the bench: the files that were given, one task at a time, and what came of it.
+"""The state of the studio: the files it was given, one task at a time, and the results.
 
-This is the studio's only state. It changes when the page asks for something and when news of the
-task is taken in; everything that was computed lies in one folder, and is found by the names that
-were put down here, never by a path that somebody sends.
+Nothing else in the studio has state. It changes by orders of the page and by news of the task.
+Results lie in one folder. They are found by the names recorded here, never by a path from the
+browser.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from miurafab.surfaces.mesh import MESH_SUFFIXES
 
 PATTERN_SUFFIX, DESIGN_SUFFIX = ".fold", ".toml"
 _KEPT = 8
-"""How many files of the browser are kept; the oldest goes."""
+"""The number of uploads kept; a further one removes the oldest."""
 
 
 @dataclass(frozen=True)
 class Source:
     """A file to fit or to open: a ``mesh``, a ``pattern`` or a ``design``.
 
-    ``ours`` is what was named on the command line; ``shown`` how a command line names it.
+    ``ours`` says that the command line named the file; ``shown`` is its name in command lines.
     """
 
     id: str
@@ -44,13 +44,13 @@ class Source:
 
     @property
     def name(self) -> str:
-        """What is made of it is called so."""
+        """The name of what is made of it."""
         return safe_stem(self.path.name)
 
 
 @dataclass
 class Task:
-    """What is being done, or was done last."""
+    """The running task, or the last one."""
 
     order: Order
     id: str
@@ -63,8 +63,8 @@ class Task:
 
 @dataclass(frozen=True)
 class Asked:
-    """How the pattern on the bench was asked for; ``target`` as a design file has it, if one can.
-    ``file`` is the pattern as the command line names it.
+    """The order for the pattern on the bench. ``target`` is as in a design file, None where a
+    design file cannot state it; ``file`` is the pattern's name in command lines.
     """
 
     command: str
@@ -75,7 +75,7 @@ class Asked:
 
 
 class Bench:
-    """The state of one studio; ``folder`` is its own, and ``start`` carries orders out."""
+    """The state of one studio in its own ``folder``; ``start`` starts an order."""
 
     def __init__(self, folder: Path, start: Callable[[Order], Running]) -> None:
         self.sources: dict[str, Source] = {}
@@ -91,7 +91,7 @@ class Bench:
         self._coming: Asked | None = None
 
     def add_upload(self, name: str, content: bytes) -> Source:
-        """Keep a file of the browser. Raises :class:`~miurafab.errors.InputError`."""
+        """Keep an uploaded file. Raises :class:`~miurafab.errors.InputError`."""
         suffix = suffix_of(name)
         kind = "pattern" if suffix == PATTERN_SUFFIX else "mesh"
         if kind == "mesh" and suffix not in MESH_SUFFIXES:
@@ -110,11 +110,11 @@ class Bench:
         return self._keep(Source(number, kind, path, file))
 
     def add_own(self, path: Path, kind: str) -> Source:
-        """Keep a file that was named on the command line."""
+        """Keep a file that the command line names."""
         return self._keep(Source(self._number(), kind, path, str(path), ours=True))
 
     def fit(self, asked: FitOrder) -> None:
-        """Begin a fit. Raises :class:`~miurafab.errors.InputError` where something else runs."""
+        """Start a fit. Raises :class:`~miurafab.errors.InputError` while another task runs."""
         self._check_idle()
         if asked.source is None:
             assert asked.surface is not None
@@ -129,14 +129,14 @@ class Bench:
         self._begin("fit", name, target=target, options=asked.options)
 
     def open(self, source_id: str) -> None:
-        """Begin to open a pattern. Raises as :meth:`fit`."""
+        """Start to open a pattern. Raises as :meth:`fit`."""
         self._check_idle()
         source = self._source(source_id, ("pattern",))
         self._coming = Asked(recipe.check_command(source.shown), source.shown)
         self._begin("open", source.name, file=source.path, ours=source.ours)
 
     def lay_out(self, asked: LayoutOrder) -> None:
-        """Begin to lay out the pattern on the bench. Raises as :meth:`fit`."""
+        """Start to lay out the pattern on the bench. Raises as :meth:`fit`."""
         self._check_idle()
         if self.pattern is None or "fold" not in self.pattern["files"] or self._asked is None:
             raise InputError("There is no pattern to lay out yet; fit or open one first.")
@@ -157,7 +157,7 @@ class Bench:
         )
 
     def cancel(self) -> None:
-        """End what is being done; what there was before, and parts that were finished, stay."""
+        """End the task; earlier results and finished parts stay."""
         if self.task is not None and self.task.running is not None:
             self.task.running.stop()
             self.take_in()
@@ -183,7 +183,7 @@ class Bench:
                 return
 
     def design_text(self) -> str | None:
-        """The design file of the pattern on the bench, None where there can be none."""
+        """The design file of the pattern on the bench, None if it can have none."""
         asked = self._asked
         if self.pattern is None or asked is None or asked.target is None:
             return None
@@ -194,7 +194,7 @@ class Bench:
         return recipe.design_text(self.pattern["name"], asked.target, asked.options, layout)
 
     def state(self) -> dict[str, Any]:
-        """Everything that the page shows."""
+        """All that the page shows."""
         task = self.task
         return {
             "sources": [
@@ -281,8 +281,8 @@ class Bench:
         ]
 
     def _plain(self, sentence: str) -> str:
-        """``sentence`` with files of the studio's own folder called by their names alone, and
-        options as their fields are called.
+        """``sentence`` with files of the studio's folder named without a path, and options named
+        by the labels of their fields.
         """
         return by_label(self._own.sub("", sentence))
 
@@ -292,7 +292,7 @@ class Bench:
         self.task = Task(order, number, self._start(order))
 
     def _settle(self) -> None:
-        """A folding that does not come any more is not waited for; nothing is left lying about."""
+        """Stop waiting for a folding that will not come, and delete a folder without results."""
         assert self.task is not None
         if self.pattern is not None and self.pattern["folding"]:
             self.pattern |= {"folding": False, "still": "The folding was not computed."}
@@ -303,16 +303,16 @@ class Bench:
     def _check_idle(self) -> None:
         self.take_in()
         if self.task is not None and self.task.running is not None:
-            raise InputError("Something is being computed already; wait for it or cancel it.")
+            raise InputError("A task is running already; wait for it or cancel it.")
 
     def _source(self, source_id: str, kinds: tuple[str, ...]) -> Source:
         source = self.sources.get(source_id)
         if source is None or source.kind not in kinds:
-            raise InputError("That file is not here any more; choose it again.")
+            raise InputError("That file is gone; choose it again.")
         return source
 
     def _put_down(self, number: str, files: Mapping[str, str]) -> dict[str, str]:
-        """Note where computed ``files`` are; the addresses by which they are found."""
+        """Record where computed ``files`` are. Returns their addresses."""
         folder = self._folder / number
         self.files |= {(number, name): folder / name for name in files.values()}
         return {what: f"files/{number}/{name}" for what, name in files.items()}

@@ -1,8 +1,8 @@
-"""The work itself, by the package's own verbs: fit or open a pattern, fold it, lay it out.
+"""The work, done by the verbs of the package: fit or open a pattern, fold it, lay it out.
 
-Each order has a folder of its own, and everything is written there, in files of the names that the
-command line would give them. What is there to be shown is told part by part, so that a pattern can
-be looked at while its folding is still computed.
+Each order has its own folder. All its files are written there, with the names that the command
+line gives them. Results are reported part by part, so that the page can show a pattern while its
+folding is still being computed.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ Tell = Callable[[dict[str, Any]], None]
 
 PAGE, MOTION, PICTURE = "still.html", "folding.html", "pattern.svg"
 _FITTING = 0.6
-"""The part of the bar that the fit takes; the folding has the rest."""
+"""The share of the progress bar for the fit; the rest is for the folding."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """What is to be done (``fit``, ``open`` or ``sheets``) in ``folder``, for the pattern ``name``.
+    """What to do (``fit``, ``open`` or ``sheets``) in ``folder``, for the pattern ``name``.
 
-    ``target`` is for a fit; ``file`` is the pattern that is opened or laid out, and ``ours`` says
-    that it is the user's own on this computer and was not sent by the browser.
+    ``target`` is for a fit; ``file`` is the pattern to open or lay out. ``ours`` says that the
+    command line named the file, and that the browser did not send it.
     """
 
     do: str
@@ -52,7 +52,7 @@ class Order:
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        """For the way to another process."""
+        """The order as JSON for another process."""
         return asdict(self) | {"folder": str(self.folder), "file": str(self.file)}
 
 
@@ -62,9 +62,9 @@ def order_from(values: Mapping[str, Any]) -> Order:
 
 
 def carry_out(order: Order, tell: Tell) -> None:
-    """Do what ``order`` says; ``tell`` is given progress and parts of the answer.
+    """Carry out ``order``; ``tell`` gets progress and parts of the answer.
 
-    Raises whatever the verbs raise, :class:`~miurafab.errors.MiurafabError` for what is wrong.
+    Raises what the verbs raise: :class:`~miurafab.errors.MiurafabError` for wrong input.
     """
     {"fit": _fit, "open": _open, "sheets": _sheets}[order.do](order, tell)
 
@@ -106,7 +106,7 @@ def _read(order: Order) -> tuple[CreasePattern, Any, tuple[Finding, ...]]:
 
 
 def _with_mesh_in(folder: Path, pattern: CreasePattern) -> CreasePattern:
-    """``pattern`` with the mesh of its target beside it, so that it is named without a path."""
+    """``pattern`` with a copy of its target's mesh beside it, named without a path."""
     if "mesh" not in pattern.target:
         return pattern
     mesh = Path(pattern.target["mesh"])
@@ -116,7 +116,7 @@ def _with_mesh_in(folder: Path, pattern: CreasePattern) -> CreasePattern:
 
 
 def _show(order: Order, pattern: CreasePattern, part: dict[str, Any], tell: Tell) -> None:
-    """The pattern as a drawing and in space, at first still, and then as it folds."""
+    """Report the pattern as a drawing and in space, first still, then folding."""
     folder = order.folder
     write_text(folder / PICTURE, pattern_svg(pattern))
     miurafab.write_page(folder / PAGE, title=order.name, pattern=pattern)
@@ -192,7 +192,7 @@ def _progress(tell: Tell, low: float, high: float) -> Callable[[float, str], Non
 
 
 def failure(fault: MiurafabError | OSError | MemoryError) -> str:
-    """What went wrong, in one sentence."""
+    """One sentence about ``fault``."""
     if isinstance(fault, MemoryError):
         return "This computer has not enough memory for that; ask for fewer `facets`."
     if isinstance(fault, OSError):

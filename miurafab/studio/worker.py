@@ -1,8 +1,8 @@
-"""The process in which the work is done, from both ends, so that it can be ended at any time.
+"""The process that does the work, seen from both ends; it can be ended at any time.
 
-An order goes in as one line of JSON, and a line of JSON comes out for whatever happens: progress,
-parts of the answer, and ``done`` or ``error`` at last. The process ends at once when its standard
-input is closed, as it is when the studio is gone.
+The process reads an order as one line of JSON. It writes a line of JSON for each event: progress,
+parts of the answer, and at the end ``done`` or ``error``. It ends at once when its standard input
+is closed, which happens when the studio ends.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ class Running(Protocol):
     """An order that is being carried out."""
 
     def news(self) -> list[News]:
-        """What has happened since this was last asked."""
+        """The events since the last call."""
 
     def stop(self) -> None:
-        """End it now; it may have ended already."""
+        """End it now, if it has not ended already."""
 
 
 class Process:
-    """An order that is carried out by a process of its own."""
+    """An order that a process of its own carries out."""
 
     def __init__(self, order: Order) -> None:
         root = str(Path(__file__).resolve().parents[2])
@@ -63,12 +63,12 @@ class Process:
         self._complaints.start()
         self._answers.start()
         assert self._process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # one that has died says so by its end
+        with contextlib.suppress(BrokenPipeError):  # _listen reports a process that has died
             self._process.stdin.write(json_text(order.as_dict(), one_line=True) + "\n")
             self._process.stdin.flush()
 
     def news(self) -> list[News]:
-        """What has happened since this was last asked."""
+        """The events since the last call."""
         found = []
         with contextlib.suppress(queue.Empty):
             while True:
@@ -76,7 +76,7 @@ class Process:
         return found
 
     def stop(self) -> None:
-        """Kill the process, and wait until nothing of it is left."""
+        """Kill the process and wait until it is gone."""
         self._process.kill()
         self._answers.join()
         self._complaints.join()
@@ -91,7 +91,7 @@ class Process:
             try:
                 said = json.loads(line)
             except json.JSONDecodeError:
-                break  # cut off when it was killed
+                break  # the process was killed in mid-line
             ended = "done" in said or "error" in said
             self._news.put(said)
         status = self._process.wait()
@@ -106,14 +106,14 @@ class Process:
 
 def _unexpected(status: int, last: str) -> str:
     if status == -9:
-        return "The system ended the computation, as it does when memory runs out."
+        return "The system ended the computation, probably because memory ran out."
     return f"The computation ended unexpectedly ({last.rstrip('.') or f'status {status}'})."
 
 
 def main() -> None:
     """Carry out the order on standard input."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the studio, which ends us
-    # What libraries print themselves must not get among the answers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the studio handles Ctrl-C and ends this process
+    # What libraries print must not mix with the answers.
     answers = os.fdopen(os.dup(1), "w", encoding="ascii")
     os.dup2(2, 1)
 
