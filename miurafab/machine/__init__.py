@@ -1,1 +1,1 @@
-"""Everything that touches a port: transport, session, delivery, journal, resume, pre-flight."""
+"""Everything that touches a port: transport, session, driver, journal, resume, pre-flight."""

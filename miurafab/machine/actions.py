@@ -1,4 +1,4 @@
-"""What one does with a machine besides cutting: look at it, home it, unlock it, move it.
+"""Actions on a machine besides cutting: query it, home it, unlock it, move it.
 
 Each function opens the port, greets the controller, does one thing and closes the port. Those
 that move the machine reset it first on every way out but success, as the sender does.
@@ -26,7 +26,7 @@ _POLL_S = 0.1
 
 @dataclass(frozen=True)
 class MachineInfo:
-    """What a controller says of itself; a figure that it does not report is None.
+    """The controller's report on itself; a figure that it does not report is None.
 
     ``position`` and ``machine_position`` are in mm, ``state`` as in its status report.
     """
@@ -81,7 +81,7 @@ def conversation(
 
 
 def machine_info(port: str, **line: Unpack[LineOptions]) -> MachineInfo:
-    """What the controller at ``port`` is and how it stands; moves and changes nothing."""
+    """The identity and state of the controller at ``port``; moves and changes nothing."""
     with conversation(port, **line) as session:
         banner = session.banner
         status = session.wait_status()
@@ -104,7 +104,7 @@ def machine_info(port: str, **line: Unpack[LineOptions]) -> MachineInfo:
 
 
 def read_settings(port: str, **line: Unpack[LineOptions]) -> Settings:
-    """What the controller answers to ``$$``."""
+    """The settings that the controller reports (``$$``)."""
     with conversation(port, **line) as session:
         return Settings.from_events(session.command("$$"))
 
@@ -119,7 +119,7 @@ def read_dump(path: Path) -> Settings:
 
 
 def write_settings(port: str, wanted: Settings, **line: Unpack[LineOptions]) -> dict[int, str]:
-    """Write those of ``wanted`` that differ, one at a time; what was changed, as read back.
+    """Write the settings of ``wanted`` that differ, one at a time; returns the changes, read back.
 
     Homing (``$22``) goes first: soft limits are refused without it. Raises
     :class:`~miurafab.errors.ControllerError` for a setting that is refused or does not stick.
@@ -137,7 +137,7 @@ def write_settings(port: str, wanted: Settings, **line: Unpack[LineOptions]) -> 
 
 
 def unlock(port: str, **line: Unpack[LineOptions]) -> StatusReport:
-    """Open the lock that an alarm left (``$X``); the machine must be where it thinks it is."""
+    """Unlock the controller after an alarm (``$X``); its position must still be right."""
     with conversation(port, **line) as session:
         session.command("$X")
         return session.wait_status()
@@ -159,7 +159,7 @@ def jog(
     absolute: bool = False,
     **line: Unpack[LineOptions],
 ) -> StatusReport:
-    """Move by ``x`` and ``y`` mm (``absolute``: to them, in work coordinates), beam off; waits.
+    """Move by ``x`` and ``y`` mm (``absolute``: to these work coordinates), beam off, and wait.
 
     Raises :class:`~miurafab.errors.InputError` if neither is given,
     :class:`~miurafab.errors.ControllerError` if the controller refuses, as for a target outside
@@ -186,11 +186,12 @@ def talk(
     tell: Callable[[str], None],
     **line: Unpack[LineOptions],
 ) -> None:
-    """Send ``lines`` one at a time as they come, and ``tell`` what the controller answers.
+    """Send ``lines`` one at a time as they come, and ``tell`` the answers of the controller.
 
     ``?``, ``!`` and ``~`` alone on a line are the realtime bytes, ``reset`` is a soft reset. A
-    refused line is told and does not end the conversation. At the end dark moves are waited for;
-    then, and on every way out, the controller is reset unless it stands idle with the beam off.
+    refused line is told and does not end the conversation. At the end the function waits for dark
+    moves. Then, and on every way out, it resets the controller unless that is idle with the beam
+    off.
     """
     with conversation(port, moves=True, **line) as session:
         heard = bytearray()

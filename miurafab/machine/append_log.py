@@ -1,4 +1,4 @@
-"""A file that is appended to without ever waiting for the disk.
+"""A log file to append to without waiting for the disk.
 
 A slow disk (an SD card may take a second for one ``fsync``) must hold up neither the streaming
 nor a Ctrl-C. So :meth:`DurableFile.append` only leaves the bytes for a thread, which writes and
@@ -46,7 +46,7 @@ class DurableFile:
         self._thread.start()
 
     def append(self, data: bytes) -> None:
-        """Leave ``data`` to be written; returns at once."""
+        """Queue ``data`` for writing; returns at once."""
         self._left.append(data)
 
     def check(self) -> None:
@@ -57,7 +57,7 @@ class DurableFile:
             )
 
     def close(self) -> None:
-        """Write what is left, wait until it is on the disk, and close the file."""
+        """Write the queued data, wait until it is on the disk, and close the file."""
         self._closing = True
         self._wake.set()
         self._thread.join()

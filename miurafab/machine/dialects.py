@@ -1,18 +1,18 @@
-"""What differs between machines by what they speak: the wire, the delivery, and the way to stop.
+"""The differences between dialects: the wire, the driver, and the way to stop a machine.
 
-GRBL and its kin are reset, Marlin is halted, a cutter is told to lift its tool. Whoever needs one
-of these asks here by the machine's profile.
+GRBL and its relatives are reset, Marlin is halted, a cutter is told to lift its tool. Other modules
+ask here with the profile of the machine.
 """
 
 from __future__ import annotations
 
 from miurafab.grbl.connection import Connection
-from miurafab.machine.delivery import Delivery, Errand
-from miurafab.machine.grbl_delivery import NOT_CONFIRMED, WAS_RESET, GrblDelivery
-from miurafab.machine.marlin_delivery import NOT_CONFIRMED as NOT_HALTED
-from miurafab.machine.marlin_delivery import WAS_HALTED, MarlinDelivery, MarlinWire
-from miurafab.machine.plotter_delivery import NOT_TOLD, PEN_SENT_UP, PlotterDelivery, send_up
+from miurafab.machine.grbl_driver import NOT_CONFIRMED, WAS_RESET, GrblDriver
+from miurafab.machine.marlin_driver import NOT_CONFIRMED as NOT_HALTED
+from miurafab.machine.marlin_driver import WAS_HALTED, MarlinDriver, MarlinWire
+from miurafab.machine.plotter_driver import NOT_TOLD, PEN_SENT_UP, PlotterDriver, send_up
 from miurafab.machine.session import Session
+from miurafab.machine.stream_driver import JobContext, StreamDriver
 from miurafab.machine.transport import (
     VIRTUAL,
     Device,
@@ -51,16 +51,16 @@ def virtual_machine(machine: MachineProfile) -> Device:
     return VirtualGrbl(virtual_settings(machine), baud=controller.baud, dialect=machine.dialect)
 
 
-def delivery_of(errand: Errand) -> Delivery:
-    """How the errand's plan is delivered to its machine."""
-    return _DELIVERIES.get(errand.plan.machine.dialect, GrblDelivery)(errand)
+def driver_of(context: JobContext) -> StreamDriver:
+    """The driver for the machine of the plan."""
+    return _DRIVERS.get(context.plan.machine.dialect, GrblDriver)(context)
 
 
-_DELIVERIES: dict[str, type[Delivery]] = {"marlin": MarlinDelivery, "hpgl": PlotterDelivery}
+_DRIVERS: dict[str, type[StreamDriver]] = {"marlin": MarlinDriver, "hpgl": PlotterDriver}
 
 
 def make_safe(machine: MachineProfile, transport: FlowTransport) -> str:
-    """Stop a machine of which nothing is known; what became of that, as a clause."""
+    """Stop a machine in an unknown state; returns the outcome as a clause."""
     if machine.dialect == "marlin":
         return WAS_HALTED if MarlinWire(transport).kill() else NOT_HALTED
     if machine.dialect == "hpgl":

@@ -1,4 +1,4 @@
-"""A machine in memory to which something happens: on its cable, or to itself.
+"""A machine in memory with faults: on its cable, or in the machine itself.
 
 The virtual GRBL has its own cable, in step with its processor's clock. This one stands around any
 other machine that runs only by ``advance``, such as the virtual Marlin and the virtual cutter.
@@ -77,7 +77,7 @@ class FaultyDevice:
         self._run(self.now + max(seconds, 0.0), stop_at_line=True)
 
     def _run(self, target: float, *, stop_at_line: bool) -> None:
-        """From one event to the next, so that every byte enters the cable at its time."""
+        """Advance from event to event, so that every byte enters the cable at its time."""
         while True:
             self._exchange()
             line = self._cable.outward.next_line() if stop_at_line else None
@@ -106,7 +106,7 @@ class FaultyDevice:
         return round(self.now * _SECOND)
 
     def _exchange(self) -> None:
-        """What is due goes from the machine into the cable, and out of it to the machine."""
+        """Move the bytes that are due between the machine and the cable."""
         now = self._ticks
         self._cable.reply((now, byte) for byte in self._device.take_output())
         self._device.receive(self._cable.happen(now))

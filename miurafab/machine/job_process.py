@@ -1,16 +1,15 @@
-"""A job in a process of its own, so that nothing that happens to the user interface can hurt it.
+"""Sending a job from a process of its own, so that no fault of the user interface can hurt it.
 
-:func:`stream_apart` does what :func:`~miurafab.machine.sender.stream_plan` does, in another
-process, and two processes watch each other:
+:func:`stream_apart` does the work of :func:`~miurafab.machine.sender.stream_plan` in another
+process. The two processes watch each other:
 
-* the one that sends knows nothing of terminals, progress bars and people. When the starting
-  program dies or hangs it stops the machine (:mod:`~miurafab.machine.watchdog`);
-* the starting program shows and asks. When the sending process dies (``kill -9``, out of memory)
-  it opens the port itself and resets the controller.
+* the sending process has no terminal, progress bar or dialogue. When the starting program dies or
+  hangs, it stops the machine (:mod:`~miurafab.machine.watchdog`);
+* the starting program shows progress and asks the user. When the sending process dies (``kill -9``,
+  out of memory), it opens the port itself and resets the controller.
 
-Ctrl-C in a terminal reaches both at once; a signal to the starting program alone is passed on.
-What goes between them: the plan, pickled, then single bytes one way; pickled progress and the
-outcome the other way.
+Ctrl-C in a terminal reaches both at once; the starting program passes on a signal that it alone
+gets. It sends the pickled plan and then single bytes; it receives pickled progress and the outcome.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ _STOP_S = 15.0  # for the process to stop the machine, ask it, and end; stopping
 
 @dataclass(frozen=True, slots=True)
 class _Order:
-    """What the sending process is told at its start."""
+    """The order that the sending process gets at its start."""
 
     plan: JobPlan
     port: str
@@ -52,7 +51,7 @@ class _Order:
 
 @dataclass(frozen=True, slots=True)
 class _Begun:
-    """Said by the sending process when it is about to open the port."""
+    """The message of the sending process before it opens the port."""
 
 
 class _Nothing:
@@ -181,7 +180,7 @@ class _Sender:
             self._down.flush()
 
     def end(self) -> None:
-        """On every way out: the pipe is closed, which stops the machine if nothing else has."""
+        """Close the pipe, on every way out; that stops the machine if it still runs."""
         with contextlib.suppress(OSError):
             self._down.close()
         try:
@@ -200,7 +199,7 @@ class _Sender:
 
 
 def _make_safe(order: _Order, begun: bool) -> str:
-    """Reset the controller that a dead process left; what became of that, in words."""
+    """Reset the controller after its process died; returns the outcome as a clause."""
     if not begun:
         return "it had not opened the port"
     try:

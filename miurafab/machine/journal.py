@@ -1,4 +1,4 @@
-"""What of a job the controller has taken, on disk while it runs, so that a job can be resumed.
+"""The journal: the acknowledged lines of a running job on the disk, so that it can be resumed.
 
 The journal is a file of JSON objects, one a line; each run of a job appends its own. First a
 header: ``schema``, ``job``, ``sha256`` of the whole program's text, ``machine``, ``port``,
@@ -63,11 +63,11 @@ class Journal:
         self._pending: dict[str, Any] | None = None
 
     def plans_ahead(self, blocks: int) -> None:
-        """Note that the controller plans ``blocks`` moves ahead."""
+        """Record that the controller plans ``blocks`` moves ahead."""
         self._file.append(_record({"blocks": blocks}))
 
     def taken(self, count: int, line: int, seconds: float) -> None:
-        """Note that ``count`` lines were acknowledged, the last being ``line`` of the file."""
+        """Record that ``count`` lines were acknowledged, the last of them ``line`` of the file."""
         if count == self._count:
             return
         self._count = count
@@ -82,7 +82,7 @@ class Journal:
             self._pending = None
 
     def ended(self, how: str, why: str) -> None:
-        """Note the run's last word."""
+        """Record how the run ended."""
         self._flush()
         self._file.append(_record({"ended": how, "why": why}))
 
@@ -97,7 +97,7 @@ class Journal:
 
 @dataclass(frozen=True)
 class JournalRun:
-    """One run as the journal tells it.
+    """One run in the journal.
 
     ``taken`` lines were acknowledged for certain, the last being ``line`` of the file (0: none);
     ``ended`` is None when the run broke off without a last word.
@@ -118,7 +118,7 @@ class JournalRun:
 
 
 def read_journal(path: Path) -> list[JournalRun]:
-    """All runs in the journal, in order; a torn line ends what is known of its run.
+    """All runs in the journal, in order; a torn line ends the record of its run.
 
     Raises :class:`~miurafab.errors.InputError` if the file cannot be read or holds no run.
     """

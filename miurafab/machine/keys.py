@@ -27,21 +27,21 @@ KEYS = {
 
 
 def keys_of(dialect: str) -> dict[str, bytes]:
-    """The keys that mean something to a machine: few have overrides as realtime bytes."""
+    """The keys that a machine of this dialect obeys: few dialects have realtime overrides."""
     if dialect in ("grbl-0.9", "marlin", "hpgl"):
         return {key: order for key, order in KEYS.items() if order in (HOLD, RESUME, ABORT)}
     return KEYS
 
 
 class Keys(Protocol):
-    """Where keys come from."""
+    """A source of keys."""
 
     def pressed(self) -> str:
         """The keys pressed since the last call; never waits."""
 
 
 class NoKeys:
-    """Nobody at a keyboard."""
+    """No keyboard."""
 
     def pressed(self) -> str:
         """Nothing."""

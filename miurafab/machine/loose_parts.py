@@ -1,14 +1,14 @@
-"""Pieces that lie loose on the bed while the job goes on, and outlines that leave no piece.
+"""Pieces that are cut loose while the job goes on, and outlines that do not close.
 
-Where an outline has been cut all round, what is inside may have tipped, fallen or blown away. A
-stroke burnt there later misses its place, and a beam on a tipped piece is out of focus and near
-to what lies below: this is how sheets catch fire. So nothing is to be burnt inside an outline that
-is cut already, in its last pass. And an outline that all but closes was meant to close: it holds
-its piece by a thread that nobody sees until the sheet is lifted.
+After an outline has been cut all round, its piece may have tipped, fallen or blown away. A later
+stroke there misses its place; and on a tipped piece the beam is out of focus and close to the
+material below, which is how sheets catch fire. So nothing may be burnt inside an outline after its
+last pass. An outline that almost closes was meant to close: it holds its piece by a thread that
+nobody sees until the sheet is lifted.
 
-What is cut *through* only the job can say: the strokes after ``(operation cut)``. In a job that
-says no operations every closed stroke may be an outline, and may be an engraving; that is no
-fault, but worth a word.
+Only the job can say which strokes cut *through*: those after ``(operation cut)``. In a job that
+names no operations every closed stroke may be an outline, and may be an engraving; that is a
+warning and no refusal.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ _POINTS_AT_ONCE = 4096
 
 @dataclass(frozen=True, slots=True)
 class LooseStroke:
-    """``line`` of the job is at fault; ``outline_line`` is where the outline was begun.
+    """A stroke at fault: its ``line``, and ``outline_line``, where the outline begins.
 
-    ``gap_mm`` of an outline that does not close.
+    ``gap_mm`` is for an outline that does not close.
     """
 
     line: int
@@ -43,7 +43,7 @@ class LooseStroke:
 
 @dataclass(frozen=True)
 class _Path:
-    """Strokes that follow one another end to end: their points (n, 2), and first and last move."""
+    """Strokes joined end to end: their points (n, 2), and their first and last move."""
 
     points: Floats
     first_move: int
@@ -55,14 +55,14 @@ class _Path:
 
 
 def says_operations(program: Program) -> bool:
-    """Whether the job tells which of its strokes cut through."""
+    """Whether the job names the operations of its strokes."""
     return any(context.operation for context in program.contexts)
 
 
 def burnt_on_loose_pieces(program: Program) -> Iterator[LooseStroke]:
-    """The first stroke inside each outline that was cut all round before it.
+    """For each outline, the first later stroke inside it.
 
-    In a job that says no operations, each closed stroke counts as an outline.
+    In a job that names no operations, each closed stroke counts as an outline.
     """
     table = strokes(program)
     chosen = _without_lone_dashes(table, _through(table, program))
@@ -88,9 +88,9 @@ def burnt_on_loose_pieces(program: Program) -> Iterator[LooseStroke]:
 
 
 def open_outlines(program: Program) -> Iterator[LooseStroke]:
-    """Outlines to be cut through, by the job's own word, whose end misses their beginning.
+    """Outlines of operation ``cut`` whose end misses their beginning.
 
-    One whose ends are near other cut strokes is not meant: it is one of several that make an
+    A stroke whose ends are near other cut strokes is not such an outline: it is a part of an
     outline held by bridges.
     """
     table = strokes(program)
@@ -108,13 +108,13 @@ def open_outlines(program: Program) -> Iterator[LooseStroke]:
 
 
 def _through(table: Strokes, program: Program) -> Ints:
-    """Which strokes are cut, or all of them where no operation is said."""
+    """The indices of the strokes of operation ``cut``; of all strokes if none is named."""
     cut = np.array([c.operation == CUT for c in table.contexts], dtype=bool)
     return np.flatnonzero(cut[table.context] | (not says_operations(program)))
 
 
 def _without_lone_dashes(table: Strokes, chosen: Ints) -> Ints:
-    """``chosen`` without the short ones that meet no other in turn: most, and no outline."""
+    """``chosen`` without short strokes that do not join their neighbours: most, and no outline."""
     begin, end = table.offsets[:-1][chosen], table.offsets[1:][chosen]
     first, last = table.points[begin, :2], table.points[end - 1, :2]
     meets = np.zeros(len(chosen) + 1, dtype=bool)  # the one before it
@@ -123,7 +123,7 @@ def _without_lone_dashes(table: Strokes, chosen: Ints) -> Ints:
 
 
 def _paths(table: Strokes, chosen: Ints) -> list[_Path]:
-    """The ``chosen`` strokes, joined where they meet in turn."""
+    """The ``chosen`` strokes, joined where one begins at the end of the stroke before it."""
     paths: list[_Path] = []
     for index in chosen.tolist():
         for path in _rounds(table.stroke(index)[:, :2], int(table.first_move[index])):
@@ -141,7 +141,7 @@ def _paths(table: Strokes, chosen: Ints) -> list[_Path]:
 
 
 def _rounds(points: Floats, first_move: int) -> Iterator[_Path]:
-    """A stroke parted where it comes back to its beginning: passes without a travel between."""
+    """A stroke split where it returns to its beginning: several passes without a travel."""
     back = np.flatnonzero(np.linalg.norm(points - points[0], axis=1) <= _CLOSED)
     back = back[(back >= _LEAST_MOVES) & (back < len(points) - 1)]
     bounds = [0, *back[np.diff(back, prepend=0) >= _LEAST_MOVES].tolist(), len(points) - 1]
@@ -150,7 +150,7 @@ def _rounds(points: Floats, first_move: int) -> Iterator[_Path]:
 
 
 def _last_passes(outlines: list[_Path]) -> list[_Path]:
-    """Of outlines traced again, the last time: only then is the piece loose."""
+    """The last pass of each outline: only after that pass is the piece loose."""
     last: dict[tuple[int, ...], _Path] = {}
     for outline in outlines:
         low, high = outline.points.min(axis=0), outline.points.max(axis=0)

@@ -1,4 +1,4 @@
-"""What is said of a job on its way to a machine, and at its end."""
+"""The progress of a job that is being sent, and its result."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from miurafab.grbl.streamer import Refusal
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where a running job is; ``position`` in work coordinates, ``in_flight`` in bytes.
+    """The progress of a running job; ``position`` in work coordinates, ``in_flight`` in bytes.
 
-    ``line`` is the last acknowledged one of the file (0: none); ``feed_override`` in percent.
+    ``line`` is the last acknowledged line of the file (0: none); ``feed_override`` in percent.
     """
 
     lines_acknowledged: int
@@ -31,8 +31,8 @@ class StreamResult:
     """A job that is done: every line acknowledged, the machine idle.
 
     ``seconds`` on the wire's clock from the first line to Idle; ``errors`` the refused lines of a
-    run in check mode (a real run ends at the first); ``findings`` the refusals that were forced,
-    and what went wrong without harm.
+    run in check mode (a real run ends at the first refused line); ``findings`` the refusals that
+    were forced, and faults that did no harm.
     """
 
     lines: int
@@ -42,4 +42,4 @@ class StreamResult:
 
 
 class JobAborted(JobStopped):
-    """The job was ended at the keyboard, with time for the machine to come to rest."""
+    """The user ended the job at the keyboard; the machine has time to come to rest."""

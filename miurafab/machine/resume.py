@@ -1,19 +1,19 @@
-"""Where a job that was interrupted goes on: at a stroke boundary, with nothing left out.
+"""Resuming an interrupted job at a stroke boundary, so that no stroke is left out.
 
-An acknowledged line is planned, not burnt, and an acknowledgement follows when the move of its line
-is in the planner. GRBL plans at most 15 moves there and has five segments cut from the moves before
-them, each of which may be the rest of a move of its own where moves are short: so of the lines
-that move, the 21st before the last acknowledged one is behind it for certain. A controller that
-says in ``$I`` that it plans further ahead is believed. Lines are counted, not chords: an arc has as
-many moves on the controller as its ``$12`` gives it, one at the least.
+An acknowledged line is planned, not burnt: the controller acknowledges a line when its move is in
+the planner. GRBL plans at most 15 moves and holds five segments of the moves before them; where
+moves are short, each segment may be the rest of a different move. So, counting lines that move, the
+21st line before the last acknowledged line is burnt for certain. A controller that reports in
+``$I`` that it plans further ahead is believed. The count is of lines, not of chords: an arc has as
+many moves on the controller as its ``$12`` gives it, at least one.
 
-At the other end, what may have been burnt already reaches past the last acknowledged line by
-what the receive buffer can hold, and, when the sender itself died, by what the wire can carry in
-the time that the journal may be behind. The strokes between the two may be burnt twice.
+At the other end, the machine may have burnt lines past the last acknowledged line: as many as the
+receive buffer holds and, if the sender itself died, as many as the wire carries in the time that
+the journal may be behind. The strokes between the two ends may be burnt twice.
 
-The rest of the job keeps the line numbers of the whole. The lines that bring back its modes take
-the place of the first ones: a dark move to where the stroke begins, then units, distance mode,
-plane, feed, air, beam and motion mode as they were there.
+The rest of the job keeps the line numbers of the whole. A preamble in place of its first lines
+restores the state: a dark move to the start of the stroke, then units, distance mode, plane, feed,
+air, beam and motion mode as they were there.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from miurafab.machine.journal import JournalRun, job_digest
 from miurafab.profiles import MachineProfile
 
 GRBL_BLOCKS, GRBL_SEGMENTS, OTHER_SEGMENTS = 15, 5, 12
-"""What GRBL 1.1 holds of moves that it has acknowledged: planned (``planner.h``: 16 places, one
-free) and cut into segments (``stepper.h``: 6 places, one free). GrblHAL has up to 10 segments,
+"""The acknowledged moves that GRBL 1.1 holds: planned (``planner.h``: 16 places, one free) and as
+segments (``stepper.h``: 6 places, one free). GrblHAL has up to 10 segments,
 FluidNC 12 (``segments`` in its ``config.yaml``)."""
 JOURNAL_LAG_S = 1.0
-"""How far the journal on the disk may be behind the wire when the sender dies: a quarter of a
-second to the record, another to the disk, and twice that for a slow disk."""
+"""The largest delay of the journal on the disk when the sender dies: a quarter of a second until
+the record, a quarter until the disk, doubled for a slow disk."""
 
 _REAL_MOVE_MM = 0.05  # a shorter line may round to no step and take no place in the planner
 _MOTION_WORDS = {0: "G0", 1: "G1", 2: "G2", 3: "G3"}
@@ -76,7 +76,7 @@ class Resumption:
 
 
 def resume(job: Job, machine: MachineProfile, runs: Sequence[JournalRun]) -> Resumption:
-    """Where ``job`` goes on after the last of the ``runs`` that its journal tells of.
+    """The rest of ``job`` after the last of the ``runs`` in its journal.
 
     Raises :class:`~miurafab.errors.InputError` when there is nothing to resume: the last run was
     of another text, or was done; and for a job that cannot be taken up in its middle.
@@ -126,7 +126,7 @@ def _require_resumable(job: Job, machine: MachineProfile, run: JournalRun) -> No
 
 
 def _how_far(job: Job, machine: MachineProfile, run: JournalRun) -> str:
-    """What the machine had been given when ``run`` ended, for the user."""
+    """The sentence on the lines that the machine had when ``run`` ended."""
     program = read_program(job, machine)
     all_strokes = strokes(program)
     given = int(np.count_nonzero(program.line[all_strokes.last_move] <= run.line))
@@ -134,7 +134,7 @@ def _how_far(job: Job, machine: MachineProfile, run: JournalRun) -> str:
 
 
 def moves_back(machine: MachineProfile, run: JournalRun) -> int:
-    """How many moves before the last acknowledged one the job goes on: all held, one to be sure."""
+    """The number of moves to go back from the last acknowledged move: all held, plus one."""
     blocks = max(GRBL_BLOCKS, machine.controller.planner_blocks, run.blocks or 0)
     segments = GRBL_SEGMENTS if machine.dialect == "grbl-1.1" else OTHER_SEGMENTS
     return blocks + segments + 1
@@ -168,7 +168,7 @@ def _reach(
 
 
 def _rest(job: Job, line: int) -> tuple[Job, int]:
-    """``job`` from ``line`` on with its modes brought back, and the line: 1 if it is too early."""
+    """``job`` from ``line`` on behind its preamble, and that line: 1 if it is too early."""
     if line == 1:
         return job, 1
     modes = list(_modes(_state_before(job, line)))
@@ -181,7 +181,7 @@ def _rest(job: Job, line: int) -> tuple[Job, int]:
 
 
 def _state_before(job: Job, line: int) -> ModalState:
-    """The modes before ``line``; raises ``InputError`` for what no preamble can bring back."""
+    """The modes before ``line``; raises ``InputError`` if no preamble can restore them."""
     state, rules = ModalState(), ReaderRules()
     for number, text in zip(range(1, line), job.iter_lines(), strict=False):
         code = bare_code(job.name, number, text).upper().replace("/", "")

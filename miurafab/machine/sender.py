@@ -1,12 +1,11 @@
-"""A job sent to a machine, from the opening of the port to the last move, safe on every way out.
+"""Sending a job to a machine, from the opening of the port to the last move, safe on every way out.
 
-The way through: the port is opened; the journal and the transcript are proved to be writable; the
-machine is greeted, asked and checked, and the lines are delivered
-(:mod:`~miurafab.machine.delivery`).
+The steps: open the port; prove that the journal and the transcript can be written; greet, query and
+check the machine; send the lines (:mod:`~miurafab.machine.stream_driver`).
 
 Every other way out - a refused line, an alarm, a reset, silence, a full disk, Ctrl-C, SIGTERM, an
-exception in somebody's progress callback - makes the machine safe before anything else happens,
-and puts what became of it into the sentence that the user reads.
+exception in a progress callback - makes the machine safe before anything else happens. The outcome
+stands in the sentence that the user reads.
 """
 
 from __future__ import annotations
@@ -17,13 +16,13 @@ from pathlib import Path
 from typing import TypedDict, Unpack
 
 from miurafab.errors import JobStopped, MiurafabError
-from miurafab.machine.delivery import Errand
-from miurafab.machine.dialects import delivery_of, open_machine
+from miurafab.machine.dialects import driver_of, open_machine
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import Keys, NoKeys
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.signals import StopSignals
+from miurafab.machine.stream_driver import JobContext
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import FlowTransport
 
@@ -31,15 +30,15 @@ __all__ = ["Files", "Progress", "StreamOptions", "StreamResult", "deliver", "str
 
 
 class Files(TypedDict, total=False):
-    """What is written down of a job while it is sent."""
+    """The files that record a job while it is sent."""
 
     journal_path: Path | None
     transcript_path: Path | None
 
 
 class StreamOptions(Files, total=False):
-    """... and who is told: ``on_progress``, about five times a second. ``keys`` may hold, resume,
-    abort and override while the job runs.
+    """... and ``on_progress``, called about five times a second. ``keys`` may hold, resume, abort
+    and override while the job runs.
     """
 
     on_progress: Callable[[Progress], None] | None
@@ -104,21 +103,21 @@ def deliver(
                 sha256=rest.sha256 if rest else None,
             )
             at_end.callback(journal.close)
-        delivery = delivery_of(
-            Errand(
+        driver = driver_of(
+            JobContext(
                 plan, transport, transcript, journal, on_progress, keys or NoKeys(), signals.check
             )
         )
         # A signal between an exception and its handling would skip the handling, not this.
-        at_end.callback(delivery.make_safe)
+        at_end.callback(driver.make_safe)
         try:
-            return delivery.run()
+            return driver.run()
         except KeyboardInterrupt:
             signals.hold()
-            delivery.end(JobStopped(f"{job.name} was stopped by {signals.reason}."))
+            driver.end(JobStopped(f"{job.name} was stopped by {signals.reason}."))
         except MiurafabError as error:
             signals.hold()
-            delivery.end(error)
+            driver.end(error)
         except BaseException:
             signals.hold()
             raise

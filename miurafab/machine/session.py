@@ -1,14 +1,13 @@
 """One conversation with one controller: greet it, ask it, stop it.
 
-The session joins the three things that must agree - the wire, the books of the connection and
-the transcript - and adds the one that they lack: time. What waits has a limit, and silence is an
-error with a sentence. Times are those of the wire's own clock, so a session with a controller in
-memory needs no real second.
+A session joins the wire, the byte accounting of the connection and the transcript, which must
+agree, and adds time. Every wait has a limit, and silence is an error with a sentence. Times are
+those of the wire's own clock, so a session with a controller in memory takes no real second.
 
-Stopping is the one thing that must always work. :meth:`Session.stop` puts a soft reset on the
-wire before it does anything else and repeats it until a banner proves that it was heard (a
-controller that writes its EEPROM is deaf for a moment); then it asks for a status report, since
-only the controller can say that the beam is off.
+Stopping must always work. :meth:`Session.stop` puts a soft reset on the wire before anything else
+and repeats it until a banner proves that the controller heard it (a controller that writes its
+EEPROM is deaf for a moment). Then it asks for a status report, since only the controller can say
+that the beam is off.
 """
 
 from __future__ import annotations
@@ -25,11 +24,12 @@ from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
 
 BANNER_S = 2.5
-"""How long a board that resets when its port opens may take to speak (boot loader: 1 to 2 s)."""
+"""The longest time until the banner of a board that resets when its port opens (boot loader: 1 to
+2 s)."""
 ANSWER_S = 3.0
-"""How long a living controller may be silent when it was asked something."""
+"""The longest time until a working controller answers a question."""
 HOMING_S = 180.0
-"""How long homing may take; GRBL answers nothing meanwhile, not even a status query."""
+"""The longest time of homing; GRBL answers nothing meanwhile, not even a status query."""
 _RESET_S = 0.8  # from a soft reset to its banner
 _RESETS = 3
 _HOLD_S = 1.0  # to come to rest from full speed before the reset that ends a refused job
@@ -40,8 +40,8 @@ _BUSY = ("Run", "Jog", "Home", "Hold", "Door")
 class Session:
     """A conversation over ``transport``; mutable, for one thread.
 
-    ``check`` is called before every read: it raises what should interrupt the conversation.
-    ``on_data`` is called with all that arrives, as it came.
+    ``check`` is called before every read: it raises the exception that should interrupt the
+    conversation. ``on_data`` is called with the bytes as they arrive.
     """
 
     def __init__(
@@ -70,12 +70,12 @@ class Session:
 
     @property
     def name(self) -> str:
-        """How messages call the port."""
+        """The name of the port in messages."""
         return self._transport.name
 
     @property
     def position(self) -> tuple[float, ...] | None:
-        """The work position by the last status report that gave one."""
+        """The work position of the last status report with a position."""
         status = self.status
         if status is None:
             return None
@@ -89,7 +89,7 @@ class Session:
     # The wire
 
     def write(self, data: bytes) -> None:
-        """Send bytes that the connection gave out."""
+        """Send bytes that come from the connection."""
         self._transport.write(data)
         if self._transcript is not None:
             self._transcript.sent(self.now(), data)
@@ -122,7 +122,7 @@ class Session:
         return events
 
     def pause(self, seconds: float) -> None:
-        """Let time pass on the wire's clock, taking in what is said meanwhile."""
+        """Let time pass on the wire's clock, and receive meanwhile."""
         end = self.now() + seconds
         while self.now() < end:
             self.receive(end - self.now())
@@ -168,7 +168,7 @@ class Session:
         return None
 
     def command(self, text: str, timeout: float = ANSWER_S) -> list[Event]:
-        """Send one line, wait for its ``ok``, and return what was said up to it.
+        """Send one line, wait for its ``ok``, and return the events before it.
 
         Raises :class:`~miurafab.errors.ControllerError` for ``error:``, an alarm, an unexpected
         reset, or ``timeout`` seconds without an answer.
@@ -219,11 +219,11 @@ class Session:
     # Beginning and end
 
     def greet(self) -> None:
-        """Wait for the controller's banner, or bring it about, and learn whether it is locked.
+        """Wait for the controller's banner, or cause it, and learn whether it is locked.
 
-        A board that does not reset when its port opens is asked for its state; if it is at
-        work, :class:`~miurafab.errors.ControllerError` says so and nothing is disturbed, else a
-        soft reset (which keeps the position) makes it speak. Raises
+        A board that does not reset when its port opens is asked for its state. If it is at work,
+        :class:`~miurafab.errors.ControllerError` says so and nothing is disturbed; else a soft
+        reset (which keeps the position) causes the banner. Raises
         :class:`~miurafab.errors.PortError` if nothing that speaks GRBL answers.
         """
         banner = self._wait_banner(BANNER_S)
@@ -255,9 +255,9 @@ class Session:
     def stop(self, *, hold_first: bool = False) -> bool:
         """Reset the controller now; whether it then reported that the beam is off.
 
-        The reset is the first thing on the wire, with ``hold_first`` right behind a feed hold,
-        which a controller obeys that overhears the reset. Never raises for the machine's sake: a
-        wire that is gone is an answer too (False).
+        The reset is the first byte on the wire. With ``hold_first`` it follows a feed hold, which a
+        controller obeys that misses the reset. Never raises because of the machine: the answer for
+        a wire that is gone is False.
         """
         try:
             for _ in range(_RESETS):

@@ -38,7 +38,7 @@ class StopSignals:
 
     @property
     def reason(self) -> str:
-        """What stopped the job, in words."""
+        """The name of the signal that stopped the job."""
         return self.cause or _WORDS.get(self.caught or "SIGINT", "a signal")
 
     def check(self) -> None:

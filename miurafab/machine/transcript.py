@@ -1,4 +1,4 @@
-"""Everything that went over the wire, both ways, with the time: what to look at afterwards.
+"""The transcript: all bytes on the wire, both ways, with the time.
 
 One line a piece as it was written, or a reply up to its line end: seconds on the wire's clock
 since the opening (of a reply: when its end came), ``>`` for what we sent or ``<`` for what came,
@@ -27,11 +27,11 @@ class Transcript:
         self._at = 0.0
 
     def sent(self, at: float, data: bytes) -> None:
-        """Note what went out."""
+        """Record bytes that were sent."""
         self._note(at, ">", data)
 
     def came(self, at: float, data: bytes) -> None:
-        """Note what came in."""
+        """Record bytes that arrived."""
         *lines, self._coming = (self._coming + data).split(b"\n")
         self._at = at
         for line in lines:

@@ -26,7 +26,7 @@ from miurafab.simulate.grbl.controller import VirtualGrbl
 VIRTUAL = "virtual"
 """The port name of the controller in memory."""
 BAUD = 115_200
-"""What nearly every GRBL board speaks."""
+"""The baud rate of nearly every GRBL board."""
 
 # What pyserial lets through when a port goes away: a TypeError for a descriptor that is None by
 # now, a termios.error (no OSError) for a request to a line that has hung up.
@@ -55,10 +55,10 @@ class Transport(Protocol):
         """Hand all of ``data`` to the wire."""
 
     def write_now(self, data: bytes) -> None:
-        """Send ``data`` before anything that was handed over and has not left yet."""
+        """Send ``data`` ahead of all bytes that are still waiting."""
 
     def read(self, timeout: float) -> bytes:
-        """What has arrived; waits up to ``timeout`` seconds for a first byte."""
+        """The bytes that have arrived; waits up to ``timeout`` seconds for the first."""
 
     def now(self) -> float:
         """Seconds on the clock of this wire, from an arbitrary start."""
@@ -72,10 +72,10 @@ class FlowTransport(Transport, Protocol):
 
     @property
     def waiting(self) -> int:
-        """How many bytes were taken and have not left yet."""
+        """The number of bytes that wait to be sent."""
 
     def offer(self, data: bytes) -> int:
-        """How many of ``data``'s first bytes the wire took; never waits."""
+        """Offer ``data``; returns the number of bytes that the wire took. Never waits."""
 
 
 class SerialTransport:
@@ -128,12 +128,12 @@ class SerialTransport:
 
     @property
     def waiting(self) -> int:
-        """How many bytes were taken and have not left yet, as far as the driver tells."""
+        """The number of bytes that wait to be sent, as far as the operating system tells."""
         with self._gone():
             return self._serial.out_waiting if isinstance(self._serial, serial.Serial) else 0
 
     def offer(self, data: bytes) -> int:
-        """How many of ``data``'s first bytes the driver took; does not wait for an XON."""
+        """Offer ``data``; returns the number of bytes taken. Does not wait for an XON."""
         with self._gone():
             if isinstance(self._serial, serial.Serial) and os.name == "posix":
                 try:
@@ -144,7 +144,7 @@ class SerialTransport:
         return len(data)
 
     def read(self, timeout: float) -> bytes:
-        """What has arrived; waits up to ``timeout`` seconds for a first byte."""
+        """The bytes that have arrived; waits up to ``timeout`` seconds for the first."""
         end = self.now() + timeout
         with self._gone():
             while True:
@@ -184,11 +184,11 @@ class Device(Protocol):
 
     @property
     def beam_log(self) -> list[BeamSegment]:
-        """What it burnt or drew."""
+        """The segments that it burnt or drew."""
 
     @property
     def lost_bytes(self) -> int:
-        """Bytes that it had no room for."""
+        """The number of bytes lost for want of room."""
 
     @property
     def resets_on_open(self) -> bool:
@@ -210,7 +210,7 @@ class Device(Protocol):
         """Bytes start down the wire."""
 
     def take_output(self) -> bytes:
-        """What it has said since the last call."""
+        """The bytes that it sent since the last call."""
 
     def advance_to_line(self, seconds: float) -> None:
         """Let time pass until it has spoken a line, ``seconds`` at the most."""
@@ -245,7 +245,7 @@ class VirtualTransport:
 
     @property
     def waiting(self) -> int:
-        """How many bytes are still on the wire."""
+        """The number of bytes that are still on the wire."""
         return int(getattr(self.device, "waiting", 0))
 
     def offer(self, data: bytes) -> int:

@@ -44,21 +44,21 @@ _CHUNK = 4096
 
 
 class Wire(Protocol):
-    """Where the senders are, one at a time."""
+    """A wire that serves one sender at a time."""
 
     address: str
 
     def wait(self, timeout: float) -> tuple[bytes, bool]:
-        """What arrived within ``timeout`` seconds, and whether a sender has just opened."""
+        """The bytes that arrive within ``timeout`` seconds, and whether a sender just opened."""
 
     def write(self, data: bytes) -> None:
-        """Send to whoever listens; what nobody takes is lost, as on a serial line."""
+        """Send to the sender; without one the bytes are lost, as on a serial line."""
 
     def unplug(self) -> None:
-        """Take the cable out: whoever has it open finds it gone."""
+        """Take the cable out: the port of the sender is gone."""
 
     def plug(self) -> None:
-        """Put the cable in again; ``address`` may be another then, as with USB."""
+        """Put the cable in again; ``address`` may have changed, as with USB."""
 
     def close(self) -> None:
         """Release the address."""
@@ -214,7 +214,7 @@ def load_controller(source: str, faults: Iterable[Fault] = ()) -> Device:
 
 @dataclass(frozen=True)
 class Served:
-    """How a virtual controller was used: its own seconds, those with the beam on, bytes lost."""
+    """The use of a virtual controller: its seconds, the seconds with the beam on, bytes lost."""
 
     seconds: float
     beam_on_seconds: float
@@ -303,7 +303,7 @@ def _replug(wire: Wire, plugged: bool, announce: Callable[[str], None]) -> None:
 
 
 class _BeamLog:
-    """Takes the segments that ``device`` burns as they come, and writes them to ``path``."""
+    """Writes the segments that ``device`` burns to ``path`` as they come."""
 
     def __init__(self, device: Device, path: Path | None) -> None:
         self.seconds = 0.0
@@ -320,14 +320,14 @@ class _BeamLog:
             self._file.write("t0,t1,x0,y0,x1,y1,power\n")
 
     def update(self) -> None:
-        """Take what has come, at most once a second of virtual time."""
+        """Write the new segments, at most once a second of virtual time."""
         if self._device.now >= self._due:
             self._due = self._device.now + 1.0
             # The last segment may still grow.
             self._take(len(self._device.beam_log) - 1)
 
     def close(self) -> None:
-        """Take the rest and finish the file."""
+        """Write the last segments and close the file."""
         self._take(len(self._device.beam_log))
         if self._file is not None:
             self._file.close()

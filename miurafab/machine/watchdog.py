@@ -1,10 +1,10 @@
-"""The process that sends a job watches the one that started it, and ends the job when that is gone.
+"""The watchdog: the process that sends a job ends it when the program that started it is gone.
 
-The starting program holds the other end of this process's standard input. It writes bytes there:
-a :data:`BEAT` every second, whatever the user presses, or the number of a stop. When the pipe
-closes (that program has died, however it died) or is silent for :data:`SILENCE_S` (it hangs), this
-process is stopped as by SIGTERM: the reset goes onto the wire, the beam is off, the journal has
-its last word. The user interface can die without harm.
+The starting program writes bytes to the standard input of this process: a :data:`BEAT` every
+second, each key that the user presses, or the number of a stop. When the pipe closes (that program
+has died) or is silent for :data:`SILENCE_S` (it hangs), this process stops as by SIGTERM: it resets
+the controller, the beam is off, and the journal gets its last record. So the user interface can die
+without harm.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from miurafab.machine.signals import StopSignals
 
 BEAT = b"\0"
 BEAT_S = 1.0
-"""How often the starting program writes at the least."""
+"""The longest time between two bytes of a working program."""
 SILENCE_S = 5.0
-"""How long it may be silent."""
+"""The silence after which the starting program counts as hung."""
 STOPS = {"SIGINT": b"\1", "SIGTERM": b"\2", "SIGHUP": b"\3", "SIGBREAK": b"\4"}
 """The bytes that stop this process as the signal of that name does."""
 
@@ -29,7 +29,7 @@ _SIGNALS = {code[0]: name for name, code in STOPS.items()}
 
 
 class ParentWatch:
-    """``with ParentWatch(...)``: until the end of the block the starting program is heeded.
+    """``with ParentWatch(...)``: watch the starting program until the end of the block.
 
     ``descriptor`` is the pipe's end to read; ``signals`` are told why, when it is gone. It is also
     the job's keyboard (:class:`~miurafab.machine.keys.Keys`): printable bytes are keys.

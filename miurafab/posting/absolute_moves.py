@@ -1,4 +1,4 @@
-"""The strokes as ``G0`` hops and ``G1`` cuts to absolute places: how most jobs are written."""
+"""Strokes as ``G0`` travels and ``G1`` cuts in absolute coordinates: the usual form of a job."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What each kind of controller is told around the strokes: the words that use its tool.
+"""The words that switch and set the tool, for each dialect and kind of tool.
 
 What they mean (gnea/grbl 1.1, doc/markdown/laser_mode.md and gcode.c; MarlinFirmware/Marlin,
 gcode/control/M3-M5.cpp and gcode/gcode.cpp):
@@ -29,12 +29,12 @@ from miurafab.profiles import OPERATIONS, Knife, MachineProfile, Material
 _GRBL = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc")
 _LASER_MODE_IS_SETTING_32 = ("grbl-1.1", "grblhal")
 _SHALLOW = ("engrave", "score")
-"""The operations that mark the sheet and must not part it."""
+"""The operations that mark the sheet and must not cut through it."""
 
 
 @dataclass(frozen=True)
 class Words:
-    """How the tool is used.
+    """The words that use the tool.
 
     ``begin`` and ``end``: the lines before and after all strokes. ``travel``: what a stroke's
     ``G0`` says besides its place; ``down`` (by operation) and ``up``: what follows that ``G0``
@@ -55,7 +55,7 @@ class Words:
 
 
 def words_of(machine: MachineProfile, material: Material) -> Words:
-    """How ``machine`` makes the operations of ``material``.
+    """The words with which ``machine`` makes the operations of ``material``.
 
     Raises :class:`~miurafab.errors.ProfileError` for a machine that G-code is not written for.
     """
@@ -129,7 +129,7 @@ def _servo(machine: MachineProfile, feed: tuple[str, ...]) -> Words:
 
 
 def depth(machine: MachineProfile, operation: str) -> int:
-    """The S of a pen or knife that is down for ``operation``: shallow for what must only mark."""
+    """The S of a pen or knife that is down for ``operation``; shallow for operations that mark."""
     knife = machine.tool.knife
     if knife is not None and knife.s_shallow is not None and operation in _SHALLOW:
         return knife.s_shallow
@@ -137,7 +137,7 @@ def depth(machine: MachineProfile, operation: str) -> int:
 
 
 def made_by_knife(toolpath: Toolpath, knife: Knife, machine: MachineProfile) -> tuple[str, ...]:
-    """The operations of ``toolpath`` that ``knife`` leaves out, as its profile says.
+    """The operations of ``toolpath`` that the profile of ``knife`` leaves out.
 
     Raises :class:`~miurafab.errors.LayoutError` for one that it would cut right through.
     """

@@ -24,7 +24,7 @@ from miurafab.posting.text import ByteRows, comment
 from miurafab.profiles import OPERATIONS, MachineProfile, Material
 
 NO_PATCH = "-"
-"""What ``(patch ...)`` says for strokes that belong to none."""
+"""The text of ``(patch ...)`` for strokes that belong to no patch."""
 _WORTH_IT = 0.98
 """Relative moves are chosen where they take less than this share of the time."""
 _BITS_A_BYTE = 10  # a start and a stop bit (8N1)
@@ -37,7 +37,7 @@ def post(
     *,
     patch_labels: Mapping[int, str] | None = None,
 ) -> Job:
-    """The file of ``toolpath`` for ``machine``: G-code, or HPGL where it speaks that.
+    """The file of ``toolpath`` for ``machine``: G-code, or HPGL for a cutter.
 
     G-code is in mm, plain ASCII, coordinates rounded to 0.001 mm. Places are absolute; only where
     the wire is too slow for the dashes, by the estimate, are gaps written as relative ``G1 S0``.
@@ -122,7 +122,7 @@ def _hpgl(made: Toolpath, machine: MachineProfile, material: Material) -> Job:
 def _wire_is_short(
     points: Points, runs: Runs, rows: ByteRows, machine: MachineProfile, material: Material
 ) -> bool:
-    """Whether chains wait for the wire so long that shorter lines could be worth it.
+    """Whether the wire delays absolute moves so much that shorter lines may pay.
 
     A bound that needs no planner: how much longer the lines of each chain take on the wire than
     its motion does at full speed, summed, against all motion at full speed.
@@ -150,7 +150,7 @@ def _seconds(job: Job, machine: MachineProfile) -> float:
 
 
 def _body(runs: Runs, rows: ByteRows, row_of_stroke: Ints, labels: Mapping[int, str]) -> list[str]:
-    """The strokes' lines, a piece a run, with the comments that hold from there on."""
+    """The lines of the strokes, a piece for each run, each with its comments."""
     byte_of_row = np.concatenate([[0], np.cumsum(np.count_nonzero(rows, axis=1))])
     text = rows[rows != 0].tobytes().decode("ascii")
     cuts = [*byte_of_row[row_of_stroke[runs.first]].tolist(), len(text)]

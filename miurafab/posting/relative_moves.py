@@ -1,10 +1,10 @@
-"""Strokes in chains of relative moves, for a wire too slow for the dashes.
+"""Strokes in chains of relative moves, where the wire is too slow for absolute moves.
 
-Strokes that follow one another over a short gap form a chain: one ``G0`` to its beginning, then
-``G91`` and moves of a few bytes each, the gap a ``G1`` with the power at 0. In laser mode the power
-changes with the move, without a stop. A chain is short enough for the firmware's
-single-precision sums (2^-24 of the position each) to stay below a micrometre, and each begins
-at an absolute place, so that nothing adds up over a sheet.
+Consecutive strokes with short gaps form a chain: one ``G0`` to its beginning, then ``G91`` and
+moves of a few bytes each. A gap is a ``G1`` with the power at 0. In laser mode the power changes
+with the move, without a stop. A chain is so short that the rounding errors of the firmware's
+single-precision sums (2^-24 of the position each) stay below a micrometre in total. Each chain
+begins at an absolute position, so that errors do not accumulate over a sheet.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from miurafab.posting.strokes import Points
 from miurafab.posting.text import ByteRows, absolute_number, relative_number, table
 
 LONGEST_GAP = 5000
-"""The longest gap made at the feed of the cut, in micrometres; further, a ``G0`` is faster."""
+"""The longest gap in a chain, in micrometres; over a longer gap a ``G0`` is faster."""
 LONGEST_CHAIN = 64
-"""Strokes in one chain at most."""
+"""The most strokes in one chain."""
 
 
 def chains(points: Points, words: Words, run_first: Ints) -> tuple[ByteRows, Ints]:
     """The lines as rows of bytes, and (T,) the row at which each stroke starts.
 
-    ``run_first`` are the strokes before which comments stand: a chain begins at each.
+    ``run_first`` are the strokes after comments; each of them begins a chain.
     """
     assert words.s is not None
     xy, first = points.xy, points.first
@@ -69,14 +69,14 @@ def chains(points: Points, words: Words, run_first: Ints) -> tuple[ByteRows, Int
 
 
 def gaps(points: Points) -> Ints:
-    """(T, 2) micrometres from the end of the stroke before to the start of each."""
+    """(T, 2) micrometres from the end of the previous stroke to the start of each stroke."""
     gap = np.zeros((len(points.first), 2), dtype=np.int64)
     gap[1:] = points.xy[points.first[1:]] - points.xy[points.last[:-1]]
     return gap
 
 
 def apart(points: Points, run_first: Ints) -> Bools:
-    """(T,) whether a stroke is too far from the one before, or parted by comments, for a chain."""
+    """(T,) whether a stroke begins a chain: after a long gap, or after comments."""
     begins: Bools = np.linalg.norm(gaps(points), axis=1) > LONGEST_GAP
     begins[run_first] = True
     return begins
@@ -85,7 +85,7 @@ def apart(points: Points, run_first: Ints) -> Bools:
 def _axis(
     letter: str, place: Ints, step: Ints, anchor: Bools
 ) -> tuple[ByteRows, ByteRows, ByteRows]:
-    """A letter with its number: the place at an anchor, the step elsewhere, nothing for no step."""
+    """The axis words: a position at an anchor, a step elsewhere, nothing for a step of 0."""
     said = anchor | (step != 0)
     absolute, relative = absolute_number(place), relative_number(step)
     absolute[~anchor] = 0

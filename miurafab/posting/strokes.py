@@ -1,4 +1,4 @@
-"""The strokes of a sheet as they will be made: on the bed, in micrometres, passes repeated."""
+"""The strokes of a sheet in the order of making: on the bed, in micrometres, passes repeated."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from miurafab.profiles import OPERATIONS, MachineProfile
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Strokes in the order made, cut into runs of one operation, patch and pass.
+    """Strokes in the order of making, in runs of one operation, patch and pass.
 
     ``order`` (T,) stroke indices, passes expanded; ``first`` (R,) where each run starts in it;
     ``operation``, ``patch``, ``number`` (1-based) and ``passes`` (R,).
@@ -71,7 +71,7 @@ def repeated(toolpath: Toolpath, runs: Runs) -> Toolpath:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """The points that make the strokes, in the order made.
+    """The points of the strokes, in the order of making.
 
     ``xy`` (N, 2) int64 micrometres; ``first`` (T,) the index of each stroke's first point;
     ``starts`` (N,) bool, whether a point is one; ``operation`` (T,) that of each stroke.

@@ -1,4 +1,4 @@
-"""Numbers and words as matrices of bytes, a row a line: how a hundred thousand lines are written.
+"""Numbers and words as matrices of bytes, a row for each line, to write 100,000 lines at once.
 
 Nearly all lines of a job look alike, so they are one matrix, a row a line and a column range a
 field, filled by looking up tables of digits. What a field leaves over is zero, and the zeros are
@@ -46,7 +46,7 @@ _WHOLE_UNLESS_ZERO = table([str(value) if value else "" for value in range(20_00
 
 
 def relative_number(microns: Ints) -> ByteRows:
-    """(n, width) signed micrometres written in mm as shortly as a controller reads them."""
+    """(n, width) signed micrometres written in mm, in the shortest form that controllers read."""
     whole, rest = np.divmod(np.abs(microns), 1000)
     sign = table(["", "-"])[(microns < 0).astype(np.int64)]
     return np.concatenate([sign, _WHOLE_UNLESS_ZERO[whole], _THOUSANDTHS[rest]], axis=1)

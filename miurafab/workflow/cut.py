@@ -1,4 +1,4 @@
-"""Before cutting: whatever is missing on the way from a THING to the G-code of its sheets is made.
+"""Preparing a cut: from a THING to the G-code of its sheets.
 
 THING is a job directory, a G-code file, a pattern (.fold), a design (.toml) or a TARGET.
 """

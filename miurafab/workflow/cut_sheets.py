@@ -107,11 +107,11 @@ def cut(
 ) -> tuple[CutSheet, ...]:
     """Stream the sheets of ``prepared`` (or those numbered in ``sheets``, from 1) to ``port``.
 
-    Every sheet is checked before the first is started. ``before_sheet`` is called with the number
-    of the sheet and how many there are, before each: the place to ask for fresh material;
-    ``after_frame`` with its number when its frame was traced; ``on_resume``, before the port is
-    opened, with what will be burnt twice of a sheet that goes on. The journal and the transcript go
-    beside the job. A sheet for a real port is sent by a process of its own
+    All sheets are checked before the first is started. ``before_sheet`` is called before each sheet
+    with its number and the number of sheets: the place to ask for fresh material. ``after_frame``
+    is called with the number of a sheet whose frame was traced. ``on_resume`` is called, before the
+    port is opened, with the finding on the strokes that may be burnt twice. The journal and the
+    transcript go beside the job. A sheet for a real port is sent by a process of its own
     (:func:`~miurafab.machine.job_process.stream_apart`). Raises what
     :func:`~miurafab.machine.sender.stream_plan` raises.
     """
@@ -174,7 +174,7 @@ def cut_sheet(
 def head_after(
     prepared: Prepared, number: int, at: tuple[float, float] | None
 ) -> tuple[float, float] | None:
-    """Where sheet ``number`` leaves a head that was ``at``; the port forgets it when closed."""
+    """The position of the head after sheet ``number``; a closed port forgets it."""
     program = prepared.dry_runs[number - 1].program
     if at is None or not len(program):
         return at
@@ -183,7 +183,7 @@ def head_after(
 
 
 def _stream(port: str) -> Callable[..., StreamResult]:
-    """What sends to ``port``: the controller in memory needs no process that guards it."""
+    """The sender for ``port``: the controller in memory needs no process of its own."""
     return stream_plan if port == VIRTUAL else stream_apart
 
 
@@ -201,10 +201,10 @@ def _chosen(prepared: Prepared, sheets: Sequence[int] | None) -> list[int]:
 def plan_sheets(
     prepared: Prepared, sheets: Sequence[int] | None, options: CutOptions
 ) -> list[tuple[int, JobPlan]]:
-    """The sheets to send, each checked by itself, those interrupted from where they go on.
+    """The plans of the ``sheets`` (None: all), each checked by itself.
 
-    Of the ``sheets`` (None: all) those that a resumed job has done already are left out. Raises
-    :class:`~miurafab.errors.InputError` for what is wrong with any.
+    With ``options.resume`` finished sheets are left out and interrupted sheets are resumed. Raises
+    :class:`~miurafab.errors.InputError` for a sheet that cannot be sent.
     """
     plans: list[tuple[int, JobPlan]] = []
     for number in _chosen(prepared, sheets):

@@ -1,8 +1,8 @@
-"""Several machines share the sheets of one job: each takes the next sheet when it has none.
+"""Several machines share the sheets of one job: each takes the next sheet when it is free.
 
-Every sheet is cut by a process of its own (:mod:`miurafab.machine.job_process`), so that nothing
-that happens at one machine can disturb another. A machine that fails is given no more sheets; the
-sheet it was at is left as it is, to be looked at and resumed there; the others cut what is left.
+Every sheet is cut by a process of its own (:mod:`miurafab.machine.job_process`), so that no machine
+can disturb another. A machine that fails gets no more sheets; its current sheet can be resumed
+there. The other machines cut the remaining sheets.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ _LOOK_S = 0.1
 
 @dataclass(frozen=True)
 class Shared:
-    """What became of ``sheet``: the ``port`` it went to (empty: none was left), and why not."""
+    """The outcome of ``sheet``: the ``port`` that cut it (empty: no machine was left), whether it
+    is ``done``, and why not.
+    """
 
     sheet: str
     port: str
@@ -48,13 +50,13 @@ def share_sheets(
     *,
     on_progress: Callable[[float, str], None],
 ) -> tuple[Shared, ...]:
-    """Cut the sheets of a job directory on the machines at ``ports``; in order of the sheets.
+    """Cut the sheets of a job directory on the machines at ``ports``; returns the outcomes in the
+    order of the sheets.
 
-    ``on_progress`` is called with the fraction done and a note when a sheet is done or failed. A
-    machine that fails is part of the answer. With ``options.resume`` an interrupted sheet goes on
-    at the machine that had it, before that takes another. Raises
-    :class:`~miurafab.errors.InputError` for what cannot be shared,
-    :class:`~miurafab.errors.JobStopped` after Ctrl-C, with every machine reset.
+    ``on_progress`` gets the fraction done and a note when a sheet is done or has failed. A machine
+    that fails is part of the answer. With ``options.resume`` each machine first resumes the sheet
+    that it was interrupted at. Raises :class:`~miurafab.errors.InputError` for a job that cannot be
+    shared, and :class:`~miurafab.errors.JobStopped` after Ctrl-C, with every machine reset.
     """
     if prepared.directory is None:
         raise InputError(

@@ -1,8 +1,8 @@
-"""Where a running job is, in strokes and in time left, by the figures of its dry run.
+"""The progress of a running job in strokes and time left, from its dry run.
 
-What is acknowledged is planned, not made: the machine is behind by up to the moves of its planner.
-Among those the reported position says which is being made, and how much of it is done. The time
-left is the dry run's from there on, at the feed that the override leaves.
+An acknowledged move is planned, not made: the machine is behind by up to the moves of its planner.
+The reported position tells which of these moves it makes, and how much of it is done. The time left
+is the rest of the dry run, at the overridden feed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from miurafab.workflow.dry_run import SheetPreview
 
 
 class Timeline:
-    """The way of one sheet; ``blocks`` is how many moves the controller plans ahead."""
+    """The dry run of one sheet over time; the controller plans ``blocks`` moves ahead."""
 
     def __init__(self, sheet: SheetPreview, blocks: int) -> None:
         burnt = strokes(sheet.program)
@@ -25,7 +25,7 @@ class Timeline:
         self._program = sheet.program
         self._ends = np.concatenate([[0.0], sheet.end_seconds])
         self._blocks = blocks
-        self._move = 0  # being made; never goes back
+        self._move = 0  # the move being made; never decreases
 
     def place(self, now: Progress) -> tuple[int, float]:
         """The strokes done, and the seconds left."""
@@ -51,7 +51,7 @@ class Timeline:
 
 
 def _nearest(at: Floats, start: Floats, end: Floats) -> tuple[Floats, Floats]:
-    """(n,) how far ``at`` is from each of n moves, and (n,) what share of it lies behind."""
+    """(n,) the distance of ``at`` from each of n moves, and (n,) the done share of each."""
     way = end - start
     square = np.maximum((way**2).sum(axis=1), 1e-12)
     along = np.clip(((at - start) * way).sum(axis=1) / square, 0.0, 1.0)

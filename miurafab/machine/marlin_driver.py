@@ -1,15 +1,17 @@
-"""A job on its way to a controller that speaks Marlin, and the one way out of it.
+"""The driver for controllers that speak Marlin.
 
-One line is in flight at a time, counted and with a checksum, and sent again when it was damaged
-or its answer is missing. The job is done when ``M400`` was answered, which waits for all motion
-to end.
+One line is in flight at a time, with a number and a checksum. The driver sends it again if it was
+damaged or its answer is missing. The job is done when the controller has answered ``M400``, which
+waits for all motion to end.
 
-Every other way out is ``M112``, first of all: it halts the controller with motors and laser off
-until it is reset, and it is the one command that Marlin obeys ahead of the others. ``M410`` stops
-the motion too, but leaves the laser to an ``M5`` behind it, so it is not relied on. A board without
-``EMERGENCY_PARSER`` reads even M112 only between two commands; the user is told.
+On every other way out the driver sends ``M112`` first: it halts the controller with motors and
+laser off until a reset, and it is the one command that Marlin obeys ahead of the others. ``M410``
+stops the motion too, but leaves the laser on until a later ``M5``, so the driver does not rely on
+it. A board without ``EMERGENCY_PARSER`` reads even M112 only between two commands; a finding says
+so.
 
-Marlin has no feed hold: holding is to send nothing more, and what it has planned it still makes.
+Marlin has no feed hold: the driver pauses by sending nothing more, and the machine still makes the
+moves that it has planned.
 """
 
 from __future__ import annotations
@@ -19,9 +21,9 @@ from collections.abc import Callable, Iterator
 from miurafab.errors import ControllerError, MiurafabError, PortError
 from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
-from miurafab.machine.delivery import Delivery, Errand
 from miurafab.machine.judge_job import longest_line
 from miurafab.machine.session import ANSWER_S, BANNER_S, HOMING_S
+from miurafab.machine.stream_driver import JobContext, StreamDriver
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
 from miurafab.marlin.connection import EMERGENCY, MarlinConnection
@@ -31,8 +33,8 @@ WAS_HALTED = "the controller was halted (M112) with the laser off; reset it befo
 NOT_CONFIRMED = (
     "the controller did not confirm that it halted, so switch the laser off at the machine"
 )
-_LOOK_S = 0.05  # between two looks at the keys
-_SILENCES = 3  # the line is sent again after each but the last
+_LOOK_S = 0.05  # between two reads of the keys
+_SILENCES = 3  # the line is sent again after each silence but the last
 _KILL_S = 0.8  # from M112 to its answer
 _KILLS = 3
 _NO_PARSER = Finding(
@@ -42,27 +44,27 @@ _NO_PARSER = Finding(
 )
 
 
-class MarlinDelivery(Delivery):
-    """See the module."""
+class MarlinDriver(StreamDriver):
+    """The driver of one job."""
 
-    def __init__(self, errand: Errand) -> None:
-        super().__init__(errand)
-        self._wire = MarlinWire(errand.transport, errand.transcript, errand.check)
+    def __init__(self, context: JobContext) -> None:
+        super().__init__(context)
+        self._wire = MarlinWire(context.transport, context.transcript, context.check)
         self._taken = 0
         self._last = 0
 
     @property
     def acknowledged(self) -> int:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         return self._taken
 
     @property
     def line(self) -> int:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         return self._last
 
     def stream(self) -> None:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         wire = self._wire
         for line in self._lines():
             while self.held:
@@ -78,8 +80,8 @@ class MarlinDelivery(Delivery):
         job = self.plan.job
         return job.send_lines(longest_line(self.plan.machine))
 
-    def meet(self) -> tuple[Finding, ...]:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+    def prepare(self) -> tuple[Finding, ...]:
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         plan, wire = self.plan, self._wire
         wire.greet()
         said = wire.send(SendLine(0, b"M115"))
@@ -100,7 +102,7 @@ class MarlinDelivery(Delivery):
         return f"after it took line {self._last} of {name}"
 
     def stop(self, error: MiurafabError | None) -> str:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         return WAS_HALTED if self._wire.kill() else NOT_CONFIRMED
 
 
@@ -124,7 +126,7 @@ class MarlinWire:
         return self._transport.now() - self._start
 
     def receive(self, timeout: float) -> list[Reply]:
-        """What is said within ``timeout``; returns as soon as there are bytes."""
+        """The replies within ``timeout``; returns as soon as there are bytes."""
         self._check()
         data = self._transport.read(max(0.0, timeout))
         if not data:
@@ -167,7 +169,7 @@ class MarlinWire:
         *,
         patience: float = ANSWER_S,
     ) -> list[Reply]:
-        """Send ``line``, wait for its ``ok``, and return what was said up to it.
+        """Send ``line``, wait for its ``ok``, and return the replies before it.
 
         ``meanwhile`` is called twenty times a second, ``where`` is the tail of a sentence.
         Raises :class:`~miurafab.errors.ControllerError` for a line that is refused, a halt, a
@@ -224,7 +226,7 @@ class MarlinWire:
             raise ControllerError(f"The controller refused {number}: '{text}'.")
 
     def kill(self) -> bool:
-        """Halt the controller; whether it said that it did. Never raises for the wire's sake."""
+        """Halt the controller; whether it confirmed. Never raises because of the wire."""
         try:
             for _ in range(_KILLS):
                 self._transport.write_now(EMERGENCY)

@@ -1,10 +1,10 @@
-"""One job on its way to one machine, whatever the machine speaks: the way through, and its end.
+"""Sending one job to one machine, in any dialect: the steps, and every way out.
 
-Each dialect says how the machine is met, how lines become bytes, and how it is made safe
-(:meth:`Delivery.stop`). This says when. Meanwhile, whatever is awaited, the files, the keys and the
-user are looked after (:meth:`Delivery.attend`). On every way out but success the machine is made
-safe first of all, once, and what became of it stands in the sentence that the user reads and in the
-journal.
+A subclass for each dialect defines how the machine is greeted, how lines become bytes, and how the
+machine is made safe (:meth:`StreamDriver.stop`). The base class defines when. While it waits for
+anything, it serves the files, the keys and the user (:meth:`StreamDriver.attend`). On every way out
+but success it makes the machine safe first, once; the outcome stands in the sentence that the user
+reads and in the journal.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from miurafab.machine.progress import JobAborted, Progress, StreamResult
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import FlowTransport
 
-_TELL_S = 0.2  # between two words to the user, of a machine that does not tell where it is
+_TELL_S = 0.2  # between two progress reports for a machine that does not report its position
 
 
 @dataclass(frozen=True)
-class Errand:
-    """A ``plan``, the wire that it goes over, and who is told of it and may step in.
+class JobContext:
+    """A ``plan``, the wire to send it over, and everybody who follows it or may step in.
 
-    ``check`` is called before every read: it raises what should interrupt the conversation.
+    ``check`` is called before every read: it raises the exception that should interrupt the
+    conversation, such as Ctrl-C.
     """
 
     plan: JobPlan
@@ -43,79 +44,79 @@ class Errand:
     check: Callable[[], None]
 
 
-class Delivery(ABC):
-    """An errand under way; ``at_risk`` while the machine may move or burn by what was sent.
+class StreamDriver(ABC):
+    """The driver of one job. ``at_risk`` while the machine may move or burn because of sent lines.
 
-    ``taken`` is the word for a line that the machine has. ``held`` says whether the user wants
-    nothing to be sent, ``orders`` are those of the keyboard that were not carried out yet,
-    ``refusals`` the refused lines of a job in check mode.
+    ``taken`` is the verb for lines that the machine has. ``held``: the user has paused sending.
+    ``orders``: pressed keys that are not carried out yet. ``refusals``: the refused lines of a job
+    in check mode.
     """
 
     taken = "acknowledged"
 
-    def __init__(self, errand: Errand) -> None:
+    def __init__(self, context: JobContext) -> None:
         self.at_risk = False
         self.held = False
         self.orders: list[bytes] = []
         self.refusals: list[Refusal] = []
-        self.plan = errand.plan
-        self.journal = errand.journal
-        self._errand = errand
-        self._records = [r for r in (errand.transcript, errand.journal) if r is not None]
+        self.plan = context.plan
+        self.journal = context.journal
+        self._context = context
+        self._records = [r for r in (context.transcript, context.journal) if r is not None]
         self._begin = self._tell_at = 0.0
 
-    # What each dialect says
+    # Defined by each dialect
 
-    def meet(self) -> tuple[Finding, ...]:
-        """Greet the machine and make all checks that need it; returns what did not stop the job."""
+    def prepare(self) -> tuple[Finding, ...]:
+        """Greet the machine and make all checks that need it; returns the forced refusals."""
         return ()
 
     @abstractmethod
     def stream(self) -> None:
-        """Send the job until the machine has done it, and attend meanwhile; raises what ends it."""
+        """Send the job until the machine has done it; raises the error that ends it."""
 
-    def part(self) -> tuple[Finding, ...]:
+    def finish(self) -> tuple[Finding, ...]:
         """Leave the machine dark after a job that is done."""
         return ()
 
     @abstractmethod
     def stop(self, error: MiurafabError | None) -> str:
-        """Make the machine safe, before anything else; what became of that, as a clause.
+        """Make the machine safe, before anything else; returns the outcome as a clause.
 
-        Never raises for the machine's sake.
+        Never raises because of the machine.
         """
 
     @property
     @abstractmethod
     def acknowledged(self) -> int:
-        """How many lines the machine has taken."""
+        """The number of lines that the machine has taken."""
 
     @property
     @abstractmethod
     def line(self) -> int:
-        """The number of the last of them in the file; 0: none."""
+        """The line number in the file of the last line taken; 0: none."""
 
     @property
     def state(self) -> str:
-        """What the machine is doing, in one word, as far as it is known here."""
+        """The state of the machine in one word, as far as the driver knows it."""
         return "Hold" if self.held else "Run"
 
     def obey(self) -> None:
-        """Carry out ``orders``: without a feed hold, holding is to send nothing more."""
+        """Carry out ``orders``. A machine without feed hold is paused by sending nothing more."""
         for order in self.orders:
             self.held = order == HOLD
         self.orders.clear()
 
-    # The way through
+    # The steps
 
     def run(self) -> StreamResult:
-        """The whole way through; raises what ends it."""
-        findings = self.plan.forced + self.meet()
+        """Send the whole job; raises the error that ends it early."""
+        findings = self.plan.forced + self.prepare()
         self.at_risk = True
-        self._begin = self._tell_at = self._errand.transport.now()
+        self._begin = self._tell_at = self._context.transport.now()
         self.stream()
         seconds = self._seconds
-        findings += self.part()
+        findings += self.finish()
         self.at_risk = False
         if self.journal is not None:
             self.journal.ended("done", f"{self.acknowledged} lines {self.taken}")
@@ -124,11 +125,11 @@ class Delivery(ABC):
 
     @property
     def _seconds(self) -> float:
-        """Since the first line, on the wire's clock."""
-        return self._errand.transport.now() - self._begin
+        """Seconds since the first line, on the wire's clock."""
+        return self._context.transport.now() - self._begin
 
     def attend(self) -> None:
-        """Look after the files and the keys: many times a second, whatever is awaited.
+        """Serve the files and the keys; called many times a second during every wait.
 
         Raises :class:`~miurafab.machine.progress.JobAborted` if the user ends the job, and
         :class:`~miurafab.errors.MachineError` for a file that cannot be written.
@@ -138,15 +139,15 @@ class Delivery(ABC):
         for record in self._records:
             record.check()
         known = keys_of(self.plan.machine.dialect)
-        self.orders += [known[key] for key in self._errand.keys.pressed() if key in known]
+        self.orders += [known[key] for key in self._context.keys.pressed() if key in known]
         if ABORT in self.orders:
             raise JobAborted(f"{self.plan.job.name} was stopped at the keyboard.")
         self.obey()
 
     def attend_and_tell(self) -> None:
-        """:meth:`attend`, and :meth:`tell` the user of a machine that does not tell of itself."""
+        """:meth:`attend`, and :meth:`tell` the progress of a machine that does not report it."""
         self.attend()
-        now = self._errand.transport.now()
+        now = self._context.transport.now()
         if now >= self._tell_at:
             self._tell_at = now + _TELL_S
             self.tell(self.state)
@@ -158,9 +159,9 @@ class Delivery(ABC):
         in_flight: int = 0,
         feed_override: int = 100,
     ) -> None:
-        """Tell the user how far the job is; see :class:`~miurafab.machine.progress.Progress`."""
-        if self._errand.on_progress is not None:
-            self._errand.on_progress(
+        """Report the progress; see :class:`~miurafab.machine.progress.Progress`."""
+        if self._context.on_progress is not None:
+            self._context.on_progress(
                 Progress(
                     self.acknowledged,
                     self.plan.lines,
@@ -174,7 +175,7 @@ class Delivery(ABC):
             )
 
     def _close_records(self) -> tuple[Finding, ...]:
-        """Finish the files; a fault now does not undo the job, so it is a warning."""
+        """Close the files. The job is done by then, so a fault is a warning."""
         findings = []
         for record in self._records:
             record.close()
@@ -187,7 +188,7 @@ class Delivery(ABC):
     # The other ways out
 
     def end(self, error: MiurafabError) -> NoReturn:
-        """Stop the machine if it is at risk, and raise ``error`` with what became of it."""
+        """Stop the machine if it is at risk; raise ``error`` with the outcome in its sentence."""
         sentence = error.sentence
         if self.at_risk:
             outcome = self.stop(error)
@@ -205,7 +206,7 @@ class Delivery(ABC):
         raise kind(sentence) from None
 
     def make_safe(self) -> None:
-        """Stop the machine if nothing else has: the last line of defence, on every way out."""
+        """Stop the machine if it is still at risk: the last line of defence on every way out."""
         if self.at_risk:
             self.at_risk = False
             self.stop(None)

@@ -1,16 +1,16 @@
-"""A file on its way to a cutter that speaks HPGL and answers nothing.
+"""The driver for cutters that speak HPGL, which answer nothing.
 
-The cutter is greeted with nothing and asked nothing; it is given instructions as fast as its flow
-control lets the wire take them, and at the end the pen is up. The journal tells what was handed
-over, which is not what was cut. On every other way out the pen is sent up, behind what the cutter
-holds unless it knows ``ESC.K`` (:mod:`miurafab.plotter.stream`).
+The driver sends no greeting and no question. It sends instructions as fast as the flow control of
+the cutter allows; at the end the pen is up. The journal records what was handed over, which is not
+what was cut. On every other way out the driver sends the pen up. The cutter first draws what it
+holds, unless it knows ``ESC.K`` (:mod:`miurafab.plotter.stream`).
 """
 
 from __future__ import annotations
 
 from miurafab.errors import MiurafabError, PortError
 from miurafab.findings import Finding
-from miurafab.machine.delivery import Delivery, Errand
+from miurafab.machine.stream_driver import JobContext, StreamDriver
 from miurafab.machine.transport import FlowTransport
 from miurafab.plotter.stream import PlotterStream
 
@@ -23,40 +23,40 @@ _GONE_ON = Finding(
 )
 _PIECE = 64
 _MOST_WAITING = 128
-"""Bytes that the driver may hold: so few that an end comes soon behind them."""
+"""The most bytes in the operating system's buffer: few, so that a stop soon reaches the cutter."""
 _LOOK_S = 0.02
 _STOP_S = 3.0  # how long an XOFF may hold up the last bytes
 
 
-class PlotterDelivery(Delivery):
-    """See the module."""
+class PlotterDriver(StreamDriver):
+    """The driver of one job."""
 
     taken = "handed over"
 
-    def __init__(self, errand: Errand) -> None:
-        super().__init__(errand)
-        self._transport = errand.transport
-        self._transcript = errand.transcript
-        self._check = errand.check
-        self._stream = PlotterStream(errand.plan.job)
+    def __init__(self, context: JobContext) -> None:
+        super().__init__(context)
+        self._transport = context.transport
+        self._transcript = context.transcript
+        self._check = context.check
+        self._stream = PlotterStream(context.plan.job)
 
     @property
     def acknowledged(self) -> int:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         return self._stream.lines
 
     @property
     def line(self) -> int:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         return self._stream.line
 
     @property
     def state(self) -> str:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         return "Hold" if self.held or self._stream.waits else "Run"
 
     def stream(self) -> None:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         stream, transport = self._stream, self._transport
         while not stream.finished:
             self._check()
@@ -71,8 +71,8 @@ class PlotterDelivery(Delivery):
             self._listen(_LOOK_S)
             self.attend_and_tell()
 
-    def part(self) -> tuple[Finding, ...]:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+    def finish(self) -> tuple[Finding, ...]:
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         return (_GONE_ON,)
 
     def _hand_over(self, data: bytes) -> int:
@@ -90,12 +90,12 @@ class PlotterDelivery(Delivery):
         self._stream.hear(data)
 
     def stop(self, error: MiurafabError | None) -> str:
-        """See :class:`~miurafab.machine.delivery.Delivery`."""
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         return PEN_SENT_UP if send_up(self._transport, self._stream.abort()) else NOT_TOLD
 
 
 def send_up(transport: FlowTransport, data: bytes) -> bool:
-    """Hand over ``data``, which lifts the tool; whether it has left in time. Never raises."""
+    """Send ``data``, which lifts the tool; whether it left in time. Never raises."""
     try:
         end = transport.now() + _STOP_S
         while (data or transport.waiting) and transport.now() < end:

@@ -1,11 +1,11 @@
-"""A job on its way to a controller that speaks GRBL, and every way out of it.
+"""The driver for controllers that speak GRBL.
 
-The job is done when every line was acknowledged *and* a status report that was asked for after the
-last acknowledgement says Idle. On every other way out (:meth:`GrblDelivery.stop`) the controller is
-reset before anything else, and asked whether the beam is off. The one exception is an
-abort at the keyboard of a job that goes dark at rest (M4): a feed hold before the reset lets the
-machine keep its position. An ``M5`` is never relied on: it would wait in the controller's queue
-behind up to seconds of burning.
+The job is done when the controller has acknowledged every line *and* a status report, requested
+after the last acknowledgement, says Idle. On every other way out (:meth:`GrblDriver.stop`) the
+driver resets the controller first, and then asks whether the beam is off. The one exception is an
+abort at the keyboard of a job under M4, whose beam is dark at rest: a feed hold before the reset
+lets the machine keep its position. The driver never relies on ``M5``: it would wait in the
+controller's queue behind up to seconds of burning.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Error, Ok, Options, StatusReport
 from miurafab.grbl.settings import Settings
 from miurafab.grbl.streamer import LineRefused, Streamer
-from miurafab.machine.delivery import Delivery, Errand
 from miurafab.machine.keys import NoKeys
 from miurafab.machine.preflight import (
     check_settings,
@@ -29,29 +28,30 @@ from miurafab.machine.preflight import (
 )
 from miurafab.machine.progress import JobAborted
 from miurafab.machine.session import ANSWER_S, Session
+from miurafab.machine.stream_driver import JobContext, StreamDriver
 
 WAS_RESET = "the controller was reset and reports the beam off"
 NOT_CONFIRMED = (
     "the controller did not confirm that the beam is off, so switch the laser off at the machine"
 )
-"""What became of the machine, as a clause."""
+"""The outcome of a stop, as a clause."""
 
 _WAS_ARMED = Finding("armed", "The job ended with the laser armed, so the controller was reset.")
 
 _POLL_S = 0.2  # between status queries while lines flow
-_END_POLL_S = 0.1  # and when only the last moves are awaited
-_KEY_S = 0.01  # between two looks at the keyboard, if there is one
+_END_POLL_S = 0.1  # between status queries while the last moves are made
+_KEY_S = 0.01  # between two reads of the keyboard, if there is one
 
 
-class GrblDelivery(Delivery):
-    """One job on its way over one session."""
+class GrblDriver(StreamDriver):
+    """The driver of one job over one session."""
 
-    def __init__(self, errand: Errand) -> None:
-        super().__init__(errand)
-        plan, controller = errand.plan, errand.plan.machine.controller
-        self._patience = math.inf if isinstance(errand.keys, NoKeys) else _KEY_S
+    def __init__(self, context: JobContext) -> None:
+        super().__init__(context)
+        plan, controller = context.plan, context.plan.machine.controller
+        self._patience = math.inf if isinstance(context.keys, NoKeys) else _KEY_S
         self._session = Session(
-            errand.transport, Connection(controller.rx_bytes), errand.transcript, errand.check
+            context.transport, Connection(controller.rx_bytes), context.transcript, context.check
         )
         self._streamer = Streamer(
             self._session.connection,
@@ -64,18 +64,18 @@ class GrblDelivery(Delivery):
 
     @property
     def acknowledged(self) -> int:
-        """See :class:`Delivery`."""
+        """See :class:`StreamDriver`."""
         return self._streamer.acknowledged
 
     @property
     def line(self) -> int:
-        """See :class:`Delivery`."""
+        """See :class:`StreamDriver`."""
         return self._streamer.last.number if self._streamer.last else 0
 
-    # The way through
+    # The steps
 
-    def meet(self) -> tuple[Finding, ...]:
-        """See :class:`Delivery`."""
+    def prepare(self) -> tuple[Finding, ...]:
+        """See :class:`StreamDriver`."""
         plan, session = self.plan, self._session
         session.greet()
         if plan.options.home:
@@ -102,7 +102,7 @@ class GrblDelivery(Delivery):
         return forced
 
     def stream(self) -> None:
-        """See :class:`Delivery`."""
+        """See :class:`StreamDriver`."""
         session, streamer = self._session, self._streamer
         poll_at = answered = session.now()
         asked_last = False  # whether a status was asked for after the last acknowledgement
@@ -143,14 +143,14 @@ class GrblDelivery(Delivery):
             self.attend()
 
     def obey(self) -> None:
-        """Send ``orders``, unless the controller is deaf just now."""
+        """Send ``orders``, unless the controller is deaf while it writes its EEPROM."""
         if not self._session.connection.writing_eeprom:
             for order in self.orders:
                 self._session.write(self._session.connection.send_realtime(order))
             self.orders.clear()
 
-    def part(self) -> tuple[Finding, ...]:
-        """See :class:`Delivery`."""
+    def finish(self) -> tuple[Finding, ...]:
+        """See :class:`StreamDriver`."""
         session = self._session
         if self.plan.options.check_mode:
             session.stop()
@@ -160,7 +160,7 @@ class GrblDelivery(Delivery):
         return ()
 
     def _watch_for_loss(self, report: StatusReport, answered: float) -> None:
-        """A controller that idles while it owes an answer never got the line whole."""
+        """Raise if the controller idles while an answer is missing: the line was damaged."""
         owed = self._session.connection.in_flight
         patience = ANSWER_S + self._streamer.dwell_in_flight
         if owed and report.state == "Idle" and self._session.now() - answered > patience:
@@ -173,7 +173,7 @@ class GrblDelivery(Delivery):
     # The other ways out
 
     def stop(self, error: MiurafabError | None) -> str:
-        """See :class:`Delivery`."""
+        """See :class:`StreamDriver`."""
         session = self._session
         if isinstance(error, JobAborted) and not self._burns_at_rest:
             off = session.hold_and_stop()
@@ -183,7 +183,7 @@ class GrblDelivery(Delivery):
 
     @property
     def _burns_at_rest(self) -> bool:
-        """Whether a feed hold leaves the beam on for a moment: M3, or nobody knows what it is."""
+        """Whether a feed hold may leave the beam on: under M3, or in an unreadable program."""
         program = self.plan.program
         laser = self.plan.machine.tool.kind == "laser"
         return laser and (program is None or bool((program.spindle == BEAM_M3).any()))
