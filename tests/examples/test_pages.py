@@ -138,6 +138,20 @@ def test_links_lead_somewhere(page):
                 assert heading in headings_of(linked), link
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_the_files_of_the_checkout_that_are_named_exist(page):
+    rooms = "benchmarks|docs|firmware_profiles|materials|miurafab|patterns|tests"
+    named = re.findall(rf"`((?:{rooms})/[\w./-]*)", prose_of(page))
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_the_tests_that_contributing_names_exist():
+    prose = prose_of(ROOT / "CONTRIBUTING.md")
+    tests = "\n".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
+    for name in re.findall(r"`(test_\w+)`", prose):
+        assert f"def {name}(" in tests
+
+
 def headings_of(page):
     """The anchors of the headings of ``page``."""
     titles = re.findall(r"^#+ (.*)$", prose_of(page), re.MULTILINE)
