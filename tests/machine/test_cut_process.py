@@ -46,7 +46,7 @@ def resumes(bench: Bench, nc: Path) -> None:
     rest = resume(JOB, load_machine("grbl-laser-400"), read_journal(journal))
     first = list(bench.device.beam_log)
     said = bench.finish(bench.cut(nc, "--resume", "--at", "0,0", "--quiet"), 60)
-    assert rest.sentence in " ".join(said.split())
+    assert rest.finding.sentence in " ".join(said.split())
     counts = burnt(JOB, [first, bench.device.beam_log[len(first) :]])
     assert all(counts[index] for index in range(STROKES))
     twice = {index % 1000 for index, count in counts.items() if count > 1 or index >= 1000}
@@ -94,7 +94,7 @@ def test_ctrl_c_in_the_terminal_is_on_the_wire_within_20_ms(nc: Path) -> None:
         bench.run(lambda b=bench: b"\x18" in b.bytes_came)
         at, virtual, _ = bench.came[-1]
         bench.run(lambda p=process: p.poll() is not None)
-        assert process.wait() == 3
+        assert process.wait() == 130
         shown = words(terminal.shown)
         assert shown.startswith(f"{JOB.name} was stopped by Ctrl-C; ")
         assert shown.endswith(RESET)
@@ -115,7 +115,7 @@ def test_the_terminal_is_closed(nc: Path) -> None:
     bench.run(lambda: b"\x18" in bench.bytes_came)
     virtual = bench.came[-1][1]
     bench.run(lambda: process.poll() is not None)
-    assert process.wait() == 3
+    assert process.wait() == 130
     run = read_journal(nc.with_suffix(".journal"))[-1]
     assert run.ended == "stopped"
     assert "was stopped by the closing of the terminal (SIGHUP)" in str(run.why)
@@ -137,7 +137,7 @@ def test_keys_in_the_terminal_are_on_the_wire_within_20_ms(nc: Path) -> None:
     assert sorted(delays)[2] <= 0.02, delays  # others have the processor now and then
     terminal.type(b"q")
     bench.run(lambda: process.poll() is not None)
-    assert process.wait() == 3
+    assert process.wait() == 130
     assert "was stopped at the keyboard" in words(terminal.shown)
     assert bench.commands.endswith(b"!\x18")
     assert "stroke" in terminal.shown
