@@ -39,6 +39,7 @@ RULES = {
     "mesh-unit": Rule("warning", "a mesh whose size suggests a unit that is not the millimetre"),
     "filled-holes": Rule("note", "small holes of a mesh that were filled"),
     "sampling": Rule("warning", "a function that turns faster than its samples show"),
+    "smoothed": Rule("note", "a height map that was smoothed"),
     # A fit (miurafab.origami.fitting)
     "interrupted": Rule("refusal", "a fit that was interrupted; the sheet is the best so far"),
     "no-sheet": Rule("refusal", "no exact sheet was found"),

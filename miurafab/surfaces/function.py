@@ -181,7 +181,6 @@ def from_function(
     return surface, (
         Finding(
             "sampling",
-            "warning",
             f"The function turns faster than {SAMPLES[-1]} samples to a side show: the spline "
             f"through the samples, which is fitted and checked, leaves it by {100 * miss:.2g} % of "
             "its size. Choose a smaller domain for a closer spline.",

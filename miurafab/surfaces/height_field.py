@@ -86,7 +86,6 @@ def from_heights(
     return surface, (
         Finding(
             "smoothed",
-            "note",
             f"The height map was smoothed: the surface that is fitted and checked leaves its "
             f"heights by up to {miss:.3g}, which is {100 * miss / size:.2g} % of its size.",
         ),

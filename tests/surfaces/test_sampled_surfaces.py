@@ -73,6 +73,7 @@ def test_a_function_is_left_alone_where_it_has_no_values():
 def test_a_function_that_turns_too_fast_says_so():
     _, (finding,) = from_function(lambda u, v: 0.1 * np.sin(60 * u))
     assert finding.code == "sampling"
+    assert "turns faster than" in finding.sentence
     assert finding.severity == "warning"
 
 
@@ -118,6 +119,7 @@ def test_heights_are_met_and_noise_is_smoothed_and_told():
     rough = heights + np.random.default_rng(1).normal(0, 1.0, heights.shape)
     _, (finding,) = from_heights(rough, spacing=2.0)
     assert finding.code == "smoothed"
+    assert "was smoothed" in finding.sentence
 
 
 def test_an_image_is_heights_with_its_lowest_row_first(tmp_path: Path):
