@@ -14,7 +14,6 @@ from typing import Annotated, Any, Literal
 
 import rich.box
 import rich.console
-import rich.progress
 import rich.table
 from cyclopts import Parameter
 from rich.text import Text
@@ -116,6 +115,8 @@ class Console:
     @contextmanager
     def progress(self, label: str) -> Iterator[Callable[[float, str], None]]:
         """A progress bar on standard error; call it with a fraction in 0..1 and a short text."""
+        import rich.progress  # only now: no page of help waits for it
+
         columns = (
             rich.progress.TextColumn("{task.description}"),
             rich.progress.BarColumn(bar_width=28),

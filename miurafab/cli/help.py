@@ -28,7 +28,8 @@ class HelpFormatter:
         names = [_names(entry) for entry in panel.entries]
         room = min(MOST_FOR_NAMES, int(NAME_SHARE * console.width))
         column = max((len(name) for name in names if len(name) <= room), default=room)
-        page = Text(str(panel.title), style="bold")
+        page = Text()
+        page.append(str(panel.title), "bold")
         for name, entry in zip(names, panel.entries, strict=True):
             page.append("\n  ")
             page.append(name, "cyan")

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option
 from miurafab.errors import DONE
 from miurafab.options import File, Text, length
-from miurafab.profiles import load_machine, load_material, shipped_names
-from miurafab.profiles.shipped import Kind
 
 NameArgument = Annotated[
     str | None, argument("NAME", "A shipped name or a TOML file; without it, all are listed.")
@@ -24,12 +22,12 @@ PROFILES_EXAMPLES = ("miurafab profiles", "miurafab profiles grbl-laser-400")
 
 def profiles(name: NameArgument = None, /, *, console: Console = Console()) -> int:
     """List the machine profiles, or show and validate one."""
-    return _list_or_show(console, "firmware_profiles", load_machine, name)
+    return _list_or_show(console, "firmware_profiles", miurafab.load_machine, name)
 
 
 def show_material(name: NameArgument = None, /, *, console: Console = Console()) -> int:
     """List the materials, or show and validate one."""
-    return _list_or_show(console, "materials", load_material, name)
+    return _list_or_show(console, "materials", miurafab.load_material, name)
 
 
 def add_material(
@@ -71,11 +69,16 @@ MATERIALS_ACTIONS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {
 
 
 def _list_or_show(
-    console: Console, kind: Kind, load: Callable[[str], Any], name: str | None
+    console: Console,
+    kind: Literal["firmware_profiles", "materials"],
+    load: Callable[[str], Any],
+    name: str | None,
 ) -> int:
     if name is not None:
         console.answer(asdict(load(name)))
         return DONE
+    from miurafab.profiles import shipped_names
+
     titles = {stem: load(stem).title for stem in shipped_names(kind)}
     console.answer(
         {kind: [{"name": stem, "title": title} for stem, title in titles.items()]},
