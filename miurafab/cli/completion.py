@@ -8,8 +8,8 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from miurafab.cli.console import Console
-from miurafab.cli.declared import ARGUMENTS
-from miurafab.errors import DONE, InputError
+from miurafab.cli.declared import argument
+from miurafab.errors import DONE
 
 EXAMPLES = ("miurafab completion bash", "miurafab completion powershell")
 
@@ -17,9 +17,7 @@ SHELLS = ("bash", "zsh", "fish", "powershell")
 
 
 def completion(
-    shell: Annotated[
-        str, Parameter(name="SHELL", help=f"One of {', '.join(SHELLS)}.", group=ARGUMENTS)
-    ],
+    shell: Annotated[str, argument("SHELL", f"One of {', '.join(SHELLS)}.", SHELLS)],
     /,
     *,
     program: Annotated[App, Parameter(parse=False)],
@@ -35,10 +33,6 @@ def completion(
 
     PowerShell: add 'miurafab completion powershell | Out-String | Invoke-Expression' to $PROFILE.
     """
-    if shell not in SHELLS:
-        raise InputError(
-            f"'{shell}' is not a shell with completion; there are {', '.join(SHELLS)}."
-        )
     script = program.generate_completion(shell=shell)  # type: ignore[arg-type]
     console.answer({"shell": shell, "script": script}, lambda: print(script, file=sys.stdout))
     return DONE

@@ -17,16 +17,16 @@ from cyclopts import Group, Parameter, Token
 
 from miurafab.cli.ending import flag, spelled
 from miurafab.errors import OptionError
-from miurafab.options import Declared, Flag, Kind, Several, Text, declared
+from miurafab.options import Choice, Declared, Flag, Kind, Several, Text, declared
 
 ARGUMENTS = Group("Arguments", sort_key=0)
 OPTIONS = Group("Options", sort_key=1)
 EVERY_COMMAND = Group("General", sort_key=99)
 
 
-def argument(label: str, help: str) -> Parameter:
+def argument(label: str, help: str, choices: Sequence[str] | None = None) -> Parameter:
     """What is given by its place; ``label`` stands for it in help."""
-    return Parameter(name=label, help=help, group=ARGUMENTS)
+    return Parameter(name=label, help=help, group=ARGUMENTS, choices=choices)
 
 
 def option(
@@ -62,6 +62,7 @@ def option(
         metavar=kind.metavar,
         show_default=default_text or (lambda value: "" if value is None else kind.show(value)),
         converter=read,
+        choices=kind.names if isinstance(kind, Choice) else None,
         allow_leading_hyphen=True,
     )
 
@@ -164,6 +165,8 @@ def _annotation(entry: Declared, group: Group) -> Any:
         return Annotated[bool | None, parameter]
     if isinstance(entry.kind, Several):  # --force a --force b is --force a,b
         return Annotated[list[str] | None, parameter, Parameter(converter=_with_commas)]
+    if isinstance(entry.kind, Choice):
+        return Annotated[str | None, parameter, Parameter(choices=entry.kind.names)]
     return Annotated[str | None, parameter]
 
 

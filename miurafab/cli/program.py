@@ -9,6 +9,7 @@ from typing import Any
 
 from cyclopts import (
     App,
+    CoercionError,
     CycloptsError,
     Group,
     MissingArgumentError,
@@ -41,6 +42,7 @@ from miurafab.cli.console import Screen
 from miurafab.cli.declared import ARGUMENTS, EVERY_COMMAND, OPTIONS
 from miurafab.cli.help import HelpFormatter
 from miurafab.errors import DONE, EXIT_CODES, UsageError
+from miurafab.options import Choice
 from miurafab.version import __version__
 
 DESIGN = Group("Design", sort_key=1)
@@ -196,6 +198,12 @@ def _sentence(error: CycloptsError) -> str:
             return _unknown_option(unknown[0], path)
         label = f"{error.argument.name} {metavar}".strip()
         return f"{name} needs {label}: {error.argument.parameter.help}"
+    if isinstance(error, CoercionError) and error.token and error.argument:
+        names = error.argument.parameter.choices
+        if isinstance(names, tuple):
+            return _wrong_choice(
+                error.token.keyword or error.argument.name, error.token.value, names
+            )
     if isinstance(error, UnusedCliTokensError):
         return f"{name} takes no further argument '{unused[0]}'."
     return f"{name}: {str(error).rstrip('.')}."
@@ -209,6 +217,16 @@ def _unknown_option(word: str, path: Sequence[str]) -> str:
     known = [name for each in options for name in each.names]
     option = word.partition("=")[0]
     return f"{' '.join(('miurafab', *path))} has no option {option}{_near(option, known)}."
+
+
+def _wrong_choice(label: str, value: str, names: tuple[str, ...]) -> str:
+    """In the words of the declaration, which is what Python and TOML files answer with."""
+    fault = ""
+    try:
+        Choice(names).check(value)
+    except ValueError as error:
+        fault = str(error)
+    return f"{label} {fault}."
 
 
 def _near(word: str, names: Iterable[str]) -> str:

@@ -140,7 +140,9 @@ def test_the_examples_name_commands_and_options_that_exist():
         (("cut", "job", "--pointer", "50", "--port", "virtual"), "between 0 % and 5 %"),
         (("cut", "job", "--pointer", "3", "--port", "virtual"), "ask for the --frame as well"),
         (("cut", "job.nc", "--facets", "8x8", "--port", "virtual"), "--facets is for a target"),
-        (("completion", "tcsh"), "'tcsh' is not a shell"),
+        (("completion", "tcsh"), "SHELL is 'tcsh'; it must be one of bash, zsh"),
+        (("fit", "hypar", "-o", "x.fold", "--polish", "maybe"), "one of auto, on, off."),
+        (("fit", "hypar", "-o", "x.fold", "--close", "seem"), "--close is 'seem'; did you mean"),
     ],
 )
 def test_a_mistake_in_the_command_line_is_one_sentence(run, arguments, named):
@@ -158,7 +160,15 @@ def test_a_mistake_in_the_command_line_is_one_sentence(run, arguments, named):
 )
 def test_completion_knows_commands_and_options(run, tmp_path, shell, check):
     script = run("completion", shell).stdout
-    for word in ("miurafab", "tradeoff", "calibrate", "min-edge", "check-mode", "baud"):
+    for word in (
+        "miurafab",
+        "tradeoff",
+        "calibrate",
+        "min-edge",
+        "check-mode",
+        "baud",
+        "alternate",
+    ):
         assert word in script
     assert json.loads(run("completion", shell, "--json").stdout)["script"] + "\n" == script
     if check is not None and shutil.which(check[0]):
