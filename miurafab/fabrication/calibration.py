@@ -1,17 +1,17 @@
-"""The calibration sheet: what a material needs on one laser, read off one small piece of it.
+"""The calibration sheet: finds the settings of a material on a laser from one small sheet.
 
-Four things are on it, all with their settings engraved beside them:
+It holds four tests, each with its settings engraved beside it:
 
 * *Flaps*, cut on three sides and hinged on dashes: a row for each pair of dash and gap, a column
-  for each pair of power and feed. Fold them; the best one names all four.
-* *Squares*, cut with a power and a feed each: the first that falls out is the one to use.
+  for each pair of power and feed. Fold them; the flap that folds best gives all four settings.
+* *Squares*, each cut with a power and a feed: use the settings of the first that falls out.
 * The *kerf gauge*, a window of width W cut into n strips. With a kerf k the window is W + k wide
   and the strips W - n k together, so when they are pushed to the left the last one ends
   (n + 1/2) k short of the drawn right end; a scale above the window is ruled by that formula, and
   kerf is read off it.
 * A *coupon*, a small Miura-ori made with the material as it is.
 
-The sheet is as large as it needs to be, so that an off-cut will do.
+The sheet is as small as possible, so that an off-cut is enough.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ Points = Floats
 
 SHEET = "sheet-01"
 DASHES = ((0.7, 1.3), (1.0, 1.0), (1.4, 1.0), (1.8, 0.8))
-"""The rows: dash and gap over those of the material, from stiff to soft."""
+"""The rows: dash and gap over the material's, from stiff to soft."""
 POWERS = (0.7, 1.0, 1.3)
 FEEDS = (1.0, 1.6)
-"""The columns: power and feed over those of the material, as far as both allow."""
+"""The columns: power and feed over the material's, within the limits of both."""
 STRIPS = 20
 _PITCH = (16.0, 14.0)
 _FLAP = (11.0, 9.0)
 _SQUARE = 8.0
 _HEAD, _FOOT = 9.0, 20.0
 _RATIO = 2.4
-"""The height of what is written on the left of a row, in mm."""
+"""The height of the text at the left of a row, in mm."""
 _WINDOW = (80.0, 14.0)
 _SPACE = 8.0
 _COUPON = MiuraCell(across=12.0, along=12.0, alpha=math.radians(68), theta=math.radians(40))
@@ -57,7 +57,7 @@ _COUPON_GRID = (7, 5)
 
 @dataclass(frozen=True)
 class Cell:
-    """One flap: ``label`` as engraved, its dashes, and how they are burnt."""
+    """One flap: its engraved ``label``, its dashes, and their operation."""
 
     label: str
     perforation: Perforation
@@ -66,7 +66,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Square:
-    """One square: ``label`` as engraved, and how it is cut."""
+    """One square: its engraved ``label`` and its operation."""
 
     label: str
     operation: Operation
@@ -74,8 +74,8 @@ class Square:
 
 @dataclass(frozen=True, eq=False)
 class CalibrationSheet:
-    """The sheet. ``sections`` are made in turn, each with a material of its own; ``labels`` name
-    the patch numbers of their strokes. ``coupon`` is the pattern of the Miura-ori.
+    """The sheet. ``sections`` are made in order, each with its own material; ``labels`` name the
+    patch numbers of their strokes. ``coupon`` is the pattern of the Miura-ori.
     """
 
     width_mm: float
@@ -88,7 +88,7 @@ class CalibrationSheet:
 
     @property
     def toolpath(self) -> Toolpath:
-        """All strokes in turn, for drawings."""
+        """All strokes in order, for drawings."""
         paths = [toolpath for toolpath, _ in self.sections]
         sizes = np.concatenate([np.diff(path.offsets) for path in paths])
         return replace(
@@ -233,12 +233,12 @@ def _dashes(material: Material) -> list[Perforation]:
 
 
 def _scaled(length: float, factor: float) -> float:
-    """A length times ``factor`` in twentieths of a millimetre; the length itself as it stands."""
+    """A length times ``factor``, rounded to 0.05 mm; unchanged if the factor is 1."""
     return length if factor == 1.0 else round(round(length * factor * 20) / 20, 2)
 
 
 def _settings(material: Material, name: str, fastest: float) -> list[Operation]:
-    """The columns of one operation, by energy a mm, least first."""
+    """The columns of one operation, by energy per mm, the least first."""
     usual = material.operations[name]
     powers = dict.fromkeys(
         min(usual.power if factor == 1.0 else round(usual.power * factor, 2), material.max_power)
@@ -263,8 +263,8 @@ def _trial_size(left: float, rows: int, columns: int) -> tuple[float, float]:
 def _arranged(
     blocks: Sequence[tuple[float, float]], machine: MachineProfile
 ) -> tuple[list[Points], tuple[float, float]]:
-    """The lower left corners of the blocks, and the size of them all, less high if there is room
-    for it: the first on the left and the others on its right, or all above each other.
+    """The lower left corners of the blocks, and their total size: the first block on the left and
+    the others to its right if there is room, or all above each other.
     """
     (wide, high), (wide_1, high_1), (wide_2, high_2) = blocks
     right = wide + _SPACE
@@ -303,7 +303,7 @@ def _write(pen: _Pen, text: str, middle: Points | tuple[float, float], height: f
 
 
 def gauge_mark(kerf: float) -> float:
-    """How far left of the window's drawn right end the last strip ends with this kerf, in mm."""
+    """The distance in mm of the last strip from the drawn right end of the window, at this kerf."""
     return (STRIPS + 0.5) * kerf
 
 
@@ -328,7 +328,7 @@ def _gauge(engraved: _Pen, cut: _Pen, corner: Points) -> None:
 
 
 def _routed(folds: Toolpath, coupon: CreasePattern) -> Toolpath:
-    """The strokes of the coupon in an order with little travel."""
+    """The strokes of the coupon, ordered for little travel."""
     nowhere = np.zeros(len(folds), dtype=np.int64)
     return order_strokes(StrokeSet(folds, folds.edge, nowhere), coupon.edges_vertices)
 

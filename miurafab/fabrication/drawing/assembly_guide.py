@@ -1,9 +1,9 @@
-"""``assembly.pdf``: what the person with the glue needs, on A4.
+"""``assembly.pdf``: the assembly guide, on A4.
 
-The first page shows the folded form and the flat pattern with the patches in the same colours, and
-what was used to make them; then each sheet, its patches and where they belong; then how to fold and
-glue, step by step. Everything is drawn from the layout and the pattern, and the same input gives
-the same bytes.
+The first page shows the folded form and the flat pattern, with the patches in the same colours, and
+the settings. Then follow each sheet with its patches and their places, and the folding and gluing,
+step by step. Everything is drawn from the layout and the pattern; the same input gives the same
+bytes.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class _Overview:
             y -= 2.2
 
     def facts(self) -> list[tuple[str, list[str]]]:
-        """What the overview says beside the pictures."""
+        """The text of the overview beside the pictures."""
         pattern, material, totals = self.views.pattern, self.material, self.views.layout.totals
 
         def size(points: Floats) -> str:
@@ -136,7 +136,7 @@ class _Overview:
 
 
 def _ways(material: Material) -> list[str]:
-    """How the creases are made, kinds that are alike in one line."""
+    """How the creases are made; kinds made alike share a line."""
     kinds: dict[str, list[str]] = {}
     for kind, crease in material.creases.items():
         rule = material.perforation_of(kind)
@@ -154,7 +154,7 @@ def _ways(material: Material) -> list[str]:
 
 
 def _setting(machine: MachineProfile, material: Material, name: str) -> str:
-    """Power, where the tool is a laser, and feed of one operation."""
+    """The power, if the tool is a laser, and the feed of one operation."""
     operation = material.operations[name]
     power = f"{operation.power:.0%}, " if machine.tool.kind == "laser" else ""
     passes = f", {operation.passes} passes" if operation.passes > 1 else ""

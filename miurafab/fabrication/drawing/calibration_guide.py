@@ -1,4 +1,4 @@
-"""``calibration.pdf``: how the calibration sheet is read, on one A4 page."""
+"""``calibration.pdf``: how to read the calibration sheet, on one A4 page."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """The colours of patches, the same in every drawing.
 
-Their hues are spread by the golden section, so that neighbours differ, and they are of nearly one
-lightness, so that none stands out, in OKLCH (Ottosson 2020, "A perceptual color space for image
-processing").
+In OKLCH (Ottosson 2020, "A perceptual color space for image processing"), their hues are spaced by
+the golden section, so that neighbouring numbers differ, and their lightness is nearly equal.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ _GOLDEN = 0.61803398875
 
 
 def patch_colour(number: int, strength: float = 1.0) -> RGB:
-    """The colour of patch ``number``; a ``strength`` below 1 is nearer to white."""
+    """The colour of patch ``number``; a ``strength`` below 1 is closer to white."""
     hue = 2 * math.pi * ((0.12 + number * _GOLDEN) % 1.0)
     lightness = 1.0 - strength * (0.17 + 0.03 * (number % 3))
     return _srgb(lightness, 0.095 * strength, hue)

@@ -1,8 +1,8 @@
-"""Sheets as DXF, for cutters and CAD programs: real segments, one layer an operation, millimetres.
+"""Sheets as DXF, for cutters and CAD programs: real segments, one layer per operation, in mm.
 
-R12 is read by everything and is written line by line, so a hundred thousand dashes cost no memory;
-R2010 also says that its unit is the millimetre (``$INSUNITS`` = 4) and keeps outlines whole as
-light-weight polylines. DXF's y runs upwards like the sheet's. This is the only home of ezdxf.
+Every program reads R12. It is written line by line, so a hundred thousand dashes need no memory.
+R2010 also states its unit, mm (``$INSUNITS`` = 4), and keeps outlines whole as light-weight
+polylines. The y axis points up, as on the sheet. Only this module imports ezdxf.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ _COLOUR_INDEX = {"engrave": 7, "score": 3, "perforate": 5, "cut": 1}
 def sheet_dxf(toolpath: Toolpath, version: str = "R12") -> str:
     """The strokes of one sheet in DXF ``version`` (one of :data:`VERSIONS`), in their order.
 
-    R12 has a LINE for every straight piece; R2010 a LINE for a stroke of one piece and an
-    LWPOLYLINE for any other. Layers are named for the operations.
+    R12 has a LINE for every segment; R2010 a LINE for a stroke of one segment and an LWPOLYLINE for
+    other strokes. Layers are named after the operations.
     """
     if version == "R12":
         return _r12(toolpath)
@@ -47,7 +47,7 @@ def _r12(toolpath: Toolpath) -> str:
     heads = [f"0\nLINE\n8\n{name}\n62\n{_COLOUR_INDEX[name]}\n" for name in OPERATIONS]
     stream = io.StringIO()
     with r12writer(stream):
-        # The writer's own add_line takes three times as long.
+        # The writer's add_line takes three times as long.
         stream.writelines(
             f"{heads[operation]}10\n{x0}\n20\n{y0}\n11\n{x1}\n21\n{y1}\n"
             for (x0, y0, x1, y1), operation in zip(

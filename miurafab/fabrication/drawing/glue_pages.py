@@ -1,4 +1,4 @@
-"""The last pages of the guide: how to fold, and what is glued to what, step by step."""
+"""The last pages of the guide: how to fold, and the steps of gluing."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from miurafab.fabrication.drawing.views import Views
 from miurafab.fabrication.sheets import Layout
 
 _STEP = (ROOM - 12) / 3
-"""The width of one step of glueing."""
+"""The width of one step of gluing."""
 
 
 @dataclass(frozen=True, eq=False)
 class GluePages:
-    """The pages on folding and glueing in the guide with this ``title``."""
+    """The pages on folding and gluing in the guide with this ``title``."""
 
     views: Views
     title: str
@@ -86,11 +86,11 @@ class GluePages:
             yield more
 
     def notes(self) -> list[str]:
-        """What could not be had and has to be known."""
+        """The findings that matter for the assembly."""
         return [str(finding) for finding in self.layout.findings]
 
     def seams_by_pair(self) -> dict[tuple[int, int, bool], list[int]]:
-        """The pattern edges of each seam by its two patches and whether it closes the sheet."""
+        """The pattern edges of each seam, by its two patches and by whether it closes the sheet."""
         found: dict[tuple[int, int, bool], list[int]] = {}
         for patch in self.views.patches:
             for tab in patch.tabs:
@@ -109,7 +109,7 @@ class GluePages:
         seams: dict[tuple[int, int, bool], list[int]],
         box: Box,
     ) -> None:
-        """One step of glueing, from the top of ``box`` down."""
+        """One step of gluing, from the top of ``box`` down."""
         x, top, width, height = box
         line_above(canvas, x, top, width)
         canvas.setFillColor(INK)

@@ -1,8 +1,8 @@
-"""Sheets as HPGL, for cutting plotters: absolute moves of a pen or blade, one pen an operation.
+"""Sheets as HPGL, for cutting plotters: absolute moves of a pen or blade, one pen per operation.
 
-A plotter unit is 0.025 mm (HP-GL reference, "plotter units": 40 a millimetre). The file starts with
-``IN`` and ends with the tool lifted and put away (``PU;SP0``), so that it runs alone. A long
-outline is told in several instructions, since plotters hold only so much of one in their buffers.
+A plotter unit is 0.025 mm (HP-GL reference, "plotter units": 40 per millimetre). The file starts
+with ``IN`` and ends with the tool lifted and put away (``PU;SP0``), so that it runs alone. A long
+outline is split into several instructions, because the buffers of plotters are limited.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ that the buffers of the smallest plotters hold (judged).
 def sheet_hpgl(toolpath: Toolpath, setup: Mapping[str, str] | None = None) -> str:
     """The strokes of one sheet as HPGL text, in their order, rounded to plotter units.
 
-    ``setup`` are the instructions that set speed and force, by operation, given with its pen.
+    ``setup`` are the instructions for speed and force by operation, sent after selecting its pen.
     """
     units = np.rint(toolpath.points * UNITS_PER_MM).astype(np.int64)
     words = [f"{x},{y}" for x, y in units.tolist()]

@@ -1,4 +1,4 @@
-"""How to fold and glue, in words and two small drawings: what the lines and the tabs say."""
+"""How to fold and glue, in words and two small drawings that explain the lines and the tabs."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ _GLUEING = (
 
 _COLUMN = (ROOM - 10) / 2
 _STEP = 8.5 * 0.47
-"""From one line of a paragraph to the next."""
+"""The line spacing of a paragraph."""
 
 
 def height_of_instructions(notes: Sequence[str], *, glue: bool) -> float:
-    """What :func:`draw_instructions` takes of a page."""
+    """The height of :func:`draw_instructions` in mm."""
     columns = (
         sum(len(wrapped(line, _COLUMN - 5, 8.5)) * _STEP + 1.4 for line in lines)
         for lines in ((_FOLDING, _GLUEING) if glue else (_FOLDING,))
@@ -55,7 +55,7 @@ def height_of_instructions(notes: Sequence[str], *, glue: bool) -> float:
 
 
 def draw_instructions(canvas: Canvas, top: float, notes: Sequence[str], *, glue: bool) -> None:
-    """How to fold, and if there are tabs how to ``glue``, from ``top`` down, with ``notes``."""
+    """How to fold, how to ``glue`` if there are tabs, and ``notes``, from ``top`` down."""
     columns: list[tuple[float, str, Sequence[str]]] = [(MARGIN, "Fold", _FOLDING)]
     _draw_folds(canvas, MARGIN, top - 34)
     if glue:
@@ -85,7 +85,7 @@ def _solid(x: float, y: float, size: float, points: Sequence[tuple[float, float,
 
 
 def _draw_folds(canvas: Canvas, x: float, y: float) -> None:
-    """A mountain and a valley: two leaves that meet in a coloured line."""
+    """A mountain and a valley: two facets that meet in a coloured line."""
     size = 15.0
     for place, (name, colour, lift) in enumerate(
         (("mountain", MOUNTAIN, 0.5), ("valley", VALLEY, -0.5))
@@ -99,7 +99,7 @@ def _draw_folds(canvas: Canvas, x: float, y: float) -> None:
         canvas.setLineWidth(0.25 * mm)
         canvas.setLineJoin(1)
         leaves = [(0.4, near), (0.85, far)]
-        # The leaf that is farther from the eye goes first.
+        # The facet farther from the viewer is drawn first.
         for strength, corners in leaves if lift < 0 else leaves[::-1]:
             canvas.setFillColor(tint(0, strength))
             polygon(canvas, _solid(left, base, size, corners), stroke=True)
@@ -108,7 +108,7 @@ def _draw_folds(canvas: Canvas, x: float, y: float) -> None:
 
 
 def _draw_tab(canvas: Canvas, x: float, y: float) -> None:
-    """A tab with its number and letter, and the facet that it goes under."""
+    """A tab with its number and letter, and the facet under which it goes."""
     left = np.array([[0, 0], [30, 0], [26, 24], [-4, 24]]) + np.array([x + 6, y + 4])
     tab = np.array([[29.6, 2.5], [38.5, 5], [35.2, 20], [26.6, 21.5]]) + np.array([x + 6, y + 4])
     right = np.array([[0, 0], [27, 0], [23, 24], [-4, 24]]) + np.array([x + 49, y + 4])
@@ -128,7 +128,7 @@ def _draw_tab(canvas: Canvas, x: float, y: float) -> None:
 
 
 def _line(canvas: Canvas, ends: Floats, colour: Color) -> None:
-    """A crease, heavier than the outlines about it."""
+    """A crease, drawn heavier than outlines."""
     canvas.setStrokeColor(colour)
     canvas.setLineWidth(0.7 * mm)
     (x0, y0), (x1, y1) = (ends * mm).tolist()

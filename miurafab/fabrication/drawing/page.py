@@ -1,6 +1,6 @@
-"""The printed page: A4 with one set of margins, inks, type sizes and small parts for all guides.
+"""The parts of a printed A4 page that all guides share: margins, inks, type sizes, small drawings.
 
-Lengths are mm on the page, its origin at the lower left.
+Lengths are mm on the page; the origin is at the lower left.
 """
 
 from __future__ import annotations
@@ -16,21 +16,23 @@ from reportlab.pdfgen.canvas import Canvas
 from miurafab.fabrication.drawing.colours import patch_colour
 from miurafab.fabrication.wording import runs
 from miurafab.geometry.arrays import Floats
+from miurafab.origami import picture
 
 Page = Callable[[Canvas], None]
-"""What draws one page."""
+"""A function that draws one page."""
 Box = tuple[float, float, float, float]
 """A rectangle on the page: x, y of its lower left corner, width, height."""
 
 WIDTH, HEIGHT, MARGIN = 210.0, 297.0, 18.0
 ROOM = WIDTH - 2 * MARGIN
-"""Between the margins."""
+"""The width between the margins."""
 BOTTOM = 17.0
-"""Above the foot of the page."""
+"""The lower end of the content, above the foot."""
 
-INK, QUIET, RULE = HexColor("#1d2329"), HexColor("#5c6670"), HexColor("#c3cad2")
+INK, QUIET, RULE = HexColor(picture.INK), HexColor("#5c6670"), HexColor("#c3cad2")
 PALE = HexColor("#eef1f4")
-MOUNTAIN, VALLEY, OTHER = HexColor("#c8372d"), HexColor("#2a5fb0"), HexColor("#8a6d3b")
+MOUNTAIN, VALLEY = HexColor(picture.CREASES["M"]), HexColor(picture.CREASES["V"])
+OTHER = HexColor("#8a6d3b")
 CREASE_COLOURS = {"M": MOUNTAIN, "V": VALLEY, "U": OTHER}
 
 
@@ -50,7 +52,7 @@ def text(
     colour: Color = INK,
     align: str = "left",
 ) -> None:
-    """One line of text with its baseline at ``y``, from, to or about ``x``."""
+    """One line of text with its baseline at ``y``; it starts, ends or is centred at ``x``."""
     canvas.setFillColor(colour)
     canvas.setFont(_font(bold), size)
     draw = {
@@ -66,7 +68,7 @@ def _font(bold: bool) -> str:
 
 
 def wrapped(words: str, width: float, size: float, *, bold: bool = False) -> list[str]:
-    """``words`` in lines of at most ``width`` mm, as far as single words let them."""
+    """``words`` in lines of at most ``width`` mm; a longer word gets a line of its own."""
     lines = [""]
     for word in words.split():
         longer = f"{lines[-1]} {word}".strip()
@@ -88,7 +90,7 @@ def paragraph(
     bold: bool = False,
     colour: Color = INK,
 ) -> float:
-    """``words`` in lines from the baseline ``y`` down; returns the baseline that follows."""
+    """``words`` in lines from the baseline ``y`` down; returns the next baseline."""
     step = size * 0.47
     for line in wrapped(words, width, size, bold=bold):
         text(canvas, x, y, line, size, bold=bold, colour=colour)
@@ -97,7 +99,7 @@ def paragraph(
 
 
 def heading(canvas: Canvas, title: str, subtitle: str) -> float:
-    """The head of a page; returns the height at which the page goes on."""
+    """The head of a page; returns the top of the content."""
     top = HEIGHT - MARGIN
     text(canvas, MARGIN, top - 5, title, 18, bold=True)
     text(canvas, MARGIN, top - 11, subtitle, 9.5, colour=QUIET)
@@ -108,7 +110,7 @@ def heading(canvas: Canvas, title: str, subtitle: str) -> float:
 
 
 def foot(canvas: Canvas, title: str, page: int, pages: int) -> None:
-    """What stands below every page."""
+    """The foot of a page."""
     text(canvas, MARGIN, 10, f"{title}, made with miurafab", 7.5, colour=QUIET)
     numbers = f"{page} of {pages}"
     text(canvas, WIDTH - MARGIN, 10, numbers, 7.5, colour=QUIET, align="right")
@@ -120,7 +122,7 @@ def caption(canvas: Canvas, words: str, x: float, y: float) -> None:
 
 
 def scale_bar(canvas: Canvas, scale: float, x: float, y: float) -> None:
-    """A bar of a round length in the drawing's own scale (page mm a pattern mm)."""
+    """A bar of a round length at ``scale`` (page mm per pattern mm)."""
     length = next(
         size for size in (500, 200, 100, 50, 20, 10, 5, 2, 1, 0.5) if size * scale <= 45 or size < 1
     )
@@ -133,7 +135,7 @@ def scale_bar(canvas: Canvas, scale: float, x: float, y: float) -> None:
 
 
 def legend(canvas: Canvas, entries: Sequence[tuple[str, Color, float]], x: float, y: float) -> None:
-    """Names behind strokes of their colour and weight (mm), from right to left up to ``x``."""
+    """Names, each behind a stroke of its colour and weight (mm), right-aligned at ``x``."""
     for name, colour, weight in reversed(entries):
         text(canvas, x, y - 1, name, 8, colour=QUIET, align="right")
         x -= stringWidth(name, "Helvetica", 8) / mm + 1.5
@@ -144,7 +146,7 @@ def legend(canvas: Canvas, entries: Sequence[tuple[str, Color, float]], x: float
 
 
 def chip(canvas: Canvas, words: str, x: float, y: float, fill: Color, size: float = 7.0) -> None:
-    """A short word on a rounded patch of colour about (``x``, ``y``)."""
+    """A short word on a rounded rectangle, centred at (``x``, ``y``)."""
     wide = stringWidth(words, "Helvetica-Bold", size) / mm + 0.32 * size
     tall = 0.52 * size
     canvas.setFillColor(fill)
@@ -157,7 +159,7 @@ def chip(canvas: Canvas, words: str, x: float, y: float, fill: Color, size: floa
 
 
 def polygon(canvas: Canvas, points: Floats, *, stroke: bool = False) -> None:
-    """A closed polygon (n, 2) in the current colours, filled."""
+    """A filled closed polygon (n, 2) in the current colours."""
     path = canvas.beginPath()
     path.moveTo(points[0, 0] * mm, points[0, 1] * mm)
     for x, y in points[1:].tolist():
@@ -176,7 +178,7 @@ def fitted(points: Floats, box: Box) -> tuple[Floats, float]:
 
 
 def line_above(canvas: Canvas, x: float, y: float, width: float) -> None:
-    """What parts two pieces of a page."""
+    """A rule between two parts of a page."""
     canvas.setStrokeColor(RULE)
     canvas.setLineWidth(0.2 * mm)
     canvas.line(x * mm, y * mm, (x + width) * mm, y * mm)

@@ -1,7 +1,6 @@
-"""Sheets as PDF, true to scale: for machines in the colours of their operations, for people in
-those of folds.
+"""Sheets as PDF, true to scale: in the colours of operations for machines, of folds for people.
 
-The parts of the drawing room that write PDF are the only homes of reportlab.
+Only the modules of this room that write PDF import reportlab.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ LINE_MM = 0.1
 
 
 def sheets_pdf(toolpaths: tuple[Toolpath, ...], title: str) -> bytes:
-    """All sheets, one page each, the page being the sheet. The same input gives the same bytes."""
+    """All sheets, one page each, of the sheet's size. The same input gives the same bytes."""
     stream = io.BytesIO()
     canvas = new_canvas(stream, title)
     for toolpath in toolpaths:
@@ -44,7 +43,7 @@ def new_canvas(stream: io.BytesIO, title: str) -> Canvas:
 
 
 def draw_strokes(canvas: Canvas, toolpath: Toolpath, line_mm: float = LINE_MM) -> None:
-    """Draw the strokes at the canvas's origin, in mm, a colour an operation."""
+    """Draw the strokes from the origin of the canvas, in mm, one colour per operation."""
     canvas.setLineWidth(line_mm * mm)
     canvas.setLineCap(0)
     points = (toolpath.points * mm).tolist()

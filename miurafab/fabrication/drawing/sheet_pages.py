@@ -1,4 +1,4 @@
-"""The pages of the guide on one sheet: what is made of it, and where its patches belong."""
+"""The pages of the guide on one sheet: its strokes, and the places of its patches."""
 
 from __future__ import annotations
 
@@ -45,15 +45,15 @@ from miurafab.geometry.arrays import Floats
 from miurafab.profiles import OPERATIONS
 
 _CARD = 33.0
-"""The least height of what is said of one patch below its sheet; more is used where there is."""
+"""The least height of a card below its sheet; cards are higher if there is room."""
 _PICTURED = 12
-"""Of more patches on a sheet only the words are shown: the sheet itself is the picture."""
+"""With more patches on a sheet, cards have no picture: the sheet is the picture."""
 _COLUMNS = 3
 _MADE = {"cut": "cut", "perforate": "perforated", "score": "scored"}
-"""The operations whose lengths are told, and what they do."""
+"""The operations whose lengths are shown, and their verbs."""
 
 _Words = tuple[float, float, str, list[str]]
-"""Where the words on a patch begin, its name, and the lines below."""
+"""The places of the text on a card: its left edge, the name, and the lines below."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class SheetPages:
 
     @cached_property
     def behind(self) -> Toolpath | None:
-        """What is made from the back of the sheet, as it lies seen from the front."""
+        """The strokes made from the back of the sheet, seen from the front."""
         for back in self.layout.backs:
             if back.sheet == self.sheet.back:
                 mirrored = back.points * [-1.0, 1.0] + [self.sheet.width_mm, 0.0]
@@ -79,7 +79,7 @@ class SheetPages:
         return None
 
     def holes(self) -> str:
-        """Where the registration holes lie when the front is made."""
+        """The places of the registration holes when the front is made."""
         path = self.behind
         assert path is not None
         cut = path.operation == OPERATIONS.index("cut")
@@ -110,7 +110,7 @@ class SheetPages:
         if len(placed) > _PICTURED:
             yield from self.listed(placed, subtitle, scale, under)
             return
-        # The cards that stand below the drawing, and those on a page of their own.
+        # Cards below the drawing, and cards on a page of their own.
         first = max(int((under - BOTTOM) // _CARD), 0) * 2
 
         def front(canvas: Canvas) -> None:
@@ -132,7 +132,7 @@ class SheetPages:
     def listed(
         self, patches: list[int], subtitle: str, scale: float, under: float
     ) -> Iterator[Page]:
-        """The sheet, and the words on many patches in columns, on as many pages as it takes."""
+        """The sheet, and the texts of many patches in columns, on as many pages as needed."""
         top = HEIGHT - MARGIN - 19
         width = (ROOM - 6 * (_COLUMNS - 1)) / _COLUMNS
         blocks = [
@@ -173,7 +173,7 @@ class SheetPages:
             yield more
 
     def draw_sheet(self, canvas: Canvas, top: float, scale: float) -> None:
-        """The sheet with what is drawn on it, in the middle of the page."""
+        """The sheet with its strokes, in the middle of the page."""
         sheet, toolpath = self.sheet, self.toolpath
         x = MARGIN + (ROOM - sheet.width_mm * scale) / 2
         low = top - sheet.height_mm * scale
@@ -223,7 +223,7 @@ class SheetPages:
     def draw_names(
         self, canvas: Canvas, placed: Placement, corner: tuple[float, float], scale: float
     ) -> None:
-        """The name of a patch, and along each of its seams that of the patch beyond."""
+        """The name of a patch, and along each of its seams the name of the neighbour."""
         patch = self.layout.patches[placed.patch]
         pattern = self.views.pattern
 
@@ -257,7 +257,7 @@ class SheetPages:
             )
 
     def seams_of(self, patch: int) -> dict[int, list[int]]:
-        """The pattern edges of a patch that are glued, by the patch beyond."""
+        """The glued pattern edges of a patch, by neighbour."""
         found: dict[int, list[int]] = {}
         for other in self.layout.patches:
             for tab in other.tabs:
@@ -268,7 +268,7 @@ class SheetPages:
         return found
 
     def cards(self, canvas: Canvas, patches: list[int], top: float) -> None:
-        """What is to be known of each patch, in two columns."""
+        """The cards of the patches, in two columns."""
         rows = math.ceil(len(patches) / 2)
         if not rows:
             return
@@ -284,7 +284,7 @@ class SheetPages:
             self.say(canvas, patch, (x + beside + 5, y, width - beside - 5, height))
 
     def one_card(self, canvas: Canvas, patch: int, top: float) -> None:
-        """The same for a patch that has the page for itself, with its place in the folded form."""
+        """The card of a single patch on its page, with its place in the folded form."""
         third = (ROOM - 12) / 3
         room = min(top - BOTTOM, 80.0)
         line_above(canvas, MARGIN, top, ROOM)
@@ -298,7 +298,7 @@ class SheetPages:
         self.say(canvas, patch, (MARGIN + 2 * third + 12, top, third, room))
 
     def say(self, canvas: Canvas, patch: int, box: Box) -> None:
-        """The name of a patch and what it is glued to, in the upper part of ``box``."""
+        """The name of a patch and its neighbours, in the upper part of ``box``."""
         x, top, width, height = box
         facets = count(len(self.layout.patches[patch].faces), "facet", "facets")
         text(canvas, x, top - 6, self.label(patch), 11, bold=True)
@@ -332,8 +332,8 @@ class SheetPages:
 
 
 def _clear_place(places: Floats, strokes: Floats, label: str, size: float) -> Floats:
-    """The first of ``places`` (n, 2), or else the one nearest to it, where a ``label`` in type of
-    ``size`` hides none of the points ``strokes`` (m, 2); the first if there is no such place.
+    """The place of ``places`` (n, 2) nearest to the first place at which a ``label`` of type size
+    ``size`` hides none of the points ``strokes`` (m, 2); the first place if there is none.
     """
     wide = stringWidth(label, "Helvetica-Bold", size) / mm / 2 + 1.5
     room = np.array([wide, 0.14 * size + 1.5])

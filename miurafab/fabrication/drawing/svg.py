@@ -1,12 +1,11 @@
 """Drawings as SVG: sheets for the machine, and a picture of the pattern for people.
 
-A sheet is drawn true to scale: width and height in mm and a viewBox in mm, so that importers need
-not guess a resolution. SVG's y runs downwards and the sheet's upwards, so y is flipped about the
-sheet. Each operation is a layer of its own, in the colour that LightBurn maps to a layer of its
-own (palette entries 00 to 03), and every dash is a segment of its own: importers cut a dashed
-line style through.
+A sheet is drawn true to scale: width, height and viewBox in mm, so that importers do not guess a
+resolution. The y axis of SVG points down and that of the sheet up, so y is mirrored. Each operation
+is a layer, in a colour that LightBurn maps to a layer (palette entries 00 to 03). Every dash is a
+segment: importers ignore a dashed line style and would cut through.
 
-This is the only home of svgwrite. Its validation is off: it costs more than the drawing.
+Only this module imports svgwrite. Its validation is off: it takes longer than the drawing.
 """
 
 from __future__ import annotations
@@ -47,9 +46,9 @@ _CREASES = {
 
 
 def sheet_svg(toolpath: Toolpath) -> str:
-    """The strokes of one sheet, true to scale, a layer an operation, in the order they are made.
+    """The strokes of one sheet in their order, true to scale, one layer per operation.
 
-    The strokes of one crease are subpaths of one path, and so is the lettering of one patch.
+    The strokes of a crease are subpaths of one path, and so are the texts of a patch.
     """
     width, height = toolpath.width_mm, toolpath.height_mm
     drawing = _drawing(width, height, (f"{_short(width)}mm", f"{_short(height)}mm"))
@@ -74,7 +73,7 @@ def sheet_svg(toolpath: Toolpath) -> str:
 def pattern_svg(pattern: CreasePattern, layout: Layout | None = None) -> str:
     """A picture of the flat pattern: mountains red, valleys blue, border black.
 
-    With a ``layout`` the patches are tinted, and their names stand in them.
+    With a ``layout`` the patches are tinted and named.
     """
     points = pattern.vertices_coords * np.array([1.0, -1.0])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -126,7 +125,7 @@ def _add_names(
     group = drawing.g(
         font_family="sans-serif", font_size=_short(size), font_weight="bold", text_anchor="middle",
     )  # fmt: skip
-    # A rim under the letters, so that creases do not spoil them; many programs do not know
+    # A white rim under the letters keeps creases away; many programs do not know
     # paint-order, so it is a text of its own.
     rim = {"stroke": "#ffffff", "stroke_width": _short(0.16 * size), "stroke_linejoin": "round"}
     for patch in layout.model.patches:

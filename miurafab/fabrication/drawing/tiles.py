@@ -1,10 +1,10 @@
-"""Sheets over the pages of an ordinary printer, true to scale, to be joined by hand.
+"""Sheets tiled over the pages of an ordinary printer, true to scale, to be joined by hand.
 
-First comes a page that shows the sheet and its tiles, then one page for each tile on which
-something is drawn, named like a field of a chess board: A1 is at the lower left. The tiles begin
-where the drawing does, not the sheet, since each page costs an edge to glue. Neighbouring pages
-share a strip. In it lie numbered crosses, each at one place of the sheet and so on both pages: laid
-cross upon cross the pages match. Mountains, valleys and cuts are told apart by colour.
+The first page shows the sheet and its tiles. Then follows one page for each tile that is not blank,
+named like a square of a chess board: A1 is at the lower left. The tiles start at the drawing, not
+at the sheet, because each page costs an edge to glue. Neighbouring pages overlap by a strip with
+numbered crosses; each cross is on both pages at the same place of the sheet, so pages match cross
+on cross. Mountains, valleys and cuts have different colours.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ PAGES_MM = {
 """Page sizes by name: width and height in mm (ISO 216; ANSI/ASME Y14.1, US legal)."""
 
 CHECK_MM = 50.0
-"""The length of the bar by which the scale of a print is checked."""
+"""The length of the bar for checking the scale of a print."""
 
 EDGE_MM = 2.0
-"""Between the drawing and the frame of the outermost pages."""
+"""The distance between the drawing and the edge of the outermost pages."""
 
 _HOW = (
     "Print at 100 %, without fitting to the page, and check the bar of 50 mm at the foot of each. "
@@ -61,9 +61,9 @@ _HOW = (
 
 @dataclass(frozen=True)
 class Tiling:
-    """How a sheet is cut into pages: a size of :data:`PAGES_MM`, upright or lying as it takes
-    fewer of them, the ``margin_mm`` that printers leave blank, and the ``overlap_mm`` that
-    neighbouring pages share.
+    """The tiling of a sheet: a page size of :data:`PAGES_MM`, portrait or landscape, whichever
+    needs fewer pages, the blank ``margin_mm`` of printers, and the ``overlap_mm`` of neighbouring
+    pages.
     """
 
     page: str = "a4"
@@ -119,12 +119,12 @@ class _Tiles:
 
     @property
     def grid(self) -> str:
-        """How many columns and rows there are, in words."""
+        """The number of columns and rows, in words."""
         columns = count(self.columns, "column", "columns")
         return f"{columns} by {count(self.rows, 'row', 'rows')}"
 
     def corner(self, row: int, column: int) -> tuple[float, float]:
-        """Where on the sheet a tile begins."""
+        """The lower left corner of a tile on the sheet."""
         x, y = self.origin.tolist()
         return x + column * self.step[0], y + row * self.step[1]
 
@@ -142,7 +142,7 @@ class _Tiles:
 
     @cached_property
     def printed(self) -> list[tuple[int, int]]:
-        """The tiles with something on them, row by row."""
+        """The tiles that are not blank, row by row."""
         places = [(row, column) for row in range(self.rows) for column in range(self.columns)]
         return [place for place in places if len(self.strokes_in(*place))]
 
@@ -166,7 +166,7 @@ class _Tiles:
                         yield (number, at, along) if axis == 0 else (number, along, at)
 
     def overview(self, canvas: Canvas, title: str) -> None:
-        """The sheet with its tiles and what to do with them."""
+        """The sheet with its tiles, and instructions."""
         margin = self.margin + 6
         room = self.page[0] - 2 * margin
         top = self.page[1] - margin

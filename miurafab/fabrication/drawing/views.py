@@ -1,6 +1,6 @@
 """Views of a pattern and its patches on a printed page: folded, flat, and as a small map.
 
-All views of one guide show a patch in the same colour, and all flat ones lie the same way round.
+All views of a guide show a patch in the same colour, and all flat views have the same orientation.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.picture import project
 
 _TALL = 1.25
-"""A flat pattern so many times taller than wide is shown lying on its side."""
+"""A flat pattern with a larger ratio of height to width is turned by a right angle."""
 
 OUTLINED = 30_000
-"""In views of more facets than this the outline of each would be all that is seen."""
+"""Views with more facets omit the outlines of facets, which would hide everything else."""
 
 
 def edge_letters(layout: Layout, pattern: CreasePattern) -> NDArray[np.str_]:
-    """(E,) the assignment of each edge, a border that is glued having that of its fold."""
+    """(E,) the assignment of each edge; a glued border has the assignment of its fold."""
     letters = pattern.edges_assignment.copy()
     for patch in layout.patches:
         for tab in patch.tabs:
@@ -60,15 +60,15 @@ class Views:
 
     @cached_property
     def patches(self) -> tuple[Patch, ...]:
-        """The patches of one model: of several copies the views show the first."""
+        """The patches of the first copy of the model, which the views show."""
         return self.layout.model.patches
 
     def base(self, patch: int) -> int:
-        """The patch of the first copy that any patch is a copy of."""
+        """The patch of the first copy that corresponds to a patch."""
         return patch % len(self.patches)
 
     def name(self, patch: int) -> str:
-        """What a patch is called in every copy."""
+        """The name of a patch, the same in every copy."""
         return self.patches[self.base(patch)].label.partition("-")[0]
 
     @cached_property
@@ -81,7 +81,7 @@ class Views:
 
     @cached_property
     def flat(self) -> Floats:
-        """(V, 2) the flat pattern, lying on its side if it is tall."""
+        """(V, 2) the flat pattern, turned by a right angle if it is tall."""
         points = self.pattern.vertices_coords
         width, height = np.ptp(points, axis=0)
         turned = points[:, ::-1] * [-1.0, 1.0]
@@ -104,8 +104,8 @@ class Views:
         return edge_letters(self.layout, self.pattern)
 
     def folded_view(self, canvas: Canvas, box: Box, shown: Collection[int] | None = None) -> float:
-        """An orthographic view, far facets first, lit from the upper left; returns its scale. With
-        ``shown`` all other patches are pale.
+        """An orthographic view, far facets first, lit from the upper left; returns its scale. If
+        ``shown`` is given, other patches are pale.
         """
         assert self.pattern.folded_coords is not None
         faces = self.pattern.faces_vertices
@@ -168,8 +168,8 @@ class Views:
         done: Collection[int] = (),
         seams: Ints | None = None,
     ) -> None:
-        """The patches alone: those ``shown`` in colour, those ``done`` lighter, all others pale,
-        and the pattern edges ``seams`` drawn heavily.
+        """The patches without creases: ``shown`` patches in colour, ``done`` patches lighter, other
+        patches pale; the pattern edges ``seams`` are heavy.
         """
         points, _ = fitted(self.flat, box)
         for patch in range(len(self.patches)):
@@ -189,7 +189,7 @@ class Views:
 
 
 def named(canvas: Canvas, label: str, x: float, y: float, size: float) -> None:
-    """A label about a point of a drawing, with a rim of white."""
+    """A label centred on a point of a drawing, with a white rim."""
     at = canvas.beginText()
     canvas.setLineWidth(0.14 * size / 72 * 25.4 * mm)
     canvas.setLineJoin(1)
@@ -205,5 +205,5 @@ def named(canvas: Canvas, label: str, x: float, y: float, size: float) -> None:
 
 
 def _fitting(size: float, patches: int) -> float:
-    """The type size of the names of so many patches."""
+    """The type size for the names of ``count`` patches."""
     return max(size * min(1.0, math.sqrt(16 / max(patches, 1))), 3.5)
