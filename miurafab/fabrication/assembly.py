@@ -1,15 +1,14 @@
-"""The order in which patches are glued: always onto what is already one piece, from its rim.
+"""The order of gluing: each patch is glued to the rim of the assembly.
 
-A step is reachable if the patch meets what is assembled along one unbroken line: then the seam is
-closed from one end to the other with fingers on both sides, and what is assembled stays a disk,
-without a hole that would have to be closed from the outside. A disk of patches always has such a
-step left, wherever one begins (Danaraj and Klee 1978: every shelling of a disk can be finished).
-Where the pattern itself has a hole, the step that closes the ring is the last resort.
+A step is reachable if the patch meets the assembly along one unbroken line. Then the seam can be
+closed from one end to the other with fingers on both sides, and the assembly stays a disk. A disk
+of patches always has a reachable step, whatever the order so far (Danaraj and Klee 1978: every
+shelling of a disk can be completed). If the pattern has a hole, the step that closes the ring is
+taken only when no other step is left.
 
-The first patch is the one with the longest seams. Of the reachable ones the next is the one that
-shares the longest seam with what is assembled, so that the assembly grows round. A seam between
-two borders of the pattern, which makes a ring or a tube of the sheet, is closed when everything
-else is glued: until then it is reached from both sides.
+The patch with the longest seams is first. The next patch is the reachable patch with the longest
+seam to the assembly, so the assembly grows round. A seam between two borders of the pattern, which
+closes a ring or a tube, is glued last: until then both sides can be reached.
 """
 
 from __future__ import annotations
@@ -25,9 +24,9 @@ from miurafab.origami.crease_pattern import CreasePattern
 
 @dataclass(frozen=True)
 class GlueStep:
-    """``patch`` is glued onto ``onto`` (patch ids, sorted) by the tabs of these numbers; the first
-    step of each connected piece has neither. A step that ``closes`` glues what is assembled to
-    itself, ``patch`` being the one that bears the tabs.
+    """``patch`` is glued to the patches ``onto`` (sorted ids) by tabs numbered ``tabs``;
+    the first step of each connected component has neither. A step that ``closes`` glues the
+    assembly to itself; ``patch`` bears the tabs.
     """
 
     patch: int
@@ -37,7 +36,7 @@ class GlueStep:
 
 
 def assembly_order(layout: Layout, pattern: CreasePattern) -> tuple[GlueStep, ...]:
-    """One step for each patch, in the order of assembly, then those that close it."""
+    """One step for each patch, in the order of assembly, then the steps that close it."""
     count = len(layout.patches)
     owner = np.full(len(pattern.faces_vertices), -1)
     for patch in layout.patches:

@@ -1,20 +1,19 @@
-"""The way of a drag knife's holder, so that the blade's tip goes where the strokes are.
+"""The path of the axis of a drag knife, so that the tip of its blade follows the strokes.
 
-A drag knife is a caster: its tip T trails at the distance d behind the holder's axis C and can move
-only along the blade, towards C. So for the tip to move in direction u, the axis must be at
-C = T + d u, and
+A drag knife is a caster: its tip T trails at distance d behind the axis C and moves only along the
+blade, towards C. For the tip to move in direction u, the axis must be at C = T + d u. So
 
-* along a straight piece the axis runs parallel to it, d ahead;
-* at a corner from u to v the tip must stand while the blade turns: the axis goes on a circle of
-  radius d about the corner, from T + d u to T + d v. A chord of that circle over an angle s pushes
-  the tip back along the blade by at most d (1 - cos s/2) and lets it forth again;
-* at a turn too small to matter, such as those of a curve, that circle is a single chord;
-* a stroke begins with the blade where the stroke before left it: the axis comes down d ahead of
-  the first point in the *old* direction, and swivels there into the new one.
+* on a straight segment the axis runs parallel to it, d ahead;
+* at a corner from u to v the tip must stand still while the blade turns: the axis follows a circle
+  of radius d about the corner, from T + d u to T + d v. A chord of this circle over an angle s
+  pushes the tip back along the blade by at most d (1 - cos s/2) and then lets it return;
+* at a very small turn, as on a curve, the arc is a single chord;
+* a stroke starts with the blade in the direction of the last stroke: the axis comes down d ahead of
+  the first point in the *old* direction and swivels there into the new direction.
 
-Nobody knows how the blade stands before the first stroke. A straight cut in the margin of the sheet
-turns it: on such a cut tan(a/2) of the angle a between blade and cut falls by exp(-1) every d
-(the tractrix), so a length of 20 d leaves nothing of any angle.
+The direction of the blade before the first stroke is unknown. A straight cut in the margin of the
+sheet aligns it: tan(a/2), a the angle between blade and cut, falls by the factor exp(-1) every d
+(the tractrix), so a cut of 20 d aligns any angle.
 """
 
 from __future__ import annotations
@@ -29,17 +28,17 @@ from miurafab.geometry.arrays import Floats, Ints, places_in_runs
 from miurafab.profiles import OPERATIONS, Knife
 
 ALIGNING_OFFSETS = 20
-"""The length of the cut that turns the blade, in offsets."""
+"""The length of the cut that aligns the blade, in offsets."""
 _MM = 1e-3  # what is shorter cannot be told apart in the file
 _PUSH = 1e-3  # mm, how far the tip may be pushed back in a swivel
 _STRAIGHT = 1e-9  # rad, below which there is no turn
 
 
 def tip_way(toolpath: Toolpath, knife: Knife, margin_mm: float) -> Toolpath:
-    """What the tip of ``knife`` has to cut for ``toolpath``, its strokes in the same order.
+    """The path of the tip of ``knife`` for ``toolpath``, its strokes in the same order.
 
-    A cut that turns the blade along +X comes first, in the margin of ``margin_mm`` at the sheet's
-    lower edge, unless the blade's offset is 0. Closed strokes are cut on over their beginning by
+    The first cut, in the margin of ``margin_mm`` at the lower edge of the sheet, aligns the blade
+    along +X, unless the offset of the blade is 0. Closed strokes are extended past their start by
     the overcut. Raises :class:`~miurafab.errors.LayoutError` if the margin has no room for the
     first cut, and for a stroke without length.
     """
@@ -50,7 +49,7 @@ def tip_way(toolpath: Toolpath, knife: Knife, margin_mm: float) -> Toolpath:
 
 
 def _distinct(toolpath: Toolpath) -> Toolpath:
-    """``toolpath`` without the points that repeat the one before in their stroke."""
+    """``toolpath`` without points that repeat the previous point of their stroke."""
     keep = np.ones(len(toolpath.points), dtype=bool)
     keep[1:] = np.linalg.norm(np.diff(toolpath.points, axis=0), axis=1) >= _MM
     keep[toolpath.offsets[:-1][np.diff(toolpath.offsets) > 0]] = True
@@ -65,7 +64,7 @@ def _distinct(toolpath: Toolpath) -> Toolpath:
 
 
 def _overcut(toolpath: Toolpath, overcut: float) -> Toolpath:
-    """Each closed stroke led on over its beginning by ``overcut``."""
+    """Each closed stroke extended past its start by ``overcut``."""
     if overcut <= 0 or not len(toolpath):
         return toolpath
     closed = np.linalg.norm(toolpath.ends - toolpath.starts, axis=1) < _MM
@@ -88,7 +87,7 @@ def _led_on(points: Floats, overcut: float) -> Floats:
 
 
 def _with_aligning(toolpath: Toolpath, d: float, margin_mm: float) -> Toolpath:
-    """``toolpath`` with the cut that turns the blade before it, in the middle of the margin."""
+    """``toolpath`` after the cut that aligns the blade, in the middle of the margin."""
     y = margin_mm / 2
     length = ALIGNING_OFFSETS * d
     if y < 2 * d or 2 * y + length + 2 * d > toolpath.width_mm:
@@ -108,9 +107,9 @@ def _with_aligning(toolpath: Toolpath, d: float, margin_mm: float) -> Toolpath:
 
 
 def axis_way(toolpath: Toolpath, knife: Knife) -> Toolpath:
-    """The way of the axis of ``knife`` for the tip's way ``toolpath``, stroke by stroke.
+    """The path of the axis of ``knife`` for the path ``toolpath`` of its tip, stroke by stroke.
 
-    The blade stands along +X before; every stroke has a length.
+    The blade is along +X at the start; every stroke has a length.
     """
     d, points = knife.offset_mm, toolpath.points
     if d == 0 or not len(toolpath):
@@ -118,14 +117,14 @@ def axis_way(toolpath: Toolpath, knife: Knife) -> Toolpath:
     last = toolpath.offsets[1:] - 1
     begins = np.ones(len(points), dtype=bool)
     begins[last] = False
-    corners = np.flatnonzero(begins)  # where a straight piece begins
+    corners = np.flatnonzero(begins)  # where a segment starts
     steps = points[corners + 1] - points[corners]
     along = steps / np.linalg.norm(steps, axis=1, keepdims=True)
     before = np.vstack([[1.0, 0.0], along[:-1]])
     turn = np.arctan2(
         before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], (before * along).sum(axis=1)
     )
-    # At each corner a fan of points about the tip, ``count`` chords from ``before`` to ``along``.
+    # At each corner, ``count`` chords about the tip from ``before`` to ``along``.
     chord = 2.0 * np.arccos(max(0.5, 1.0 - _PUSH / d))
     first = np.isin(corners, toolpath.offsets[:-1])
     swivels = first | (np.abs(turn) > knife.corner_angle)

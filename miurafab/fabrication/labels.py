@@ -1,17 +1,18 @@
-"""Where patch names and tab numbers are engraved: inside a facet, clear of every crease and cut.
+"""The places of engraved patch names and tab numbers: inside a facet, clear of creases and cuts.
 
-A text of height s and width s·w, centred on c and running along u, lies inside a convex polygon
-with at least the clearance to its sides if for each side, with inward normal n at distance d of c,
+A text of height s and width s·w, centred at c along direction u, lies inside a convex polygon with
+the clearance to its sides if for each side, with inward normal n at distance d from c,
 
     s (w |n·u| + |n·v|) / 2 <= d - clearance,
 
-v being u turned by a right angle. So the largest s is the least of the quotients, and a text that
-would be too small to read is left out. For a polygon that is not convex the same rule is stricter
-than needed.
+where v is u turned by a right angle. So the largest s is the least of the quotients. A text that
+would be too small to read is left out. For a polygon that is not convex the rule is stricter than
+necessary.
 
-The number of a tab stands on the tab, followed by M or V where its fold is a mountain or a valley,
-and once more on the facet it is glued to, at the place that the tab will cover; a patch name stands
-where no tab will. A letter for which there is no room is left out before its number is.
+The number of a tab is engraved on the tab, followed by M or V if its fold is a mountain or a
+valley, and on the facet to which it is glued, at the place that the tab covers. A patch name is
+engraved where no tab will be. If there is no room for number and letter, the letter is left out
+first.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 
 CLEARANCE_MM = 0.5
-"""Kept between a text and any crease or cut (judged: three kerfs)."""
+"""The distance between a text and any crease or cut (judged: three kerfs)."""
 
 NAME_MM = (1.5, 5.0)
 """Least and greatest height of a patch name in mm (judged)."""
@@ -37,7 +38,7 @@ NUMBER_MM = (1.2, 3.0)
 
 
 MARKED = ("M", "V")
-"""The assignments of folds that are engraved behind the number of a tab."""
+"""The assignments of folds that are engraved after the number of a tab."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +52,8 @@ class PlacedText:
 
 @dataclass(frozen=True, eq=False)
 class Lettering:
-    """The ``texts`` of all patches, how many were ``left_out`` for want of room, and on how many
-    tabs the number stands ``unmarked``, without the letter of its fold.
+    """The ``texts`` of all patches, the number ``left_out`` for lack of room, and the number of
+    tabs ``unmarked``, without the letter of their fold.
     """
 
     texts: list[PlacedText]
@@ -62,8 +63,8 @@ class Lettering:
 
 @dataclass(frozen=True, eq=False)
 class _Spots:
-    """N convex places: the greatest height in mm of a text of given proportions on ``centre``
-    (N, 2) running along ``along`` (N, 2) is :meth:`height`.
+    """N convex places for texts centred at ``centre`` (N, 2) along ``along`` (N, 2); the sides have
+    inward ``normal`` (N, k, 2) at distance ``depth`` (N, k), less the clearance.
     """
 
     centre: Floats
@@ -72,7 +73,7 @@ class _Spots:
     depth: Floats
 
     def height(self, width: Floats) -> Floats:
-        """(N,) for texts of ``width`` (N,) over height; negative if the centre is too near."""
+        """(N,) the greatest height in mm of texts of ``width`` (N,) over height, negative: none."""
         along = np.abs(np.einsum("nki,ni->nk", self.normal, self.along))
         across = np.abs(
             self.normal[..., 1] * self.along[:, None, 0]
@@ -92,9 +93,9 @@ def place_texts(
 ) -> Lettering:
     """The texts of all patches.
 
-    ``face_patch`` (F,) the patch of each facet, ``names`` of the P patches, ``numbers`` (N,) those
-    of the ``tabs``, ``turns`` (P,) the angle by which each patch is turned later: texts are
-    engraved so that they can be read then.
+    ``face_patch`` (F,) is the patch of each facet, ``names`` are the names of the P patches,
+    ``numbers`` (N,) the numbers of the ``tabs``, and ``turns`` (P,) the angles by which patches are
+    turned later: texts are upright after that.
     """
     texts, left_out, unmarked = _tab_numbers(face_patch, tabs, numbers, turns)
     spots = _facet_spots(pattern, tabs, turns[face_patch])
@@ -115,8 +116,8 @@ def place_texts(
 def _tab_numbers(
     face_patch: Ints, tabs: TabRegions, numbers: Ints, turns: Floats
 ) -> tuple[list[PlacedText], int, int]:
-    """Each tab's number on the tab and on the facet under it, how many of these have no room, and
-    how many tabs have none for the letter.
+    """The number of each tab on the tab and on the facet under it, the count of numbers without
+    room, and the count of tabs without room for the letter.
     """
     texts: list[PlacedText] = []
     left_out = unmarked = 0
@@ -146,12 +147,12 @@ def _tab_numbers(
 
 
 def _facet_spots(pattern: CreasePattern, tabs: TabRegions, turns: Floats) -> _Spots:
-    """A place in each facet, along its longest side, beyond whatever tabs cover it."""
+    """A place in each facet, along its longest side, outside of the tabs that cover it."""
     corners = pattern.faces_vertices
     points, count = pattern.vertices_coords[corners], (corners >= 0).sum(axis=1)
     ends = pattern.vertices_coords[pattern.edges_vertices[pattern.faces_edges]]
     side = ends[:, :, 1] - ends[:, :, 0]
-    # Sides equal up to rounding: the first one, so that rounding decides nothing.
+    # Of sides equal up to rounding the first is taken, so that rounding decides nothing.
     length = np.where(corners >= 0, np.round(np.linalg.norm(side, axis=2), 6), -1.0)
     longest = side[np.arange(len(corners)), length.argmax(axis=1)]
 
@@ -183,14 +184,14 @@ def _spots(points: Floats, present: Bools, along: Floats) -> _Spots:
     centre = np.where(present[..., None], points, 0.0).sum(axis=1) / count
     depth = np.einsum("nki,nki->nk", normal, centre[:, None] - points) - CLEARANCE_MM
     depth = np.where(present, depth, np.inf)
-    # Nothing fits into a place that is gone.
+    # Nothing fits into an empty place.
     depth[~present.any(axis=1)] = -np.inf
     return _Spots(centre, along, normal, depth)
 
 
 def _upright(along: Floats, turns: Floats) -> Floats:
-    """The unit directions of ``along`` (N, 2), each reversed if, turned by ``turns`` (N,), its
-    text would run to the left. Within 10 degrees of upright it runs upwards.
+    """The unit directions of ``along`` (N, 2), reversed if the text, turned by ``turns`` (N,),
+    would run to the left. Within 10 degrees of vertical it runs upwards.
     """
     along = along / np.linalg.norm(along, axis=1)[:, None]
     tilted = turns - np.radians(10.0)

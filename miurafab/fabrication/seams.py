@@ -1,16 +1,16 @@
 """Seams: the pairs of facet sides that are glued together.
 
-Most lie within the sheet: an edge between two facets of different patches, one side of which bears
-a tab. Where the folded form closes upon itself (a ring, a tube), two edges of the sheet's border
-come to lie on each other, and are glued as well. Such edges are found by the folded form alone:
+Most seams lie within the pattern: an edge between two facets of different patches, one of which
+bears a tab. If the folded form closes upon itself (a ring, a tube), two edges of the border of the
+pattern coincide and are glued, too. Two border edges form such a seam if, in the folded form,
 
-- their ends coincide there, one edge running against the other as seen from its own facet;
-- they are equally long in the flat pattern;
-- no third edge lies there, and the facets do not lie on each other, as they do where a sheet is
-  folded together and nothing is glued.
+- their ends coincide, and the edges run in opposite directions as seen from their facets;
+- their lengths in the flat pattern are equal;
+- no third edge coincides with them, and their facets do not lie on each other, as in a sheet that
+  is folded flat without glue.
 
-The crease of such a seam folds by the angle between its two facets, a valley if they close on the
-printed side, which is the one that the flat pattern is seen from.
+The crease of such a seam has the angle between its two facets. It is a valley if they close on the
+printed side, the side from which the flat pattern is seen.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.unfold import FLAT_ANGLE
 
 COINCIDENT = 1e-6
-"""Distance, over the diagonal of the folded form's box, within which two points are one."""
+"""The distance of coincident points, over the diagonal of the box of the folded form."""
 
 TOGETHER = math.radians(0.5)
-"""Two facets that close to less than this lie on each other and are not glued."""
+"""Facets at a smaller angle lie on each other and are not glued."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seams:
-    """S seams. ``edges`` (S, 2) int64 are the pattern edges that come together, the same one twice
-    within the sheet, and ``faces`` (S, 2) the facets on them: column 0 bears the tab, which is
-    glued inside column 1. ``fold`` (S,) is the assignment of the crease.
+    """S seams. ``edges`` (S, 2) int64 are the pattern edges that are joined (the same edge twice
+    within the pattern), and ``faces`` (S, 2) their facets: column 0 bears the tab, column 1 is the
+    facet to which it is glued. ``fold`` (S,) is the assignment of the crease.
     """
 
     edges: Ints
@@ -50,7 +50,7 @@ class Seams:
         return len(self.edges)
 
     def swapped(self, which: Bools) -> Seams:
-        """The seams with the tab on the other side where ``which`` (S,) says so."""
+        """The seams, with the tab on the other side for those of ``which`` (S,)."""
         turn = which[:, None]
         return Seams(
             np.where(turn, self.edges[:, ::-1], self.edges),
@@ -59,7 +59,7 @@ class Seams:
         )
 
     def take(self, which: Ints | Bools) -> Seams:
-        """The seams that ``which`` picks."""
+        """The seams chosen by ``which``."""
         return Seams(self.edges[which], self.faces[which], self.fold[which])
 
     def joined(self, others: Seams) -> Seams:
@@ -72,8 +72,8 @@ class Seams:
 
 
 def inner_seams(pattern: CreasePattern, edges: Ints, sides: Ints) -> Seams:
-    """The seams on ``edges`` (S,) between two facets each, ``edges_faces[edge, side]`` being the
-    one that is glued upon.
+    """The seams on ``edges`` (S,) between two facets; ``edges_faces[edge, side]`` is the facet to
+    which the tab is glued.
     """
     mate = pattern.edges_faces[edges, sides]
     own = pattern.edges_faces[edges, 1 - sides]
@@ -85,7 +85,7 @@ def inner_seams(pattern: CreasePattern, edges: Ints, sides: Ints) -> Seams:
 
 
 def all_seams(pattern: CreasePattern, face_patch: Ints) -> Seams:
-    """The seams of the split ``face_patch`` (F,): between patches, then between borders."""
+    """The seams of ``face_patch`` (F,): first between patches, then between borders."""
     faces = pattern.edges_faces
     patch = np.where(faces >= 0, face_patch[faces], -1)
     seam = (faces >= 0).all(axis=1) & (patch[:, 0] != patch[:, 1])
@@ -94,8 +94,8 @@ def all_seams(pattern: CreasePattern, face_patch: Ints) -> Seams:
 
 
 def ring_seams(pattern: CreasePattern) -> Seams:
-    """The pairs of border edges that the folded form brings together, the lower one first, in its
-    order; none where the folded form is not known.
+    """The pairs of border edges that coincide in the folded form, in the order of the lower edge;
+    none if the folded form is unknown.
     """
     none = np.empty((0, 2), dtype=np.int64)
     border = np.flatnonzero((pattern.edges_faces >= 0).sum(axis=1) == 1)

@@ -1,6 +1,6 @@
 """Sheets: a pattern laid out for a machine and a material, ready to be drawn and posted.
 
-:func:`lay_out` is the one way from a :class:`~miurafab.origami.crease_pattern.CreasePattern` to a
+:func:`lay_out` turns a :class:`~miurafab.origami.crease_pattern.CreasePattern` into a
 :class:`Layout`: split into patches, turned to their smallest box, nested, lettered, and ordered.
 Each patch is moved twice: from the pattern to its own frame, in which its box begins at the
 origin, and from there to its sheet. A point p of the pattern lies on the sheet at
@@ -41,7 +41,7 @@ from miurafab.profiles import MachineProfile, Material
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a patch lies on its sheet: turned about the origin of its frame, then moved."""
+    """The place of a patch on its sheet: turned about the origin of its frame, then moved."""
 
     patch: int
     x_mm: float
@@ -49,19 +49,19 @@ class Placement:
     rotation_deg: float
 
     def from_patch(self, points: Floats) -> Floats:
-        """``points`` (n, 2) of the patch frame on the sheet."""
+        """``points`` (n, 2) of the patch frame, on the sheet."""
         shift = np.array([self.x_mm, self.y_mm])
         return np.asarray(turned(points, self.rotation_deg) + shift)
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A sheet and what lies on it. ``stock`` is what its kind is called, empty for one as large as
-    the bed; ``grain`` is which way its fibres run on the bed (``x``, ``y`` or ``none``), and
+    """A sheet and the patches on it. ``stock`` is the name of its kind, empty for a sheet of the
+    bed's size; ``grain`` is the direction of its fibres on the bed (``x``, ``y`` or ``none``), and
     ``defects_mm`` are closed curves on which nothing lies.
 
-    ``back`` is the name of what is made on its back before its front, or None. ``travel_mm`` is
-    the length travelled with the beam off.
+    ``back`` is the name of the program for its back, which is made before the front, or None.
+    ``travel_mm`` is the length travelled with the beam off.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Sheet:
 
     @property
     def passes(self) -> tuple[str, ...]:
-        """The names of what is made of this sheet, in turn."""
+        """The names of the passes over this sheet, in order."""
         return (self.name,) if self.back is None else (self.back, self.name)
 
 
@@ -127,17 +127,17 @@ class Layout:
 
     @property
     def copies(self) -> int:
-        """How many models it makes."""
+        """The number of models."""
         return max((patch.copy for patch in self.patches), default=1)
 
     @property
     def model(self) -> Layout:
-        """The same layout with the patches of the first model alone."""
+        """The same layout with the patches of the first model only."""
         return replace(self, patches=tuple(p for p in self.patches if p.copy == 1))
 
     @property
     def passes(self) -> tuple[Toolpath, ...]:
-        """All toolpaths in turn, the back of a sheet before its front."""
+        """All toolpaths in order, the back of a sheet before its front."""
         behind = {back.sheet: back for back in self.backs}
         return tuple(
             each
@@ -153,13 +153,11 @@ def lay_out(
     *,
     options: LayoutOptions | None = None,
 ) -> Layout:
-    """The pattern, opened if that is asked, laid out on sheets of the machine's bed as ``options``
-    want it.
+    """The pattern laid out on sheets of the machine's bed, as ``options`` say; deterministic.
 
-    Deterministic. Raises
-    :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed, or is not a simple
-    polygon, or the material's dashes cannot be drawn, or the stock does not suffice, or an option
-    asks for what the pattern or the material does not have.
+    Raises :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed or is not a simple
+    polygon, if the dashes of the material cannot be drawn, if the stock does not suffice, or if the
+    pattern or the material lacks what an option asks for.
     """
     options = options or LayoutOptions()
     pattern = opened(pattern, options)
@@ -219,7 +217,7 @@ def _lettering(
     patches: tuple[Patch, ...],
     motion: RigidTransform,
 ) -> Lettering:
-    """The texts of all copies, each upright as its patch lies."""
+    """The texts of all copies, upright on their sheets."""
     outlined, count = framed.outlined, len(framed.patches)
     turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
     texts, left_out, unmarked = [], 0, 0
@@ -262,7 +260,7 @@ def _kinds(nesting: Nesting) -> list[int]:
 def _sheets(
     nesting: Nesting, patches: tuple[Patch, ...], stock: LaidStock
 ) -> tuple[tuple[Sheet, ...], list[Placement]]:
-    """The sheets with what lies on them, and the placement of each patch."""
+    """The sheets with their patches, and the placement of each patch."""
     placements = [
         Placement(
             patch=patch.id,
@@ -294,7 +292,7 @@ def _sheets(
 def _motion(
     patches: tuple[Patch, ...], placements: list[Placement], slots: tuple[Slot, ...]
 ) -> RigidTransform:
-    """The way of each patch from the pattern to its sheet, in one step."""
+    """The motion of each patch from the pattern to its sheet."""
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     moved = np.array(
         [

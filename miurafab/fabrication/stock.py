@@ -1,16 +1,16 @@
-"""The stock: which sheets patches are cut from, as the user describes it, and how they may lie.
+"""The stock: the sheets from which patches are cut, and the rotations that are allowed on them.
 
 A stock file is TOML with one table for each kind of sheet, as it lies on the bed with its lower
 left corner at the bed's::
 
     [[sheets]]
-    name = "left over"            # told where a sheet is used
+    name = "left over"            # shown where a sheet is used
     width = "400mm"               # along the bed's x
     height = "300mm"              # along its y
-    quantity = 2                  # left out: as many as it takes
-    grain = "y"                   # left out: the material's
+    quantity = 2                  # default: unlimited
+    grain = "y"                   # default: the material's
 
-    [[sheets.defects]]            # nothing is laid on them
+    [[sheets.defects]]            # no patch is placed here
     x = "120mm"
     y = "40mm"
     width = "60mm"
@@ -19,9 +19,9 @@ left corner at the bed's::
     [[sheets.defects]]
     outline = [[350, 0], [400, 0], [400, 60]]
 
-Fibres run along the bed's x, along its y, or not at all. Where they do, patches are laid with one
-axis of the pattern along them: they keep the pattern's own frame, and of all rotations only those
-stay that lay that axis along the fibres, one way or the other.
+The grain of a sheet is the direction of its fibres: the bed's x, the bed's y, or none. If a sheet
+has a grain, one axis of the pattern is laid along it: patches keep the frame of the pattern, and
+only the rotations that lay this axis along the fibres, in either direction, are allowed.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ from miurafab.profiles.machine import Bed
 
 @dataclass(frozen=True)
 class StockSheet:
-    """Sheets alike, in mm: ``name``, whole size, how many (None for as many as it takes), which way
-    their fibres run (``x``, ``y`` or ``none``; None for the material's) and their ``defects_mm``.
+    """A kind of sheet: its ``name``, whole size in mm, ``quantity`` (None: unlimited), ``grain``
+    (``x``, ``y`` or ``none``; None: the material's) and ``defects_mm``.
     """
 
     name: str
@@ -55,8 +55,8 @@ class StockSheet:
 
 @dataclass(frozen=True)
 class LaidStock:
-    """The ``sheets`` that may be used on a bed, which way the ``fibres`` of each run, the same
-    ``kinds`` less their ``margin_mm`` for nesting, and the number of the ``main`` one, which
+    """The ``sheets`` for a bed, the direction of the ``fibres`` of each, the same sheets as
+    ``kinds`` for nesting (without ``margin_mm``), and the index of the ``main`` sheet, which
     patches are made to fit.
     """
 
@@ -68,7 +68,7 @@ class LaidStock:
 
     @property
     def upright(self) -> bool:
-        """Whether patches keep the directions of the pattern because fibres run in some sheet."""
+        """Whether patches keep the directions of the pattern, because some sheet has a grain."""
         return any(way != "none" for way in self.fibres)
 
 
@@ -119,9 +119,9 @@ def _defect(table: Table) -> Ring:
 def lay_stock(options: LayoutOptions, bed: Bed, grain: str) -> LaidStock:
     """The stock that ``options`` describe, on ``bed``, of a material with the given ``grain``.
 
-    Without a stock file that is the off-cuts and as many sheets as it takes, all as large as the
-    bed. Raises :class:`~miurafab.errors.LayoutError` where a sheet is larger than the bed or leaves
-    nothing within its margins, or no rotation would lay a patch along the fibres.
+    Without a stock file these are the off-cuts and an unlimited number of sheets of the bed's size.
+    Raises :class:`~miurafab.errors.LayoutError` if a sheet is larger than the bed or not larger
+    than its margins, or if no rotation lays a patch along the fibres.
     """
     wanted = options.nesting
     margin = bed.margin_mm if wanted.margin_mm is None else wanted.margin_mm
@@ -184,7 +184,7 @@ def _turns(allowed: tuple[int, ...], fibres: str, axis: str) -> tuple[int, ...]:
 
 
 def _offcut(size: tuple[float, float], bed: Bed) -> StockSheet:
-    """What the bed takes of an off-cut, laid along its longer side."""
+    """The part of an off-cut that fits the bed, longer side along longer side."""
     long, short = size
     width, height = (long, short) if bed.width_mm >= bed.height_mm else (short, long)
     name = f"off-cut of {long:g} mm x {short:g} mm"

@@ -1,8 +1,8 @@
-"""What the tool draws on one sheet: an ordered batch of polylines.
+"""The strokes of the tool on one sheet: an ordered batch of polylines.
 
-A :class:`Toolpath` is the last thing that the origami tower makes and the first that the post
-reads. Strokes are kept as flat arrays with offsets, so that a hundred thousand dashes are a few
-arrays and not a hundred thousand objects.
+A :class:`Toolpath` is the output of the origami tower and the input of the post processor. Strokes
+are flat arrays with offsets, so that a hundred thousand dashes are a few arrays and not a hundred
+thousand objects.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from miurafab.profiles import OPERATIONS
 
 @dataclass(frozen=True, eq=False)
 class Toolpath:
-    """S strokes in the order in which they are made, N points in all.
+    """S strokes in order, with N points in total.
 
     ``points`` (N, 2) float64 in mm on the sheet, the origin at its lower left corner;
-    ``offsets`` (S + 1,) int64, stroke s being ``points[offsets[s]:offsets[s + 1]]``;
+    ``offsets`` (S + 1,) int64: stroke s is ``points[offsets[s]:offsets[s + 1]]``;
     ``operation`` (S,) int64, indices into :data:`~miurafab.profiles.OPERATIONS`;
     ``patch`` (S,) int64, the patch id, -1 for none; ``edge`` (S,) int64, the pattern edge that a
     crease stroke lies on, -1 for outlines and text.
@@ -65,7 +65,7 @@ class Toolpath:
 
     @property
     def travel_mm(self) -> float:
-        """The length in mm moved with the beam off, from the origin and back to it."""
+        """The length in mm travelled with the beam off, from the origin and back to it."""
         if not len(self):
             return 0.0
         legs = np.linalg.norm(self.starts[1:] - self.ends[:-1], axis=1).sum()

@@ -1,10 +1,10 @@
-"""What a job is drawn as, besides the SVG of each sheet and the guide: formats by name.
+"""The drawing formats of a job, besides the SVG of each sheet and the guide.
 
 ============ ============================ ======================================================
 format       file                         is for
 ============ ============================ ======================================================
-dxf          sheet-01.dxf                 cutters and CAD: R12, which everything reads
-dxf-r2010    sheet-01-r2010.dxf           the same, saying that its unit is mm; outlines are whole
+dxf          sheet-01.dxf                 cutters and CAD: R12, which every program reads
+dxf-r2010    sheet-01-r2010.dxf           the same in R2010, with its unit (mm), outlines whole
 pdf          sheet-01.pdf                 large printers and cutters: the page is the sheet
 hpgl         sheet-01.hpgl                cutting plotters
 tiled-a4     sheet-01-a4.pdf              ordinary printers, likewise -a3, -letter, -legal: pages
@@ -52,16 +52,16 @@ _SHEETS: Mapping[str, tuple[str, Draw]] = {
 }
 FORMATS = (*_SHEETS, "picture")
 ENDINGS = tuple(ending for ending, _ in _SHEETS.values())
-"""What the names of drawings end in, behind the name of their sheet."""
+"""The endings of the names of drawings, after the name of their sheet."""
 
 
 def read_formats(given: Iterable[str]) -> tuple[str, ...]:
-    """The formats that are named, several in one word being parted by commas, each once.
+    """The formats named in ``given`` (also comma-separated), without repeats.
 
-    Raises :class:`~miurafab.errors.InputError` naming one that there is not.
+    Raises :class:`~miurafab.errors.InputError` naming an unknown format.
     """
     names = [name.strip().lower() for word in given for name in word.split(",")]
-    # Every sheet is drawn as SVG in any case.
+    # Every sheet is always drawn as SVG.
     names = list(dict.fromkeys(name for name in names if name != "svg"))
     for name in names:
         if name not in FORMATS:

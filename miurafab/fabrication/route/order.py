@@ -1,20 +1,19 @@
-"""The order of the strokes on a sheet: what loosens the sheet comes last, and little travel.
+"""The order of the strokes on a sheet: little travel, and cuts that loosen the sheet last.
 
-Operations follow each other as in :data:`~miurafab.profiles.OPERATIONS`: engrave, score,
-perforate, cut. Within one:
+The operations follow :data:`~miurafab.profiles.OPERATIONS`: engrave, score, perforate, cut. Within
+an operation:
 
-- creases go by the postman's route (:mod:`~miurafab.fabrication.route.postman`), the dashes of a
-  crease in turn, in the direction of the route;
-- lettering goes text by text, each time to the nearest one that is left;
-- small holes go first of all cuts, by their middles; then cuts within patches, rings around waste,
-  and the outlines, each time to the nearest one left; a closed stroke is begun at its nearest
-  point.
+- creases follow the postman's route (:mod:`~miurafab.fabrication.route.postman`); the dashes of a
+  crease are made in the direction of the route;
+- texts are made one by one, the nearest remaining text next;
+- cuts are made in the order small holes, slits in patches, rings of waste, outlines, the nearest
+  remaining cut next; a closed stroke starts at its nearest point.
 
-With heat to be spread, the outline that is made next is the one farthest from the two before it,
-and so is the patch whose creases are made next. Within a patch every other trail of the route is
-left out on the way through, and made on the way back: trails side by side are far apart in time.
+To spread heat, the next outline is the outline farthest from the last two, and so is the next patch
+for creases. Within a patch every second trail of the route is left out on the way through and made
+on the way back, so neighbouring trails are far apart in time.
 
-The strokes are the same before and after, but for their direction and where a closed one begins.
+Ordering changes only the direction of strokes and the start of closed strokes.
 """
 
 from __future__ import annotations
@@ -29,16 +28,15 @@ from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs
 from miurafab.profiles import OPERATIONS, MachineProfile, Material
 
 HOLE = 0
-"""The rank of closed strokes so small that their middle says where they are."""
+"""The rank of small closed strokes, which are ordered by their centres."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StrokeSet:
-    """A toolpath in no order, with what its order depends on.
+    """An unordered toolpath with the data for ordering it.
 
-    ``group`` (S,) int64: strokes of one crease or one text, which are consecutive and stay
-    together, share it. ``rank`` (S,) int64: of the strokes of one operation a lower rank goes
-    first.
+    ``group`` (S,) int64: the strokes of a crease or a text are consecutive, have the same group and
+    stay together. ``rank`` (S,) int64: within an operation lower ranks come first.
     """
 
     toolpath: Toolpath
@@ -63,9 +61,9 @@ def corner_of(machine: MachineProfile, material: Material) -> float:
 def order_strokes(
     strokes: StrokeSet, edges_vertices: Ints, *, spread_heat: bool = False, corner_mm: float = 1.0
 ) -> Toolpath:
-    """The toolpath of ``strokes`` in order. ``edges_vertices`` (E, 2) of the pattern tells which
-    creases meet; a crease's strokes run from its first vertex to its second. ``corner_mm`` is the
-    travel in whose time a corner is turned, when creases follow each other.
+    """The toolpath of ``strokes`` in order. ``edges_vertices`` (E, 2) of the pattern says which
+    creases meet; the strokes of a crease run from its first vertex to its second. ``corner_mm`` is
+    the travel that takes as long as a corner between two creases.
     """
     raw = strokes.toolpath
     parts: list[_StrokeOrder] = []
@@ -88,8 +86,8 @@ def order_strokes(
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _StrokeOrder:
-    """The strokes in turn, whether each is made backwards, and at which point a closed one is
-    begun.
+    """The strokes in order, whether each is reversed, and the index of the point at which a closed
+    stroke starts.
     """
 
     stroke: Ints
@@ -125,7 +123,7 @@ def _arranged(raw: Toolpath, order: _StrokeOrder) -> Toolpath:
 
 
 def _groups(group: Ints) -> tuple[Ints, Ints]:
-    """Where each run of equal ``group`` begins, and how long it is."""
+    """The start and the length of each run of equal ``group``."""
     begin = np.flatnonzero(np.diff(group, prepend=group[:1] - 1))
     return begin, np.diff(np.append(begin, len(group)))
 
@@ -148,7 +146,7 @@ def _creases(
 def _spread_creases(
     raw: Toolpath, chosen: Ints, group: Ints, edges_vertices: Ints, here: Floats, corner: float
 ) -> _StrokeOrder:
-    """Patch after patch, and of each every other trail on the way through, the rest on the way
+    """Patch after patch; in each, every second trail on the way through and the rest on the way
     back, each from its nearer end.
     """
     patches = np.unique(raw.patch[chosen])
@@ -174,7 +172,7 @@ def _spread_creases(
 
 
 def _far_apart(middles: Floats, begin: int) -> list[int]:
-    """All of ``middles`` (n, 2) from ``begin`` on, each time the farthest from the last two."""
+    """The order of ``middles`` (n, 2) from ``begin``, the farthest from the last two next."""
     left = np.ones(len(middles), dtype=bool)
     taken = [begin]
     left[begin] = False
@@ -187,8 +185,9 @@ def _far_apart(middles: Floats, begin: int) -> list[int]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Runs:
-    """C creases, each a run of strokes: where it ``begin``s among those chosen and their ``count``,
-    its ``node``s (C, 2), its drawn ``ends`` (C, 2, 2), and the ``positions`` of all nodes.
+    """C creases, each a run of strokes: its first stroke ``begin`` among the chosen strokes, their
+    ``count``, its two nodes ``node`` (C, 2), its drawn ``ends`` (C, 2, 2), and the ``positions`` of
+    all nodes.
     """
 
     begin: Ints
@@ -212,7 +211,7 @@ class _Runs:
 def _runs(raw: Toolpath, chosen: Ints, group: Ints, edges_vertices: Ints) -> _Runs:
     begin, count = _groups(group)
     ends = np.stack([raw.starts[chosen[begin]], raw.ends[chosen[begin + count - 1]]], axis=1)
-    # The same pattern vertex is another node on another patch.
+    # A pattern vertex is a different node on each patch.
     vertex = edges_vertices[raw.edge[chosen[begin]]]
     key = raw.patch[chosen[begin]][:, None] * (edges_vertices.max() + 1) + vertex
     nodes, node = np.unique(key, return_inverse=True)
@@ -223,7 +222,7 @@ def _runs(raw: Toolpath, chosen: Ints, group: Ints, edges_vertices: Ints) -> _Ru
 
 
 def _holes(raw: Toolpath, chosen: Ints, here: Floats) -> _StrokeOrder:
-    """Small closed strokes, each time the nearest one left."""
+    """Small closed strokes, the nearest remaining stroke next."""
     middle = np.array([raw.stroke(int(k))[:-1].mean(axis=0) for k in chosen])
     left = np.arange(len(chosen))
     taken, begin = [], []
@@ -241,9 +240,9 @@ def _holes(raw: Toolpath, chosen: Ints, here: Floats) -> _StrokeOrder:
 def _nearest(
     raw: Toolpath, chosen: Ints, group: Ints, here: Floats, spread: bool = False
 ) -> _StrokeOrder:
-    """Groups by the nearest entry: the beginning of a text, either end of an open stroke on its
-    own, and any corner of a closed one. With ``spread`` each time the group farthest from the two
-    before it, by its nearest entry.
+    """Groups, the nearest entry next. The entries of a group are the start of a text, both ends of
+    a single open stroke, and all corners of a closed stroke. With ``spread`` the group farthest
+    from the last two is next, entered at its nearest entry.
     """
     begin, count = _groups(group)
     entries, exits, item, back, corner = [], [], [], [], []
@@ -282,7 +281,7 @@ def _nearest(
 
 
 def _middles(raw: Toolpath, chosen: Ints, begin: Ints, count: Ints) -> Floats:
-    """(G, 2) the middle of the box around each group of strokes."""
+    """(G, 2) the centre of the box around each group of strokes."""
     found = []
     for at, strokes in zip(begin.tolist(), count.tolist(), strict=True):
         points = np.concatenate([raw.stroke(int(k)) for k in chosen[at : at + strokes]])

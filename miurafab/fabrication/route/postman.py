@@ -1,18 +1,18 @@
-"""The route over creases with the least travel: a postman's tour, not a salesman's.
+"""The route over creases with little travel, as a postman problem.
 
-Creases are the edges of a graph whose nodes are pattern vertices, and the beam can pass from one
-crease to the next at a node for nothing. The route begins at a given point and may end anywhere:
-that is a closed tour with one more edge, from a node that is everywhere at once to the starting
-point. A closed tour without travel exists if the graph is connected and every node is even. So
+Creases are the edges of a graph whose nodes are pattern vertices. Passing from a crease to the next
+at a node costs no travel. The route starts at a given point and may end anywhere; this is a closed
+tour with an additional edge from a node at distance 0 from every place to the starting point. A
+closed tour without travel exists if the graph is connected and every node has an even degree. So
 travel legs are added:
 
-1. The odd nodes are matched in pairs with the least total length. The assignment problem (every
-   node is sent to another one) is a relaxation of matching: half its value is a lower bound. Its
-   cycles of even length split into two matchings, of which the shorter is taken; what remains of
-   odd cycles is assigned again; and pairs of legs are exchanged as long as that shortens them.
-2. Components that are still apart are joined by exchanging two legs ab, cd for ac, bd, the
-   exchange that costs least first. If nothing is tied to the starting point by then, it is let in
-   where that costs least, at a leg or at the nearest node.
+1. The odd nodes are matched in pairs of little total length. The assignment problem (every node is
+   assigned another node) is a relaxation of matching: half its value is a lower bound. Its cycles
+   of even length split into two matchings, and the shorter is taken. One node of each odd cycle is
+   left and assigned again. Finally pairs of legs are exchanged while this shortens them.
+2. Components that are still apart are joined by exchanging two legs ab, cd for ac, bd, the cheapest
+   exchange first. If the starting point has no other leg by then, it is inserted where that costs
+   least, into a leg or at the nearest node.
 3. The tour passes each node by the cheapest of its pairings
    (:mod:`~miurafab.fabrication.route.tour`).
 
@@ -33,12 +33,12 @@ from miurafab.fabrication.route.tour import closed_tour
 from miurafab.geometry.arrays import Bools, Floats, Ints
 
 _ASSIGNED = 1200
-"""Odd nodes that are assigned at once; more are halved along the longer side first."""
+"""The number of odd nodes assigned at once; more nodes are halved along the longer side."""
 
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """``order`` (M,) the creases in turn and ``backwards`` (M,) whether from b to a.
+    """``order`` (M,) the creases in order, and ``backwards`` (M,) whether each runs from b to a.
 
     ``legs_mm`` is the travel between the nodes in mm, from the starting point on, and
     ``bound_mm`` what no route falls below (0 where it is not known).
@@ -122,7 +122,7 @@ def match(nodes: Ints, positions: Floats) -> tuple[Ints, float]:
 def _split_cycles(
     sent: Ints, apart: Floats, names: Ints, pairs: list[tuple[int, int]]
 ) -> list[int]:
-    """Append the pairs that the cycles of ``sent`` give, and return the nodes left alone."""
+    """Append the pairs of the cycles of ``sent``, and return the nodes without a pair."""
     alone: list[int] = []
     seen = np.zeros(len(sent), dtype=bool)
     for first in range(len(sent)):
@@ -133,7 +133,7 @@ def _split_cycles(
             cycle.append(after)
         seen[cycle] = True
         if len(cycle) % 2:
-            # Without one node an odd cycle is a path; the best one to leave out is tried for.
+            # Without one node an odd cycle is a path; the best node to leave out is chosen.
             turns = [cycle[k + 1 :] + cycle[:k] for k in range(len(cycle))]
             costs = [apart[turn[0::2], turn[1::2]].sum() for turn in turns]
             k = int(np.argmin(costs))
@@ -149,7 +149,7 @@ def _split_cycles(
 
 
 def _apart(x: Floats, y: Floats) -> Floats:
-    """The distances of points (..., 2); 0 to a point that is anywhere."""
+    """The distances of points (..., 2); 0 to the point that is everywhere (NaN)."""
     return np.asarray(np.nan_to_num(np.linalg.norm(x - y, axis=-1), nan=0.0))
 
 
@@ -174,7 +174,7 @@ def _exchange(legs: Ints, i: int, j: int, straight: bool) -> None:
 
 
 def _exchanged(legs: Ints, positions: Floats) -> Ints:
-    """The legs after all exchanges of two that shorten them."""
+    """The legs after all exchanges of two legs that shorten them."""
     if len(legs) < 2:
         return legs
     legs = legs.copy()
@@ -192,7 +192,7 @@ def _exchanged(legs: Ints, positions: Floats) -> Ints:
 
 
 def _joined(a: Ints, b: Ints, legs: Ints, positions: Floats) -> Ints:
-    """The legs changed so that creases and legs are one component."""
+    """The legs, exchanged so that creases and legs form one component."""
     _, label = _components(a, b, legs, len(positions))
     if label.max() == 0:
         return legs
@@ -227,7 +227,7 @@ def _begun(used: Ints, legs: Ints, start: int, positions: Floats) -> Ints:
 
 
 def _components(a: Ints, b: Ints, legs: Ints, nodes: int) -> tuple[Ints, Ints]:
-    """The nodes in use, and (N,) the component of each node, from 0 for those in use."""
+    """The used nodes, and (N,) the component of each node, from 0; -1 for unused nodes."""
     tails, heads = np.concatenate([a, legs[:, 0]]), np.concatenate([b, legs[:, 1]])
     graph = scipy.sparse.coo_array((np.ones(len(tails)), (tails, heads)), shape=(nodes, nodes))
     _, raw = connected_components(graph, directed=False)
@@ -238,7 +238,7 @@ def _components(a: Ints, b: Ints, legs: Ints, nodes: int) -> tuple[Ints, Ints]:
 
 
 def _with_bare_components(a: Ints, b: Ints, legs: Ints, positions: Floats) -> Ints:
-    """The legs with all components that have none joined to one that has."""
+    """The legs, with every component without legs joined to a component with legs."""
     used, label = _components(a, b, legs, len(positions))
     for bare in np.setdiff1d(label[used], label[legs[:, 0]]).tolist():
         members = np.flatnonzero(label == bare)
@@ -247,7 +247,7 @@ def _with_bare_components(a: Ints, b: Ints, legs: Ints, positions: Floats) -> In
 
 
 def _with_bare(members: Ints, legs: Ints, positions: Floats) -> Ints:
-    """The legs with the nodes ``members``, which have none, joined by the least detour of a leg."""
+    """The legs, with the component ``members`` joined by the least detour of a leg."""
     ends = positions[legs]
     out = _apart(positions[members][:, None, None], ends[None]).sum(axis=2)
     extra = out - _lengths(legs, positions)

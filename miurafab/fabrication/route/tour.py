@@ -1,19 +1,19 @@
-"""One closed tour over a connected even graph, with the cheapest passes through its nodes.
+"""A closed tour over a connected even graph, with cheap passes through its nodes.
 
-A closed tour pairs the ends of edges that meet at each node: it arrives by one and leaves by the
-other. A pass has a price: the way from the drawn end of one stroke to that of the other, and what
-the corner costs in time, written as travel. A turn by the angle phi is priced at
+A closed tour pairs the ends of edges that meet at each node: it arrives by one edge and leaves by
+the other. The price of a pass is the distance between the drawn ends of the two strokes, plus the
+time of the corner, expressed as travel. The price of a turn by the angle phi is
 
     corner * sin(phi / 2),
 
-``corner`` being v^2 / a: at the acceleration a the tool loses v / a of time where it stops and
-starts again, in which it would have gone that far.
+where ``corner`` is v^2 / a: at acceleration a the tool loses the time v / a to stop and start
+again, in which it would travel v^2 / a.
 
-1. At each node the cheapest pairing is taken; of the three there are at a node of degree 4 all are
-   tried, at nodes of higher degree the cheapest pair goes first.
-2. The pairs now form closed trails. As long as there is more than one, two that meet at a node are
-   joined by exchanging the partners of two pairs there, the exchange that costs least first
-   (Kruskal's rule). For nodes of degree 4 every exchange of that kind joins them.
+1. At each node a cheap pairing is taken: the best of the three pairings at a node of degree 4; the
+   cheapest pair first at nodes of higher degree.
+2. The pairs form closed trails. While there is more than one trail, two trails that meet at a node
+   are joined by exchanging the partners of two pairs there, the cheapest exchange first (Kruskal's
+   rule). At nodes of degree 4 every such exchange joins the trails.
 
 Half-edge h of M edges leaves its node along edge h % M: the tail for h < M, the head otherwise.
 """
@@ -30,11 +30,11 @@ from miurafab.geometry.arrays import Floats, Ints
 
 
 def closed_tour(tails: Ints, heads: Ints, ends: Floats, corner: float) -> Ints:
-    """(M, 2) the edges in turn and the direction of each (1 for head to tail).
+    """(M, 2) the edges in order and the direction of each (1: from head to tail).
 
-    ``tails`` and ``heads`` (M,) are the nodes of each edge and ``ends`` (M, 2, 2) where it is drawn
-    from and to, in mm, NaN for an end that is anywhere; ``corner`` is in mm. Every node has an even
-    number of edges, and they are all connected.
+    ``tails`` and ``heads`` (M,) are the nodes of each edge, ``ends`` (M, 2, 2) its drawn ends in
+    mm, NaN for an end that is everywhere; ``corner`` is in mm. The graph must be connected, and
+    every node must have an even degree.
     """
     count = len(tails)
     at = np.concatenate([tails, heads])
@@ -59,13 +59,13 @@ def closed_tour(tails: Ints, heads: Ints, ends: Floats, corner: float) -> Ints:
 
 
 class _Prices:
-    """What the passes between half-edges cost, in mm."""
+    """The prices of passes between half-edges, in mm."""
 
     def __init__(self, places: Floats, ways: Floats, corner: float) -> None:
         self.places, self.ways, self.corner = places, ways, corner
 
     def of(self, i: Ints, j: Ints) -> Floats:
-        """The price of each pass from i to j, the same both ways."""
+        """The price of each pass from i to j, the same in both directions."""
         apart = np.nan_to_num(np.linalg.norm(self.places[i] - self.places[j], axis=-1))
         one, other = self.ways[i], self.ways[j]
         both = (one != 0).any(axis=-1) & (other != 0).any(axis=-1)
@@ -74,7 +74,7 @@ class _Prices:
 
 
 _PAIRINGS = np.array([[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]])
-"""The ways to pair four things: the first with the second, the third with the fourth."""
+"""The pairings of four items: the first with the second, the third with the fourth."""
 
 
 def _cheapest(at: Ints, prices: _Prices) -> Ints:
@@ -89,7 +89,7 @@ def _cheapest(at: Ints, prices: _Prices) -> Ints:
     if len(four):
         options = four[:, _PAIRINGS]
         cost = prices.of(options[..., 0::2], options[..., 1::2]).sum(axis=2)
-        # Prices equal up to rounding: the first pairing, so that rounding decides nothing.
+        # Of prices equal up to rounding the first is taken, so that rounding decides nothing.
         best = np.argmin(np.round(cost, 9), axis=1)
         chosen = options[np.arange(len(four)), best]
         partner[chosen] = chosen[:, [1, 0, 3, 2]]
@@ -104,7 +104,7 @@ def _cheapest(at: Ints, prices: _Prices) -> Ints:
 
 
 def _trails(partner: Ints, count: int) -> Ints:
-    """(2 M,) the closed trail that each half-edge is part of."""
+    """(2 M,) the closed trail of each half-edge."""
     half = np.arange(2 * count)
     rows = np.concatenate([half, half])
     columns = np.concatenate([(half + count) % (2 * count), partner])
@@ -113,7 +113,7 @@ def _trails(partner: Ints, count: int) -> Ints:
 
 
 def _join(partner: Ints, trail: Ints, at: Ints, prices: _Prices) -> None:
-    """Exchange partners, the cheapest exchange first, where that joins two trails."""
+    """Exchange partners that join two trails, the cheapest exchange first."""
     one, other = _meeting(partner, trail, at)
     partner_one, partner_other = partner[one], partner[other]
     now = prices.of(one, partner_one) + prices.of(other, partner_other)
@@ -137,7 +137,7 @@ def _join(partner: Ints, trail: Ints, at: Ints, prices: _Prices) -> None:
         a, b = int(one[k]), int(other[k])
         c, d = int(partner_one[k]), int(partner_other[k])
         first, second = find(int(trail[a])), find(int(trail[b]))
-        # A pair that was exchanged already is no more; it is looked at again in the next round.
+        # A pair that was exchanged already has changed; the next round looks at it again.
         if first == second or partner[a] != c or partner[b] != d:
             continue
         root[first] = second
@@ -146,12 +146,12 @@ def _join(partner: Ints, trail: Ints, at: Ints, prices: _Prices) -> None:
 
 
 def _meeting(partner: Ints, trail: Ints, at: Ints) -> tuple[Ints, Ints]:
-    """Half-edges of two pairs at one node that are parts of two trails, one of each pair."""
+    """The half-edges, one per pair, of two pairs that meet at a node and lie on two trails."""
     pairs = np.flatnonzero(np.arange(len(partner)) < partner)
     pairs = pairs[np.argsort(at[pairs], kind="stable")]
     found = [np.empty((0, 2), dtype=np.int64)]
     node = at[pairs]
-    # The pairs of a node follow each other: each is held against the next, the one after it ...
+    # The pairs of a node are consecutive: each is compared with the next, the second next ...
     for apart in itertools.count(1):
         same = np.flatnonzero(node[apart:] == node[:-apart])
         if not len(same):

@@ -1,7 +1,7 @@
 """The preview as one HTML file: the sheets move by move, the pattern flat and folded in space.
 
-The page is complete in itself. Its script and style are inline and named by their hashes in a
-Content-Security-Policy that allows nothing else, so that it can ask nothing of any network.
+The page is self-contained. Its script and style are inline, and its Content-Security-Policy allows
+only their hashes, so that the page cannot load anything from a network.
 Coordinates travel as 16-bit fractions of their bounding box (400 mm: 6 µm), in base64.
 """
 
@@ -34,9 +34,9 @@ _STEPS = 65535
 
 @dataclass(frozen=True, eq=False)
 class Slider:
-    """What the slider of a motion of T frames tells: a word for each frame in ``names`` (T, or
-    none), the frame that it stands at first, and ``strain`` (T, F) of the facets, which can be
-    shown by colours and is at first if ``show_strain``.
+    """The slider of a motion of T frames: a name for each frame in ``names`` (T, or none), the
+    first frame ``start``, and the ``strain`` (T, F) of the facets, which colours can show; they do
+    from the start if ``show_strain``.
     """
 
     names: tuple[str, ...] = ()
@@ -56,10 +56,9 @@ def write_page(
 ) -> None:
     """Write the page of a ``preview``, of a ``pattern``, or of both, to ``path``.
 
-    ``motion`` (T, V, 3) float64 mm, the vertices of ``pattern`` in T frames of a folding motion,
-    adds a slider through exactly these frames, which tells what ``slider`` holds. Without it the
-    page shows the forms that there are, flat and folded, and nothing between them. The same input
-    gives the same bytes.
+    ``motion`` (T, V, 3) float64 in mm has the vertices of ``pattern`` in T frames of a folding
+    motion; it adds a slider through these frames, with the data of ``slider``. Without a motion the
+    page shows the flat and the folded form only. The same input gives the same bytes.
     """
     text = page_text(title, preview, pattern, motion, slider)
     path.write_text(text, encoding="utf-8", newline="\n")
