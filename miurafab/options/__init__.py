@@ -15,7 +15,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_type_hints
@@ -166,6 +166,7 @@ def read_options(
     folder: Path = Path(),
     over: Mapping[str, object] | None = None,
     base: T | None = None,
+    besides: Iterable[str] = (),
 ) -> T:
     """The options ``given`` as a value of ``cls``; None leaves an option as it is by default.
 
@@ -184,6 +185,8 @@ def read_options(
         Values that win over those ``given``, such as those of the command line over a file's.
     base : instance of cls, optional
         What holds for options that are not given, in place of the defaults.
+    besides : iterable of str, optional
+        Further names that the table may hold, for the near miss in messages.
 
     Raises
     ------
@@ -199,7 +202,7 @@ def read_options(
     for name in (*given, *over):
         if name not in known:
             noun = "a known key" if place(name) else "an option"
-            complaint = f"'{name}' is not {noun}; {_nearest(name, known)}"
+            complaint = f"'{name}' is not {noun}; {_nearest(name, [*known, *besides])}"
             raise OptionError(None, complaint, place(name))
     inside: dict[str, Any] = {}
     for name, value in {**given, **over}.items():
@@ -246,6 +249,6 @@ def check_options(value: Any) -> None:
                 raise OptionError(outside(entry.name), str(fault)) from None
 
 
-def _nearest(name: str, known: Sequence[str] | Mapping[str, object]) -> str:
-    near = difflib.get_close_matches(name, list(known), n=1)
+def _nearest(name: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=1)
     return f"did you mean '{near[0]}'" if near else f"there are {', '.join(sorted(known))}"

@@ -84,7 +84,8 @@ class Table:
     def options(self, cls: type[T], base: T | None = None) -> T:
         """All that is left as the options that ``cls`` declares; ``base`` holds the defaults."""
         try:
-            return read_options(cls, self.rest(), where=self.where, base=base)
+            asked = tuple(self._asked)
+            return read_options(cls, self.rest(), where=self.where, base=base, besides=asked)
         except OptionError as fault:
             raise self._error(fault.sentence) from None
 

@@ -70,8 +70,20 @@ def _from_file(path: Path, options: Mapping[str, object]) -> Design:
     layout = table.table("layout", {})
     machine = layout.text("machine") if layout.has("machine") else None
     material = layout.text("material") if layout.has("material") else None
-    sheets = read_options(LayoutOptions, layout.rest(), where=layout.where, folder=path.parent)
-    asked = read_options(FitOptions, table.rest(), where=path.name, over=options)
+    sheets = read_options(
+        LayoutOptions,
+        layout.rest(),
+        where=layout.where,
+        folder=path.parent,
+        besides=("machine", "material"),
+    )
+    asked = read_options(
+        FitOptions,
+        table.rest(),
+        where=path.name,
+        over=options,
+        besides=("title", "target", "layout"),
+    )
     try:
         if target.has("mesh"):
             design = _on_mesh(path.parent / target.text("mesh"), asked, title)

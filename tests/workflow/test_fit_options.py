@@ -77,6 +77,11 @@ def test_a_fault_of_a_file_names_the_file_and_one_of_the_caller_does_not(tmp_pat
     with pytest.raises(OptionError, match=r"^'size' is -4 mm"):
         design(str(file), size=-4)
     assert design(str(file), size=100).request.size_mm == 100
+    for key, near in (("titel", "title"), ("[layout]\nmachin", "machine")):
+        file.write_text(f'[target]\nsurface = "hypar"\n{key} = "x"\n' if "[" in key else
+                        f'{key} = "x"\n[target]\nsurface = "hypar"\n')  # fmt: skip
+        with pytest.raises(OptionError, match=f"is not a known key; did you mean '{near}'"):
+            design(str(file))
     file.write_text('sizee = "3mm"\n[target]\nsurface = "hypar"\n')
     with pytest.raises(OptionError, match=r"^mine\.toml: 'sizee' is not a known key; .* 'size'"):
         design(str(file))
