@@ -126,10 +126,11 @@ class _Command:
             for parameter in own.parameters.values()
             if parameter.kind is not inspect.Parameter.VAR_KEYWORD
         ]
+        groups: dict[str, Group] = {"": OPTIONS}
         parameters += [
             parameter
             for each in self._classes
-            for parameter in parameters_of(each())
+            for parameter in _parameters(each(), groups)
             if parameter.name not in self._without
         ]
         return own.replace(parameters=parameters)
@@ -139,9 +140,11 @@ class _Command:
         return {name: each.annotation for name, each in self.__signature__.parameters.items()}
 
 
-def parameters_of(cls: type) -> Iterator[inspect.Parameter]:
-    """The options of ``cls`` as parameters that hold text, under the groups of their headings."""
-    groups: dict[str, Group] = {"": OPTIONS}
+def _parameters(cls: type, groups: dict[str, Group]) -> Iterator[inspect.Parameter]:
+    """The options of ``cls`` as parameters that hold text, under the ``groups`` of their headings.
+
+    Help shows the groups in the order in which they come into being.
+    """
     for name, entry in declared(cls).items():
         group = groups.setdefault(entry.group, Group(entry.group, sort_key=1 + len(groups)))
         yield inspect.Parameter(

@@ -27,24 +27,24 @@ class SendOptions:
     )
     at: tuple[float, float] | None = option(
         Pair(length(-math.inf), "X,Y", "0,0 or 10mm,5mm"),
-        "Where the head stands, in the job's coordinates: 0,0 is its origin.",
+        "Position of the head in the job's coordinates; 0,0 is the job's origin.",
         group="Start",
     )
     check_mode: bool = option(
         Flag(),
-        "Let the controller only read the job ($C); nothing moves.",
+        "Let the controller read the job without moving ($C).",
         default=False,
         group="Safety",
     )
     allow_m3: bool = option(
         Flag(),
-        "Cut with M3, which burns on if the link is lost.",
+        "Cut with M3: the beam stays on if the connection is lost.",
         default=False,
         group="Safety",
     )
     force: frozenset[str] = option(
         Several(Text("CODE"), frozenset),
-        "Override the pre-flight checks of these codes.",
+        "Override the refusals with these codes.",
         default=frozenset(),
         group="Safety",
     )

@@ -68,19 +68,19 @@ class CutOptions:
     send: SendOptions = field(default_factory=SendOptions)
     resume: bool = option(
         Flag(),
-        "Go on with what was interrupted; needs `home` or `at`, once stopped.",
+        "Continue an interrupted job; needs `home` or `at`, since the position was lost.",
         default=False,
         group="Start",
     )
     frame: bool = option(
         Flag(),
-        "Trace the box around each sheet before it, then wait.",
+        "Trace the box around each sheet first, then wait.",
         default=False,
         group="Start",
     )
     pointer: float = option(
         percent(0, 100 * MOST_POINTER),
-        "Power of the frame in percent; 0 keeps it dark.",
+        "Beam power of the frame in percent; 0 keeps the beam off.",
         default=0.0,
         group="Start",
     )
