@@ -44,11 +44,7 @@ class NestingOptions:
     """The sheets on which patches are nested."""
 
     quantity: int = option(
-        Whole(1, 1000),
-        "Number of copies of the whole model.",
-        default=1,
-        group="Sheets",
-        page="first",
+        Whole(1, 1000), "Number of copies of the whole model.", 1, group="Sheets", page="first"
     )
     stock: Path | None = option(
         File(),
@@ -78,7 +74,7 @@ class NestingOptions:
     rotations: tuple[int, ...] = option(
         Several(Whole(0, 359), distinct),
         "Allowed turns of a patch on the sheet, in whole degrees.",
-        default=(0, 90, 180, 270),
+        (0, 90, 180, 270),
         group="Sheets",
     )
 
@@ -93,35 +89,21 @@ class LayoutOptions:
     gap_mm: float = option(
         length(0, 100),
         "Least distance between patches on a sheet.",
-        default=2.0,
+        2.0,
         group="Patches",
         page="first",
     )
     offcuts_mm: tuple[tuple[float, float], ...] = option(
-        Several(SIDES),
-        "Left-over sheets to use up first.",
-        default=(),
-        group="Sheets",
-        page="more",
+        Several(SIDES), "Left-over sheets to use up first.", (), group="Sheets", page="more"
     )
     max_patch_mm: tuple[float, float] | None = option(
-        SIDES,
-        "The largest patch.",
-        group="Patches",
-        default_text="the bed",
-        page="first",
+        SIDES, "The largest patch.", group="Patches", default_text="the bed", page="first"
     )
     seam_rows: tuple[int, ...] = option(
-        Several(LINES, distinct),
-        "Force a seam after these rows of facets.",
-        default=(),
-        group="Patches",
+        Several(LINES, distinct), "Force a seam after these rows of facets.", (), group="Patches"
     )
     seam_columns: tuple[int, ...] = option(
-        Several(LINES, distinct),
-        "Force a seam after these columns of facets.",
-        default=(),
-        group="Patches",
+        Several(LINES, distinct), "Force a seam after these columns of facets.", (), group="Patches"
     )
     open_row: int | None = option(
         LINES,
@@ -158,44 +140,32 @@ class LayoutOptions:
         Choice(TAB_SIDES),
         "The patch of a seam that bears the tabs: the one with the lower or the upper number, or "
         "alternate: both in turn, edge by edge.",
-        default="lower",
+        "lower",
         group="Tabs",
         page="more",
     )
     full_facet: bool = option(
         Flag(),
         "Make each tab as large as the facet that it is glued to, less the inset.",
-        default=False,
+        False,
         group="Tabs",
         page="more",
     )
     two_sided: bool = option(
-        Flag(),
-        "Score the valleys from the back of the sheet.",
-        default=False,
-        group="Cutting",
-        page="more",
+        Flag(), "Score the valleys from the back of the sheet.", False, group="Cutting", page="more"
     )
     bridges: int = option(
         Whole(0, 12),
         "Holding bridges on each outline, so that nothing falls out: 0, or 2 and more.",
-        default=0,
+        0,
         group="Cutting",
         page="more",
     )
     bridge_mm: float = option(
-        length(0.1, 20),
-        "Length of a holding bridge.",
-        default=BRIDGE_MM,
-        group="Cutting",
-        page="more",
+        length(0.1, 20), "Length of a holding bridge.", BRIDGE_MM, group="Cutting", page="more"
     )
     spread_heat: bool = option(
-        Flag(),
-        "Cut neighbouring patches far apart in time.",
-        default=False,
-        group="Cutting",
-        page="more",
+        Flag(), "Cut neighbouring patches far apart in time.", False, group="Cutting", page="more"
     )
     nesting: NestingOptions = field(default_factory=NestingOptions)
 

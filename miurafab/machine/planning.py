@@ -31,21 +31,15 @@ class SendOptions:
         group="Start",
     )
     check_mode: bool = option(
-        Flag(),
-        "Let the controller read the job without moving ($C).",
-        default=False,
-        group="Safety",
+        Flag(), "Let the controller read the job without moving ($C).", False, group="Safety"
     )
     allow_m3: bool = option(
-        Flag(),
-        "Cut with M3: the beam stays on if the connection is lost.",
-        default=False,
-        group="Safety",
+        Flag(), "Cut with M3: the beam stays on if the connection is lost.", False, group="Safety"
     )
     force: frozenset[str] = option(
         Several(Text("CODE"), frozenset),
         "Override the refusals with these codes.",
-        default=frozenset(),
+        frozenset(),
         group="Safety",
     )
 

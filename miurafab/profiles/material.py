@@ -10,17 +10,7 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from miurafab.options import (
-    REQUIRED,
-    Choice,
-    Whole,
-    angle,
-    feed,
-    length,
-    modulus,
-    number,
-    option,
-)
+from miurafab.options import REQUIRED, Choice, Whole, angle, feed, length, modulus, number, option
 from miurafab.profiles.shipped import find_file
 from miurafab.profiles.table import Table, read_toml
 

@@ -141,11 +141,7 @@ class Bench:
         if self.pattern is None or "fold" not in self.pattern["files"] or self._asked is None:
             raise InputError("There is no pattern to lay out yet; fit or open one first.")
         self._coming = Asked(
-            self._asked.command,
-            self._asked.file,
-            self._asked.target,
-            self._asked.options,
-            asked,
+            self._asked.command, self._asked.file, self._asked.target, self._asked.options, asked
         )
         self._begin(
             "sheets",

@@ -95,12 +95,7 @@ def _revolving(
 
 
 _ENTRIES = (
-    NamedSurface(
-        "plane",
-        "a flat rectangle: the regular Miura-ori",
-        _SIDES,
-        analytic.plane,
-    ),
+    NamedSurface("plane", "a flat rectangle: the regular Miura-ori", _SIDES, analytic.plane),
     NamedSurface(
         "cylinder",
         "a profile curve extruded; by default a circular arc",
@@ -223,11 +218,7 @@ _ENTRIES = (
     NamedSurface(
         "catenoid",
         "the minimal surface of revolution, about z",
-        {
-            "waist": _length(0.8, "radius at the waist"),
-            "height": _length(1.6, "height"),
-            **_TURN,
-        },
+        {"waist": _length(0.8, "radius at the waist"), "height": _length(1.6, "height"), **_TURN},
         _revolving("catenoid", curves.catenary),
     ),
     NamedSurface(

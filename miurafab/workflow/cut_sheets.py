@@ -69,19 +69,16 @@ class CutOptions:
     resume: bool = option(
         Flag(),
         "Continue an interrupted job; needs `home` or `at`, since the position was lost.",
-        default=False,
+        False,
         group="Start",
     )
     frame: bool = option(
-        Flag(),
-        "Trace the box around each sheet first, then wait.",
-        default=False,
-        group="Start",
+        Flag(), "Trace the box around each sheet first, then wait.", False, group="Start"
     )
     pointer: float = option(
         percent(0, 100 * MOST_POINTER),
         "Beam power of the frame in percent; 0 keeps the beam off.",
-        default=0.0,
+        0.0,
         group="Start",
     )
     virtual_speed: float | None = None
@@ -235,11 +232,7 @@ def plan_sheets(
 
 
 def frame(
-    prepared: Prepared,
-    number: int,
-    *,
-    port: str,
-    options: CutOptions = DEFAULT_OPTIONS,
+    prepared: Prepared, number: int, *, port: str, options: CutOptions = DEFAULT_OPTIONS
 ) -> StreamResult:
     """Trace the box around what sheet ``number`` (from 1) burns, beam off or as a pointer."""
     (number,) = _chosen(prepared, [number])

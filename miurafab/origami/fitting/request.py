@@ -124,7 +124,7 @@ class FitOptions:
         Choice(CLOSINGS),
         "For surfaces of revolution and the circular cylinder: sector (of the angle given), open "
         "(all round but one facet), or seam (all round, to be glued).",
-        default="sector",
+        "sector",
         group="Sheet",
         page="more",
     )
@@ -132,7 +132,7 @@ class FitOptions:
         Choice(get_args(Follow)),
         "What lies on the target: the middle of the sheet, or its top or bottom vertices (top is "
         "the side of the target's normal).",
-        default="middle",
+        "middle",
         group="Sheet",
     )
     flat_foldable: float | None = option(
@@ -144,10 +144,7 @@ class FitOptions:
         page="more",
     )
     min_edge_mm: float | None = option(
-        length(above=True),
-        "The shortest edge allowed.",
-        group="Limits",
-        page="first",
+        length(above=True), "The shortest edge allowed.", group="Limits", page="first"
     )
     max_deviation_mm: float | None = option(
         length(above=True),
@@ -180,10 +177,10 @@ class FitOptions:
         Choice(("auto", "on", "off")),
         "Bring the sheet as close to the target as it goes: on, off, or auto (where a limit is not "
         "met or flat-foldability is asked for).",
-        default="auto",
+        "auto",
         group="Search",
     )
-    seed: int = option(Whole(), "Random seed of the attempts.", default=0, group="Search")
+    seed: int = option(Whole(), "Random seed of the attempts.", 0, group="Search")
 
     def __post_init__(self) -> None:
         check_options(self)
