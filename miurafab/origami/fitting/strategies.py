@@ -131,15 +131,7 @@ class Strategy:
             solution = solve(unknowns, solution.x, flat_foldable=True)
             iterations += solution.iterations
         if not solution.converged:
-            return Attempt(
-                self.way,
-                self.rows_along,
-                self.corrugation,
-                solution.residual,
-                iterations,
-                solution.reason,
-                self.place,
-            )
+            return self._attempt(solution.residual, iterations, solution.reason)
         plain = self._candidate(request, unknowns, solution, iterations)
         asked = request.flat_foldable is not None or plain.rank != (0, False)
         if request.polish == "off" or (request.polish == "auto" and not asked):
@@ -244,16 +236,14 @@ class Strategy:
             kawasaki=None,
         )
         faults = tuple(_faults(request, pattern, measured, deviation, unmeasured, sheet))
-        attempt = Attempt(
-            self.way,
-            self.rows_along,
-            self.corrugation,
-            max(measured.max_planarity or 0.0, measured.max_developability or 0.0),
-            iterations,
-            " ".join(fault.sentence for fault in faults),
-            self.place,
-        )
+        residual = max(measured.max_planarity or 0.0, measured.max_developability or 0.0)
+        attempt = self._attempt(residual, iterations, " ".join(fault.sentence for fault in faults))
         return Candidate(attempt, pattern, measured, faults, deviation)
+
+    def _attempt(self, residual: float, iterations: int, reason: str) -> Attempt:
+        """The record of this strategy."""
+        way, rows, corrugation = self.way, self.rows_along, self.corrugation
+        return Attempt(way, rows, corrugation, residual, iterations, reason, self.place)
 
 
 def strategies_for(request: FitRequest) -> Iterator[Strategy]:

@@ -1,0 +1,112 @@
+"""The rules of CONTRIBUTING that the syntax of the code shows."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+MODULES = sorted((ROOT / "miurafab").rglob("*.py"))
+PROTOCOL_ROOMS = ("gcode", "motion", "wire", "grbl", "marlin", "plotter", "simulate")
+HOMES = {
+    "serial": ("miurafab/machine/transport.py",),
+    "svgwrite": ("miurafab/fabrication/drawing/svg.py",),
+    "trimesh": ("miurafab/surfaces/", "miurafab/origami/formats/mesh.py"),
+    "shapely": ("miurafab/geometry/", "miurafab/fabrication/"),
+    "cyclopts": ("miurafab/cli/",),
+    "reportlab": ("miurafab/fabrication/drawing/",),
+}
+"""Each library is imported only below its paths."""
+MOST_LINES = 400
+FLAG = re.compile(r"(?<![\w-])--[a-z]{2,}")
+WRITE_COMMANDS = ("errors.py", "studio/recipe.py", "fabrication/drawing/calibration_guide.py")
+"""Below ``cli``, these spell options for it, or write whole command lines for a person to type."""
+
+
+def name(module: Path) -> str:
+    return module.relative_to(ROOT).as_posix()
+
+
+@cache
+def tree(module: Path) -> ast.Module:
+    return ast.parse(module.read_text(encoding="utf-8"))
+
+
+def imported(module: Path) -> set[str]:
+    """The top-level packages that ``module`` imports, in functions too."""
+    packages = set()
+    for node in ast.walk(tree(module)):
+        if isinstance(node, ast.Import):
+            packages |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            packages.add((node.module or "").partition(".")[0])
+    return packages
+
+
+def test_a_class_name_is_used_once() -> None:
+    places = defaultdict(list)
+    for module in MODULES:
+        for node in ast.walk(tree(module)):
+            if isinstance(node, ast.ClassDef):
+                places[node.name].append(f"{name(module)}:{node.lineno}")
+    assert {text: where for text, where in places.items() if len(where) > 1} == {}
+
+
+def test_every_module_opens_with_its_idea_and_is_short() -> None:
+    assert [name(module) for module in MODULES if not ast.get_docstring(tree(module))] == []
+    lines = {name(module): len(module.read_text().splitlines()) for module in MODULES}
+    assert {module: count for module, count in lines.items() if count > MOST_LINES} == {}
+
+
+@pytest.mark.parametrize("library", HOMES)
+def test_a_library_has_one_home(library: str) -> None:
+    users = [name(module) for module in MODULES if library in imported(module)]
+    assert users
+    assert [user for user in users if not user.startswith(HOMES[library])] == []
+
+
+def test_only_the_command_line_names_its_flags() -> None:
+    named = [
+        f"{name(module)}:{number}: {line.strip()}"
+        for module in MODULES
+        if not name(module).startswith("miurafab/cli/")
+        and not name(module).endswith(WRITE_COMMANDS)
+        for number, line in enumerate(module.read_text(encoding="utf-8").splitlines(), 1)
+        if FLAG.search(line)
+    ]
+    assert named == []
+
+
+def called(module: Path) -> dict[str, list[ast.Call]]:
+    """The calls in ``module`` by the dotted name of what is called."""
+    calls = defaultdict(list)
+    for node in ast.walk(tree(module)):
+        if isinstance(node, ast.Call):
+            calls[ast.unparse(node.func)].append(node)
+    return calls
+
+
+def test_only_the_command_line_prints() -> None:
+    printing = [name(module) for module in MODULES if "print" in called(module)]
+    assert [text for text in printing if not text.startswith("miurafab/cli/")] == []
+
+
+def test_randomness_comes_from_a_seeded_generator() -> None:
+    for module in MODULES:
+        for function, calls in called(module).items():
+            if function.endswith(("default_rng", "random.Random")):
+                assert all(call.args for call in calls), name(module)
+            elif "default_rng(" not in function:
+                shared = ("np.random.", *(["random."] if "random" in imported(module) else []))
+                assert not function.startswith(shared), f"{name(module)}: {function}"
+
+
+def test_protocol_tests_wait_for_no_clock() -> None:
+    tests = [path for room in PROTOCOL_ROOMS for path in (ROOT / "tests" / room).rglob("*.py")]
+    assert len(tests) > 20
+    assert [name(path) for path in tests if imported(path) & {"time", "asyncio", "threading"}] == []
