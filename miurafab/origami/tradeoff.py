@@ -104,12 +104,12 @@ class Tradeoff:
 def summarise(samples: list[Sample], weights: tuple[float, ...] = WEIGHTS) -> Tradeoff:
     """The laws and cost curves that follow from ``samples``."""
     ordered = tuple(sorted(samples, key=lambda s: (s.columns * s.rows, s.columns)))
-    found = [s for s in ordered if s.status == "converged"]
-    if len(found) < ENOUGH:
+    fitted = [s for s in ordered if s.status == "converged"]
+    if len(fitted) < ENOUGH:
         return Tradeoff(ordered, None, None, None, None, None, ())
-    n = np.array([s.side for s in found])
-    d = np.array([s.hausdorff_relative for s in found], dtype=np.float64)
-    area = np.array([s.area_ratio for s in found], dtype=np.float64)
+    n = np.array([s.side for s in fitted])
+    d = np.array([s.hausdorff_relative for s in fitted], dtype=np.float64)
+    area = np.array([s.area_ratio for s in fitted], dtype=np.float64)
     coefficient = float(np.exp(np.log(d * n).mean()))
     exponent = float(np.polyfit(np.log(n), np.log(d), 1)[0])
     # weighted by n, since fine sheets are closer to the limit
@@ -117,7 +117,7 @@ def summarise(samples: list[Sample], weights: tuple[float, ...] = WEIGHTS) -> Tr
     curves = []
     for weight in weights:
         costs = cost(weight, n, d)
-        best = found[int(np.argmin(costs))]
+        best = fitted[int(np.argmin(costs))]
         curves.append(
             CostCurve(
                 weight,

@@ -284,10 +284,10 @@ def _placement(layout: MeshChart, region: Region | None, rotate: float | None) -
         if domain is None:
             raise TargetError(f"{layout.name}: no rectangle fits into the mesh at this `rotate`.")
         return GridPlacement(rotate, domain)
-    found = placements(layout.vertices, layout.flat, layout.faces)
-    if not found:
+    candidates = placements(layout.vertices, layout.flat, layout.faces)
+    if not candidates:
         raise TargetError(f"{layout.name}: no rectangle fits into the mesh; it is too narrow.")
-    return found[0][1]
+    return candidates[0][1]
 
 
 def _placed_before(place: dict[str, Any], name: str) -> tuple[GridPlacement, float]:

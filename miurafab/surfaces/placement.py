@@ -93,16 +93,16 @@ def placements(vertices: Floats, flat: Floats, faces: Ints) -> list[tuple[float,
 
     The score is the area times the root of the :func:`evenness`.
     """
-    found = []
+    scored = []
     for angle in ANGLES.tolist():
         frame = turned(flat, angle)
         domain = largest_rectangle(frame, faces)
         if domain is not None:
             score = domain.width * domain.height * evenness(vertices, frame, faces, domain) ** 0.5
-            found.append((score, GridPlacement(angle, domain)))
+            scored.append((score, GridPlacement(angle, domain)))
     # of scores equal to 2 %, the angle nearest to the axes of the layout comes first
-    best = max((score for score, _ in found), default=0.0)
-    return sorted(found, key=lambda pair: (-math.floor(50 * pair[0] / best), abs(pair[1].angle)))
+    best = max((score for score, _ in scored), default=0.0)
+    return sorted(scored, key=lambda pair: (-math.floor(50 * pair[0] / best), abs(pair[1].angle)))
 
 
 def covered(frame: Floats, faces: Ints, domain: Domain, count: int = 41) -> bool:

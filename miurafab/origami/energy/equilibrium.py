@@ -268,10 +268,10 @@ class Driven:
         rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
         real = (rows >= 0) & (columns >= 0)
         key = np.where(real, columns * len(free) + rows, -1).ravel()
-        found, place = np.unique(key, return_inverse=True)
-        columns, rows = np.divmod(found[found >= 0], len(free))
+        keys, place = np.unique(key, return_inverse=True)
+        columns, rows = np.divmod(keys[keys >= 0], len(free))
         starts = np.searchsorted(columns, np.arange(len(free) + 1))
-        offset = 1 - int((found < 0).sum())
+        offset = 1 - int((keys < 0).sum())
         return rows.astype(np.int32), starts.astype(np.int32), place + offset
 
 

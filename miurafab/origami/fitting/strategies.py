@@ -183,12 +183,12 @@ class Strategy:
         Limits in mm depend on the scale, and the scale on the sheet: so the rounds are repeated.
         """
         constraints = unknowns.constraints(request.exactly_flat_foldable)
-        found, first, least = plain, solution, request.min_edge_mm
+        best, first, least = plain, solution, request.min_edge_mm
         for _ in range(SCALINGS):
             asked = replace(request, min_edge_mm=least)
-            on_grid = limits(asked, unknowns, found.pattern.scale, BOUND_MARGIN)
+            on_grid = limits(asked, unknowns, best.pattern.scale, BOUND_MARGIN)
             bounds = unknowns.on_unknowns(on_grid) if on_grid.any else None
-            iterations = found.attempt.iterations
+            iterations = best.attempt.iterations
             if bounds is not None:
                 solution = project(
                     constraints,
@@ -209,17 +209,17 @@ class Strategy:
                 bounds=bounds,
             )
             solution = better.projection
-            found = replace(
+            best = replace(
                 self._candidate(request, unknowns, solution, iterations + better.rounds),
                 polished=True,
                 active_bounds=on_grid.count(solution.active) if bounds is not None else {},
             )
             shortest = KEPT_EDGE * plain.measurements.min_edge_mm
-            if least is None and found.measurements.min_edge_mm < shortest:
-                found, solution, least = plain, first, shortest
-            elif bounds is None or not found.faults:
+            if least is None and best.measurements.min_edge_mm < shortest:
+                best, solution, least = plain, first, shortest
+            elif bounds is None or not best.faults:
                 break
-        return found
+        return best
 
     def _candidate(
         self, request: FitRequest, unknowns: Unknowns, solution: Projection, iterations: int

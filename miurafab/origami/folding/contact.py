@@ -64,7 +64,7 @@ def _meeting_facets(pattern: CreasePattern, points: Floats) -> Ints:
     order = np.argsort(owner, kind="stable")
     counts = np.bincount(owner, minlength=len(faces))
     start = run_starts(counts)
-    found = []
+    meeting = []
     first, second = meeting_pairs(low, high)
     for begin in range(0, len(first), _CHUNK):
         a, b = first[begin : begin + _CHUNK], second[begin : begin + _CHUNK]
@@ -75,8 +75,8 @@ def _meeting_facets(pattern: CreasePattern, points: Floats) -> Ints:
         one = order[start[a[pair]] + within // counts[b[pair]]]
         other = order[start[b[pair]] + within % counts[b[pair]]]
         hit = np.unique(pair[shapes.meet(one, other)])
-        found.append(np.stack([a[hit], b[hit]], axis=1))
-    pairs = np.concatenate(found) if found else np.empty((0, 2), dtype=np.int64)
+        meeting.append(np.stack([a[hit], b[hit]], axis=1))
+    pairs = np.concatenate(meeting) if meeting else np.empty((0, 2), dtype=np.int64)
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
 

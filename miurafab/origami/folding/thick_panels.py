@@ -135,7 +135,7 @@ def _collisions(
     folding = np.abs(pattern.edges_fold_angle[pattern.edges_fold_angle != 0])
     middling = float(np.median(folding))
     states = np.tan(np.array(STATES) * middling / 2) / np.tan(middling / 2)
-    found: list[tuple[float, int, int]] = []
+    collisions: list[tuple[float, int, int]] = []
     solids = _Solids.of(pattern, thickness)
     placement = place(pattern, fold_angles_at(pattern, states))
     owner_of_vertex = first_facets(pattern, placement.depth)
@@ -150,8 +150,8 @@ def _collisions(
         pairs = self_intersections(solids.as_pattern(placed))
         panels = np.sort(solids.triangle_facet[pairs], axis=1)
         panels = np.unique(panels[panels[:, 0] != panels[:, 1]], axis=0)
-        found.extend((float(state), int(a), int(b)) for a, b in panels)
-    return tuple(found)
+        collisions.extend((float(state), int(a), int(b)) for a, b in panels)
+    return tuple(collisions)
 
 
 @dataclass(frozen=True, eq=False)

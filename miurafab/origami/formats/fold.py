@@ -232,14 +232,14 @@ def _coordinates(document: Mapping[str, Any], key: str) -> Floats:
 
 def _indices(document: Mapping[str, Any], key: str, width: int) -> Ints:
     try:
-        found = np.array(_array(document, key))
+        indices = np.array(_array(document, key))
     except ValueError:
         raise PatternError(f"'{key}' is not a list of {width} vertices each.") from None
-    if found.ndim != 2 or found.shape[1] != width or found.dtype.kind not in "iu":
+    if indices.ndim != 2 or indices.shape[1] != width or indices.dtype.kind not in "iu":
         raise PatternError(f"'{key}' is not a list of {width} whole numbers each.")
-    if found.min() < 0:
+    if indices.min() < 0:
         raise PatternError(f"'{key}' holds a negative vertex.")
-    return found.astype(np.int64)
+    return indices.astype(np.int64)
 
 
 def _face_indices(document: Mapping[str, Any]) -> Ints:

@@ -193,11 +193,11 @@ def _colour(text: str) -> tuple[int, int, int] | None:
     if re.fullmatch(r"#[0-9a-f]{6}", text):
         red, green, blue = (int(text[at : at + 2], 16) for at in (1, 3, 5))
         return red, green, blue
-    found = re.fullmatch(r"rgba?\(([^)]*)\)", text)
-    if found:
-        numbers = _NUMBER.findall(found[1])
+    match = re.fullmatch(r"rgba?\(([^)]*)\)", text)
+    if match:
+        numbers = _NUMBER.findall(match[1])
         if len(numbers) >= 3:
-            full = 2.55 if "%" in found[1] else 1.0
+            full = 2.55 if "%" in match[1] else 1.0
             red, green, blue = (round(float(number) * full) for number in numbers[:3])
             return red, green, blue
     if text in ("none", "", "transparent"):
@@ -239,7 +239,7 @@ def _pieces(element: Element) -> Iterator[Matrix]:
 
 
 def _path_pieces(text: str) -> Iterator[Matrix]:
-    tokens = [(found[1], found[2]) for found in _PATH.finditer(text)]
+    tokens = [(match[1], match[2]) for match in _PATH.finditer(text)]
     command, at, start = "", np.zeros(2), np.zeros(2)
     points: list[Matrix] = []
     index = 0
@@ -332,7 +332,7 @@ def _composed(outer: Matrix, inner: Matrix) -> Matrix:
 
 
 def _value(text: str, name: str) -> float:
-    found = re.fullmatch(rf"\s*({_NUMBER.pattern})\s*(?:px)?\s*", text)
-    if found is None:
+    match = re.fullmatch(rf"\s*({_NUMBER.pattern})\s*(?:px)?\s*", text)
+    if match is None:
         raise PatternError(f"{name} is '{text[:40]}', not a number.")
-    return float(found[1])
+    return float(match[1])
