@@ -211,8 +211,8 @@ def _loose_parts(program: Program) -> Iterator[Finding]:
 
 def _dwells(job: Job, program: Program, machine: MachineProfile) -> Iterator[Finding]:
     burning = _burning_dwells(program)
-    if not burning and machine.dialect == "marlin":
-        burning = _dwells_under_m3(job)
+    if machine.dialect == "marlin":
+        burning = sorted((dict(_dwells_under_m3(job)) | dict(burning)).items())
     if burning:
         line, power = burning[0]
         yield _in_line(

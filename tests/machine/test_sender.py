@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from wires import BANNER, FakeWire
 
@@ -175,6 +175,7 @@ def test_the_same_job_makes_the_same_records(tmp_path: Path) -> None:
 # Stopped by somebody
 
 STOPPED = zigzag(30)
+NO_SHRINKING = (Phase.explicit, Phase.generate)  # it takes minutes; the first failure says enough
 
 
 def _calls_of_a_whole_job() -> int:
@@ -187,7 +188,7 @@ CALLS = None
 
 
 @given(st.integers(0, 10_000), st.booleans())
-@settings(max_examples=60)
+@settings(max_examples=60, phases=NO_SHRINKING)
 def test_an_interrupt_at_any_point_ends_with_a_reset_and_a_dark_beam(
     where: int, in_progress: bool
 ) -> None:

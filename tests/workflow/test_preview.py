@@ -14,6 +14,7 @@ from small_jobs import KNOWN, LASER, dashes, known_toolpath, write_folder, write
 import miurafab
 from miurafab.errors import GcodeError, InputError, ProfileError
 from miurafab.gcode.job import Job
+from miurafab.profiles import load_machine
 from miurafab.workflow.dry_run import LAYERS, clock_text, dry_run, length_text
 from miurafab.workflow.preview import preview, with_settings
 
@@ -104,6 +105,16 @@ def test_a_dwell_under_a_constant_beam_burns_in_place():
     assert "dwell" not in codes(text.replace("M3", "M4"))
     dark = text.replace("G4 P0.5\nG4P1\n", "M5\nG4 P0.5\n")
     assert "dwell" not in codes(dark)
+
+
+def test_marlin_without_inline_mode_burns_in_a_dwell_under_m3():
+    text = "M3 S100\nG4 P500\nG1 X10 S100 F600\nG4 S1\nM5\n"
+    marlin = load_machine("marlin-laser-220")
+    assert "dwell" in codes(text, marlin)
+    assert "line 2 (the first of 2) waits with the beam on at S100" in run(text, marlin).warnings[1]
+    for dark in (text.replace("M3", "M4"), text.replace("S100", "S0"), text.replace("M3", "M5")):
+        assert "dwell" not in codes(dark, marlin)
+    assert "dwell" not in codes("M3 S100\nG4 P0.5\nM5\n")  # laser mode is dark under G0
 
 
 def test_m2_disarms_and_g40_is_no_dwell():
