@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 from miurafab.origami.fitting.fit import fit
-from miurafab.workflow.design import design, save_pattern
+from miurafab.workflow.design import design
 
 RESIDUAL = 1e-12
 
@@ -51,7 +51,7 @@ def main() -> int:
             failed.append(path.stem)
         if options.out is not None:
             options.out.mkdir(parents=True, exist_ok=True)
-            save_pattern(result.pattern, options.out / f"{path.stem}.fold", wanted.title)
+            result.pattern.save(options.out / f"{path.stem}.fold", title=wanted.title)
     print(f"{time.perf_counter() - started:.1f} s together")
     if failed:
         print(f"not as asked: {', '.join(failed)}")

@@ -1,14 +1,20 @@
 """miurafab: from a curved surface to a folded origami shell, cut on a real machine.
 
-The verbs of the command line are functions here, over frozen dataclasses::
+The verbs of the command line are functions here, over values, paths and objects alike. Lengths are
+in mm and angles in degrees::
 
-    import miurafab
+    import miurafab as mf
 
-    wanted = miurafab.design("hypar:height=0.5", facets="20x20", size="250mm")
-    result = miurafab.fit(wanted.request)
-    layout = miurafab.sheets(result.pattern, "grbl-laser-400", "card-250")
-    miurafab.write_job(layout, "jobs/hypar")
-    miurafab.cut("jobs/hypar", port="virtual")
+    sheet = mf.fit("hypar", height=0.5, facets=(20, 20), size=250)
+    sheet.pattern.save("hypar.fold")
+    mf.fold(sheet).save("hypar.gif")
+    job = mf.sheets(sheet, machine="grbl-laser-400", material="card-250")
+    job.write("jobs/hypar")
+    mf.preview(job)
+    mf.cut("jobs/hypar", port="virtual")
+
+A mistake in what you give is one of the exceptions below :class:`MiurafabError`, whose message is
+one sentence. A fit that finds no sheet is a result with advice.
 
 Each name is imported when it is first used, so that ``import miurafab`` costs nothing.
 """
@@ -18,130 +24,91 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from miurafab.version import __version__
+from miurafab.version import __version__ as __version__
 
+# The one list of public names. Editors and type checkers read it as imports; at run time
+# `_homes` reads the same lines as text, and `__getattr__` imports a name when it is asked for.
 if TYPE_CHECKING:
-    from miurafab.origami.fitting.fit import fit
-    from miurafab.origami.folding.thick_panels import thick_panels
-    from miurafab.origami.verify import audit as check
-    from miurafab.posting import post
-    from miurafab.profiles import load_machine, load_material
-    from miurafab.workflow.calibrate import add_material, calibrate
-    from miurafab.workflow.convert import convert, read_pattern
-    from miurafab.workflow.cut import DEFAULT_MATERIAL, prepare
-    from miurafab.workflow.cut_sheets import cut
-    from miurafab.workflow.design import design, load_pattern, save_pattern
-    from miurafab.workflow.doctor import examine
-    from miurafab.workflow.energy import check_writable as check_energy_file
-    from miurafab.workflow.energy import energy, write_energy
-    from miurafab.workflow.fold import (
-        check_motion_file,
-        fold,
-        thickness_report,
-        write_angles,
-        write_motion,
-    )
-    from miurafab.workflow.job_directory import (
-        design_profiles,
-        layout_options,
-        read_job,
-        sheets,
-        write_job,
-    )
-    from miurafab.workflow.page import write_page
-    from miurafab.workflow.picture import write_pictures
-    from miurafab.workflow.preview import ASSUMED_MACHINE as DEFAULT_MACHINE
-    from miurafab.workflow.preview import preview
-    from miurafab.workflow.tradeoff import check_writable as check_tradeoff_file
-    from miurafab.workflow.tradeoff import tradeoff, write_tradeoff
+    from miurafab.errors import ControllerError as ControllerError
+    from miurafab.errors import GcodeError as GcodeError
+    from miurafab.errors import InputError as InputError
+    from miurafab.errors import JobStopped as JobStopped
+    from miurafab.errors import LayoutError as LayoutError
+    from miurafab.errors import MachineError as MachineError
+    from miurafab.errors import MiurafabError as MiurafabError
+    from miurafab.errors import OptionError as OptionError
+    from miurafab.errors import PatternError as PatternError
+    from miurafab.errors import PortError as PortError
+    from miurafab.errors import ProfileError as ProfileError
+    from miurafab.errors import TargetError as TargetError
+    from miurafab.errors import UnitError as UnitError
+    from miurafab.fabrication.options import LayoutOptions as LayoutOptions
+    from miurafab.fabrication.sheets import DrawnLayout as DrawnLayout
+    from miurafab.fabrication.sheets import Layout as Layout
+    from miurafab.findings import Finding as Finding
+    from miurafab.origami.crease_pattern import CreasePattern as CreasePattern
+    from miurafab.origami.energy.path import EnergyCurve as EnergyCurve
+    from miurafab.origami.fitting.request import FitOptions as FitOptions
+    from miurafab.origami.fitting.request import FitRequest as FitRequest
+    from miurafab.origami.fitting.request import FitResult as FitResult
+    from miurafab.origami.folding.kinematics import FoldingMotion as FoldingMotion
+    from miurafab.origami.folding.thick_panels import ThickPanels as ThickPanels
+    from miurafab.origami.formats.files import load as load
+    from miurafab.origami.tradeoff import Tradeoff as Tradeoff
+    from miurafab.origami.verify import Audit as Audit
+    from miurafab.origami.verify import Measurements as Measurements
+    from miurafab.profiles import MachineProfile as MachineProfile
+    from miurafab.profiles import Material as Material
+    from miurafab.profiles import load_machine as load_machine
+    from miurafab.profiles import load_material as load_material
+    from miurafab.workflow.calibrate import Calibration as Calibration
+    from miurafab.workflow.calibrate import add_material as add_material
+    from miurafab.workflow.calibrate import calibrate as calibrate
+    from miurafab.workflow.convert import Conversion as Conversion
+    from miurafab.workflow.convert import convert as convert
+    from miurafab.workflow.cut_sheets import CutOptions as CutOptions
+    from miurafab.workflow.cut_sheets import CutSheet as CutSheet
+    from miurafab.workflow.cut_sheets import cut as cut
+    from miurafab.workflow.design import Design as Design
+    from miurafab.workflow.design import design as design
+    from miurafab.workflow.doctor import Examination as Examination
+    from miurafab.workflow.doctor import doctor as doctor
+    from miurafab.workflow.dry_run import SheetPreview as SheetPreview
+    from miurafab.workflow.energy import energy as energy
+    from miurafab.workflow.fit import fit as fit
+    from miurafab.workflow.fold import Folding as Folding
+    from miurafab.workflow.fold import fold as fold
+    from miurafab.workflow.fold import thick_panels as thick_panels
+    from miurafab.workflow.job_directory import JobDirectory as JobDirectory
+    from miurafab.workflow.job_directory import read_job as read_job
+    from miurafab.workflow.listings import machines as machines
+    from miurafab.workflow.listings import materials as materials
+    from miurafab.workflow.listings import surfaces as surfaces
+    from miurafab.workflow.patterns import check as check
+    from miurafab.workflow.preview import Preview as Preview
+    from miurafab.workflow.preview import preview as preview
+    from miurafab.workflow.sheets import SheetJob as SheetJob
+    from miurafab.workflow.sheets import sheets as sheets
+    from miurafab.workflow.tradeoff import tradeoff as tradeoff
 
-_HOMES = {
-    "DEFAULT_MACHINE": ("miurafab.workflow.preview", "ASSUMED_MACHINE"),
-    "DEFAULT_MATERIAL": ("miurafab.workflow.cut", "DEFAULT_MATERIAL"),
-    "add_material": ("miurafab.workflow.calibrate", "add_material"),
-    "calibrate": ("miurafab.workflow.calibrate", "calibrate"),
-    "check": ("miurafab.origami.verify", "audit"),
-    "check_energy_file": ("miurafab.workflow.energy", "check_writable"),
-    "check_motion_file": ("miurafab.workflow.fold", "check_motion_file"),
-    "check_tradeoff_file": ("miurafab.workflow.tradeoff", "check_writable"),
-    "convert": ("miurafab.workflow.convert", "convert"),
-    "cut": ("miurafab.workflow.cut_sheets", "cut"),
-    "design": ("miurafab.workflow.design", "design"),
-    "design_profiles": ("miurafab.workflow.job_directory", "design_profiles"),
-    "energy": ("miurafab.workflow.energy", "energy"),
-    "examine": ("miurafab.workflow.doctor", "examine"),
-    "fit": ("miurafab.origami.fitting.fit", "fit"),
-    "fold": ("miurafab.workflow.fold", "fold"),
-    "load_machine": ("miurafab.profiles", "load_machine"),
-    "layout_options": ("miurafab.workflow.job_directory", "layout_options"),
-    "load_material": ("miurafab.profiles", "load_material"),
-    "load_pattern": ("miurafab.workflow.design", "load_pattern"),
-    "post": ("miurafab.posting", "post"),
-    "prepare": ("miurafab.workflow.cut", "prepare"),
-    "preview": ("miurafab.workflow.preview", "preview"),
-    "read_job": ("miurafab.workflow.job_directory", "read_job"),
-    "read_pattern": ("miurafab.workflow.convert", "read_pattern"),
-    "save_pattern": ("miurafab.workflow.design", "save_pattern"),
-    "sheets": ("miurafab.workflow.job_directory", "sheets"),
-    "thick_panels": ("miurafab.origami.folding.thick_panels", "thick_panels"),
-    "thickness_report": ("miurafab.workflow.fold", "thickness_report"),
-    "tradeoff": ("miurafab.workflow.tradeoff", "tradeoff"),
-    "write_angles": ("miurafab.workflow.fold", "write_angles"),
-    "write_energy": ("miurafab.workflow.energy", "write_energy"),
-    "write_job": ("miurafab.workflow.job_directory", "write_job"),
-    "write_motion": ("miurafab.workflow.fold", "write_motion"),
-    "write_tradeoff": ("miurafab.workflow.tradeoff", "write_tradeoff"),
-    "write_page": ("miurafab.workflow.page", "write_page"),
-    "write_pictures": ("miurafab.workflow.picture", "write_pictures"),
-}
 
-__all__ = [
-    "DEFAULT_MACHINE",
-    "DEFAULT_MATERIAL",
-    "__version__",
-    "add_material",
-    "calibrate",
-    "check",
-    "check_energy_file",
-    "check_motion_file",
-    "check_tradeoff_file",
-    "convert",
-    "cut",
-    "design",
-    "design_profiles",
-    "energy",
-    "examine",
-    "fit",
-    "fold",
-    "layout_options",
-    "load_machine",
-    "load_material",
-    "load_pattern",
-    "post",
-    "prepare",
-    "preview",
-    "read_job",
-    "read_pattern",
-    "save_pattern",
-    "sheets",
-    "thick_panels",
-    "thickness_report",
-    "tradeoff",
-    "write_angles",
-    "write_energy",
-    "write_job",
-    "write_motion",
-    "write_page",
-    "write_pictures",
-    "write_tradeoff",
-]
+def _homes() -> dict[str, str]:
+    """The module of each public name, from the lines ``from MODULE import NAME as NAME`` above."""
+    source = __spec__.loader.get_source(__name__)  # type: ignore[union-attr]
+    lines = (line.split() for line in source.splitlines() if line.startswith("    from miurafab"))
+    return {words[3]: words[1] for words in lines}
+
+
+_HOMES = _homes()
+__all__ = ["__version__", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'miurafab' has no attribute '{name}'")
-    module, attribute = _HOMES[name]
-    return getattr(importlib.import_module(module), attribute)
+    value = getattr(importlib.import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
 
 
 def __dir__() -> list[str]:

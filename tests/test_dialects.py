@@ -27,10 +27,10 @@ from miurafab.profiles import (
     shipped_directory,
     shipped_names,
 )
-from miurafab.workflow.design import save_pattern
 from miurafab.workflow.dry_run import dry_run
-from miurafab.workflow.job_directory import read_job, write_job
+from miurafab.workflow.job_directory import read_job
 from miurafab.workflow.preview import preview
+from miurafab.workflow.sheets import sheets
 
 MACHINES = shipped_names("firmware_profiles")
 CARD = load_material("card-250")
@@ -230,8 +230,8 @@ def test_a_plotter_is_told_its_pen_and_speed_alone() -> None:
 
 
 def test_a_job_for_a_cutter_is_a_directory_like_any_other(tmp_path, pattern) -> None:
-    save_pattern(pattern, tmp_path / "flat.fold", "flat")
-    made = write_job(tmp_path / "flat.fold", tmp_path / "job", "hpgl-cutter-a3", "card-250")
+    pattern.save(tmp_path / "flat.fold", title="flat")
+    made = sheets(tmp_path / "flat.fold", "hpgl-cutter-a3", "card-250").write(tmp_path / "job")
     assert (tmp_path / "job" / "sheet-01.plt").read_text() == made.jobs[0].text
     assert not list((tmp_path / "job").glob("*.nc"))
     assert read_job(tmp_path / "job").jobs[0].text == made.jobs[0].text
@@ -239,7 +239,7 @@ def test_a_job_for_a_cutter_is_a_directory_like_any_other(tmp_path, pattern) -> 
     alone = preview(tmp_path / "job" / "sheet-01.plt")
     assert alone.machine.name == "hpgl-cutter-a3"
     # Made again for another machine, nothing of the first is left behind.
-    write_job(tmp_path / "flat.fold", tmp_path / "job", "grbl-laser-400", "card-250")
+    sheets(tmp_path / "flat.fold", "grbl-laser-400", "card-250").write(tmp_path / "job")
     assert not list((tmp_path / "job").glob("*.plt"))
 
 

@@ -26,11 +26,7 @@ def calibrate(
     Preview and cut it like any job, then keep the best settings with 'miurafab materials add'.
     """
     with console.progress("drawing the sheet") as progress:
-        made = miurafab.calibrate(
-            miurafab.DEFAULT_MACHINE if machine is None else machine,
-            miurafab.DEFAULT_MATERIAL if material is None else material,
-            out,
-        )
+        made = miurafab.calibrate(out, machine, material)
         progress(1.0, "done")
     layout, sheet = made.job.layout, made.sheet
     answer: dict[str, Any] = {

@@ -9,7 +9,6 @@ import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import argument
 from miurafab.errors import DONE, NO
-from miurafab.findings import findings_json
 
 EXAMPLES = ("miurafab check hypar.fold", "miurafab check hypar.fold --json")
 
@@ -24,15 +23,13 @@ def check(
 
     Exits with 1 if an invariant does not hold.
     """
-    pattern, surface, findings = miurafab.load_pattern(file)
-    result = miurafab.check(pattern, surface)
-    findings += result.findings
-    report = result.report() | {"findings": findings_json(findings)}
+    result = miurafab.check(file)
+    report = result.report()
 
     def show() -> None:
         hidden = {"findings", "advice", "iterations"}
         console.facts({key: value for key, value in report.items() if key not in hidden})
-        console.findings(findings)
+        console.findings(result.findings)
 
     console.answer(report, show)
     return DONE if result.valid else NO

@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, MaterialOption, argument, option, split, takes
 from miurafab.cli.fit import RigidOption, fit_options
@@ -90,8 +89,10 @@ def cut(
         raise InputError(
             "Name the machine's `port` ('virtual' needs no machine), or ask for `dry_run`."
         )
+    from miurafab.workflow.cut import prepare
+
     with console.progress("preparing") as progress:
-        prepared = miurafab.prepare(
+        prepared = prepare(
             thing,
             machine=machine,
             material=material,
@@ -132,6 +133,7 @@ def _stream(
 ) -> tuple[CutSheet, ...]:
     """Cut on one machine, with a progress bar and the keys of the terminal."""
     from miurafab.machine.keys import terminal_keys
+    from miurafab.workflow.cut_sheets import cut_prepared
     from miurafab.workflow.dry_run import clock_text
 
     def before(number: int, count: int) -> None:
@@ -154,7 +156,7 @@ def _stream(
             )
 
         with terminal_keys() as keys:
-            return miurafab.cut(
+            return cut_prepared(
                 prepared,
                 port=port,
                 sheets=sheet,

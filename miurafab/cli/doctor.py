@@ -14,7 +14,7 @@ def doctor(*, console: Console = Console()) -> int:
 
     Sends nothing to any port. Exits with 1 if anything would stop a job.
     """
-    report = miurafab.examine()
+    report = miurafab.doctor()
 
     def show() -> None:
         console.facts(report.versions, "Installed")

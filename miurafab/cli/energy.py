@@ -9,6 +9,7 @@ import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option
 from miurafab.errors import DONE, NO
+from miurafab.files import new_file
 from miurafab.options import File, Text, Whole, number
 
 if TYPE_CHECKING:
@@ -56,11 +57,12 @@ def energy(
     Exits with 1 if the way to flat was lost.
     """
     if out is not None:
-        miurafab.check_energy_file(out)
-    pattern, _, _ = miurafab.load_pattern(file)
+        from miurafab.origami.plotting import RESULTS
+
+        new_file(out, "The energy", RESULTS)
     with console.progress("unfolding") as progress:
         curve = miurafab.energy(
-            pattern,
+            file,
             steps,
             material=material,
             crease=crease,
@@ -69,7 +71,7 @@ def energy(
         )
     answer = curve.report()
     if out is not None:
-        miurafab.write_energy(curve, out, file.stem)
+        curve.save(out, title=file.stem)
         answer["file"] = str(out)
     console.answer(answer, lambda: _show(console, curve, answer))
     return DONE if curve.path.converged else NO

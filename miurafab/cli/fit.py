@@ -10,7 +10,6 @@ from miurafab.cli.console import Console
 from miurafab.cli.declared import TargetArgument, option, takes
 from miurafab.cli.ending import spelled
 from miurafab.errors import DONE, INTERRUPTED, NO, OptionError
-from miurafab.findings import findings_json
 from miurafab.options import File, Flag
 from miurafab.workflow.json_text import json_text
 
@@ -56,11 +55,10 @@ def fit(
     for finding in asked.findings:
         console.note(finding.sentence)
     with console.progress("fitting") as progress:
-        result = miurafab.fit(asked.request, progress)
-    findings = (*asked.findings, *result.findings)
-    answer = spelled(result.report() | {"findings": findings_json(findings)})
+        result = miurafab.fit(asked, on_progress=progress)
+    answer = spelled(result.report())
     if result.pattern is not None:
-        miurafab.save_pattern(result.pattern, out, asked.title)
+        result.pattern.save(out, title=asked.title)
         answer["file"] = str(out)
     if report is not None:
         report.write_text(json_text(answer) + "\n", encoding="utf-8", newline="\n")

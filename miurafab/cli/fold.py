@@ -9,6 +9,7 @@ import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option
 from miurafab.errors import DONE, NO
+from miurafab.files import new_file
 from miurafab.options import Choice, File, Whole, length
 
 EXAMPLES = (
@@ -52,21 +53,23 @@ def fold(
 
     The pattern folds rigidly if it can; otherwise its facets bend as little as possible.
     """
+    from miurafab.workflow.fold import ENDINGS, thickness_report
+
     if out is not None:
-        miurafab.check_motion_file(out)
-    pattern = miurafab.read_pattern(file)
+        new_file(out, "The motion", ENDINGS)
+    pattern = miurafab.load(file)
     with console.progress("folding") as progress:
-        folding = miurafab.fold(pattern, steps, progress)
+        folding = miurafab.fold(pattern, steps, on_progress=progress)
         if out is not None:
-            miurafab.write_motion(
-                folding, out, file.stem, by_strain=colour == "strain", on_progress=progress
-            )
+            folding.save(out, title=file.stem, colour=colour, on_progress=progress)
         if csv is not None:
-            miurafab.write_angles(folding, csv)
-        panels = None if thickness is None else miurafab.thick_panels(pattern, thickness, progress)
+            folding.save_angles(csv)
+        panels = None
+        if thickness is not None:
+            panels = miurafab.thick_panels(pattern, thickness, on_progress=progress)
     answer: dict[str, Any] = folding.report()
     answer |= {"file": None if out is None else str(out), "csv": None if csv is None else str(csv)}
-    answer["thickness"] = None if panels is None else miurafab.thickness_report(panels)
+    answer["thickness"] = None if panels is None else thickness_report(panels)
     if not folding.motion.is_rigid:
         console.note(
             f"The sheet does not fold rigidly (its facets would miss each other by up to "

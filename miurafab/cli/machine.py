@@ -161,10 +161,10 @@ def frame(
     **given: str,
 ) -> int:
     """Trace the box around what a sheet burns, with the beam off or as a pointer."""
-    import miurafab
     from miurafab.workflow import cut_sheets
+    from miurafab.workflow.cut import prepare
 
-    prepared = miurafab.prepare(thing, machine=machine)
+    prepared = prepare(thing, machine=machine)
     options = read_options(cut_sheets.CutOptions, given)
     for each in port:
         if len(port) > 1:

@@ -48,16 +48,13 @@ def preview(
 
     Prints times, lengths and warnings, and writes pictures and a page.
     """
-    profile = None if machine is None else miurafab.load_machine(machine)
     with console.progress("dry run") as progress:
-        seen = miurafab.preview(job, machine=profile, settings_dump=settings, on_progress=progress)
+        seen = miurafab.preview(job, machine=machine, settings=settings, on_progress=progress)
         progress(0.9, "pictures")
         folder = out or (job / "preview" if job.is_dir() else job.with_name(f"{job.stem}-preview"))
-        files = list(miurafab.write_pictures(seen, folder))
-        page = folder / "preview.html"
-        miurafab.write_page(page, title=seen.name, preview=seen, pattern=seen.pattern)
+        files = seen.write(folder)
         progress(1.0, "done")
-    answer: dict[str, Any] = {**seen.as_dict(), "files": [str(file) for file in (*files, page)]}
+    answer: dict[str, Any] = {**seen.as_dict(), "files": [str(file) for file in files]}
 
     def show() -> None:
         console.rows(
@@ -68,7 +65,7 @@ def preview(
         console.findings(seen.findings)
         for sheet in seen.sheets:
             console.findings(sheet.findings)
-        console.line(f"Open {page} in a browser; pictures are beside it.")
+        console.line(f"Open {files[-1]} in a browser; pictures are beside it.")
 
     console.answer(answer, show)
     return DONE

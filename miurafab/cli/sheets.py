@@ -61,20 +61,19 @@ def sheets(
 
     Makes patches, tabs, perforation, nesting and order, for one machine and one material.
     """
-    options = miurafab.layout_options(given, design)
-    named = (None, None) if design is None else miurafab.design_profiles(design)
-    # An empty name, as of a variable that is not set, is a mistake and not the usual machine.
-    machine = named[0] if machine is None else machine
-    material = named[1] if material is None else material
     with console.progress("laying out") as progress:
-        job = miurafab.write_job(
+        made = miurafab.sheets(
             file,
+            machine,
+            material,
+            design=design,
+            on_progress=lambda fraction, note: progress(0.7 * fraction, note),
+            **given,
+        )
+        job = made.write(
             out,
-            miurafab.DEFAULT_MACHINE if machine is None else machine,
-            miurafab.DEFAULT_MATERIAL if material is None else material,
-            progress,
             formats=formats or (),
-            options=options,
+            on_progress=lambda fraction, note: progress(0.7 + 0.3 * fraction, note),
         )
     answer = _answer(job, out)
     console.answer(answer, lambda: _show(console, answer, job.findings))

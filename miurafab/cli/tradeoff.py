@@ -11,6 +11,7 @@ from miurafab.cli.console import Console
 from miurafab.cli.declared import TargetArgument, option, takes
 from miurafab.cli.fit import fit_options
 from miurafab.errors import DONE, NO
+from miurafab.files import new_file
 from miurafab.options import File
 
 EXAMPLES = (
@@ -42,13 +43,15 @@ def tradeoff(
     if fewer than three sheets were found.
     """
     if out is not None:
-        miurafab.check_tradeoff_file(out)
+        from miurafab.origami.plotting import RESULTS
+
+        new_file(out, "The trade-off", RESULTS)
     given.setdefault("workers", str(os.cpu_count() or 1))
     with console.progress("fitting") as progress:
         found = miurafab.tradeoff(target, on_progress=progress, **given)
     answer = found.report()
     if out is not None and (found.curves or out.suffix.lower() == ".csv"):
-        miurafab.write_tradeoff(found, out, target)
+        found.save(out, title=target)
         answer["file"] = str(out)
 
     def show() -> None:

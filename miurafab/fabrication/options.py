@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from miurafab.display import Shown
 from miurafab.errors import OptionError
 from miurafab.options import (
     Choice,
@@ -39,8 +40,8 @@ def longer_first(sides: tuple[float, float]) -> tuple[float, float]:
 SIDES = Pair(length(above=True), "LENGTHxLENGTH", "300mmx200mm", "x", longer_first)
 
 
-@dataclass(frozen=True)
-class NestingOptions:
+@dataclass(frozen=True, repr=False)
+class NestingOptions(Shown):
     """The sheets on which patches are nested."""
 
     quantity: int = option(
@@ -82,8 +83,8 @@ class NestingOptions:
         check_options(self)
 
 
-@dataclass(frozen=True)
-class LayoutOptions:
+@dataclass(frozen=True, repr=False)
+class LayoutOptions(Shown):
     """How a pattern is laid out. Sizes are (longer, shorter) side in mm."""
 
     gap_mm: float = option(

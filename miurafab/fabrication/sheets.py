@@ -10,11 +10,13 @@ origin, and from there to its sheet. A point p of the pattern lies on the sheet 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import shapely
 
+from miurafab.display import Shown
 from miurafab.fabrication.labels import Lettering, place_texts
 from miurafab.fabrication.layout_findings import layout_findings
 from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, nest, turned
@@ -37,6 +39,9 @@ from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, Material
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -99,14 +104,24 @@ class Totals:
     sheets_bound: int | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """A pattern on sheets. ``toolpaths`` holds one for each sheet and ``backs`` one for each back
-    that is worked on; both are empty if the layout was read from a file. ``pattern`` is the one
-    whose facets and edges it names, opened where that was asked; None if it was read from a file.
+@dataclass(frozen=True, eq=False, repr=False)
+class Layout(Shown):
+    """A pattern on sheets, as ``layout.json`` holds it.
 
-    ``findings`` are for the assembly: options that could not be honoured, and everything that has
-    no room.
+    Parameters
+    ----------
+    machine, material : str
+        The names of the profiles.
+    patches : tuple of Patch
+        The pieces with their tabs, each in a frame of its own.
+    sheets : tuple of Sheet
+        The sheets and the places of the patches on them.
+    totals : Totals
+        Sums over the layout.
+    nesting : NestingRecord
+        What nested the patches.
+    findings : tuple of Finding
+        For the assembly: options that could not be honoured, and everything that has no room.
     """
 
     machine: str
@@ -115,9 +130,13 @@ class Layout:
     sheets: tuple[Sheet, ...]
     totals: Totals
     findings: tuple[Finding, ...] = ()
-    toolpaths: tuple[Toolpath, ...] = ()
-    backs: tuple[Toolpath, ...] = ()
-    pattern: CreasePattern | None = None
+
+    def _summary(self) -> str:
+        totals = self.totals
+        return (
+            f"{totals.patches} patches, {totals.tabs} tabs, {totals.sheets} sheets of "
+            f"{self.material} for {self.machine}"
+        )
 
     @property
     def untabbed(self) -> tuple[int, ...]:
@@ -131,9 +150,44 @@ class Layout:
         return max((patch.copy for patch in self.patches), default=1)
 
     @property
-    def model(self) -> Layout:
+    def model(self) -> Self:
         """The same layout with the patches of the first model only."""
         return replace(self, patches=tuple(p for p in self.patches if p.copy == 1))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DrawnLayout(Layout):
+    """A layout with its strokes, as :func:`lay_out` makes it.
+
+    Parameters
+    ----------
+    pattern : CreasePattern
+        The pattern whose facets and edges the layout names, opened where that was asked.
+    toolpaths : tuple of Toolpath
+        The strokes of each sheet, in the order of ``sheets``.
+    backs : tuple of Toolpath
+        The strokes of each back that is worked on.
+    """
+
+    pattern: CreasePattern = field(kw_only=True)
+    toolpaths: tuple[Toolpath, ...] = field(kw_only=True)
+    backs: tuple[Toolpath, ...] = ()
+
+    def plot(self) -> list[Axes]:
+        """Draw what is made of each sheet with matplotlib: cuts, creases and scores in mm.
+
+        Returns
+        -------
+        list of matplotlib Axes
+            One for each pass of each sheet.
+        """
+        from miurafab.fabrication.drawing.plot import draw_toolpath
+        from miurafab.origami.plotting import shown_row
+
+        axes = shown_row((4.6 * len(self.passes) + 1.2, 4.6), len(self.passes))
+        for each, toolpath in zip(axes, self.passes, strict=True):
+            draw_toolpath(toolpath, each)
+        return axes
 
     @property
     def passes(self) -> tuple[Toolpath, ...]:
@@ -152,7 +206,7 @@ def lay_out(
     material: Material,
     *,
     options: LayoutOptions | None = None,
-) -> Layout:
+) -> DrawnLayout:
     """The pattern laid out on sheets of the machine's bed, as ``options`` say; deterministic.
 
     Raises :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed or is not a simple
@@ -198,7 +252,7 @@ def lay_out(
     sheets = tuple(_with_passes(*made) for made in zip(sheets, toolpaths, backs, strict=True))
     behind = tuple(back for back in backs if back is not None)
     usable = sum(stock.kinds.kinds[kind].area for kind in _kinds(nesting))
-    return Layout(
+    return DrawnLayout(
         machine=machine.name,
         material=material.name,
         patches=patches,

@@ -66,6 +66,7 @@ __all__ = [
     "outside",
     "percent",
     "read_options",
+    "read_value",
 ]
 
 _KEY = "miurafab.option"
@@ -235,6 +236,18 @@ def _made(cls: type[T], inside: Mapping[str, Any], base: T | None = None) -> T:
         elif isinstance(hints[entry.name], type) and is_dataclass(hints[entry.name]):
             values[entry.name] = _made(hints[entry.name], inside)
     return cls(**(values if base is None else vars(base) | values))
+
+
+def read_value(name: str, kind: Kind, value: object) -> Any:
+    """One ``value`` of the option ``name``. Raises :class:`~miurafab.errors.OptionError`.
+
+    >>> read_value("steps", Whole(2, 1000), 40)
+    40
+    """
+    try:
+        return kind.read(value)
+    except ValueError as fault:
+        raise OptionError(name, str(fault)) from None
 
 
 def check_options(value: Any) -> None:

@@ -7,30 +7,58 @@ from flat (FOLD 1.2, https://github.com/edemaine/fold).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab.errors import PatternError
+from miurafab.display import Shown
+from miurafab.errors import OptionError, PatternError
+from miurafab.files import AnyPath
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.options import Choice, read_value
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 
 
-@dataclass(frozen=True, eq=False)
-class CreasePattern:
-    """A pattern of V vertices, E edges and F facets; lengths in mm, angles in radians.
+@dataclass(frozen=True, eq=False, repr=False)
+class CreasePattern(Shown):
+    """A crease pattern of V vertices, E edges and F facets.
 
-    ``vertices_coords`` (V, 2) float64 is the flat pattern and ``folded_coords`` (V, 3) float64 its
-    folded form, or None where only the flat pattern is known. ``edges_vertices`` (E, 2) int64,
-    ``edges_assignment`` (E,) of one-letter strings, ``edges_fold_angle`` (E,) float64.
-    ``faces_vertices`` (F, k) int64, counter-clockwise in the flat pattern, rows of polygons with
-    fewer than k corners filled with -1. ``grid`` is ``(columns, rows)`` of vertices where the
-    vertices form a grid in row-major order. ``target`` names the surface and its parameters, and
-    the folded form lies on ``scale`` times it.
+    Parameters
+    ----------
+    vertices_coords : (V, 2) float64
+        The flat pattern, mm.
+    edges_vertices : (E, 2) int64
+        The two ends of each edge.
+    edges_assignment : (E,) str
+        One letter for each edge: B border, M mountain, V valley, F flat, U unassigned, C cut,
+        J join.
+    edges_fold_angle : (E,) float64
+        Radians from flat, positive for a valley.
+    faces_vertices : (F, k) int64
+        The corners of each facet, counter-clockwise in the flat pattern. A facet with fewer than
+        k corners is filled up with -1.
+    folded_coords : (V, 3) float64, optional
+        The folded form, mm. None where only the flat pattern is known.
+    grid : (int, int), optional
+        Columns and rows of vertices, where the vertices form a grid in row-major order.
+    scale : float
+        The folded form lies on ``scale`` times the target.
+    target : dict
+        The surface and its parameters (:mod:`miurafab.surfaces.description`).
+
+    Raises
+    ------
+    PatternError
+        For arrays that do not fit together, and for coordinates that are not finite.
     """
 
     vertices_coords: Floats
@@ -62,6 +90,100 @@ class CreasePattern:
                 raise PatternError(f"{name} refers to a vertex that does not exist.")
         if self.grid is not None and self.grid[0] * self.grid[1] != vertices:
             raise PatternError(f"The grid {self.grid} does not have {vertices} vertices.")
+
+    @property
+    def name(self) -> str:
+        """What the target is called, empty for none."""
+        target = self.target
+        if "mesh" in target:
+            return Path(str(target["mesh"])).stem
+        return str(target.get("surface", target.get("name", "")))
+
+    def chosen_form(self, form: str | None) -> str:
+        """``flat`` or ``folded``; None is folded where there is a folded form.
+
+        Raises :class:`~miurafab.errors.OptionError`.
+        """
+        there = self.folded_coords is not None
+        if form is None:
+            return "folded" if there else "flat"
+        if read_value("form", Choice(("flat", "folded")), form) == "folded" and not there:
+            raise OptionError("form", "is folded, and the pattern has no folded form; leave it out")
+        return form
+
+    def save(self, path: AnyPath, *, title: str = "", form: str | None = None) -> None:
+        """Write the pattern to ``path``, in the format of its ending.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            A ``.fold``, ``.svg``, ``.dxf``, ``.cp``, ``.opx``, ``.obj``, ``.stl`` or ``.glb`` file.
+        title : str
+            The title inside the file. The default is the name of the target.
+        form : {"folded", "flat"}, optional
+            What an ``.obj``, ``.stl`` or ``.glb`` shows. The default is the folded form where there
+            is one.
+
+        Raises
+        ------
+        InputError
+            For another ending, and for a folder that does not exist.
+        """
+        from miurafab.origami.formats.files import write_pattern
+
+        write_pattern(self, path, title=title or self.name, form=form)
+
+    def plot(self, form: str | None = None, ax: Axes | None = None) -> Axes:
+        """Draw the pattern with matplotlib.
+
+        Parameters
+        ----------
+        form : {"folded", "flat"}, optional
+            The default is the folded form where there is one.
+        ax : matplotlib Axes, optional
+            Where to draw; three-dimensional axes for the folded form. The default is a new figure.
+
+        Returns
+        -------
+        matplotlib Axes
+            ``.figure.savefig("pattern.png")`` writes it to a file.
+        """
+        from miurafab.origami.pattern_plot import draw_flat, draw_folded
+        from miurafab.origami.plotting import shown
+
+        if self.chosen_form(form) == "folded":
+            axes = shown((6.4, 5.0), ax, projection="3d")
+            draw_folded(self, axes)
+        else:
+            axes = shown((6.4, 5.0), ax)
+            draw_flat(self, axes)
+        return axes
+
+    def _summary(self) -> str:
+        width, height = np.ptp(self.vertices_coords, axis=0).tolist()
+        form = "with folded form" if self.folded_coords is not None else "without folded form"
+        of = f", of {self.name}" if self.name else ""
+        return (
+            f"{len(self.faces_vertices)} facets, {len(self.vertices_coords)} vertices, "
+            f"{width:.4g} x {height:.4g} mm flat, {form}{of}"
+        )
+
+    def _picture(self) -> str:
+        from miurafab.origami.picture import MOST_FACETS, pattern_svg
+
+        return pattern_svg(self) if len(self.faces_vertices) <= MOST_FACETS else ""
+
+    def _facts(self) -> Mapping[str, object]:
+        width, height = np.ptp(self.vertices_coords, axis=0).tolist()
+        letters = self.edges_assignment
+        return {
+            "facets": len(self.faces_vertices),
+            "vertices": len(self.vertices_coords),
+            "mountains": int((letters == "M").sum()),
+            "valleys": int((letters == "V").sum()),
+            "flat size": f"{width:.4g} x {height:.4g} mm",
+            "target": self.name or "none",
+        }
 
     @cached_property
     def faces_edges(self) -> Ints:

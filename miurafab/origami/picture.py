@@ -164,7 +164,7 @@ def _creases(pattern: CreasePattern, points: Floats) -> list[str]:
     return parts
 
 
-def _facing(points: Floats, faces: Ints) -> float:
+def azimuth_of(points: Floats, faces: Ints) -> float:
     """The azimuth from which an upright sheet shows its front, a little from the side."""
     corners = points[np.where(faces >= 0, faces, faces[:, :1])]
     spokes = corners - corners[:, :1]
@@ -175,7 +175,7 @@ def _facing(points: Floats, faces: Ints) -> float:
 def _folded(pattern: CreasePattern, width: float) -> tuple[float, list[str]]:
     """The height of the picture and its polygons, from the farthest to the nearest."""
     assert pattern.folded_coords is not None
-    azimuth = _facing(pattern.folded_coords, pattern.faces_vertices)
+    azimuth = azimuth_of(pattern.folded_coords, pattern.faces_vertices)
     view = project(pattern.folded_coords, pattern.faces_vertices, azimuth)
     points, height = _placed(view.places, width)
     texts = np.array([f"{x:.1f},{y:.1f}" for x, y in points.tolist()])

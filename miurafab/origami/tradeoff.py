@@ -16,12 +16,18 @@ hyperboloid; the units of the cost, 1 % and 1000 facets, are this project's.)
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from miurafab.display import Shown
+from miurafab.files import AnyPath
 from miurafab.geometry.arrays import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 UNIT_DISTANCE = 0.01
 UNIT_FACETS = 1000.0
@@ -64,8 +70,8 @@ class CostCurve:
     optimal_facets: float
 
 
-@dataclass(frozen=True)
-class Tradeoff:
+@dataclass(frozen=True, repr=False)
+class Tradeoff(Shown):
     """The samples by facets, and the laws of those that converged, None for fewer than three.
 
     ``coefficient`` is c of d = c / n; ``exponent`` the power of n if it is fitted too (-1 by the
@@ -85,6 +91,56 @@ class Tradeoff:
     def found(self) -> tuple[Sample, ...]:
         """The samples with an exact sheet."""
         return tuple(s for s in self.samples if s.status == "converged")
+
+    def save(self, path: AnyPath, *, title: str = "") -> None:
+        """Write a plot (``.png``, ``.svg``) or a table (``.csv``), by the ending of ``path``.
+
+        Raises
+        ------
+        InputError
+            For another ending, for a folder that does not exist, and for a plot where fewer than
+            three sheets were found.
+        """
+        from miurafab.origami.plotting import write_result
+        from miurafab.origami.tradeoff_plot import tradeoff_plot, tradeoff_table
+
+        write_result(
+            path,
+            "The trade-off",
+            lambda: tradeoff_table(self),
+            lambda kind: tradeoff_plot(self, kind, title),
+        )
+
+    def plot(self) -> list[Axes]:
+        """Draw distance, area and cost over the number of facets with matplotlib.
+
+        Returns
+        -------
+        list of three matplotlib Axes
+        """
+        from miurafab.origami.plotting import shown_row
+        from miurafab.origami.tradeoff_plot import SIZE, draw_tradeoff
+
+        axes = shown_row(SIZE, 3)
+        draw_tradeoff(self, axes)
+        return axes
+
+    def _summary(self) -> str:
+        law = "no law"
+        if self.coefficient is not None:
+            law = f"distance {100 * self.coefficient:.3g} % / n"
+        return f"{len(self.samples)} sheets, {len(self.found)} converged, {law}"
+
+    def _picture(self) -> str:
+        from miurafab.origami.tradeoff_plot import tradeoff_plot
+
+        return tradeoff_plot(self, "svg", "").decode("utf-8") if self.curves else ""
+
+    def _facts(self) -> Mapping[str, object]:
+        return {
+            f"{s.columns} x {s.rows}": "-" if s.hausdorff_mm is None else f"{s.hausdorff_mm:.3g} mm"
+            for s in self.samples
+        }
 
     def report(self) -> dict[str, Any]:
         """Everything, ready for JSON."""

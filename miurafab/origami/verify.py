@@ -7,12 +7,14 @@ which say what is wrong and where. The pattern stays unchanged.
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
-from miurafab.findings import Finding, findings_json
+from miurafab.display import Shown
+from miurafab.findings import Finding, findings_json, refusals
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
 from miurafab.geometry.polygons import edge_lengths, facet_means
@@ -27,8 +29,8 @@ EXACT = 1e-10
 DEGENERATE = invariants.DEGENERATE
 
 
-@dataclass(frozen=True)
-class Measurements:
+@dataclass(frozen=True, repr=False)
+class Measurements(Shown):
     """The numbers of the fit report; None without the folded form or the target that they need.
 
     Angles in radians, lengths in mm, as :mod:`~miurafab.origami.invariants` defines them.
@@ -52,10 +54,19 @@ class Measurements:
     area_ratio: float | None = None
 
 
-@dataclass(frozen=True)
-class Audit:
-    """What an audit found; ``valid`` when nothing is wrong. ``where`` of a finding is the indices
-    of its facets, vertices or edges.
+@dataclass(frozen=True, repr=False)
+class Audit(Shown):
+    """The result of an audit.
+
+    Parameters
+    ----------
+    measurements : Measurements
+        Residuals and distances.
+    findings : tuple of Finding
+        What is wrong, each ``where`` being the indices of facets, vertices or edges; a note where
+        the distances are left out.
+    seconds : float
+        The time that the audit took.
     """
 
     measurements: Measurements
@@ -64,14 +75,23 @@ class Audit:
 
     @property
     def valid(self) -> bool:
-        return not self.findings
+        """Whether nothing is wrong."""
+        return not refusals(self.findings)
+
+    def _summary(self) -> str:
+        if self.valid:
+            return f"valid: {self.measurements.facets} facets"
+        return f"invalid: {', '.join(finding.code for finding in refusals(self.findings))}"
+
+    def _facts(self) -> Mapping[str, object]:
+        return {"valid": self.valid, **vars(self.measurements)}
 
     def report(self) -> dict[str, Any]:
         """The report of ``miurafab check``, under the names of the fit report."""
         numbers = {f.name: getattr(self.measurements, f.name) for f in fields(self.measurements)}
         return {
             "status": "converged" if self.valid else "invalid",
-            "advice": " ".join(finding.sentence for finding in self.findings),
+            "advice": " ".join(finding.sentence for finding in refusals(self.findings)),
             **numbers,
             "iterations": None,
             "seconds": self.seconds,

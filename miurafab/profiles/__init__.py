@@ -1,11 +1,20 @@
 """Machines and materials, read strictly from TOML."""
 
-from miurafab.profiles.machine import Knife, MachineProfile, load_machine
+from miurafab.profiles.machine import Knife, MachineProfile, load_machine, read_machine
 from miurafab.profiles.material import GRAINS, OPERATIONS, Material, load_material
-from miurafab.profiles.shipped import find_file, shipped_directory, shipped_names
+from miurafab.profiles.shipped import (
+    DEFAULT_MACHINE,
+    DEFAULT_MATERIAL,
+    find_file,
+    find_profile,
+    shipped_directory,
+    shipped_names,
+)
 from miurafab.profiles.table import Table, read_toml
 
 __all__ = [
+    "DEFAULT_MACHINE",
+    "DEFAULT_MATERIAL",
     "GRAINS",
     "OPERATIONS",
     "Knife",
@@ -13,8 +22,10 @@ __all__ = [
     "Material",
     "Table",
     "find_file",
+    "find_profile",
     "load_machine",
     "load_material",
+    "read_machine",
     "read_toml",
     "shipped_directory",
     "shipped_names",

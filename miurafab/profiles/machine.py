@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
+from miurafab.display import Shown
+from miurafab.files import AnyPath
 from miurafab.options import (
     REQUIRED,
     Choice,
@@ -22,7 +23,7 @@ from miurafab.options import (
     option,
 )
 from miurafab.profiles.material import OPERATIONS
-from miurafab.profiles.shipped import find_file
+from miurafab.profiles.shipped import find_profile
 from miurafab.profiles.table import Table, read_toml
 
 DIALECTS = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc", "marlin", "hpgl")
@@ -131,8 +132,8 @@ class Controller:
     )
 
 
-@dataclass(frozen=True)
-class MachineProfile:
+@dataclass(frozen=True, repr=False)
+class MachineProfile(Shown):
     """One machine class.
 
     ``settings`` are the controller settings a job expects, ``{30: 1000.0}`` for ``$30=1000``.
@@ -158,12 +159,35 @@ class MachineProfile:
         return round(tool.s_min + fraction * (tool.s_max - tool.s_min)) if fraction > 0 else 0
 
 
-def load_machine(name: str | Path) -> MachineProfile:
-    """The machine profile called ``name``: a shipped name or the path of a TOML file.
+def read_machine(machine: MachineProfile | AnyPath) -> MachineProfile:
+    """``machine`` itself, or the profile that it names (:func:`load_machine`)."""
+    return machine if isinstance(machine, MachineProfile) else load_machine(machine)
 
-    Raises :class:`~miurafab.errors.ProfileError` naming the file, the key and what is accepted.
+
+def load_machine(name: AnyPath) -> MachineProfile:
+    """Read a machine profile.
+
+    Parameters
+    ----------
+    name : str or os.PathLike
+        A shipped name (:func:`machines` lists them) or a TOML file.
+
+    Returns
+    -------
+    MachineProfile
+
+    Raises
+    ------
+    ProfileError
+        Naming the file, the key and what is accepted.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> mf.load_machine("grbl-laser-400").bed.width_mm
+    400.0
     """
-    path = find_file("firmware_profiles", str(name))
+    path = find_profile("firmware_profiles", name)
     table = Table(read_toml(path), path.name)
     profile = MachineProfile(
         name=path.stem,

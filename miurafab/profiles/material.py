@@ -8,10 +8,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from pathlib import Path
 
-from miurafab.options import REQUIRED, Choice, Whole, angle, feed, length, modulus, number, option
-from miurafab.profiles.shipped import find_file
+from miurafab.display import Shown
+from miurafab.files import AnyPath
+from miurafab.options import (
+    REQUIRED,
+    Choice,
+    Whole,
+    angle,
+    feed,
+    length,
+    modulus,
+    number,
+    option,
+)
+from miurafab.profiles.shipped import find_profile
 from miurafab.profiles.table import Table, read_toml
 
 OPERATIONS = ("engrave", "score", "perforate", "cut")
@@ -97,8 +108,8 @@ class Operation:
     passes: int = option(Whole(1, 50), "How often each stroke is made.", 1)
 
 
-@dataclass(frozen=True)
-class Material:
+@dataclass(frozen=True, repr=False)
+class Material(Shown):
     """One material on one class of laser.
 
     ``modulus_pa`` is Young's modulus in bending, None where the file does not give it: it is
@@ -125,12 +136,30 @@ class Material:
         return self.creases[kind].perforation or self.perforation
 
 
-def load_material(name: str | Path) -> Material:
-    """The material called ``name``: a shipped name or the path of a TOML file.
+def load_material(name: AnyPath) -> Material:
+    """Read a material.
 
-    Raises :class:`~miurafab.errors.ProfileError` naming the file, the key and what is accepted.
+    Parameters
+    ----------
+    name : str or os.PathLike
+        A shipped name (:func:`materials` lists them) or a TOML file.
+
+    Returns
+    -------
+    Material
+
+    Raises
+    ------
+    ProfileError
+        Naming the file, the key and what is accepted.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> mf.load_material("card-250").thickness_mm
+    0.25
     """
-    path = find_file("materials", str(name))
+    path = find_profile("materials", name)
     table = Table(read_toml(path), path.name)
     max_power = table.value("max_power", number(0.01, 1), 1.0)
     kerf = table.value("kerf", length(0, 2))

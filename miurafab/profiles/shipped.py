@@ -11,6 +11,11 @@ from pathlib import Path
 from typing import Literal
 
 from miurafab.errors import InputError, ProfileError
+from miurafab.files import AnyPath, as_path
+
+DEFAULT_MACHINE = "grbl-laser-400"
+DEFAULT_MATERIAL = "card-250"
+"""The profiles that hold where nobody names any."""
 
 Kind = Literal["firmware_profiles", "materials", "patterns"]
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -26,6 +31,14 @@ def shipped_directory(kind: Kind) -> Path:
 def shipped_names(kind: Kind, suffix: str = ".toml") -> list[str]:
     """The names (file stems) of the shipped files of one kind, sorted."""
     return sorted(path.stem for path in shipped_directory(kind).glob(f"*{suffix}"))
+
+
+def find_profile(kind: Kind, given: AnyPath | None) -> Path:
+    """The file of a machine or material, the usual one for None. Raises ``ProfileError``."""
+    if given is None:
+        given = DEFAULT_MACHINE if kind == "firmware_profiles" else DEFAULT_MATERIAL
+    name = given if isinstance(given, str) else str(as_path(given, f"The {_NOUN[kind]}"))
+    return find_file(kind, name)
 
 
 def find_file(

@@ -27,7 +27,13 @@ from urllib.parse import unquote
 import miurafab
 from miurafab.errors import MiurafabError
 from miurafab.origami.fitting.request import DEFAULT_FACETS, DEFAULT_SIZE_MM, FACETS
-from miurafab.profiles import load_machine, load_material, shipped_names
+from miurafab.profiles import (
+    DEFAULT_MACHINE,
+    DEFAULT_MATERIAL,
+    load_machine,
+    load_material,
+    shipped_names,
+)
 from miurafab.studio.form import by_label, filled
 from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
@@ -126,8 +132,8 @@ def _catalogue() -> dict[str, Any]:
         "defaults": {
             "facets": FACETS.show(DEFAULT_FACETS),
             "size": f"{DEFAULT_SIZE_MM:g}mm",
-            "machine": miurafab.DEFAULT_MACHINE,
-            "material": miurafab.DEFAULT_MATERIAL,
+            "machine": DEFAULT_MACHINE,
+            "material": DEFAULT_MATERIAL,
         },
     }
 

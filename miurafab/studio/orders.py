@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from miurafab.errors import InputError, TargetError
-from miurafab.options import Declared, Flag, Whole
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.options import Declared, Flag, Whole, read_options
 from miurafab.profiles import shipped_names
 from miurafab.studio.form import FIT, LAYOUT
 from miurafab.studio.recipe import Value
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface
 from miurafab.workflow.design import design
-from miurafab.workflow.job_directory import layout_options
 
 _LONGEST = 200
 
@@ -87,7 +87,7 @@ def read_layout(body: bytes) -> LayoutOrder:
     machine = _listed("machine", order.get("machine"), shipped_names("firmware_profiles"))
     material = _listed("material", order.get("material"), shipped_names("materials"))
     options = _options(order.get("options", {}), LAYOUT)
-    layout_options(options)
+    read_options(LayoutOptions, options)
     return LayoutOrder(machine, material, options)
 
 

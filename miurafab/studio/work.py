@@ -20,9 +20,11 @@ from miurafab.fabrication.drawing.svg import pattern_svg
 from miurafab.findings import Finding, findings_json
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.fold import read_fold
+from miurafab.origami.verify import Audit
 from miurafab.studio.recipe import job_name
-from miurafab.workflow.design import no_target
+from miurafab.surfaces.description import no_target
 from miurafab.workflow.job_directory import GUIDE, write_text
+from miurafab.workflow.page import write_page
 from miurafab.workflow.picture import svg_text
 from miurafab.workflow.preview import Preview
 
@@ -71,7 +73,7 @@ def carry_out(order: Order, tell: Tell) -> None:
 
 def _fit(order: Order, tell: Tell) -> None:
     wanted = miurafab.design(order.target, **order.options)
-    result = miurafab.fit(wanted.request, _progress(tell, 0.0, _FITTING))
+    result = miurafab.fit(wanted, on_progress=_progress(tell, 0.0, _FITTING))
     part = {
         "part": "pattern",
         "report": result.report(),
@@ -82,27 +84,29 @@ def _fit(order: Order, tell: Tell) -> None:
         return
     pattern = _with_mesh_in(order.folder, result.pattern)
     file = order.folder / f"{order.name}.fold"
-    miurafab.save_pattern(pattern, file, wanted.title)
+    pattern.save(file, title=wanted.title)
     _show(order, pattern, part | {"files": {"fold": file.name}}, tell)
 
 
 def _open(order: Order, tell: Tell) -> None:
     tell({"progress": 0.0, "note": "checking the pattern"})
-    pattern, surface, findings = _read(order)
-    report = miurafab.check(pattern, surface).report()
+    checked, missing = _checked(order)
     copy = order.folder / f"{order.name}.fold"
     shutil.copyfile(order.file, copy)
-    part = {"part": "pattern", "report": report, "findings": findings_json(findings)}
-    _show(order, pattern, part | {"files": {"fold": copy.name}}, tell)
+    part = {"part": "pattern", "report": checked.report(), "findings": findings_json(missing)}
+    _show(order, read_fold(order.file), part | {"files": {"fold": copy.name}}, tell)
 
 
-def _read(order: Order) -> tuple[CreasePattern, Any, tuple[Finding, ...]]:
-    """The pattern with its target. A file from the browser must not name a mesh by its path."""
+def _checked(order: Order) -> tuple[Audit, tuple[Finding, ...]]:
+    """The audit, and findings on the target. A file from the browser must not name a mesh by its
+    path.
+    """
     pattern = read_fold(order.file)
-    mesh = pattern.target.get("mesh")
-    if mesh is None or order.ours:
-        return miurafab.load_pattern(order.file)
-    return pattern, None, no_target("its target is a mesh, which is not in the file")
+    if "mesh" in pattern.target and not order.ours:
+        missing = no_target("its target is a mesh, which is not in the file")
+        return miurafab.check(replace(pattern, target={})), missing
+    checked = miurafab.check(pattern)
+    return checked, tuple(each for each in checked.findings if each.code == "no-target")
 
 
 def _with_mesh_in(folder: Path, pattern: CreasePattern) -> CreasePattern:
@@ -119,7 +123,7 @@ def _show(order: Order, pattern: CreasePattern, part: dict[str, Any], tell: Tell
     """Report the pattern as a drawing and in space, first still, then folding."""
     folder = order.folder
     write_text(folder / PICTURE, pattern_svg(pattern))
-    miurafab.write_page(folder / PAGE, title=order.name, pattern=pattern)
+    write_page(folder / PAGE, title=order.name, pattern=pattern)
     tell(part | {"files": {**part["files"], "picture": PICTURE, "page": PAGE}})
     tell({"progress": _FITTING, "note": "folding"})
     try:
@@ -127,7 +131,7 @@ def _show(order: Order, pattern: CreasePattern, part: dict[str, Any], tell: Tell
     except PatternError as fault:
         tell({"part": "motion", "missing": str(fault)})
         return
-    miurafab.write_motion(folding, folder / MOTION, order.name)
+    folding.save(folder / MOTION, title=order.name)
     told = folding.report()
     findings = []
     if not told["rigid"]:
@@ -143,19 +147,15 @@ def _show(order: Order, pattern: CreasePattern, part: dict[str, Any], tell: Tell
 
 def _sheets(order: Order, tell: Tell) -> None:
     directory = order.folder / job_name(order.name)
-    options = miurafab.layout_options(order.options)
-    job = miurafab.write_job(
-        order.file,
-        directory,
-        order.machine,
-        order.material,
-        _progress(tell, 0.0, 0.9),
-        options=options,
+    progress = _progress(tell, 0.0, 0.6)
+    made = miurafab.sheets(
+        order.file, order.machine, order.material, on_progress=progress, **order.options
     )
+    job = made.write(directory, on_progress=_progress(tell, 0.6, 0.9))
     tell({"progress": 0.9, "note": "drawing the sheets"})
     shown = Preview(order.name, job.machine, job.dry_runs, None, ())
     page = f"{order.name}-preview.html"
-    miurafab.write_page(order.folder / page, title=order.name, preview=shown)
+    write_page(order.folder / page, title=order.name, preview=shown)
     pictures = []
     for sheet in job.dry_runs:
         pictures.append(f"{sheet.name}-picture.svg")

@@ -1,13 +1,13 @@
 """Targets as a pattern file describes them (``miurafab:target``), and back.
 
-========================= ===============================================================
-keys                      target
-========================= ===============================================================
-``surface``, ``parameters`` a surface of the catalogue
-``mesh``, ``sha256``      a mesh file, named from the folder of the pattern
-``vertices``, ``faces``   a mesh that had no file
-``samples``               a function or a height field (:mod:`~miurafab.surfaces.function`)
-========================= ===============================================================
+=============================== ================================================================
+keys                            target
+=============================== ================================================================
+``surface``, ``parameters``     a surface of the catalogue
+``mesh``, ``sha256``            a mesh file, named from the folder of the pattern
+``vertices``, ``faces``         a mesh that had no file
+``samples``, ``span``, ...      a function or a height field (:mod:`~miurafab.surfaces.function`)
+=============================== ================================================================
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from miurafab.errors import PatternError, TargetError
+from miurafab.findings import Finding
 from miurafab.surfaces.catalogue import make_surface
 from miurafab.surfaces.function import sampled_before
 from miurafab.surfaces.mesh import load_mesh, mesh_surface
@@ -28,32 +29,37 @@ from miurafab.surfaces.surface import TargetSurface
 
 def described_surface(
     target: Mapping[str, Any],
-) -> tuple[TargetSurface | None, str | None]:
-    """The surface that ``target`` describes, or None and why it is not there.
+) -> tuple[TargetSurface | None, tuple[Finding, ...]]:
+    """The surface that ``target`` describes, None without one, and findings on it.
 
-    A pattern without a target is a pattern of another program. A mesh file that has moved away or
-    changed is no error. Raises :class:`~miurafab.errors.PatternError` for a description that is
-    damaged.
+    A pattern without a target comes from another program. A mesh file that was moved or has changed
+    since the fit is a finding and no error. Raises :class:`~miurafab.errors.PatternError` for a
+    description that is damaged.
     """
     if not target:
-        return None, None
+        return None, ()
     if "mesh" in target:
         mesh = Path(str(target["mesh"]))
         if not mesh.is_file():
-            return None, f"the target mesh {mesh} is not there"
+            return None, no_target(f"the target mesh {mesh} is not there")
         if hashlib.sha256(mesh.read_bytes()).hexdigest() != target.get("sha256"):
-            return None, f"the target mesh {mesh} has changed since the fit"
-        return load_mesh(mesh, place=dict(target))[0], None
+            return None, no_target(f"the target mesh {mesh} has changed since the fit")
+        return load_mesh(mesh, place=dict(target))[0], ()
     try:
         if "samples" in target:
-            return sampled_before(target), None
+            return sampled_before(target), ()
         if "vertices" in target:
             vertices = np.array(target["vertices"], dtype=np.float64)
             faces = np.array(target["faces"], dtype=np.int64)
-            return mesh_surface(vertices, faces, place=dict(target)), None
+            return mesh_surface(vertices, faces, place=dict(target)), ()
     except (TargetError, KeyError, TypeError, ValueError) as fault:
         raise PatternError(f"'miurafab:target' is damaged: {fault}") from None
     parameters = target.get("parameters", {})
     if not isinstance(target.get("surface"), str) or not isinstance(parameters, dict):
         raise PatternError("'miurafab:target' names neither a surface nor a mesh.")
-    return make_surface(target["surface"], parameters)[0], None
+    return make_surface(target["surface"], parameters)[0], ()
+
+
+def no_target(why: str) -> tuple[Finding, ...]:
+    """The finding on a pattern whose target cannot be used."""
+    return (Finding("no-target", f"Distances are left out: {why}."),)

@@ -116,9 +116,7 @@ def through(points: Floats, span: Domain, domain: Domain | None = None) -> Sampl
     if not np.isfinite(points).all():
         row, column = np.argwhere(~np.isfinite(points).all(axis=2))[0].tolist()
         raise TargetError(f"The point in row {row}, column {column} of the grid is not finite.")
-    size = _diagonal(points)
-    if size > 0:
-        points = np.round(points, _DIGITS - math.ceil(math.log10(size)))
+    points = rounded(points)
     surface = SampledSurface(points, span, domain or span)
     lattice = surface.domain.lattice(33, 33)
     along, across = tangents(surface, lattice)
@@ -130,6 +128,12 @@ def through(points: Floats, span: Domain, domain: Domain | None = None) -> Sampl
             "a point or a line there; choose a domain that keeps away from it."
         )
     return surface
+
+
+def rounded(points: Floats) -> Floats:
+    """``points`` (..., 3) to nine digits of their extent, which are short to write."""
+    size = _diagonal(points)
+    return np.round(points, _DIGITS - math.ceil(math.log10(size))) if size > 0 else points
 
 
 def from_points(points: Floats) -> SampledSurface:

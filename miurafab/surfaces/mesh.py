@@ -239,6 +239,11 @@ def load_mesh(
     return surface, hashlib.sha256(content).hexdigest()
 
 
+def is_mesh(value: object) -> bool:
+    """Whether ``value`` comes from trimesh: a mesh, a scene or a point cloud."""
+    return isinstance(value, trimesh.parent.Geometry)
+
+
 def arrays_of(mesh: object, name: str) -> tuple[Floats, Ints]:
     """The vertices (V, 3) and triangles (F, 3) of a mesh of trimesh, called ``name`` in messages.
 

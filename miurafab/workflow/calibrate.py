@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from miurafab.display import Shown
 from miurafab.errors import InputError, ProfileError
 from miurafab.fabrication.calibration import (
     SHEET,
@@ -26,16 +27,18 @@ from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.perforation import MIN_STROKE_MM
 from miurafab.fabrication.sheets import Layout, Sheet, Totals
+from miurafab.files import AnyPath, as_path
+from miurafab.options import length, read_value
 from miurafab.origami.formats.fold import fold_text
 from miurafab.posting.sections import post_sections
 from miurafab.profiles import (
     Material,
     find_file,
+    find_profile,
     load_machine,
     load_material,
     read_toml,
 )
-from miurafab.units import parse_length
 from miurafab.workflow.dry_run import dry_run
 from miurafab.workflow.job_directory import JobDirectory, write_text
 from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
@@ -47,27 +50,55 @@ _COUPON = "coupon.fold"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
-@dataclasses.dataclass(frozen=True)
-class Calibration:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Calibration(Shown):
     """A calibration sheet and the job directory that it was written to."""
 
     job: JobDirectory
     sheet: CalibrationSheet
 
+    def _summary(self) -> str:
+        return f"{self.job.path}: {len(self.sheet.cells)} flaps, {len(self.sheet.squares)} squares"
 
-def calibrate(machine: str, material: str, directory: Path) -> Calibration:
-    """Write the job directory of a calibration sheet of ``material`` for ``machine``.
 
-    Both are shipped names or TOML files. Raises :class:`~miurafab.errors.ProfileError` for a
-    machine that is no laser, :class:`~miurafab.errors.LayoutError` for a bed that is too small,
-    and :class:`~miurafab.errors.InputError` for a directory that holds something else.
+def calibrate(
+    directory: AnyPath,
+    machine: AnyPath | None = None,
+    material: AnyPath | None = None,
+) -> Calibration:
+    """Write the job directory of a test sheet: dashes against power and feed, kerf gauge, coupon.
+
+    Parameters
+    ----------
+    directory : str or os.PathLike
+        The job directory. It is made if need be.
+    machine : str or os.PathLike, optional
+        A laser: a shipped name or a TOML file, grbl-laser-400 by default.
+    material : str or os.PathLike, optional
+        The material to begin with: a shipped name or a TOML file, card-250 by default.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    ProfileError
+        For a machine that is no laser.
+    LayoutError
+        For a bed that is too small.
+    InputError
+        For a directory that holds something else.
     """
-    profile, stock = load_machine(machine), load_material(material)
+    directory = as_path(directory, "The job directory")
+    machine_file = find_profile("firmware_profiles", machine)
+    material_file = find_profile("materials", material)
+    profile, stock = load_machine(machine_file), load_material(material_file)
     sheet = calibration_sheet(profile, stock)
     toolpath = sheet.toolpath
     job = post_sections(sheet.sections, profile, patch_labels=sheet.labels)
     with job_files(directory) as staging:
-        keep_profiles(machine, material, directory, staging)
+        keep_profiles(machine_file, material_file, directory, staging)
         size = (sheet.width_mm, sheet.height_mm)
         timed = dry_run(SHEET, job, profile, size, stock.max_power)
         write_text(staging / f"{SHEET}{profile.job_suffix}", job.text)
@@ -101,7 +132,6 @@ def calibrate(machine: str, material: str, directory: Path) -> Calibration:
                 travel_mm=toolpath.travel_mm,
                 seconds=round(timed.seconds, 1),
             ),
-            toolpaths=(toolpath,),
         )
         digest = hashlib.sha256(coupon.encode("utf-8")).hexdigest()
         write_text(staging / LAYOUT, write_layout(layout, _COUPON, digest))
@@ -110,22 +140,45 @@ def calibrate(machine: str, material: str, directory: Path) -> Calibration:
 
 
 def add_material(
-    name: str,
-    directory: Path,
+    name: AnyPath,
+    directory: AnyPath,
     *,
     cell: str | None = None,
     cut: str | None = None,
     kerf: str | float | None = None,
     title: str | None = None,
 ) -> tuple[Path, Material]:
-    """Write ``NAME.toml``: the material of the calibration in ``directory`` with what was chosen.
+    """Write ``NAME.toml``: the material of a calibration with the settings that were chosen.
 
-    ``cell`` is the label of a flap: its dash and gap then hold for all creases, and its power and
-    feed for perforating. ``cut`` is the label of a square, ``kerf`` a length. ``name`` may be a
-    path; the file is not overwritten. Raises :class:`~miurafab.errors.InputError` for a label that
-    is not on the sheet and for a name that cannot be one, and
-    :class:`~miurafab.errors.ProfileError` where the choices do not make a material.
+    Parameters
+    ----------
+    name : str or os.PathLike
+        What the material is called, or the path of its file. A file is not overwritten.
+    directory : str or os.PathLike
+        The job directory of the calibration sheet.
+    cell : str, optional
+        The label of a flap: its dash and gap then hold for all creases, and its power and feed for
+        perforating.
+    cut : str, optional
+        The label of a square: its power and feed then hold for cutting.
+    kerf : str or float, optional
+        The width of the cut, mm.
+    title : str, optional
+        What lists call the material.
+
+    Returns
+    -------
+    (Path, Material)
+
+    Raises
+    ------
+    InputError
+        For a label that is not on the sheet, and for a name that cannot be one.
+    ProfileError
+        Where the choices do not make a material.
     """
+    name = str(as_path(name, "The material"))
+    directory = as_path(directory, "The job directory")
     path = Path(name) if name.endswith(".toml") else Path(f"{name}.toml")
     if not _NAME.fullmatch(path.stem):
         raise InputError(f"'{path.stem}' cannot name a material; use letters, digits, '-' and '_'.")
@@ -139,7 +192,7 @@ def add_material(
     values = read_toml(base)
     values["title"] = title or f"{values['title']}, calibrated"
     if kerf is not None:
-        values["kerf"] = _mm(parse_length(kerf))
+        values["kerf"] = _mm(read_value("kerf", length(0, 2), kerf))
     if cell is not None:
         chosen = _labelled(choices["cells"], cell, directory)
         _take_dashes(values, chosen["perforation"])

@@ -5,26 +5,30 @@ THING is a job directory, a G-code file, a pattern (.fold), a design (.toml) or 
 
 from __future__ import annotations
 
+import os
+import reprlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from miurafab.errors import OptionError
-from miurafab.findings import Finding
+from miurafab.files import AnyPath, as_path
+from miurafab.findings import Finding, refusals
 from miurafab.gcode.job import Job
-from miurafab.profiles import MachineProfile, load_machine
+from miurafab.profiles import DEFAULT_MACHINE, MachineProfile, read_machine
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
-from miurafab.workflow.preview import ASSUMED_MACHINE, assumed_machine, named_machine
+from miurafab.workflow.preview import assumed_machine, named_machine
 
 # What fits and lays out is imported where it is needed: loading it
 # takes longer than all that cuts.
 if TYPE_CHECKING:
     from miurafab.fabrication.options import LayoutOptions
+    from miurafab.origami.crease_pattern import CreasePattern
     from miurafab.workflow.job_directory import JobDirectory
 
+Progress = Callable[[float, str], None]
 GCODE_SUFFIXES = (".nc", ".gcode", ".ngc", ".tap", ".plt")
-DEFAULT_MATERIAL = "card-250"
 JOBS = Path("jobs")
 """Where jobs are made unless told otherwise."""
 
@@ -54,76 +58,108 @@ class Prepared:
 
 
 def prepare(
-    thing: str,
+    thing: object,
     *,
-    machine: str | None = None,
-    material: str | None = None,
-    out: Path | None = None,
+    machine: MachineProfile | AnyPath | None = None,
+    material: AnyPath | None = None,
+    out: AnyPath | None = None,
     options: Mapping[str, object] | None = None,
-    on_progress: Callable[[float, str], None] | None = None,
+    on_progress: Progress | None = None,
 ) -> Prepared:
     """Make whatever is missing between ``thing`` and the G-code of its sheets.
 
-    ``machine`` and ``material`` default to what the job or design names, then to the common ones;
-    ``out`` is the job directory to make (default ``jobs/NAME``); ``options`` are those of a fit.
-    Raises :class:`~miurafab.errors.InputError` and its kin for whatever cannot be read or made.
+    ``machine`` and ``material`` default to those that the job or design names, then to the usual
+    ones; ``out`` is the job directory to make (default ``jobs/NAME``); ``options`` are those of a
+    fit. Raises :class:`~miurafab.errors.InputError` and its kin for whatever cannot be read or
+    made.
     """
-    path = Path(thing)
-    for name in options or {}:
-        if path.is_dir() or path.suffix.lower() in (*GCODE_SUFFIXES, ".fold"):
-            raise OptionError(name, f"is for a target or a design; {thing} is fitted already")
     tell = on_progress or (lambda fraction, note: None)
+    path = as_path(thing, "The job") if isinstance(thing, str | os.PathLike) else None
+    made = path is not None and (path.is_dir() or path.suffix.lower() in GCODE_SUFFIXES)
+    if not made:
+        return _from_value(thing, machine, material, out, options or {}, tell)
+    assert path is not None
+    _fitted_already(options or {}, path)
     if path.is_dir():
         from miurafab.workflow.job_directory import read_job
 
-        job = read_job(path)
-        profile = job.machine if machine is None else load_machine(machine)
-        dry_runs = job.dry_runs
-        if machine is not None:
-            dry_runs = tuple(_dry_run(each, profile, job.most_power) for each in job.jobs)
-        return Prepared(path.resolve().name, profile, job.jobs, dry_runs, job, path)
-    if path.suffix.lower() in GCODE_SUFFIXES:
-        gcode = read_gcode(path)
-        named = named_machine(gcode, path.parent) if machine is None else load_machine(machine)
-        profile = named or assumed_machine(path)
-        return Prepared(
-            path.name, profile, (gcode,), (_dry_run(gcode, profile),), None, path.parent
-        )
-    from miurafab.origami.fitting.fit import fit
-    from miurafab.origami.verify import audit
-    from miurafab.workflow.design import design, load_pattern, save_pattern
+        return _from_directory(read_job(path), machine)
+    gcode = read_gcode(path)
+    named = named_machine(gcode, path.parent) if machine is None else read_machine(machine)
+    profile = named or assumed_machine(path)
+    return Prepared(path.name, profile, (gcode,), (_dry_run(gcode, profile),), None, path.parent)
 
-    if path.suffix.lower() == ".fold":
-        pattern, surface, _ = load_pattern(path)
+
+def _fitted_already(options: Mapping[str, object], thing: object) -> None:
+    shown = os.fspath(thing) if isinstance(thing, str | os.PathLike) else reprlib.repr(thing)
+    for name in options:
+        raise OptionError(name, f"is for a target or a design; {shown} is fitted already")
+
+
+def _from_directory(job: JobDirectory, machine: MachineProfile | AnyPath | None) -> Prepared:
+    profile, dry_runs = job.machine, job.dry_runs
+    if machine is not None:
+        profile = read_machine(machine)
+        dry_runs = tuple(_dry_run(each, profile, job.most_power) for each in job.jobs)
+    return Prepared(job.path.resolve().name, profile, job.jobs, dry_runs, job, job.path)
+
+
+def _from_value(
+    thing: object,
+    machine: MachineProfile | AnyPath | None,
+    material: AnyPath | None,
+    out: AnyPath | None,
+    options: Mapping[str, object],
+    tell: Progress,
+) -> Prepared:
+    """A job in memory, a pattern, or a target: what is missing is made and written."""
+    from miurafab.origami.crease_pattern import CreasePattern
+    from miurafab.origami.fitting.request import FitResult
+    from miurafab.workflow.design import Design, design
+    from miurafab.workflow.fit import fit
+    from miurafab.workflow.job_directory import JobDirectory
+    from miurafab.workflow.patterns import as_pattern, check
+    from miurafab.workflow.sheets import SheetJob
+
+    if isinstance(thing, JobDirectory | SheetJob):
+        _fitted_already(options, thing)
+        if isinstance(thing, SheetJob):
+            thing = thing.write(out or JOBS / thing.name)
+        return _from_directory(thing, machine)
+    path = Path(thing) if isinstance(thing, str | os.PathLike) else None
+    if isinstance(thing, CreasePattern | FitResult) or (
+        path is not None and path.suffix.lower() == ".fold"
+    ):
+        _fitted_already(options, thing)
         tell(0.1, "checking the pattern")
-        checked = audit(pattern, surface)
+        pattern = as_pattern(thing)
+        checked = check(pattern)
+        name = path.stem if path is not None else pattern.name or "sheet"
+        report, faults = checked.report(), refusals(checked.findings)
         return _from_pattern(
-            path, path.stem, checked.report(), checked.findings, machine, material, out, tell
+            pattern, path, name, report, faults, machine, material, out or JOBS / name, tell
         )
-    wanted = design(thing, **(options or {}))
+    wanted = thing if isinstance(thing, Design) and not options else design(thing, **options)
     tell(0.0, "fitting")
-    result = fit(wanted.request, lambda fraction, note: tell(0.4 * fraction, note))
-    name = path.stem if path.suffix.lower() == ".toml" else wanted.title
-    directory = out or JOBS / name
+    result = fit(wanted, on_progress=lambda fraction, note: tell(0.4 * fraction, note))
+    named = path is not None and path.suffix.lower() == ".toml"
+    name = path.stem if path is not None and named else wanted.title
+    directory = as_path(out or JOBS / name, "The job directory")
+    machine = wanted.machine if machine is None else machine
     if result.pattern is None or result.status != "converged":
-        return Prepared(
-            name,
-            load_machine(machine or wanted.machine or ASSUMED_MACHINE),
-            (),
-            (),
-            report=result.report(),
-            refused=result.findings,
-        )
+        profile = read_machine(machine or DEFAULT_MACHINE)
+        return Prepared(name, profile, (), (), report=result.report(), refused=result.findings)
     directory.mkdir(parents=True, exist_ok=True)
-    fold = directory / f"{name}.fold"
-    save_pattern(result.pattern, fold, wanted.title)
+    file = directory / f"{name}.fold"
+    result.pattern.save(file, title=wanted.title)
     return _from_pattern(
-        fold,
+        result.pattern,
+        file,
         name,
         result.report(),
         (),
-        machine or wanted.machine,
-        material or wanted.material,
+        machine,
+        wanted.material if material is None else material,
         directory,
         tell,
         wanted.layout,
@@ -131,38 +167,33 @@ def prepare(
 
 
 def _from_pattern(
-    fold: Path,
+    pattern: CreasePattern,
+    file: Path | None,
     name: str,
     report: dict[str, Any],
     faults: tuple[Finding, ...],
-    machine: str | None,
-    material: str | None,
-    out: Path | None,
-    tell: Callable[[float, str], None],
+    machine: MachineProfile | AnyPath | None,
+    material: AnyPath | None,
+    out: AnyPath,
+    tell: Progress,
     options: LayoutOptions | None = None,
 ) -> Prepared:
-    chosen = machine or ASSUMED_MACHINE
     if faults:
-        return Prepared(name, load_machine(chosen), (), (), report=report, refused=faults)
-    from miurafab.workflow.job_directory import write_job
+        profile = read_machine(DEFAULT_MACHINE if machine is None else machine)
+        return Prepared(name, profile, (), (), report=report, refused=faults)
+    from miurafab.workflow.sheets import make_job
 
-    directory = write_job(
-        fold,
-        out or JOBS / name,
-        chosen,
-        material or DEFAULT_MATERIAL,
-        lambda fraction, note: tell(0.4 + 0.6 * fraction, note),
-        options=options,
-    )
-    return Prepared(
+    job = make_job(
+        pattern,
         name,
-        directory.machine,
-        directory.jobs,
-        directory.dry_runs,
-        directory,
-        directory.path,
-        report,
+        machine,
+        material,
+        options,
+        file=file,
+        on_progress=lambda fraction, note: tell(0.4 + 0.4 * fraction, note),
     )
+    directory = job.write(out, on_progress=lambda part, note: tell(0.8 + 0.2 * part, note))
+    return replace(_from_directory(directory, None), name=name, report=report)
 
 
 def _dry_run(job: Job, machine: MachineProfile, most_power: float = 1.0) -> SheetPreview:

@@ -10,8 +10,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from miurafab.errors import InputError
+from miurafab.display import Shown
+from miurafab.errors import InputError, OptionError
+from miurafab.files import AnyPath
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
 from miurafab.machine.job_process import stream_apart
@@ -23,15 +26,27 @@ from miurafab.machine.sender import Progress as StreamProgress
 from miurafab.machine.sender import StreamResult, stream_plan
 from miurafab.machine.trace_box import MOST_POINTER, frame_job
 from miurafab.machine.transport import VIRTUAL
-from miurafab.options import Flag, check_options, option, percent
+from miurafab.options import (
+    Flag,
+    Several,
+    Text,
+    Whole,
+    check_options,
+    declared,
+    option,
+    percent,
+    read_options,
+    read_value,
+)
+from miurafab.options.documented import described
 from miurafab.profiles import MachineProfile
-from miurafab.workflow.cut import Prepared
+from miurafab.workflow.cut import Prepared, prepare
 from miurafab.workflow.dry_run import SheetPreview
 from miurafab.workflow.timeline import Timeline
 
 
-@dataclass(frozen=True)
-class CutSheet:
+@dataclass(frozen=True, repr=False)
+class CutSheet(Shown):
     """One sheet that was cut: ``estimated_s`` before, and what the sender says after.
 
     ``findings`` are those of the job and of the machine that did not stop it; one with the code
@@ -46,6 +61,9 @@ class CutSheet:
     result: StreamResult
     findings: tuple[Finding, ...]
 
+    def _summary(self) -> str:
+        return f"{self.name}: {self.lines} lines in {self.result.seconds:.1f} s"
+
 
 @dataclass(frozen=True, slots=True)
 class SheetProgress:
@@ -58,8 +76,8 @@ class SheetProgress:
     stream: StreamProgress
 
 
-@dataclass(frozen=True)
-class CutOptions:
+@dataclass(frozen=True, repr=False)
+class CutOptions(Shown):
     """How sheets are cut; ``pointer`` is a fraction of full power.
 
     ``virtual_speed`` is how much faster than real time the virtual machine runs.
@@ -91,6 +109,99 @@ DEFAULT_OPTIONS = CutOptions()
 
 
 def cut(
+    job: object,
+    port: str | None = None,
+    *,
+    machine: MachineProfile | AnyPath | None = None,
+    material: AnyPath | None = None,
+    out: AnyPath | None = None,
+    sheets: Sequence[int] | None = None,
+    keys: Keys | None = None,
+    before_sheet: Callable[[int, int], None] | None = None,
+    after_frame: Callable[[int], None] | None = None,
+    on_resume: Callable[[Finding], None] | None = None,
+    on_progress: Callable[[SheetProgress], None] | None = None,
+    **options: Any,
+) -> tuple[CutSheet, ...]:
+    """Cut a job on a machine, or on the virtual one, making whatever is missing on the way.
+
+    Parameters
+    ----------
+    job : SheetJob, JobDirectory, CreasePattern, FitResult, str or os.PathLike, or a target
+        A job directory, a G-code file, a pattern, a design, a target of :func:`fit`, or the values
+        of all of these. What is not on disk yet is written to ``out`` first.
+    port : str
+        A serial device, a pyserial URL (``socket://host:port``), or ``virtual``, the controller in
+        memory.
+    machine : MachineProfile, str or os.PathLike, optional
+        The default is the machine that the job names, then grbl-laser-400.
+    material : str or os.PathLike, optional
+        The default is the material that the design names, then card-250.
+    out : str or os.PathLike, optional
+        The job directory to make, ``jobs/NAME`` by default. Journal and transcript go there.
+    sheets : sequence of int, optional
+        The numbers of the sheets to cut, from 1. The default is all.
+    keys : Keys, optional
+        Keys of a person that hold, resume or stop the job.
+    before_sheet : callable, optional
+        Called with the number of the sheet and how many there are, before each: the place to ask
+        for fresh material.
+    after_frame : callable, optional
+        Called with the number of the sheet whose frame was traced.
+    on_resume : callable, optional
+        Called with a finding, before the port is opened, on what is burnt twice of a sheet that
+        goes on.
+    on_progress : callable, optional
+        Called with a :class:`SheetProgress`.
+    {options}
+    **options
+        The options of :func:`fit`, for a target or a design.
+
+    Returns
+    -------
+    tuple of CutSheet
+        One for each sheet that was cut.
+
+    Raises
+    ------
+    InputError
+        For whatever cannot be read or made, and for a job that the checks refuse.
+    PortError
+        If the port cannot be opened, or goes away.
+    MachineError
+        If the controller fails, or the job is stopped. The beam is off then.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> job = mf.sheets(mf.fit("hypar", facets=(4, 4), size=60)).write("jobs/small")
+    >>> len(mf.cut(job, port="virtual"))
+    1
+    """
+    own = {name: options.pop(name) for name in declared(CutOptions) if name in options}
+    asked = read_options(CutOptions, own)
+    if port is None:
+        raise OptionError("port", "is missing; name the machine's, or 'virtual', which needs none")
+    port = read_value("port", Text(), port)
+    chosen = None if sheets is None else read_value("sheets", Several(Whole(1)), sheets)
+    prepared = prepare(job, machine=machine, material=material, out=out, options=options)
+    return cut_prepared(
+        prepared,
+        port=port,
+        sheets=chosen,
+        options=asked,
+        keys=keys,
+        before_sheet=before_sheet,
+        after_frame=after_frame,
+        on_resume=on_resume,
+        on_progress=on_progress,
+    )
+
+
+described(cut, CutOptions)
+
+
+def cut_prepared(
     prepared: Prepared,
     *,
     port: str,
@@ -104,11 +215,8 @@ def cut(
 ) -> tuple[CutSheet, ...]:
     """Stream the sheets of ``prepared`` (or those numbered in ``sheets``, from 1) to ``port``.
 
-    All sheets are checked before the first is started. ``before_sheet`` is called before each sheet
-    with its number and the number of sheets: the place to ask for fresh material. ``after_frame``
-    is called with the number of a sheet whose frame was traced. ``on_resume`` is called, before the
-    port is opened, with the finding on the strokes that may be burnt twice. The journal and the
-    transcript go beside the job. A sheet for a real port is sent by a process of its own
+    Every sheet is checked before the first is started. The other arguments are those of
+    :func:`cut`. A process of its own sends a sheet to a real port
     (:func:`~miurafab.machine.job_process.stream_apart`). Raises what
     :func:`~miurafab.machine.sender.stream_plan` raises.
     """

@@ -1,36 +1,64 @@
-"""From what a user names to what the fit is asked: TARGET, design files, and back from a pattern.
+"""From a target, in any form, to the request of a fit.
 
-A TARGET is a named surface with parameters (``hypar:height=0.5``), a design file (.toml) or a mesh
-file. A design file says the same as the options of ``miurafab fit``, and options override it.
+A target is text (a surface with parameters such as ``hypar:height=0.5``, a design ``.toml``, a mesh
+or an image file) or a value (a design, a mesh of trimesh, a function, an array). A design file says
+the same as the options of ``miurafab fit``; options override it.
 """
 
 from __future__ import annotations
 
-import hashlib
+import difflib
 import os
-from collections.abc import Mapping
+import reprlib
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from miurafab.errors import OptionError, PatternError, TargetError
+import numpy as np
+
+from miurafab.display import Shown
+from miurafab.errors import OptionError, TargetError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.findings import Finding
-from miurafab.options import read_options
-from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.options import declared, length, number, read_options, read_value
 from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitOptions, FitRequest
-from miurafab.origami.formats.fold import read_fold, write_fold
 from miurafab.profiles import Table, find_file, read_toml
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
-from miurafab.surfaces.catalogue import make_surface, parse_target
-from miurafab.surfaces.mesh import MESH_SUFFIXES, load_mesh
+from miurafab.surfaces.catalogue import CATALOGUE, make_surface, parse_target
+from miurafab.surfaces.description import described_surface
+from miurafab.surfaces.function import SampledSurface, from_function, from_points, rounded
+from miurafab.surfaces.height_field import IMAGE_SUFFIXES, from_heights, read_image
+from miurafab.surfaces.mesh import (
+    FROM_POINTS,
+    MESH_SUFFIXES,
+    MeshSurface,
+    arrays_of,
+    is_mesh,
+    load_mesh,
+    mesh_surface,
+)
 from miurafab.surfaces.surface import TargetSurface
 
+Values = Mapping[str, Any]
 
-@dataclass(frozen=True)
-class Design:
-    """A request with a title, the machine and material that its file names, if any, and findings
-    on the target. ``layout`` is what the file asks of the sheets.
+
+@dataclass(frozen=True, repr=False)
+class Design(Shown):
+    """A target and what is asked of its sheet.
+
+    Parameters
+    ----------
+    request : FitRequest
+        The surface and the options of the fit.
+    title : str
+        What the design is called.
+    machine, material : str, optional
+        The profiles that a design file names.
+    findings : tuple of Finding
+        What a person should know of the target.
+    layout : LayoutOptions, optional
+        What a design file asks of the sheets.
     """
 
     request: FitRequest
@@ -40,30 +68,147 @@ class Design:
     findings: tuple[Finding, ...] = ()
     layout: LayoutOptions | None = None
 
+    def _summary(self) -> str:
+        return f"'{self.title}': {self.request._summary()}"
 
-def design(target: str, **options: object) -> Design:
-    """What TARGET asks for.
 
-    ``options`` are those of ``miurafab fit``, as values (``facets=(20, 20)``, ``size=250``,
-    ``rotate=30``; millimetres and degrees) or as text (``size="10in"``); None leaves one unset.
+def design(target: object, /, **options: Any) -> Design:
+    """Read a target and the options of its fit, without fitting.
 
-    Raises :class:`~miurafab.errors.TargetError` or ``InputError`` for whatever cannot be read.
+    Parameters
+    ----------
+    target : str, os.PathLike, Design, trimesh.Trimesh, callable or array
+        What :func:`fit` takes.
+    **options
+        The options of :func:`fit`, and the parameters of the surface.
+
+    Returns
+    -------
+    Design
+
+    Raises
+    ------
+    TargetError
+        For a target that cannot be read.
+    OptionError
+        For a name that is neither an option nor a parameter, and for a value that cannot be taken.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> mf.design("hypar", height=0.5, facets=(20, 20), size=250).title
+    'hypar'
     """
-    suffix = Path(target).suffix.lower()
+    given = {name: _plain(value) for name, value in options.items() if value is not None}
+    if isinstance(target, FitRequest):
+        target = Design(target, "design")
+    if isinstance(target, Design):
+        return _changed(target, given)
+    if isinstance(target, str | os.PathLike):
+        return _named(os.fspath(target), given)
+    if isinstance(target, Mapping):
+        return _from_description(target, given)
+    if is_mesh(target):
+        vertices, faces = arrays_of(target, "The mesh")
+        vertices = rounded(vertices)
+        asked, _ = _asked(given, (), "a mesh")
+        surface = mesh_surface(vertices, faces, region=asked.region, rotate=asked.rotate)
+        arrays = {"vertices": vertices.tolist(), "faces": faces.tolist()}
+        return _on_mesh(surface, arrays | {"name": "mesh"}, asked, "mesh")
+    if isinstance(target, np.ndarray | list | tuple):
+        return _on_array(target, given)
+    if callable(target):
+        name = getattr(target, "__name__", "function").strip("<>").replace("lambda", "function")
+        asked, values = _asked(given, ("domain",), "a function")
+        return _on_samples(*from_function(target, **values), asked, name)
+    raise TargetError(
+        f"{reprlib.repr(target)} cannot be a target; give the name of a surface, a file, a design, "
+        "a trimesh mesh, a function of u and v, or an array of heights."
+    )
+
+
+def _plain(value: Any) -> Any:
+    """A number or an array of NumPy as Python's own, for files and messages."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def _asked(given: Values, known: Collection[str], what: str) -> tuple[FitOptions, dict[str, Any]]:
+    """The options of the fit, read, and the parameters of the target."""
+    chosen, values = _split(given, known, what)
+    return read_options(FitOptions, chosen), values
+
+
+def _split(
+    given: Values, known: Collection[str], what: str
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The options of the fit and the parameters of the target, which have no name in common."""
+    options = declared(FitOptions)
+    for name in given:
+        if name not in options and name not in known:
+            near = difflib.get_close_matches(name, [*known, *options], n=1)
+            hint = f"did you mean '{near[0]}'" if near else f"options are {', '.join(options)}"
+            if known and not near:
+                hint = f"parameters are {', '.join(known)}; {hint}"
+            raise OptionError(
+                None, f"'{name}' is neither an option of a fit nor a parameter of {what}; {hint}"
+            )
+    chosen = {name: value for name, value in given.items() if name in options}
+    return chosen, {name: value for name, value in given.items() if name not in options}
+
+
+def _from_description(target: Values, given: Values) -> Design:
+    """The target that a pattern file describes (:mod:`miurafab.surfaces.description`)."""
+    surface, missing = described_surface(target)
+    if surface is None:
+        reasons = " ".join(map(str, missing)) or "It is not described."
+        raise TargetError(f"The target is not there. {reasons}")
+    asked, _ = _asked(given, (), "a described target")
+    return Design(FitRequest(**vars(asked), surface=surface, target=dict(target)), "design")
+
+
+def _changed(design: Design, given: Values) -> Design:
+    """``design`` with other options; its surface stays."""
+    for name in ("close", "region", "rotate"):
+        if name in given:
+            raise OptionError(name, "shapes the target; give it to `design`, not to what it made")
+    asked, _ = _asked(given, (), "a design")
+    fields = {each.field for name, each in declared(FitOptions).items() if name in given}
+    changes = {field: getattr(asked, field) for field in fields}
+    return replace(design, request=replace(design.request, **changes))
+
+
+def _named(target: str, given: Values) -> Design:
+    """The target of a text: a file by its ending, else a surface with parameters."""
+    path = Path(target)
+    suffix = path.suffix.lower()
     if suffix == ".toml":
-        return _from_file(find_file("patterns", target, error=TargetError), options)
-    asked = read_options(FitOptions, options)
+        return _from_file(find_file("patterns", target, error=TargetError), given)
     if suffix in MESH_SUFFIXES:
-        return _on_mesh(Path(target), asked, Path(target).stem)
+        asked, _ = _asked(given, (), f"the mesh {path.name}")
+        return _from_mesh(path, asked, path.stem)
+    if suffix in IMAGE_SUFFIXES:
+        asked, values = _asked(given, ("height", "spacing"), f"the image {path.name}")
+        height = values.get("height")
+        if height is not None:
+            height = read_value("height", number(), height)
+        return _on_heights(read_image(path, height), values, asked, path.stem)
     if suffix and os.sep in target:
-        raise TargetError(
-            f"'{target}' cannot be a target: known files are .toml, {', '.join(MESH_SUFFIXES)}."
-        )
+        files = ", ".join((".toml", *MESH_SUFFIXES, *IMAGE_SUFFIXES))
+        raise TargetError(f"'{target}' cannot be a target: known files are {files}.")
     name, parameters = parse_target(target)
-    return _on_surface(name, parameters, asked, name)
+    asked, values = _asked(given, _parameters(name), f"'{name}'")
+    return _on_surface(name, parameters | values, asked, name)
 
 
-def _from_file(path: Path, options: Mapping[str, object]) -> Design:
+def _parameters(name: str) -> tuple[str, ...]:
+    entry = CATALOGUE.get(name)
+    if entry is None:
+        make_surface(name, {})  # says what is known
+        return ()
+    return (*entry.parameters, *(() if entry.profile_axes is None else ("profile",)))
+
+
+def _from_file(path: Path, given: Values) -> Design:
     table = Table(read_toml(path, TargetError), path.name, TargetError)
     title = table.text("title", path.stem)
     target = table.table("target")
@@ -77,41 +222,93 @@ def _from_file(path: Path, options: Mapping[str, object]) -> Design:
         folder=path.parent,
         besides=("machine", "material"),
     )
+    mesh = path.parent / target.text("mesh") if target.has("mesh") else None
+    name = "" if mesh is not None else target.text("surface")
+    known = () if mesh is not None else _parameters(name)
+    chosen, changed = _split(given, known, f"the target of {path.name}")
     asked = read_options(
         FitOptions,
         table.rest(),
         where=path.name,
-        over=options,
+        over=chosen,
         besides=("title", "target", "layout"),
     )
     try:
-        if target.has("mesh"):
-            design = _on_mesh(path.parent / target.text("mesh"), asked, title)
+        if mesh is not None:
+            design = _from_mesh(mesh, asked, title)
             target.finish()
         else:
-            design = _on_surface(target.text("surface"), target.rest(), asked, title)
+            design = _on_surface(name, target.rest() | changed, asked, title)
     except OptionError as fault:
-        where = "" if options.get(fault.option or "") is not None else path.name
+        where = "" if fault.option in given else path.name
         raise OptionError(fault.option, fault.complaint, where) from None
     return replace(design, machine=machine, material=material, layout=sheets)
 
 
-def _on_mesh(path: Path, asked: FitOptions, title: str) -> Design:
+def _from_mesh(path: Path, asked: FitOptions, title: str) -> Design:
     surface, sha256 = load_mesh(path, region=asked.region, rotate=asked.rotate)
-    target = {"mesh": str(path.resolve()), "sha256": sha256, **surface.description}
-    request = FitRequest(**vars(asked), surface=surface, target=target)
+    return _on_mesh(surface, {"mesh": str(path.resolve()), "sha256": sha256}, asked, title)
+
+
+def _on_mesh(
+    surface: MeshSurface, description: dict[str, Any], asked: FitOptions, title: str
+) -> Design:
+    request = FitRequest(
+        **vars(asked), surface=surface, target={**description, **surface.description}
+    )
     return Design(request, title, findings=surface.findings)
 
 
-def _on_surface(name: str, parameters: Mapping[str, Any], asked: FitOptions, title: str) -> Design:
+def _on_array(target: Any, given: Values) -> Design:
+    """Heights (rows, columns) or points (rows, columns, 3); a list of points is refused."""
+    try:
+        array = np.asarray(target, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise TargetError("The target is an array that does not hold numbers alone.") from None
+    if array.ndim == 2 and array.shape[1] == 3:
+        raise TargetError(f"The target is a point cloud and not a surface; {FROM_POINTS}")
+    if array.ndim == 3 and array.shape[2] == 3:
+        asked, _ = _asked(given, (), "a grid of points")
+        return _on_samples(from_points(array), (), asked, "points")
+    if array.ndim != 2:
+        raise TargetError(
+            f"The target is an array of shape {array.shape}; heights have the shape (rows, "
+            "columns), a grid of points (rows, columns, 3)."
+        )
+    asked, values = _asked(given, ("spacing",), "a height map")
+    return _on_heights(array, values, asked, "heights")
+
+
+def _on_heights(heights: Any, values: Values, asked: FitOptions, title: str) -> Design:
+    spacing = read_value("spacing", length(above=True), values.get("spacing", 1.0))
+    return _on_samples(*from_heights(heights, spacing), asked, title)
+
+
+def _on_samples(
+    surface: SampledSurface, findings: tuple[Finding, ...], asked: FitOptions, title: str
+) -> Design:
+    _not_for(title, asked)
+    _closed(surface, {}, title, asked)
+    target = {"name": title, **surface.description}
+    return Design(_request(surface, target, asked), title, findings=findings)
+
+
+def _on_surface(name: str, parameters: Values, asked: FitOptions, title: str) -> Design:
+    _not_for(name, asked)
+    surface, values = _closed(*make_surface(name, parameters), name, asked)
+    return Design(_request(surface, {"surface": name, "parameters": values}, asked), title)
+
+
+def _request(surface: TargetSurface, target: dict[str, Any], asked: FitOptions) -> FitRequest:
+    """The request for a surface that has no size of its own."""
+    size = DEFAULT_SIZE_MM if asked.size_mm is None else asked.size_mm
+    return FitRequest(**vars(replace(asked, size_mm=size)), surface=surface, target=target)
+
+
+def _not_for(name: str, asked: FitOptions) -> None:
     for option in ("region", "rotate"):
         if getattr(asked, option) is not None:
-            raise OptionError(option, "is for mesh targets; a named surface has parameters")
-    surface, values = _closed(*make_surface(name, parameters), name, asked)
-    target = {"surface": name, "parameters": values}
-    size = DEFAULT_SIZE_MM if asked.size_mm is None else asked.size_mm
-    request = FitRequest(**vars(replace(asked, size_mm=size)), surface=surface, target=target)
-    return Design(request, title)
+            raise OptionError(option, f"is for mesh targets, and '{name}' is none")
 
 
 def can_close(surface: TargetSurface, parameters: Mapping[str, Any]) -> bool:
@@ -144,40 +341,3 @@ def _closed(
     rows = asked.rows
     turn = 360.0 * (rows / (rows + 1) if asked.close == "open" else 1.0)
     return make_surface(name, {**values, "angle": turn})
-
-
-def save_pattern(pattern: CreasePattern, path: Path, title: str = "") -> None:
-    """Write a FOLD file; a mesh target is named relative to it, so that both can move together."""
-    target = dict(pattern.target)
-    if "mesh" in target:
-        target["mesh"] = Path(os.path.relpath(target["mesh"], path.resolve().parent)).as_posix()
-    write_fold(replace(pattern, target=target), path, title)
-
-
-def load_pattern(path: Path) -> tuple[CreasePattern, TargetSurface | None, tuple[Finding, ...]]:
-    """The pattern in a FOLD file, its target (None without one), and findings on the target.
-
-    A pattern without a target comes from another program. A mesh that was moved or has changed
-    since the fit is a finding and no error.
-    """
-    pattern = read_fold(path)
-    target = pattern.target
-    if not target:
-        return pattern, None, ()
-    if "mesh" in target:
-        mesh = path.parent / str(target["mesh"])
-        if not mesh.is_file():
-            return pattern, None, no_target(f"the target mesh {mesh} is not there")
-        if hashlib.sha256(mesh.read_bytes()).hexdigest() != target.get("sha256"):
-            return pattern, None, no_target(f"the target mesh {mesh} has changed since the fit")
-        return pattern, load_mesh(mesh, place=target)[0], ()
-    parameters = target.get("parameters", {})
-    if not isinstance(target.get("surface"), str) or not isinstance(parameters, dict):
-        raise PatternError(f"{path}: 'miurafab:target' names neither a surface nor a mesh.")
-    surface, _ = make_surface(target["surface"], parameters)
-    return pattern, surface, ()
-
-
-def no_target(why: str) -> tuple[Finding, ...]:
-    """The finding on a pattern whose target cannot be used."""
-    return (Finding("no-target", f"Distances are left out: {why}."),)

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from miurafab.display import Shown
 from miurafab.errors import ProfileError
 from miurafab.machine.transport import list_ports
 from miurafab.profiles import load_machine, load_material, shipped_names
@@ -29,8 +30,8 @@ class Port:
     trouble: str | None
 
 
-@dataclass(frozen=True)
-class Examination:
+@dataclass(frozen=True, repr=False)
+class Examination(Shown):
     """Versions by name, the ports, and the problems, one sentence each."""
 
     versions: dict[str, str]
@@ -46,8 +47,14 @@ class Examination:
         }
 
 
-def examine() -> Examination:
-    """Look at the installation, the ports, the shipped profiles, and the free disk."""
+def doctor() -> Examination:
+    """Look at the installation, the ports, the shipped profiles, and the free disk.
+
+    Returns
+    -------
+    Examination
+        ``problems`` are sentences on what would stop a job; nothing is sent to any port.
+    """
     versions = {
         "miurafab": __version__,
         "python": f"{platform.python_version()} on {platform.system()} {platform.machine()}",

@@ -28,7 +28,7 @@ from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.svg import pattern_svg
 from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, tiled_pdf
 from miurafab.fabrication.drawing.views import edge_letters
-from miurafab.fabrication.sheets import Layout
+from miurafab.fabrication.sheets import DrawnLayout
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -72,7 +72,7 @@ def read_formats(given: Iterable[str]) -> tuple[str, ...]:
 
 
 def drawings(
-    layout: Layout, pattern: CreasePattern, formats: Iterable[str], title: str
+    layout: DrawnLayout, pattern: CreasePattern, formats: Iterable[str], title: str
 ) -> Iterable[tuple[str, bytes]]:
     """The name and content of each drawing of ``layout`` in the ``formats`` of
     :func:`read_formats`.

@@ -5,6 +5,7 @@ All figures come from the text alone, so they hold for a foreign file as well as
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from miurafab.display import Shown
 from miurafab.errors import InputError
 from miurafab.findings import Finding, findings_json
 from miurafab.gcode.job import Job
@@ -44,8 +46,8 @@ LAYERS = (
 _TRAVEL, _OTHER = 0, len(LAYERS) - 1
 
 
-@dataclass(frozen=True, eq=False)
-class SheetPreview:
+@dataclass(frozen=True, eq=False, repr=False)
+class SheetPreview(Shown):
     """One G-code file, dry-run.
 
     ``lines`` of the file; ``seconds`` in all and with the beam on; ``cut_mm`` burnt and
@@ -82,6 +84,16 @@ class SheetPreview:
     def judged(self) -> JudgedJob:
         """What :func:`~miurafab.machine.planning.plan_job` would read again."""
         return JudgedJob(len(self.program.line_number), self.program, self.findings)
+
+    def _summary(self) -> str:
+        return (
+            f"{self.name}: {self.lines} lines, {clock_text(self.seconds)}, "
+            f"{length_text(self.cut_mm)} burnt"
+        )
+
+    def _facts(self) -> Mapping[str, object]:
+        facts = self.figures()
+        return {key: value for key, value in facts.items() if not isinstance(value, list)}
 
     def figures(self) -> dict[str, Any]:
         """The figures in the JSON answer of ``preview``."""

@@ -8,16 +8,17 @@ by drawing vertices along straight lines, which no paper could follow.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError
+from miurafab.files import AnyPath, new_file
 from miurafab.geometry.arrays import Floats
-from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.options import Choice, Whole, length, read_value
 from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.contact import triangulate
@@ -28,27 +29,124 @@ from miurafab.origami.folding.kinematics import (
     states_between,
 )
 from miurafab.origami.folding.thick_panels import ThickPanels
+from miurafab.origami.folding.thick_panels import thick_panels as make_panels
 from miurafab.origami.formats.fold import write_fold
 from miurafab.origami.formats.mesh import glb_bytes
 from miurafab.workflow.fold_gif import target_frame, write_gif
 from miurafab.workflow.page import Slider, write_page
+from miurafab.workflow.patterns import PatternLike, as_pattern
 
-DEFAULT_STEPS = 40
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+STEPS = Whole(2, 1000)
 ENDINGS = (".fold", ".gif", ".glb", ".html")
 """What a motion can be written as."""
 
 Progress = Callable[[float, str], None]
 
 
-@dataclass(frozen=True, eq=False)
-class Folding:
-    """A ``motion`` and its ``contacts``; ``mismatch`` is the loop mismatch of the rigid motion, in
-    mean edges, whether that motion was taken or not.
+@dataclass(frozen=True, eq=False, repr=False)
+class Folding(Shown):
+    """A folding motion and where it meets itself.
+
+    Parameters
+    ----------
+    motion : FoldingMotion
+        The frames.
+    contacts : tuple of Contact
+        The frames in which facets pass through each other.
+    mismatch : float
+        The loop mismatch of the rigid motion, in mean edges, also where the motion bends its
+        facets instead.
     """
 
     motion: FoldingMotion
     contacts: tuple[Contact, ...]
     mismatch: float
+
+    def save(
+        self,
+        path: AnyPath,
+        *,
+        title: str = "",
+        colour: str = "side",
+        on_progress: Progress | None = None,
+    ) -> None:
+        """Write the motion, in the format of the ending of ``path``.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            A ``.fold``, ``.gif``, ``.glb`` or ``.html`` file.
+        title : str
+            The title inside the file. The default is the name of the target.
+        colour : {"side", "strain"}
+            What the facets of a ``.gif`` and ``.html`` are coloured by.
+        on_progress : callable, optional
+            Called with a fraction in 0..1 and a short text.
+
+        Raises
+        ------
+        InputError
+            For another ending, and for a folder that does not exist.
+        """
+        file = new_file(path, "The motion", ENDINGS)
+        by_strain = read_value("colour", Choice(("side", "strain")), colour) == "strain"
+        motion, ending = self.motion, file.suffix.lower()
+        pattern, title = motion.pattern, title or motion.pattern.name
+        if ending == ".fold":
+            write_fold(pattern, file, title, motion)
+        elif ending == ".glb":
+            triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
+            file.write_bytes(glb_bytes(motion.frames[0], triangles, motion.frames))
+        elif ending == ".gif":
+            write_gif(file, motion, _strain(motion) if by_strain else None, on_progress)
+        else:
+            slider = Slider(_names(motion), target_frame(motion), _strain(motion), by_strain)
+            write_page(file, title=title, pattern=pattern, motion=motion.frames, slider=slider)
+
+    def save_angles(self, path: AnyPath) -> None:
+        """Write the fold angle of every crease in every frame, in degrees, to a ``.csv`` file.
+
+        Raises
+        ------
+        InputError
+            For another ending, and for a folder that does not exist.
+        """
+        file = new_file(path, "The table of angles", (".csv",))
+        file.write_text(angles_csv(self.motion), encoding="utf-8", newline="\n")
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw five frames of the motion beside each other with matplotlib.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw. The default is a new figure.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        from miurafab.origami.pattern_plot import draw_motion
+        from miurafab.origami.plotting import shown
+
+        axes = shown((10.0, 3.2), ax)
+        draw_motion(self.motion, axes)
+        return axes
+
+    def _summary(self) -> str:
+        contacts = f"contacts in {len(self.contacts)} frames" if self.contacts else "no contacts"
+        return f"{self.motion._summary()}, {contacts}"
+
+    def _picture(self) -> str:
+        return self.motion.pattern._picture()
+
+    def _facts(self) -> Mapping[str, object]:
+        told = self.report()
+        facts = {key: told[key] for key in ("motion", "max_mismatch", "max_strain", "frames")}
+        return facts | {"frames_with_contacts": len(self.contacts)}
 
     def report(self) -> dict[str, Any]:
         """The JSON answer of ``fold``; ``states`` are null where they are infinite."""
@@ -68,19 +166,42 @@ class Folding:
         }
 
 
-def fold(
-    pattern: CreasePattern,
-    steps: int = DEFAULT_STEPS,
-    on_progress: Progress | None = None,
-) -> Folding:
-    """The folding motion of ``pattern`` in ``steps`` steps, and where it meets itself.
+def fold(pattern: PatternLike, steps: int = 40, *, on_progress: Progress | None = None) -> Folding:
+    """Compute the folding motion of a pattern.
 
-    Raises :class:`~miurafab.errors.PatternError` for a sheet that does not fold rigidly and has no
-    folded form towards which its facets could be bent, and
-    :class:`~miurafab.errors.InputError` for a number of steps that is none.
+    A sheet that folds rigidly goes from flat through its folded form to flat-folded. Any other
+    sheet goes from nearly flat to its folded form by bending its facets.
+
+    Parameters
+    ----------
+    pattern : CreasePattern, FitResult, str or os.PathLike
+        The pattern, or a file that :func:`load` reads.
+    steps : int
+        Steps of the motion, 2 to 1000, 40 by default.
+    on_progress : callable, optional
+        Called with a fraction in 0..1 and a short text.
+
+    Returns
+    -------
+    Folding
+        ``.save("x.gif")`` writes it, ``.plot()`` draws it.
+
+    Raises
+    ------
+    PatternError
+        For a file that holds no pattern, and for a sheet that does not fold rigidly and has no
+        folded form towards which its facets could bend.
+    OptionError
+        For ``steps`` out of range.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> mf.fold(mf.fit("plane", facets=(4, 4)), steps=10)
+    <Folding rigid, 11 frames of 16 facets, no contacts>
     """
-    if not 2 <= steps <= 1000:
-        raise InputError(f"`steps` is {steps}; a motion has between 2 and 1000 steps.")
+    pattern = as_pattern(pattern)
+    steps = read_value("steps", STEPS, steps)
     motion = rigid_motion(pattern, states_between(pattern, steps))
     assert motion.mismatch is not None
     mismatch = float(motion.mismatch.max())
@@ -101,46 +222,6 @@ def fold(
     return Folding(motion, contacts(motion, on_progress), mismatch)
 
 
-def check_motion_file(path: Path) -> None:
-    """Raise :class:`~miurafab.errors.InputError` for a path that no motion can be written to."""
-    if path.suffix.lower() not in ENDINGS:
-        raise InputError(f"{path} does not end in one of {', '.join(ENDINGS)}.")
-    if not path.resolve().parent.is_dir():
-        raise InputError(f"The folder of {path} does not exist.")
-
-
-def write_motion(
-    folding: Folding,
-    path: Path,
-    title: str = "",
-    *,
-    by_strain: bool = False,
-    on_progress: Progress | None = None,
-) -> None:
-    """Write the motion to ``path`` in the format of its ending, one of :data:`ENDINGS`.
-
-    ``by_strain`` colours facets by their strain instead of by side, in ``.gif`` and ``.html``.
-    """
-    check_motion_file(path)
-    motion, ending = folding.motion, path.suffix.lower()
-    if ending == ".fold":
-        write_fold(motion.pattern, path, title, motion)
-    elif ending == ".glb":
-        triangles, _ = triangulate(motion.pattern.faces_vertices, motion.pattern.vertices_coords)
-        path.write_bytes(glb_bytes(motion.frames[0], triangles, motion.frames))
-    elif ending == ".gif":
-        strain = _strain(motion) if by_strain else None
-        write_gif(path, motion, strain, on_progress)
-    else:
-        slider = Slider(_names(motion), target_frame(motion), _strain(motion), by_strain)
-        write_page(path, title=title, pattern=motion.pattern, motion=motion.frames, slider=slider)
-
-
-def write_angles(folding: Folding, path: Path) -> None:
-    """Write the fold angle of every crease in every frame as CSV."""
-    path.write_text(angles_csv(folding.motion), encoding="utf-8", newline="\n")
-
-
 def _strain(motion: FoldingMotion) -> Floats:
     """Strains as the page shows them: rounding, which a rigid motion has for strain, is none."""
     strain = facet_strain(motion.pattern, motion.frames)
@@ -158,6 +239,35 @@ def _names(motion: FoldingMotion) -> tuple[str, ...]:
         else:
             names.append("the folded form" if frame == target else f"s = {state:.3g}")
     return tuple(names)
+
+
+def thick_panels(
+    pattern: PatternLike, thickness: float, *, on_progress: Progress | None = None
+) -> ThickPanels:
+    """Compute how panels have to be made so that they fold as a pattern does.
+
+    Parameters
+    ----------
+    pattern : CreasePattern, FitResult, str or os.PathLike
+        A pattern that folds rigidly, or a file that :func:`load` reads.
+    thickness : float
+        The thickness of the panels, mm.
+    on_progress : callable, optional
+        Called with a fraction in 0..1 and a short text.
+
+    Returns
+    -------
+    ThickPanels
+
+    Raises
+    ------
+    InputError
+        For a sheet that does not fold rigidly.
+    OptionError
+        For a thickness that is not positive.
+    """
+    panel_mm = read_value("thickness", length(above=True), thickness)
+    return make_panels(as_pattern(pattern), panel_mm, on_progress)
 
 
 def thickness_report(panels: ThickPanels) -> dict[str, Any]:

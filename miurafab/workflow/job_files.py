@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from miurafab.errors import InputError
-from miurafab.profiles import MachineProfile, Material, find_file, load_machine, load_material
+from miurafab.profiles import MachineProfile, Material, load_machine, load_material
 from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.drawings import ENDINGS, PICTURE
 
@@ -131,14 +131,14 @@ def _beside(name: str, folder: Path | None) -> str | Path:
     return own if own is not None and own.is_file() else name
 
 
-def keep_profiles(machine: str, material: str, directory: Path, staging: Path) -> None:
-    """Copy a machine and a material of the user's own into a job meant for ``directory``.
+def keep_profiles(machine: Path, material: Path, directory: Path, staging: Path) -> None:
+    """Copy the files of a machine and a material into a job meant for ``directory``, if they are
+    the user's own.
 
     Raises :class:`~miurafab.errors.InputError` where two would have one name.
     """
-    kinds: tuple[tuple[Kind, str], ...] = (("firmware_profiles", machine), ("materials", material))
-    for kind, given in kinds:
-        path = find_file(kind, given)
+    kinds: tuple[tuple[Kind, Path], ...] = (("firmware_profiles", machine), ("materials", material))
+    for kind, path in kinds:
         there = directory / path.name
         if path.resolve().parent == shipped_directory(kind).resolve():
             if there.exists():

@@ -31,7 +31,7 @@ _QUIET, _RULE, _BED, _MARGIN, _DESK = "#5c6670", "#dde1e6", "#6b7682", "#c3cad2"
 _WARNING, _START = "#b45309", "#2b8a3e"
 _WRAP = 40
 """Characters of a line of a warning."""
-_MOVES_AT_ONCE = 16_384
+_MOVES_AT_ONCE, _MOST_MOVES = 16_384, 30_000
 
 
 def write_pictures(preview: Preview, out_dir: Path) -> tuple[Path, ...]:
@@ -60,6 +60,13 @@ def png_bytes(sheet: SheetPreview, machine: MachineProfile) -> bytes:
         font_files=[str(font)],
         sans_serif_family="DejaVu Sans",
     )
+
+
+def first_sheet(sheets: tuple[SheetPreview, ...], machine: MachineProfile) -> str:
+    """The picture of the first sheet for a notebook; empty where it would be megabytes of text."""
+    if not sheets or len(sheets[0].layer) > _MOST_MOVES:
+        return ""
+    return svg_text(sheets[0], machine)
 
 
 def svg_text(sheet: SheetPreview, machine: MachineProfile) -> str:

@@ -4,32 +4,51 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
-from collections.abc import Callable
+import reprlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from miurafab.display import Shown
 from miurafab.errors import InputError
+from miurafab.files import AnyPath, as_path
 from miurafab.findings import Finding, findings_json
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import parse_dump
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.profiles import MachineProfile, load_machine
-from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
+from miurafab.profiles import DEFAULT_MACHINE, MachineProfile, load_machine, read_machine
+from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run, length_text, read_gcode
 from miurafab.workflow.job_files import job_machine, job_material
 
-ASSUMED_MACHINE = "grbl-laser-400"
-"""The machine assumed for a G-code file that names none; the preview says so."""
+if TYPE_CHECKING:
+    from miurafab.workflow.job_directory import JobDirectory
+    from miurafab.workflow.sheets import SheetJob
+
+Progress = Callable[[float, str], None]
+
 _ASSUMED_CUTTER = "hpgl-cutter-a3"
 _MACHINE = re.compile(r"^\(machine ([^()]+)\)$", re.MULTILINE)
 
 
-@dataclass(frozen=True, eq=False)
-class Preview:
-    """A whole job, dry-run on ``machine``; ``pattern`` is what its sheets fold into, if known.
+@dataclass(frozen=True, eq=False, repr=False)
+class Preview(Shown):
+    """A whole job, dry-run.
 
-    ``findings`` are about the job as a whole; each sheet has its own.
+    Parameters
+    ----------
+    name : str
+        What the job is called.
+    machine : MachineProfile
+        The machine whose times and limits hold.
+    sheets : tuple of SheetPreview
+        What each G-code file does.
+    pattern : CreasePattern, optional
+        The pattern that the sheets fold into, None where it is not known.
+    findings : tuple of Finding
+        About the job as a whole; each sheet has its own.
     """
 
     name: str
@@ -43,6 +62,49 @@ class Preview:
         """The time of all sheets, one after another, without changing sheets."""
         return sum(sheet.seconds for sheet in self.sheets)
 
+    def write(self, folder: AnyPath, *, on_progress: Progress | None = None) -> tuple[Path, ...]:
+        """Write a picture of each sheet, and ``preview.html``, which shows everything.
+
+        Parameters
+        ----------
+        folder : str or os.PathLike
+            It is made if need be.
+        on_progress : callable, optional
+            Called with a fraction in 0..1 and a short text.
+
+        Returns
+        -------
+        tuple of Path
+            The files, the page last.
+        """
+        from miurafab.workflow.page import write_page
+        from miurafab.workflow.picture import write_pictures
+
+        directory = as_path(folder, "The folder of the preview")
+        if on_progress is not None:
+            on_progress(0.0, "pictures")
+        files = write_pictures(self, directory)
+        page = directory / "preview.html"
+        write_page(page, title=self.name, preview=self, pattern=self.pattern)
+        return (*files, page)
+
+    def _summary(self) -> str:
+        return (
+            f"{self.name} on {self.machine.name}: {len(self.sheets)} sheets, "
+            f"{clock_text(self.seconds)}"
+        )
+
+    def _picture(self) -> str:
+        from miurafab.workflow.picture import first_sheet
+
+        return first_sheet(self.sheets, self.machine)
+
+    def _facts(self) -> Mapping[str, object]:
+        facts: dict[str, object] = {"machine": self.machine.title}
+        for sheet in self.sheets:
+            facts[sheet.name] = f"{clock_text(sheet.seconds)}, {length_text(sheet.cut_mm)} burnt"
+        return facts
+
     def as_dict(self) -> dict[str, Any]:
         """The JSON answer of ``preview``."""
         return {
@@ -55,23 +117,51 @@ class Preview:
 
 
 def preview(
-    job_path: str | Path,
+    job: SheetJob | JobDirectory | AnyPath,
     *,
-    machine: MachineProfile | None = None,
-    settings_dump: str | Path | None = None,
-    on_progress: Callable[[float, str], None] | None = None,
+    machine: MachineProfile | AnyPath | None = None,
+    settings: AnyPath | None = None,
+    on_progress: Progress | None = None,
 ) -> Preview:
-    """Dry-run a job directory or a single G-code file.
+    """Dry-run a job; no port is opened.
 
-    ``machine`` defaults to the one that the job names (``layout.json``, or the file's
-    ``(machine ...)`` comment). ``settings_dump`` is a file with what ``$$`` printed; its rates,
-    accelerations, S range and travel then hold instead of the profile's.
+    Parameters
+    ----------
+    job : SheetJob, JobDirectory, str or os.PathLike
+        A job in memory, a job directory or a G-code file.
+    machine : MachineProfile, str or os.PathLike, optional
+        A profile, its shipped name or its TOML file. The default is the machine that the job names.
+    settings : str or os.PathLike, optional
+        A file with the answer of a controller to ``$$``. Its rates, accelerations, S range and
+        travel replace those of the profile.
+    on_progress : callable, optional
+        Called with a fraction in 0..1 and a short text.
 
-    Raises :class:`~miurafab.errors.InputError` for a path that holds no job,
-    :class:`~miurafab.errors.GcodeError` for a program that the controller would refuse, by file
-    and line, and :class:`~miurafab.errors.ProfileError` for a machine or dump with a fault.
+    Returns
+    -------
+    Preview
+        ``.write(folder)`` writes pictures and a page.
+
+    Raises
+    ------
+    InputError
+        For a path that holds no job.
+    GcodeError
+        For a program that the controller would refuse, by file and line.
+    ProfileError
+        For a machine or settings with a fault.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> job = mf.sheets(mf.fit("hypar", facets=(6, 6), size=120))
+    >>> len(mf.preview(job).sheets)
+    1
     """
-    path = Path(job_path)
+    profile = None if machine is None else read_machine(machine)
+    if not isinstance(job, str | os.PathLike):
+        return _of_value(job, profile, settings)
+    path = as_path(job, "The job")
     if not path.exists():
         raise InputError(f"{path} does not exist.")
     if path.suffix.lower() == ".fold":
@@ -83,25 +173,51 @@ def preview(
     files = _job_files(path, layout)
     jobs = [read_gcode(file) for file in files]
     findings: list[Finding] = []
-    if machine is None:
-        machine = _made_for(path, layout, jobs[0], findings)
-    if settings_dump is not None:
-        machine = with_settings(machine, Path(settings_dump))
-    bed = (machine.bed.width_mm, machine.bed.height_mm)
+    if profile is None:
+        profile = _made_for(path, layout, jobs[0], findings)
+    if settings is not None:
+        profile = with_settings(profile, as_path(settings, "The settings"))
+    bed = (profile.bed.width_mm, profile.bed.height_mm)
     papers = {} if layout is None else layout.papers
     most_power = 1.0 if layout is None else job_material(layout.material, path).max_power
     sheets = []
-    for number, (file, job) in enumerate(zip(files, jobs, strict=True)):
+    for number, (file, gcode) in enumerate(zip(files, jobs, strict=True)):
         if on_progress is not None:
             on_progress(number / len(files), file.name)
-        sheets.append(dry_run(file.stem, job, machine, papers.get(file.stem, bed), most_power))
+        sheets.append(dry_run(file.stem, gcode, profile, papers.get(file.stem, bed), most_power))
     return Preview(
         name=path.resolve().name,
-        machine=machine,
+        machine=profile,
         sheets=tuple(sheets),
         pattern=None if layout is None else _pattern(path, layout, findings),
         findings=tuple(findings),
     )
+
+
+def _of_value(job: object, machine: MachineProfile | None, settings: AnyPath | None) -> Preview:
+    """The preview of a job in memory, or of one that was read."""
+    from miurafab.workflow.job_directory import JobDirectory  # slow to load
+    from miurafab.workflow.sheets import SheetJob
+
+    if not isinstance(job, SheetJob | JobDirectory):
+        raise InputError(
+            f"{reprlib.repr(job)} is no job; give the path of a job directory or a G-code file, or "
+            "what sheets() returns."
+        )
+    name = job.name if isinstance(job, SheetJob) else job.path.resolve().name
+    pattern = job.pattern if isinstance(job, SheetJob) else None
+    dry_runs = job.dry_runs
+    if machine is not None or settings is not None:
+        profile = machine or job.machine
+        if settings is not None:
+            profile = with_settings(profile, as_path(settings, "The settings"))
+        dry_runs = tuple(
+            dry_run(sheet.name, gcode, profile, sheet.paper_mm, job.most_power)
+            for sheet, gcode in zip(job.dry_runs, job.jobs, strict=True)
+        )
+    else:
+        profile = job.machine
+    return Preview(name, profile, dry_runs, pattern, ())
 
 
 def with_settings(machine: MachineProfile, dump: Path) -> MachineProfile:
@@ -212,7 +328,7 @@ def _made_for(
 
 def assumed_machine(path: Path) -> MachineProfile:
     """The machine assumed for a file that names none: a cutter for HPGL, else a common laser."""
-    return load_machine(_ASSUMED_CUTTER if path.suffix.lower() == ".plt" else ASSUMED_MACHINE)
+    return load_machine(_ASSUMED_CUTTER if path.suffix.lower() == ".plt" else DEFAULT_MACHINE)
 
 
 def _pattern(path: Path, layout: _Layout, findings: list[Finding]) -> CreasePattern | None:

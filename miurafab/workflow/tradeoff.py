@@ -1,4 +1,4 @@
-"""``miurafab tradeoff`` as functions: many fits of one target, here or on a cluster, and a picture.
+"""``miurafab tradeoff`` as a function: many fits of one target, here or on a cluster.
 
 The corrugation is found once, at the median of the numbers of facets, and held for all of them, so
 that the samples differ in their facets alone. Every fit is a function of text (the target and its
@@ -9,31 +9,26 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import io
-import math
 import multiprocessing
+import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from miurafab.errors import InputError, OptionError
 from miurafab.options import Text, Whole, Written, declared, option, read_options
+from miurafab.options.documented import described
 from miurafab.origami.fitting.fit import fit
-from miurafab.origami.tradeoff import WEIGHTS, Sample, Tradeoff, cost, optimal_side, summarise
-from miurafab.workflow import plotting
+from miurafab.origami.fitting.request import FitOptions
+from miurafab.origami.tradeoff import WEIGHTS, Sample, Tradeoff, summarise
 from miurafab.workflow.design import design
 
 SIDES = (8, 12, 16, 24, 32, 48)
-Job = tuple[str, dict[str, Any]]
+Job = tuple[str | Mapping[str, Any], dict[str, Any]]
 Progress = Callable[[float, str], None]
-# Colours that colour-blind eyes keep apart (Okabe and Ito, "Color Universal Design", 2008).
-SHEETS, LAW = "#0072b2", "#d55e00"
 
 
 def _read_sides(value: object) -> tuple[int, ...]:
@@ -90,44 +85,56 @@ class TradeoffOptions:
 
 
 def tradeoff(
-    target: str,
+    target: object,
     sides: Sequence[int] | str | None = None,
     *,
     on_progress: Progress | None = None,
     **options: Any,
 ) -> Tradeoff:
-    """Fit ``target`` with n x n facets for each n of ``sides``, and fit the laws.
+    """Fit a target with more and more facets, and compare accuracy and effort.
 
     Parameters
     ----------
-    target : str
-        What :func:`~miurafab.workflow.design.design` takes.
+    target : str, os.PathLike, Design, trimesh.Trimesh, callable or array
+        What :func:`fit` takes; the parameters of a surface are keywords here too.
     sides : sequence of int, optional
-        Facets along a side, three numbers or more.
+        Facets along a side, three different numbers or more: 8, 12, 16, 24, 32, 48 by default.
     on_progress : callable, optional
         Called with a fraction in 0..1 and a short text.
-    **options
-        ``weights``, ``workers`` and ``cluster`` (:class:`TradeoffOptions`), and the options of a
-        fit. The workers of a cluster need miurafab and must see the same files.
+    {options}
+
+    Returns
+    -------
+    Tradeoff
+        ``.plot()`` draws it, ``.save("x.png")`` writes it.
 
     Raises
     ------
+    OptionError
+        For options that cannot be taken.
+    TargetError
+        For a target that cannot be read.
     InputError
-        For options that cannot be taken, a target that cannot be read, a cluster that does not
-        answer.
+        For a cluster that does not answer. Its workers need miurafab and must see the same files.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> mf.tradeoff("hypar", (4, 6, 8))
+    <Tradeoff 3 sheets, 3 converged, distance 11.5 % / n>
     """
     own = {name: options.pop(name) for name in declared(TradeoffOptions) if name in options}
     asked = read_options(TradeoffOptions, own | {"sides": sides} if sides is not None else own)
-    given = {key: value for key, value in options.items() if value is not None}
+    text, given = _as_text(target, {k: v for k, v in options.items() if v is not None})
     ordered = sorted(set(asked.sides))
     pilot = ordered[len(ordered) // 2]
     if on_progress is not None:
         on_progress(0.0, f"pilot with {pilot}x{pilot} facets")
-    first = sample((target, given | {"facets": f"{pilot}x{pilot}"}))
+    first = sample((text, given | {"facets": f"{pilot}x{pilot}"}))
     if first.status == "converged":
         held = {"amplitude": repr(first.amplitude), "zigzag": repr(first.zigzag)}
         given = held | given
-    jobs: list[Job] = [(target, given | {"facets": f"{n}x{n}"}) for n in ordered if n != pilot]
+    jobs: list[Job] = [(text, given | {"facets": f"{n}x{n}"}) for n in ordered if n != pilot]
     samples = [first]
     for found in _run(jobs, asked.workers or 1, asked.cluster):
         samples.append(found)
@@ -135,6 +142,27 @@ def tradeoff(
             word = f"{found.columns}x{found.rows} facets {found.status}"
             on_progress(len(samples) / len(ordered), word)
     return summarise(samples, asked.weights)
+
+
+described(tradeoff, TradeoffOptions, FitOptions, without=("sides", "facets"))
+
+
+def _as_text(
+    target: object, given: dict[str, Any]
+) -> tuple[str | Mapping[str, Any], dict[str, Any]]:
+    """A target and options that another process can be given: a text, or the description that a
+    pattern file would hold.
+    """
+    if isinstance(target, str | os.PathLike):
+        return os.fspath(target), given
+    request = design(target, **given).request
+    written = {
+        name: entry.kind.show(getattr(request, entry.field))
+        for name, entry in declared(FitOptions).items()
+        if getattr(request, entry.field) not in (None, entry.default)
+        and name not in ("facets", "close", "region", "rotate")
+    }
+    return request.target, written
 
 
 def sample(job: Job) -> Sample:
@@ -221,99 +249,3 @@ def _on_cluster(jobs: list[Job], address: str) -> Iterator[Sample]:
         for future in client.map(sample, jobs, pure=False):
             found: Sample = future.result()
             yield found
-
-
-def check_writable(path: Path) -> None:
-    """Refuse, before any work is done, a file that :func:`write_tradeoff` could not write."""
-    plotting.check_writable(path, "the trade-off")
-
-
-def write_tradeoff(found: Tradeoff, path: str | Path, title: str = "") -> None:
-    """Write ``found`` to ``path``: a plot (.png, .svg) or a table (.csv), by the ending.
-
-    Raises :class:`~miurafab.errors.InputError` for another ending, or where matplotlib is missing.
-    """
-    plotting.write_result(
-        Path(path),
-        "the trade-off",
-        lambda: tradeoff_table(found),
-        lambda kind: tradeoff_plot(found, kind, title),
-    )
-
-
-def tradeoff_table(found: Tradeoff) -> str:
-    """One line a sheet as CSV: what was measured, and its cost at each weight."""
-    names = ("hausdorff_mm", "hausdorff_relative", "hausdorff_midsurface_mm", "area_ratio")
-    header = ["facets", "columns", "rows", "status", *names, "min_edge_mm"]
-    header += [f"cost_{curve.weight:g}" for curve in found.curves]
-    lines = [",".join(header)]
-    place = 0
-    for s in found.samples:
-        values = [getattr(s, name) for name in (*names, "min_edge_mm")]
-        costs: list[float | None] = [None] * len(found.curves)
-        if s.status == "converged" and found.curves:
-            costs = [curve.costs[place] for curve in found.curves]
-            place += 1
-        cells = [str(s.columns * s.rows), str(s.columns), str(s.rows), s.status]
-        cells += ["" if value is None else repr(float(value)) for value in (*values, *costs)]
-        lines.append(",".join(cells))
-    return "\n".join(lines) + "\n"
-
-
-def tradeoff_plot(found: Tradeoff, kind: str, title: str) -> bytes:
-    """Distance, area ratio and cost over the number of facets as a picture, ``kind`` png or svg;
-    the same bytes for the same trade-off. Raises ``InputError`` where there is no law to draw.
-    """
-    if found.coefficient is None or found.area_limit is None or found.area_slope is None:
-        raise InputError("There is nothing to plot: fewer than three sheets were found.")
-    from matplotlib import colormaps, rc_context
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import ScalarFormatter
-
-    facets = np.array([s.columns * s.rows for s in found.found], dtype=np.float64)
-    n = np.geomspace(math.sqrt(facets[0]) / 1.15, math.sqrt(facets[-1]) * 1.15, 200)
-    law = found.coefficient / n
-    with rc_context({"svg.hashsalt": "miurafab", "font.size": 9}):
-        figure = Figure(figsize=(12.0, 3.8), layout="constrained")
-        distance, area, costs = figure.subplots(1, 3)
-        distance.loglog(
-            n**2, 100 * law, color=LAW, lw=1.2, label=f"{100 * found.coefficient:.3g} % / n"
-        )
-        distance.loglog(
-            facets, [100 * (s.hausdorff_relative or 0.0) for s in found.found], "o", color=SHEETS,
-            label=f"sheets (free power: n$^{{{found.exponent:.2f}}}$)",
-        )  # fmt: skip
-        distance.set_ylabel("Hausdorff distance (% of the diagonal)")
-        area.semilogx(
-            n**2, found.area_limit + found.area_slope / n, color=LAW, lw=1.2,
-            label=f"{found.area_limit:.3f} {found.area_slope:+.2g} / n",
-        )  # fmt: skip
-        area.axhline(found.area_limit, color=LAW, lw=0.8, ls=":")
-        area.semilogx(
-            facets, [s.area_ratio for s in found.found], "o", color=SHEETS, label="sheets"
-        )
-        area.set_ylabel("area of the paper over that of the target")
-        shades = colormaps["viridis"](np.linspace(0.0, 0.85, len(found.curves)))
-        for curve, shade in zip(found.curves, shades, strict=True):
-            costs.loglog(n**2, cost(curve.weight, n, law), color=shade, lw=1.0)
-            costs.loglog(facets, curve.costs, ".", color=shade, ms=4, label=f"w = {curve.weight:g}")
-            best = np.array([optimal_side(curve.weight, found.coefficient)])
-            if n[0] <= best[0] <= n[-1]:
-                least = cost(curve.weight, best, found.coefficient / best)
-                costs.loglog(best**2, least, "v", color=shade, ms=6)
-        costs.set_ylabel("cost: (1 - w) distance / 1 %  +  w facets / 1000")
-        for axes in (distance, area, costs):
-            axes.set_xlabel("facets (n$^2$)")
-            for side in ("top", "right"):
-                axes.spines[side].set_visible(False)
-        for axes in (distance, costs):
-            axes.yaxis.set_major_formatter(ScalarFormatter())
-            axes.yaxis.set_minor_formatter(ScalarFormatter())
-        for axes in (distance, area):
-            axes.legend(frameon=False, fontsize=8)
-        costs.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        figure.suptitle(title)
-        picture = io.BytesIO()
-        without = {"Date": None} if kind == "svg" else {"Software": None}
-        figure.savefig(picture, format=kind, dpi=150, metadata=without)
-    return picture.getvalue()

@@ -11,11 +11,11 @@ from command_line import sentence
 from problems import regular
 
 from miurafab.errors import InputError
+from miurafab.origami.energy.plot import energy_plot, energy_table
 from miurafab.origami.fitting.fit import FitRequest, fit
 from miurafab.profiles import load_material
 from miurafab.surfaces.catalogue import make_surface
-from miurafab.workflow.design import save_pattern
-from miurafab.workflow.energy import energy, energy_plot, energy_table
+from miurafab.workflow.energy import energy
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def hypar():
 
 @pytest.fixture
 def saved(hypar, tmp_path):
-    save_pattern(hypar, tmp_path / "hypar.fold")
+    hypar.save(tmp_path / "hypar.fold")
     return tmp_path / "hypar.fold"
 
 
@@ -62,7 +62,7 @@ def test_people_get_a_verdict(run, saved, tmp_path):
     done = run("energy", saved, "--steps", "10")
     assert done.returncode == 0
     assert done.stdout.strip().endswith("a barrier on the way to flat holds the folded form.")
-    save_pattern(regular(5, 5), tmp_path / "flat.fold")
+    regular(5, 5).save(tmp_path / "flat.fold")
     done = run("energy", tmp_path / "flat.fold", "--steps", "6", "-o", tmp_path / "flat.png")
     assert "It folds rigidly" in done.stdout
 
@@ -92,7 +92,7 @@ def test_plots_are_the_same_every_time(run, saved, hypar, tmp_path, kind, start)
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        (["-o", "e.pdf"], "by the ending"),
+        (["-o", "e.pdf"], "does not end in one of .png, .svg, .csv"),
         (["-o", "nowhere/e.csv"], "does not exist"),
         (["--steps", "0"], "--steps is 0"),
         (["--crease", "0"], "Edge 0 is not a crease"),
@@ -105,7 +105,7 @@ def test_what_cannot_be_done_is_one_sentence(run, saved, arguments, part):
 
 
 def test_a_pattern_without_a_folded_form_is_refused(run, tmp_path):
-    save_pattern(replace(regular(5, 5), folded_coords=None), tmp_path / "flat.fold")
+    replace(regular(5, 5), folded_coords=None).save(tmp_path / "flat.fold")
     assert "no folded form" in sentence(run("energy", tmp_path / "flat.fold"), 2)
 
 

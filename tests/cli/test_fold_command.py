@@ -6,18 +6,16 @@ import pytest
 from command_line import sentence
 from problems import fitted, regular
 
-from miurafab.workflow.design import save_pattern
-
 
 @pytest.fixture
 def rigid(tmp_path):
-    save_pattern(regular(6, 5), tmp_path / "rigid.fold")
+    regular(6, 5).save(tmp_path / "rigid.fold")
     return tmp_path / "rigid.fold"
 
 
 @pytest.fixture
 def stiff(tmp_path):
-    save_pattern(fitted("hypar", 8, 8).pattern, tmp_path / "stiff.fold")
+    fitted("hypar", 8, 8).pattern.save(tmp_path / "stiff.fold")
     return tmp_path / "stiff.fold"
 
 

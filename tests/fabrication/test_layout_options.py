@@ -7,19 +7,23 @@ from pathlib import Path
 
 import pytest
 
-import miurafab
 from miurafab.errors import InputError, ProfileError
 from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.profiles import load_material, shipped_directory
 from miurafab.profiles.material import Crease, Perforation
+from miurafab.workflow.sheets import layout_options
+
+
+def options_of(given, file=None):
+    return layout_options(given, file)[0]
 
 
 def test_nothing_asked_is_the_usual():
-    assert miurafab.layout_options({}) == LayoutOptions()
+    assert options_of({}) == LayoutOptions()
 
 
 def test_every_option_is_read():
-    options = miurafab.layout_options(
+    options = options_of(
         {
             "gap": "3mm",
             "offcuts": "200x300mm, 15cm x 100",
@@ -92,16 +96,16 @@ def test_every_option_is_read():
 )
 def test_a_wrong_option_is_refused_by_name(given, complaint):
     with pytest.raises(InputError, match=complaint):
-        miurafab.layout_options(given)
+        options_of(given)
 
 
 def test_options_of_a_design_file_give_way_to_those_of_the_command_line(tmp_path):
     file = tmp_path / "x.toml"
     file.write_text('[layout]\nmachine = "m"\ngap = "4mm"\nbridges = 2\nstock = "s.toml"\n')
-    options = miurafab.layout_options({"gap": "1mm"}, file)
+    options = options_of({"gap": "1mm"}, file)
     beside = NestingOptions(stock=tmp_path / "s.toml")
     assert options == LayoutOptions(gap_mm=1.0, bridges=2, nesting=beside)
-    own = miurafab.layout_options({"stock": "mine.toml"}, file)
+    own = options_of({"stock": "mine.toml"}, file)
     assert own.nesting.stock == Path("mine.toml")
 
 

@@ -25,7 +25,9 @@ from miurafab.origami.cylinder import cylinder_over_polyline
 from miurafab.origami.formats.fold import read_fold, write_fold
 from miurafab.origami.unfold import unfold
 from miurafab.origami.verify import EXACT, audit
-from miurafab.workflow.job_directory import read_job, write_job
+from miurafab.workflow.cut import prepare
+from miurafab.workflow.job_directory import read_job
+from miurafab.workflow.sheets import sheets
 
 
 def irregular_tube(columns=6):
@@ -356,9 +358,7 @@ def test_the_job_holds_the_pattern_that_its_layout_names(tmp_path):
     write_fold(tube(), source, "A tube")
     text = source.read_bytes()
     for folder in (tmp_path / "job", tmp_path):
-        made = write_job(
-            source, folder, "grbl-laser-400", "card-250", options=LayoutOptions(open_row=5)
-        )
+        made = sheets(source, open_row=5).write(folder)
         document = json.loads((folder / "layout.json").read_text())
         file = folder / document["pattern"]["file"]
         assert file.name == "tube-opened.fold"
@@ -382,7 +382,7 @@ def test_a_design_says_where_its_ring_is_opened(tmp_path):
         'facets = "4x8"\nsize = "140mm"\nclose = "seam"\n[target]\nsurface = "hyperboloid"\n'
         "[layout]\nopen_row = 3\n"
     )
-    prepared = miurafab.prepare(str(file), out=tmp_path / "job")
+    prepared = prepare(str(file), out=tmp_path / "job")
     document = json.loads((tmp_path / "job" / "layout.json").read_text())
     assert document["pattern"]["file"] == "waist-opened.fold"
     fitted = read_fold(tmp_path / "job" / "waist.fold")

@@ -95,7 +95,7 @@ def test_a_cluster_gives_the_same(hypar):
 
 def test_the_files(hypar, tmp_path):
     for name in ("a.csv", "b.csv"):
-        miurafab.write_tradeoff(hypar, tmp_path / name)
+        hypar.save(tmp_path / name)
     text = (tmp_path / "a.csv").read_text()
     assert text == (tmp_path / "b.csv").read_text()
     lines = [line.split(",") for line in text.splitlines()]
@@ -105,7 +105,7 @@ def test_the_files(hypar, tmp_path):
     pytest.importorskip("matplotlib")
     for kind, start in (("png", b"\x89PNG"), ("svg", b"<?xml")):
         for name in ("a", "b"):
-            miurafab.write_tradeoff(hypar, tmp_path / f"{name}.{kind}", "hypar")
+            hypar.save(tmp_path / f"{name}.{kind}", title="hypar")
         content = (tmp_path / f"a.{kind}").read_bytes()
         assert content.startswith(start)
         assert content == (tmp_path / f"b.{kind}").read_bytes()
@@ -133,7 +133,7 @@ def test_the_command(run, tmp_path, hypar):
         (["--sides", "4,x,9"], "whole numbers"),
         (["--weights", "0.5,1"], "between 0 and 1"),
         (["--weights", "half"], "between 0 and 1, such as 0.2"),
-        (["-o", "picture.gif"], "by the ending"),
+        (["-o", "picture.gif"], "does not end in one of .png, .svg, .csv"),
         (["--workers", "-2"], "1 or more"),
     ],
 )

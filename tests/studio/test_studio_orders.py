@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miurafab.errors import InputError
-from miurafab.options import File
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.options import File, read_options
 from miurafab.studio.form import FIT, LAYOUT
 from miurafab.studio.orders import read_fit, read_layout, read_source
 from miurafab.studio.recipe import design_text, fit_command, sheets_command
 from miurafab.surfaces.catalogue import CATALOGUE, parse_target
 from miurafab.workflow.design import design
-from miurafab.workflow.job_directory import layout_options
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
@@ -141,6 +141,8 @@ def test_the_design_file_asks_for_the_same(tmp_path):
         written, asked = design(str(path)), design(order.target, **order.options)
         assert written.title == 'A "title"'
         assert (written.machine, written.material) == ("grbl-laser-400", "card-250")
-        assert written.layout == layout_options({"bridges": 2, "gap": "3mm", "two_sided": True})
+        assert written.layout == read_options(
+            LayoutOptions, {"bridges": 2, "gap": "3mm", "two_sided": True}
+        )
         for name in ("target", "columns", "rows", "size_mm", "amplitude", "flat_foldable"):
             assert getattr(written.request, name) == getattr(asked.request, name)

@@ -12,10 +12,12 @@ import trimesh
 from problems import saddle_mesh
 
 from miurafab.errors import InputError, TargetError
+from miurafab.origami.formats.fold import read_fold
 from miurafab.surfaces.mesh import MeshChart, load_mesh, mesh_surface
 from miurafab.surfaces.placement import Region
 from miurafab.surfaces.surface import tangents
-from miurafab.workflow.design import design, load_pattern
+from miurafab.workflow.design import design
+from miurafab.workflow.patterns import check
 
 
 def square(count: int = 9, size: float = 100.0) -> tuple[np.ndarray, np.ndarray]:
@@ -332,8 +334,8 @@ def test_a_mesh_is_fitted_checked_and_laid_out_again_from_its_file(run, tmp_path
     result = run("fit", path, "-o", out, "--facets", "12x12", "--json", *placed)
     assert result.returncode == 0, result
     report = json.loads(result.stdout)
-    pattern, _, findings = load_pattern(out)
-    assert findings == ()
+    pattern = read_fold(out)
+    assert check(pattern).findings == ()
     assert pattern.target["rotate"] == pytest.approx(10)
     checked = run("check", out, "--json")
     assert checked.returncode == 0

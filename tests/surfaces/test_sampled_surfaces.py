@@ -58,8 +58,8 @@ def test_the_normal_and_the_nearest_point_are_those_of_the_formula():
 @given(st.floats(0.5, 3.0), st.floats(0.1, 0.5))
 def test_the_file_gives_the_same_surface_again(turns, height):
     surface, _ = from_function(lambda u, v: height * np.sin(turns * u) * v)
-    again, missing = described_surface(json.loads(json.dumps(surface.description)))
-    assert missing is None
+    again, findings = described_surface(json.loads(json.dumps(surface.description)))
+    assert findings == ()
     assert isinstance(again, SampledSurface)
     uv = surface.domain.lattice(9, 9)
     np.testing.assert_array_equal(again.point(uv), surface.point(uv))

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-import miurafab
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.posting import post
 from miurafab.profiles import OPERATIONS, load_machine, load_material
 
 LASER = load_machine("grbl-laser-400")
@@ -58,7 +58,7 @@ def dashes(count, seed=3):
 
 def write_nc(folder: Path, toolpath: Toolpath) -> Path:
     path = folder / f"{toolpath.sheet}.nc"
-    path.write_text(miurafab.post(toolpath, LASER, CARD).text, newline="\n")
+    path.write_text(post(toolpath, LASER, CARD).text, newline="\n")
     return path
 
 
@@ -67,7 +67,7 @@ def write_folder(folder: Path, pattern=None, names=("sheet-01", "sheet-02")) -> 
     folder.mkdir(exist_ok=True)
     digest = "0" * 64
     if pattern is not None:
-        miurafab.save_pattern(pattern, folder / "shape.fold")
+        pattern.save(folder / "shape.fold")
         digest = hashlib.sha256((folder / "shape.fold").read_bytes()).hexdigest()
     for name in names:
         write_nc(folder, known_toolpath(name))

@@ -11,15 +11,17 @@ from problems import fitted, regular, saddle_mesh
 from miurafab.errors import InputError, PatternError
 from miurafab.origami.fitting.fit import fit
 from miurafab.origami.folding.kinematics import rigid_motion, states_between
+from miurafab.origami.formats.files import WRITTEN, load
 from miurafab.origami.formats.fold import read_fold
 from miurafab.origami.verify import audit
-from miurafab.workflow.convert import WRITTEN, convert, read_pattern
-from miurafab.workflow.design import design, load_pattern, save_pattern
+from miurafab.surfaces.description import described_surface
+from miurafab.workflow.convert import convert
+from miurafab.workflow.design import design
 
 
 @pytest.fixture
 def saved(tmp_path: Path) -> Path:
-    save_pattern(regular(6, 5), tmp_path / "sheet.fold")
+    regular(6, 5).save(tmp_path / "sheet.fold")
     return tmp_path / "sheet.fold"
 
 
@@ -71,9 +73,9 @@ def test_a_mesh_target_is_still_found_from_another_folder(tmp_path: Path) -> Non
     saddle_mesh().export(tmp_path / "saddle.stl")
     found = fit(design(str(tmp_path / "saddle.stl"), facets="8x8").request).pattern
     assert found is not None
-    save_pattern(found, tmp_path / "a.fold")
+    found.save(tmp_path / "a.fold")
     convert(tmp_path / "a.fold", tmp_path / "there" / "b.fold")
-    _, surface, findings = load_pattern(tmp_path / "there" / "b.fold")
+    surface, findings = described_surface(load(tmp_path / "there" / "b.fold").target)
     assert findings == ()
     assert surface is not None
 
@@ -82,7 +84,7 @@ def test_a_mesh_target_is_still_found_from_another_folder(tmp_path: Path) -> Non
     ("source", "target", "options", "words"),
     [
         ("sheet.fold", "a.pdf", {}, "does not end in one of"),
-        ("sheet.fold", "a.obj", {"form": "round"}, "flat or folded"),
+        ("sheet.fold", "a.obj", {"form": "round"}, "one of flat, folded"),
         ("sheet.fold", "a.cp", {"folded": "b.obj"}, "'folded' goes with"),
         ("sheet.txt", "a.cp", {}, "does not end in one of"),
         ("sheet.stl", "a.fold", {}, "no crease pattern"),
@@ -102,11 +104,11 @@ def test_what_does_not_go_is_refused(
 def test_a_fault_in_a_drawing_names_the_file(tmp_path: Path) -> None:
     (tmp_path / "bad.cp").write_text("1 2 3\n")
     with pytest.raises(PatternError, match=r"bad\.cp: line 1"):
-        read_pattern(tmp_path / "bad.cp")
+        load(tmp_path / "bad.cp")
 
 
 def test_a_flat_pattern_has_no_folded_form_to_write(tmp_path: Path) -> None:
-    save_pattern(regular(5, 4), tmp_path / "a.fold")
+    regular(5, 4).save(tmp_path / "a.fold")
     convert(tmp_path / "a.fold", tmp_path / "a.cp")
     with pytest.raises(InputError, match="no folded form"):
         convert(tmp_path / "a.cp", tmp_path / "a.stl", form="folded")
@@ -115,8 +117,8 @@ def test_a_flat_pattern_has_no_folded_form_to_write(tmp_path: Path) -> None:
 def test_a_curved_sheet_of_another_program_folds_like_ours(tmp_path: Path) -> None:
     pattern = fitted("sphere", 10, 10, 0.0).pattern
     assert pattern is not None
-    save_pattern(pattern, tmp_path / "a.fold")
+    pattern.save(tmp_path / "a.fold")
     convert(tmp_path / "a.fold", tmp_path / "a.dxf")
-    read = read_pattern(tmp_path / "a.dxf")
+    read = load(tmp_path / "a.dxf")
     motion = rigid_motion(read, states_between(read, 6))
     assert motion.is_rigid

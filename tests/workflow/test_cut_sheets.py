@@ -9,7 +9,8 @@ import miurafab
 from miurafab.errors import GcodeError, InputError
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import SendOptions
-from miurafab.workflow.cut_sheets import CutOptions, frame
+from miurafab.workflow.cut import prepare
+from miurafab.workflow.cut_sheets import CutOptions, cut_prepared, frame
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +18,7 @@ def pattern(tmp_path_factory):
     """A small pattern on disk."""
     path = tmp_path_factory.mktemp("pattern") / "s.fold"
     wanted = miurafab.design("hypar", facets="6x5", size="70mm")
-    miurafab.save_pattern(miurafab.fit(wanted.request).pattern, path, "small")
+    miurafab.fit(wanted).pattern.save(path, title="small")
     return path
 
 
@@ -25,7 +26,7 @@ def pattern(tmp_path_factory):
 def folder(pattern, tmp_path):
     """A job directory with three sheets, all alike."""
     path = tmp_path / "job"
-    miurafab.write_job(pattern, path, "grbl-laser-400", "card-250")
+    miurafab.sheets(pattern).write(path)
     layout = json.loads((path / "layout.json").read_text())
     (first,) = layout["sheets"]
     for n in (2, 3):
@@ -37,9 +38,9 @@ def folder(pattern, tmp_path):
 
 @pytest.mark.parametrize("toolpath", [known_toolpath(), dashes(1500)])
 def test_the_time_left_holds(tmp_path, toolpath):
-    prepared = miurafab.prepare(str(write_nc(tmp_path, toolpath)))
+    prepared = prepare(str(write_nc(tmp_path, toolpath)))
     seen = []
-    (sheet,) = miurafab.cut(prepared, port="virtual", on_progress=seen.append)
+    (sheet,) = cut_prepared(prepared, port="virtual", on_progress=seen.append)
     total = sheet.result.seconds
     for now in seen:
         # A planner's worth of moves either way, and the rounding of the poll.
@@ -53,7 +54,7 @@ def test_the_time_left_holds(tmp_path, toolpath):
 
 def test_a_plain_file_has_its_journal_beside_it(tmp_path):
     path = write_nc(tmp_path, known_toolpath())
-    miurafab.cut(miurafab.prepare(str(path)), port="virtual")
+    cut_prepared(prepare(str(path)), port="virtual")
     (run,) = read_journal(path.with_suffix(".journal"))
     assert run.ended == "done"
     assert path.with_suffix(".transcript").is_file()
@@ -61,8 +62,8 @@ def test_a_plain_file_has_its_journal_beside_it(tmp_path):
 
 def test_check_mode_leaves_no_journal_to_resume(tmp_path):
     path = write_nc(tmp_path, known_toolpath())
-    prepared = miurafab.prepare(str(path))
-    miurafab.cut(prepared, port="virtual", options=CutOptions(send=SendOptions(check_mode=True)))
+    prepared = prepare(str(path))
+    cut_prepared(prepared, port="virtual", options=CutOptions(send=SendOptions(check_mode=True)))
     assert not path.with_suffix(".journal").exists()
 
 
@@ -70,43 +71,43 @@ def test_a_further_sheet_is_told_where_the_head_was_left(folder):
     for name in ("sheet-01", "sheet-02"):
         file = folder / f"{name}.nc"
         file.write_text(file.read_text() + "G0 X7 Y9\n", newline="\n")
-    prepared = miurafab.prepare(str(folder))
-    miurafab.cut(prepared, port="virtual", options=CutOptions(send=SendOptions(at=(3.0, 4.0))))
+    prepared = prepare(str(folder))
+    cut_prepared(prepared, port="virtual", options=CutOptions(send=SendOptions(at=(3.0, 4.0))))
     for name, where in (("sheet-01", "X3.000Y4.000"), ("sheet-02", "X7.000Y9.000")):
         assert f"G92{where}" in (folder / f"{name}.transcript").read_text()
 
 
 def test_only_what_was_interrupted_or_never_begun_is_resumed(folder):
-    prepared = miurafab.prepare(str(folder))
-    miurafab.cut(prepared, port="virtual", sheets=[1, 2])
+    prepared = prepare(str(folder))
+    cut_prepared(prepared, port="virtual", sheets=[1, 2])
     journal = folder / "sheet-02.journal"
     journal.write_text(journal.read_text().partition('{"taken"')[0])
     options = CutOptions(send=SendOptions(at=(0.0, 0.0)), resume=True)
-    done = miurafab.cut(prepared, port="virtual", options=options)
+    done = cut_prepared(prepared, port="virtual", options=options)
     assert [sheet.name for sheet in done] == ["sheet-02", "sheet-03"]
     assert [finding.code for finding in done[0].findings] == ["resumed"]
     assert done[1].findings == ()
     with pytest.raises(InputError, match="was interrupted"):
-        miurafab.cut(prepared, port="virtual", options=options)
+        cut_prepared(prepared, port="virtual", options=options)
 
 
 def test_what_the_material_does_not_take_is_found(folder):
     file = folder / "sheet-01.nc"
     file.write_text(file.read_text() + "M4 S950\nG1 X9 F600\nM5\n", newline="\n")
-    prepared = miurafab.prepare(str(folder))
+    prepared = prepare(str(folder))
     (finding,) = [each for sheet in prepared.dry_runs for each in sheet.findings]
     assert (finding.code, finding.where.split(":")[0]) == ("material", "sheet-01.nc")
     assert "S900" in finding.sentence
     assert miurafab.preview(folder).sheets[0].findings == (finding,)
     with pytest.raises(GcodeError, match="S900"):
-        miurafab.cut(prepared, port="virtual")
+        cut_prepared(prepared, port="virtual")
 
 
 def test_a_frame_burns_nothing(tmp_path):
     path = write_nc(tmp_path, known_toolpath())
-    prepared = miurafab.prepare(str(path))
+    prepared = prepare(str(path))
     assert frame(prepared, 1, port="virtual").seconds > 5
     (tmp_path / "dark.nc").write_text("G0 X5\n")
     with pytest.raises(InputError, match="burns nothing"):
-        frame(miurafab.prepare(str(tmp_path / "dark.nc")), 1, port="virtual")
+        frame(prepare(str(tmp_path / "dark.nc")), 1, port="virtual")
     assert not list(tmp_path.glob("*frame*"))

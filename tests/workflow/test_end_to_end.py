@@ -37,22 +37,20 @@ def made(tmp_path_factory):
         wanted = miurafab.design(
             str(folder / target) if mesh else target, facets="20x20", size="250mm"
         )
-        result = miurafab.fit(wanted.request)
+        result = miurafab.fit(wanted)
         assert result.status == "converged", result.advice
         name = target.partition(".")[0]
         fold = folder / f"{name}.fold"
-        miurafab.save_pattern(result.pattern, fold, wanted.title)
+        result.pattern.save(fold, title=wanted.title)
         job = folder / f"{name}-job"
-        miurafab.write_job(fold, job, "grbl-laser-400", "card-250")
+        miurafab.sheets(fold, "grbl-laser-400", "card-250").write(job)
         jobs[target] = (fold, job)
     return jobs
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_check_passes_from_the_file_alone(made, target):
-    pattern, surface, findings = miurafab.load_pattern(made[target][0])
-    assert findings == ()
-    audit = miurafab.check(pattern, surface)
+    audit = miurafab.check(made[target][0])
     assert audit.findings == ()
     measured = audit.measurements
     assert measured.facets == 400
@@ -131,12 +129,12 @@ def test_each_crease_and_each_outline_exactly_once(made, target):
 def test_a_job_made_again_leaves_no_sheet_of_the_last(tmp_path, made):
     fold, _ = made["hypar"]
     job = tmp_path / "job"
-    miurafab.write_job(fold, job, "grbl-laser-400", "card-250")
+    miurafab.sheets(fold, "grbl-laser-400", "card-250").write(job)
     before = {file.name for file in job.iterdir()}
     small = tmp_path / "small.fold"
     wanted = miurafab.design("hypar", facets="6x6", size="60mm")
-    miurafab.save_pattern(miurafab.fit(wanted.request).pattern, small)
-    miurafab.write_job(small, job, "grbl-laser-400", "card-250")
+    miurafab.fit(wanted).pattern.save(small)
+    miurafab.sheets(small, "grbl-laser-400", "card-250").write(job)
     assert {f.name for f in job.glob("sheet-*")} < before
     assert [f.name for f in job.glob("*.nc")] == ["sheet-01.nc"]
 
@@ -145,7 +143,7 @@ def test_foreign_gcode_in_the_directory_is_not_touched(tmp_path, made):
     fold, _ = made["hypar"]
     (tmp_path / "mine.nc").write_text("G0 X1\n")
     with pytest.raises(InputError, match=r"mine\.nc"):
-        miurafab.write_job(fold, tmp_path, "grbl-laser-400", "card-250")
+        miurafab.sheets(fold, "grbl-laser-400", "card-250").write(tmp_path)
     assert (tmp_path / "mine.nc").read_text() == "G0 X1\n"
     assert not (tmp_path / "layout.json").exists()
 
@@ -158,7 +156,7 @@ def test_a_bed_smaller_than_a_facet_names_the_facet(tmp_path, made):
         text.replace('"400mm"', '"14mm"').replace('\nmargin = "5mm"', '\nmargin = "1mm"')
     )
     with pytest.raises(LayoutError, match="facet"):
-        miurafab.write_job(fold, tmp_path / "job", str(small), "card-250")
+        miurafab.sheets(fold, str(small), "card-250").write(tmp_path / "job")
 
 
 def test_an_own_machine_travels_with_the_job(tmp_path, made):
@@ -166,17 +164,17 @@ def test_an_own_machine_travels_with_the_job(tmp_path, made):
     text = (shipped_directory("firmware_profiles") / "grbl-laser-400.toml").read_text()
     own = tmp_path / "mine.toml"
     own.write_text(text.replace("Diode laser", "My laser"))
-    miurafab.write_job(fold, tmp_path / "job", str(own), "card-250")
+    miurafab.sheets(fold, str(own), "card-250").write(tmp_path / "job")
     own.unlink()
     assert miurafab.read_job(tmp_path / "job").machine.title.startswith("My laser")
     with pytest.raises(ProfileError, match="mine"):
-        miurafab.write_job(fold, tmp_path / "other", "mine", "card-250")
+        miurafab.sheets(fold, "mine", "card-250").write(tmp_path / "other")
 
 
 def test_an_interrupted_job_is_no_job(tmp_path, made):
     fold, _ = made["hypar"]
     job = tmp_path / "job"
-    miurafab.write_job(fold, job, "grbl-laser-400", "card-250")
+    miurafab.sheets(fold, "grbl-laser-400", "card-250").write(job)
     (job / "layout.json").unlink()
     with pytest.raises(InputError, match="no whole job"):
         miurafab.read_job(job)

@@ -22,9 +22,9 @@ from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.contact import self_intersections
 from miurafab.origami.folding.kinematics import FoldingMotion, facet_strain, laid_on, place
 from miurafab.origami.folding.thick_panels import thick_panels
+from miurafab.origami.formats.files import load
 from miurafab.origami.formats.fold import read_fold
-from miurafab.workflow.convert import read_pattern
-from miurafab.workflow.fold import fold, thickness_report, write_motion
+from miurafab.workflow.fold import fold, thickness_report
 from miurafab.workflow.fold_gif import picture, target_frame
 
 DATA = Path(__file__).parent.parent / "data"
@@ -87,7 +87,7 @@ def test_what_neither_folds_nor_bends_says_both() -> None:
     bare = replace(developable("hypar"), folded_coords=None)
     with pytest.raises(PatternError, match=r"does not fold rigidly.*without a folded form"):
         fold(bare, 8)
-    published = read_pattern(DATA / "peaks_coarse_flat.obj", folded=DATA / "peaks_coarse_fold.obj")
+    published = load(DATA / "peaks_coarse_flat.obj", folded=DATA / "peaks_coarse_fold.obj")
     with pytest.raises(PatternError, match=r"does not fold rigidly.*cannot be bent either"):
         fold(published, 8)
     with pytest.raises(InputError, match="'steps' is 1"):
@@ -95,7 +95,7 @@ def test_what_neither_folds_nor_bends_says_both() -> None:
 
 
 def test_the_published_pattern_folds_to_its_given_folded_form() -> None:
-    pattern = read_pattern(DATA / "peaks_coarse_flat.obj", folded=DATA / "peaks_coarse_fold.obj")
+    pattern = load(DATA / "peaks_coarse_flat.obj", folded=DATA / "peaks_coarse_fold.obj")
     assert pattern.folded_coords is not None
     placement = place(pattern, pattern.edges_fold_angle[None])
     facet, corner = np.nonzero(pattern.faces_vertices >= 0)
@@ -164,7 +164,7 @@ def test_the_angles_of_every_crease_and_frame_are_in_the_table() -> None:
 def test_the_same_motion_gives_the_same_bytes(ending: str, tmp_path: Path) -> None:
     folding = fold(regular(5, 4), 6)
     for name in ("one", "two"):
-        write_motion(folding, tmp_path / f"{name}.{ending}", "regular")
+        folding.save(tmp_path / f"{name}.{ending}", title="regular")
     one, two = (tmp_path / f"{name}.{ending}" for name in ("one", "two"))
     assert one.read_bytes() == two.read_bytes()
     if ending == "fold":
@@ -175,7 +175,7 @@ def test_the_same_motion_gives_the_same_bytes(ending: str, tmp_path: Path) -> No
 
 def test_a_gif_goes_there_and_back_and_rests_at_the_folded_form(tmp_path: Path) -> None:
     folding = fold(regular(5, 4), 6)
-    write_motion(folding, tmp_path / "a.gif")
+    folding.save(tmp_path / "a.gif")
     durations, coverage = [], []
     with Image.open(tmp_path / "a.gif") as image:
         assert image.n_frames == 12
@@ -204,9 +204,9 @@ def test_facets_in_front_hide_those_behind() -> None:
 @pytest.mark.parametrize("name", ["a.mp4", "a"])
 def test_an_ending_that_is_no_motion_is_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"does not end in one of \.fold"):
-        write_motion(fold(regular(4, 4), 2), tmp_path / name)
+        fold(regular(4, 4), 2).save(tmp_path / name)
     with pytest.raises(InputError, match="folder"):
-        write_motion(fold(regular(4, 4), 2), tmp_path / "none" / "a.gif")
+        fold(regular(4, 4), 2).save(tmp_path / "none" / "a.gif")
 
 
 def test_the_report_on_thickness_tells_every_crease() -> None:

@@ -12,7 +12,7 @@ from browser import CHROMIUM, Browser
 from PIL import Image
 from problems import fitted, regular
 
-from miurafab.workflow.fold import fold, write_motion
+from miurafab.workflow.fold import fold
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no browser to open the page in")
 
@@ -50,7 +50,7 @@ def test_the_slider_of_thirty_by_thirty_cells_moves_the_sheet(tmp_path: Path) ->
     pattern = fitted("hypar", 60, 60, 0.0).pattern
     assert pattern is not None
     path = tmp_path / "motion.html"
-    write_motion(fold(pattern), path, "hypar")
+    fold(pattern).save(path, title="hypar")
     assert path.stat().st_size <= 4_000_000
     with Browser(tmp_path / "profile") as page:
         page.open(path)
@@ -75,7 +75,7 @@ def test_facets_are_coloured_by_strain_when_asked(tmp_path: Path) -> None:
     folding = fold(pattern, 10)
     assert not folding.motion.is_rigid
     path = tmp_path / "motion.html"
-    write_motion(folding, path, "sphere", by_strain=True)
+    folding.save(path, title="sphere", colour="strain")
     with Browser(tmp_path / "profile") as page:
         page.open(path)
         assert page.run("document.documentElement.dataset.fault") is None
@@ -92,7 +92,7 @@ def test_facets_are_coloured_by_strain_when_asked(tmp_path: Path) -> None:
 
 def test_a_rigid_sheet_shows_no_strain(tmp_path: Path) -> None:
     path = tmp_path / "motion.html"
-    write_motion(fold(regular(), 6), path, "regular")
+    fold(regular(), 6).save(path, title="regular")
     with Browser(tmp_path / "profile") as page:
         page.open(path)
         assert page.run('document.getElementById("strain-most").textContent') == "no strain"

@@ -10,10 +10,15 @@ from miurafab.errors import InputError
 from miurafab.origami.formats.fold import fold_text
 from miurafab.origami.miura import MiuraCell, regular_miura
 from miurafab.origami.unfold import unfold
-from miurafab.workflow.job_directory import write_job
+from miurafab.profiles import find_file
 from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
+from miurafab.workflow.sheets import sheets
 
 SHEETS = ("sheet-01.nc", "sheet-01.svg", "assembly.pdf")
+LASER, FLUIDNC = (
+    find_file("firmware_profiles", name) for name in ("grbl-laser-400", "fluidnc-laser-600")
+)
+CARD = find_file("materials", "card-250")
 
 
 def put(directory, names=SHEETS, content="new", sheets=("sheet-01",), fail=None):
@@ -83,7 +88,7 @@ def test_a_pattern_of_the_same_name_is_not_overwritten(tmp_path):
     job.mkdir()
     (job / "p.fold").write_text("another design")
     with pytest.raises(InputError, match=r"p\.fold is no part of a job"):
-        write_job(tmp_path / "p.fold", job, "grbl-laser-400", "card-250")
+        sheets(tmp_path / "p.fold").write(job)
     assert seen(job) == {"p.fold": b"another design"}
 
 
@@ -99,8 +104,8 @@ def test_profiles_of_one_name_are_told_apart(tmp_path):
     staging.mkdir()
     (job / "grbl-laser-400.toml").write_text("own")
     with pytest.raises(InputError, match="would stand in for the shipped grbl-laser-400"):
-        keep_profiles("grbl-laser-400", "card-250", job, staging)
-    keep_profiles(str(job / "grbl-laser-400.toml"), "card-250", job, staging)
+        keep_profiles(LASER, CARD, job, staging)
+    keep_profiles(job / "grbl-laser-400.toml", CARD, job, staging)
     assert (staging / "grbl-laser-400.toml").read_text() == "own"
     with pytest.raises(InputError, match="both called grbl-laser-400"):
-        keep_profiles("fluidnc-laser-600", str(job / "grbl-laser-400.toml"), job, staging)
+        keep_profiles(FLUIDNC, job / "grbl-laser-400.toml", job, staging)

@@ -147,7 +147,7 @@ def test_a_dump_wins_over_the_profile(tmp_path):
     dump.write_text(
         "$30=300\n$110=1200.000\n$111=1200.000\n$120=20.000\n$121=20.000\n$131=120\nok\n"
     )
-    seen = preview(path, settings_dump=dump)
+    seen = preview(path, settings=dump)
     assert seen.machine.tool.s_max == 300
     assert seen.machine.motion.max_rate_mm_min == (1200.0, 1200.0)
     assert seen.machine.bed.height_mm == 120
@@ -159,7 +159,7 @@ def test_a_dump_wins_over_the_profile(tmp_path):
     with pytest.raises(ProfileError, match=r"mine\.txt"):
         with_settings(LASER, dump)
     with pytest.raises(InputError, match=r"none\.txt"):
-        preview(path, settings_dump=tmp_path / "none.txt")
+        preview(path, settings=tmp_path / "none.txt")
 
 
 def test_the_machine_is_the_one_that_the_job_names(tmp_path):

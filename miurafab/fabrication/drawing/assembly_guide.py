@@ -37,7 +37,7 @@ from miurafab.fabrication.drawing.page import (
 )
 from miurafab.fabrication.drawing.sheet_pages import SheetPages
 from miurafab.fabrication.drawing.views import Views
-from miurafab.fabrication.sheets import Layout
+from miurafab.fabrication.sheets import DrawnLayout
 from miurafab.fabrication.wording import count
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
@@ -45,7 +45,11 @@ from miurafab.profiles import MachineProfile, Material
 
 
 def assembly_guide(
-    layout: Layout, pattern: CreasePattern, machine: MachineProfile, material: Material, title: str
+    layout: DrawnLayout,
+    pattern: CreasePattern,
+    machine: MachineProfile,
+    material: Material,
+    title: str,
 ) -> bytes:
     """The guide as PDF. ``layout`` must have its toolpaths."""
     stream = io.BytesIO()

@@ -38,7 +38,7 @@ from miurafab.fabrication.drawing.page import (
 )
 from miurafab.fabrication.drawing.pdf import draw_for_people
 from miurafab.fabrication.drawing.views import OUTLINED, Views, named
-from miurafab.fabrication.sheets import Layout, Placement, Sheet
+from miurafab.fabrication.sheets import DrawnLayout, Placement, Sheet
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.fabrication.wording import count
 from miurafab.geometry.arrays import Floats
@@ -66,7 +66,7 @@ class SheetPages:
     title: str
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> DrawnLayout:
         return self.views.layout
 
     @cached_property

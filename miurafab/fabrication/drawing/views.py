@@ -28,7 +28,7 @@ from miurafab.fabrication.drawing.page import (
 )
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.partition.split import boundaries
-from miurafab.fabrication.sheets import Layout
+from miurafab.fabrication.sheets import DrawnLayout, Layout
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.picture import project
@@ -55,7 +55,7 @@ def edge_letters(layout: Layout, pattern: CreasePattern) -> NDArray[np.str_]:
 class Views:
     """The views of one ``layout`` of ``pattern``."""
 
-    layout: Layout
+    layout: DrawnLayout
     pattern: CreasePattern
 
     @cached_property

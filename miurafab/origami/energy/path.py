@@ -13,18 +13,23 @@ the higher is the barrier that keeps its folded form (Dudte et al., Nature Mater
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError
+from miurafab.files import AnyPath
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
 from miurafab.origami.energy.equilibrium import Driven, EquilibriumState, Factored, solve
 from miurafab.origami.energy.hinges import hinge_angles
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Progress = Callable[[float, str], None]
 
@@ -42,8 +47,8 @@ SMALL_TURN = 1e-3
 """Radians to either side of the folded form, for the difference quotient of its stiffness."""
 
 
-@dataclass(frozen=True, eq=False)
-class Path:
+@dataclass(frozen=True, eq=False, repr=False)
+class Path(Shown):
     """n equilibria in a row, the first of them the folded form.
 
     ``coords`` (n, V, 3) in mm, in the axes of the folded form, with one triangle near the middle
@@ -68,8 +73,8 @@ class StableState:
     energy: float
 
 
-@dataclass(frozen=True, eq=False)
-class EnergyCurve:
+@dataclass(frozen=True, eq=False, repr=False)
+class EnergyCurve(Shown):
     """The energy along ``path``, with its barrier and stable states.
 
     ``barrier`` is the highest maximum of the energy between the folded form and flat, 0 without a
@@ -93,6 +98,58 @@ class EnergyCurve:
     def bistable(self) -> bool:
         """Whether a barrier lies between two stable states."""
         return self.barrier > 0 and len(self.stable) > 1
+
+    def save(self, path: AnyPath, *, title: str = "") -> None:
+        """Write a plot (``.png``, ``.svg``) or a table (``.csv``), by the ending of ``path``.
+
+        Raises
+        ------
+        InputError
+            For another ending, and for a folder that does not exist.
+        """
+        from miurafab.origami.energy.plot import energy_plot, energy_table
+        from miurafab.origami.plotting import write_result
+
+        write_result(
+            path,
+            "The energy",
+            lambda: energy_table(self),
+            lambda kind: energy_plot(self, kind, title),
+        )
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the energy over the driven fold angle with matplotlib.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw. The default is a new figure.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        from miurafab.origami.energy.plot import SIZE, draw_energy
+        from miurafab.origami.plotting import shown
+
+        axes = shown(SIZE, ax)
+        draw_energy(self, axes)
+        return axes
+
+    def _summary(self) -> str:
+        said = "rigid" if self.rigid else "bistable" if self.bistable else "one stable state"
+        unit = self.path.model.unit_joule
+        barrier = f"{self.barrier * (unit or 1.0):.3g} {'k_f L' if unit is None else 'J'}"
+        return f"{said}, barrier {barrier}, {len(self.path.drives)} steps"
+
+    def _picture(self) -> str:
+        from miurafab.origami.energy.plot import energy_plot
+
+        return energy_plot(self, "svg", "").decode("utf-8")
+
+    def _facts(self) -> Mapping[str, object]:
+        report = self.report()
+        return {key: report[key] for key in report if not isinstance(report[key], list)}
 
     def verdict(self) -> str:
         """The result in one sentence."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
-from miurafab.errors import OptionError, UnitError
+from miurafab.display import Shown
+from miurafab.errors import OptionError, PatternError, UnitError
 from miurafab.findings import Finding, findings_json
 from miurafab.options import (
     Choice,
@@ -29,6 +30,9 @@ from miurafab.surfaces.analytic import GeneralizedCylinder
 from miurafab.surfaces.placement import Region
 from miurafab.surfaces.surface import TargetSurface
 from miurafab.units import parse_angle
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 DEFAULT_FACETS = (20, 20)
 DEFAULT_SIZE_MM = 200.0
@@ -87,8 +91,8 @@ INTERRUPTED = Finding(
 """The advice of a fit that Ctrl-C ended."""
 
 
-@dataclass(frozen=True)
-class FitOptions:
+@dataclass(frozen=True, repr=False)
+class FitOptions(Shown):
     """The options of a fit. Inside, lengths are in mm and angles in radians."""
 
     facets: tuple[int, int] | None = option(
@@ -220,7 +224,7 @@ class FitOptions:
         return self.flat_foldable is not None and self.flat_foldable <= EXACT
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FitRequest(FitOptions):
     """What is asked of one fit: its options, and the ``surface`` that the sheet is to follow.
 
@@ -261,15 +265,35 @@ class Attempt:
     place: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class FitResult:
-    """The outcome. ``status`` is ``converged``, ``infeasible`` (an exact sheet, but a limit is not
-    met), ``interrupted`` (the best exact sheet when Ctrl-C ended the fit) or ``stalled`` (no exact
-    sheet was found); ``pattern`` is the best sheet there is, or None.
+@dataclass(frozen=True, eq=False, repr=False)
+class FitResult(Shown):
+    """The outcome of a fit.
 
-    ``deviation_mm`` is how far what follows the target lies from it at most; ``polished`` whether
-    the sheet was brought closer after it was found; ``active_bounds`` how many inequalities of each
-    kind hold it back.
+    Parameters
+    ----------
+    status : str
+        ``converged``; ``infeasible``: an exact sheet that misses a limit; ``interrupted``: the best
+        exact sheet when Ctrl-C ended the fit; ``stalled``: no exact sheet was found.
+    advice : str
+        What to change, empty where nothing is to be said.
+    pattern : CreasePattern or None
+        The best sheet, None where none was found.
+    measurements : Measurements or None
+        The residuals and distances of ``pattern``.
+    attempts : tuple of Attempt
+        What was tried, in order.
+    iterations : int
+        Iterations of the solver, in all attempts.
+    seconds : float
+        The time that the fit took.
+    deviation_mm : float, optional
+        How far the part of the sheet that follows the target lies from it at most, mm.
+    polished : bool
+        Whether the sheet was brought closer after it was found.
+    active_bounds : mapping
+        How many inequalities of each kind hold the sheet back.
+    findings : tuple of Finding
+        What a person should know of the target.
     """
 
     status: str
@@ -283,6 +307,37 @@ class FitResult:
     polished: bool = False
     active_bounds: Mapping[str, int] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+
+    def plot(self, form: str | None = None, ax: Axes | None = None) -> Axes:
+        """Draw the pattern (:meth:`CreasePattern.plot`).
+
+        Raises
+        ------
+        PatternError
+            Where no sheet was found.
+        """
+        if self.pattern is None:
+            raise PatternError(f"There is no sheet to draw: {self.advice}")
+        return self.pattern.plot(form, ax)
+
+    def _summary(self) -> str:
+        if self.pattern is None or self.measurements is None:
+            return f"{self.status}: no sheet in {len(self.attempts)} attempts"
+        far = self.measurements.hausdorff_mm
+        grid = self.pattern.grid
+        return f"{self.status}: {self.measurements.facets} facets" + "".join(
+            [
+                "" if far is None else f", {far:.2g} mm from {self.pattern.name or 'the target'}",
+                "" if grid is None else f", pattern {grid[0]}x{grid[1]}",
+            ]
+        )
+
+    def _picture(self) -> str:
+        return "" if self.pattern is None else self.pattern._picture()
+
+    def _facts(self) -> Mapping[str, object]:
+        report = self.report()
+        return {key: value for key, value in report.items() if not isinstance(value, list | dict)}
 
     def report(self) -> dict[str, Any]:
         """The fit report, ready for JSON."""

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import shortest_path
 
+from miurafab.display import Shown
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import edge_lengths, facet_means, sides_and_diagonals
@@ -36,8 +37,8 @@ FOLDED_FLAT = np.pi - 1e-6
 _POINT = 1e-6  # of the mean edge; a shorter crease has no direction
 
 
-@dataclass(frozen=True, eq=False)
-class FoldingMotion:
+@dataclass(frozen=True, eq=False, repr=False)
+class FoldingMotion(Shown):
     """A folding motion of ``pattern`` in T frames.
 
     ``states`` (T,) float64 are the values of s, 1 in the folded form. ``frames`` (T, V, 3)
@@ -51,6 +52,10 @@ class FoldingMotion:
     frames: Floats
     fold_angles: Floats
     mismatch: Floats | None
+
+    def _summary(self) -> str:
+        kind = "bending" if self.mismatch is None else "rigid" if self.is_rigid else "not rigid"
+        return f"{kind}, {len(self.frames)} frames of {len(self.pattern.faces_vertices)} facets"
 
     @property
     def is_rigid(self) -> bool:

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from miurafab.display import Shown
 from miurafab.errors import InputError
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import next_corners, previous_corners
@@ -40,8 +41,8 @@ folded form panels touch along their sides.
 """
 
 
-@dataclass(frozen=True, eq=False)
-class ThickPanels:
+@dataclass(frozen=True, eq=False, repr=False)
+class ThickPanels(Shown):
     """``pattern`` made of panels ``thickness_mm`` thick, folding from flat to its folded form.
 
     ``hinge_side`` (E,) is "top" where the panels close on the top (valleys), "bottom" where they

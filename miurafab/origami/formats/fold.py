@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -106,12 +107,20 @@ def _polygons(faces: Ints) -> list[list[int]]:
 def write_fold(
     pattern: CreasePattern, path: Path, title: str = "", motion: FoldingMotion | None = None
 ) -> None:
-    """Write ``pattern``, with a ``motion`` of it or without, to the FOLD file ``path``."""
+    """Write ``pattern``, with a ``motion`` of it or without, to the FOLD file ``path``.
+
+    A mesh file that is its target is named from the folder of ``path``, so that both can move
+    together.
+    """
+    mesh = pattern.target.get("mesh")
+    if mesh is not None:
+        relative = Path(os.path.relpath(mesh, path.resolve().parent)).as_posix()
+        pattern = replace(pattern, target={**pattern.target, "mesh": relative})
     path.write_text(fold_text(pattern, title, motion), encoding="utf-8", newline="\n")
 
 
 def read_fold(path: Path) -> CreasePattern:
-    """The pattern in the FOLD file ``path``.
+    """The pattern in the FOLD file ``path``; a mesh file that is its target by its whole path.
 
     Raises :class:`~miurafab.errors.PatternError` naming the file and what is wrong with it.
     """
@@ -125,9 +134,14 @@ def read_fold(path: Path) -> CreasePattern:
     except RecursionError:
         raise PatternError(f"{path} is not a FOLD file: it is nested too deeply.") from None
     try:
-        return parse_fold(document)
+        pattern = parse_fold(document)
     except PatternError as fault:
         raise PatternError(f"{path}: {fault}") from None
+    mesh = pattern.target.get("mesh")
+    if not isinstance(mesh, str):
+        return pattern
+    whole = str((path.parent / mesh).resolve())
+    return replace(pattern, target={**pattern.target, "mesh": whole})
 
 
 def parse_fold(document: Any) -> CreasePattern:

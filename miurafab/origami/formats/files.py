@@ -1,0 +1,153 @@
+"""Pattern files by their ending: read in any format that holds a pattern, written in any format.
+
+======= =============================================== ======= ========
+ending  holds                                           read    written
+======= =============================================== ======= ========
+.fold   flat and folded form, fold angles               yes     yes
+.svg    flat pattern, fold angles (Origami Simulator)   yes     yes
+.dxf    flat pattern, mountains and valleys             yes     yes
+.cp     flat pattern, mountains and valleys             yes     yes
+.opx    flat pattern, mountains and valleys             yes     yes
+.obj    one form as facets; two files make a pattern    a pair  yes
+.stl    one form as triangles                           no      yes
+.glb    one form as triangles                           no      yes
+======= =============================================== ======= ========
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from miurafab.errors import InputError, OptionError, PatternError
+from miurafab.files import AnyPath, as_path, new_file, read_bytes
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.formats.fold import read_fold, write_fold
+from miurafab.origami.formats.lines import (
+    cp_text,
+    dxf_text,
+    opx_text,
+    parse_cp,
+    parse_dxf,
+    parse_opx,
+)
+from miurafab.origami.formats.mesh import glb_bytes, obj_text, stl_bytes
+from miurafab.origami.formats.obj import pattern_from_obj_pair
+from miurafab.origami.formats.planar_graph import CreaseLines, lines_of, pattern_from_lines
+from miurafab.origami.formats.svg import parse_svg, svg_text
+
+DRAWINGS: dict[str, Callable[[str], CreaseLines]] = {
+    ".svg": parse_svg,
+    ".dxf": parse_dxf,
+    ".cp": parse_cp,
+    ".opx": parse_opx,
+}
+WITHOUT_ANGLES = (".dxf", ".cp", ".opx")
+SOLIDS = (".obj", ".stl", ".glb")
+READ = (".fold", *DRAWINGS, ".obj")
+WRITTEN = (*READ, ".stl", ".glb")
+
+
+def load(
+    path: AnyPath, *, folded: AnyPath | None = None, tolerance: float | None = None
+) -> CreasePattern:
+    """Read a pattern from a file, in the format of its ending.
+
+    Parameters
+    ----------
+    path : str or os.PathLike
+        A ``.fold``, ``.svg``, ``.dxf``, ``.cp``, ``.opx`` or flat ``.obj`` file.
+    folded : str or os.PathLike, optional
+        The OBJ file with the folded form of an OBJ ``path``.
+    tolerance : float, optional
+        How near the ends of lines in a drawing count as met, mm. The default is a ten-thousandth
+        of the median line.
+
+    Returns
+    -------
+    CreasePattern
+
+    Raises
+    ------
+    PatternError
+        For a file that is missing or holds no pattern.
+    InputError
+        For another ending.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> mf.fit("plane", facets=(4, 4)).pattern.save("plane.fold")
+    >>> mf.load("plane.fold")
+    <CreasePattern 16 facets, 25 vertices, 88.1 x 200 mm flat, with folded form, of plane>
+    """
+    path = as_path(path, "The pattern file")
+    ending = path.suffix.lower()
+    if folded is not None and ending != ".obj":
+        raise OptionError("folded", f"goes with a flat .obj file, and {path} is none")
+    if ending == ".fold":
+        return read_fold(path)
+    if ending == ".obj":
+        if folded is None:
+            raise InputError(
+                f"{path} is one shape; give its folded form (.obj) as `folded` to make a pattern "
+                "of the two, or fit it as a surface with 'miurafab fit'."
+            )
+        return pattern_from_obj_pair(path, as_path(folded, "The folded form"))
+    if ending in (".stl", ".glb"):
+        raise InputError(
+            f"{path} holds triangles and no crease pattern; fit it as a surface with "
+            "'miurafab fit'."
+        )
+    if ending not in DRAWINGS:
+        raise InputError(f"{path} does not end in one of {', '.join(READ)}.")
+    text = read_bytes(path, PatternError).decode("utf-8", errors="replace")
+    try:
+        return pattern_from_lines(DRAWINGS[ending](text), tolerance)
+    except InputError as fault:
+        raise PatternError(f"{path}: {fault.sentence}") from None
+
+
+def write_pattern(
+    pattern: CreasePattern, path: AnyPath, *, title: str = "", form: str | None = None
+) -> Path:
+    """Write ``pattern`` to ``path``, in the format of its ending (:meth:`CreasePattern.save`)."""
+    path = new_file(path, "The pattern file", WRITTEN)
+    form = pattern.chosen_form(form)
+    ending = path.suffix.lower()
+    if ending == ".fold":
+        write_fold(pattern, path, title)
+    elif ending in SOLIDS:
+        _write_solid(pattern, path, form)
+    else:
+        _write_drawing(pattern, path, title)
+    return path
+
+
+def _write_solid(pattern: CreasePattern, path: Path, form: str) -> None:
+    if pattern.folded_coords is None or form == "flat":
+        points = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
+    else:
+        points = pattern.folded_coords
+    triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
+    if path.suffix.lower() == ".obj":
+        text = obj_text(points, pattern.faces_vertices, path.stem)
+        path.write_text(text, encoding="utf-8", newline="\n")
+    elif path.suffix.lower() == ".stl":
+        path.write_bytes(stl_bytes(points, triangles))
+    else:
+        path.write_bytes(glb_bytes(points, triangles))
+
+
+def _write_drawing(pattern: CreasePattern, path: Path, title: str) -> None:
+    lines, ending = lines_of(pattern), path.suffix.lower()
+    if ending == ".svg":
+        text = svg_text(lines, title)
+    elif ending == ".opx":
+        text = opx_text(lines, title)
+    else:
+        text = cp_text(lines) if ending == ".cp" else dxf_text(lines)
+    path.write_text(text, encoding="utf-8", newline="\n")

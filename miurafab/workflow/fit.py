@@ -1,0 +1,73 @@
+"""``miurafab fit`` as a function: from a target, in any form, to a sheet that folds onto it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from miurafab.options.documented import described
+from miurafab.origami.fitting.fit import fit as fit_request
+from miurafab.origami.fitting.request import FitOptions, FitResult
+from miurafab.workflow.design import design
+
+
+def fit(
+    target: object, /, *, on_progress: Callable[[float, str], None] | None = None, **options: Any
+) -> FitResult:
+    """Fit a generalized Miura-ori to a target surface.
+
+    Lengths are in mm and angles in degrees; text with a unit is taken too (``size="10in"``). The
+    names of options and the parameters of a surface never meet, so both are keywords here.
+
+    Parameters
+    ----------
+    target : str, os.PathLike, Design, trimesh.Trimesh, callable or array
+        One of
+
+        - a built-in surface, ``"hypar"`` or ``"hypar:height=0.5"`` (:func:`surfaces` lists them);
+          its parameters are keywords;
+        - a design ``.toml``, a mesh (``.stl``, ``.obj``, ``.ply``, ``.off``, ``.glb``), a
+          ``trimesh.Trimesh`` or a :class:`Design`;
+        - a function of u and v that returns a point (x, y, z), or one number: the height z over
+          x = u, y = v. It is called with arrays if it computes with arrays, else once for each
+          sample. Its parameter is ``domain``: u0, u1, v0, v1; -1, 1, -1, 1 by default;
+        - heights, an array (rows, columns), with ``spacing`` (1 mm by default); or an image, whose
+          grey values are heights, with ``height`` (white above black) and ``spacing``;
+        - a grid of points, an array (rows, columns, 3).
+    on_progress : callable, optional
+        Called with a fraction in 0..1 and a short text.
+    {options}
+
+    Returns
+    -------
+    FitResult
+        A fit that finds no sheet is a result as well: ``status`` and ``advice`` tell.
+
+    Raises
+    ------
+    TargetError
+        For a target that cannot be read.
+    OptionError
+        For a name that is neither an option nor a parameter, and for a value that cannot be taken.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> sheet = mf.fit("hypar", height=0.5, facets=(6, 6), size=250)
+    >>> sheet.status
+    'converged'
+    >>> mf.fit(lambda u, v: (u, v, 0.3 * u * v), facets=(6, 6)).status
+    'converged'
+
+    Source
+    ------
+    L. H. Dudte, E. Vouga, T. Tachi and L. Mahadevan, "Programming curvature using origami
+    tessellations", Nature Materials 15 (2016).
+    """
+    asked = design(target, **options)
+    result = fit_request(asked.request, on_progress)
+    return replace(result, findings=(*asked.findings, *result.findings))
+
+
+described(fit, FitOptions)

@@ -1,0 +1,37 @@
+"""What there is to choose from: surfaces, machines and materials, each with a word on it."""
+
+from __future__ import annotations
+
+from miurafab.profiles import load_machine, load_material, shipped_names
+from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface
+
+
+def surfaces() -> dict[str, str]:
+    """List the built-in surfaces.
+
+    Returns
+    -------
+    dict
+        The name of each surface, with its parameters and their defaults (angles in degrees).
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> mf.surfaces()["hypar"]
+    'a hyperbolic paraboloid z = height x y, ruled along x and y (width=2, depth=2, height=0.5)'
+    """
+    return {name: f"{entry.summary} ({_defaults(entry)})" for name, entry in CATALOGUE.items()}
+
+
+def _defaults(entry: NamedSurface) -> str:
+    return ", ".join(f"{key}={each.default_text}" for key, each in entry.parameters.items())
+
+
+def machines() -> dict[str, str]:
+    """List the shipped machines: the name of each profile, with its title."""
+    return {name: load_machine(name).title for name in shipped_names("firmware_profiles")}
+
+
+def materials() -> dict[str, str]:
+    """List the shipped materials: the name of each, with its title."""
+    return {name: load_material(name).title for name in shipped_names("materials")}

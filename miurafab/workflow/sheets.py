@@ -1,0 +1,346 @@
+"""``miurafab sheets`` as a function: a pattern as a job, in memory first, then on disk."""
+
+from __future__ import annotations
+
+import hashlib
+import reprlib
+import shutil
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from miurafab.display import Shown
+from miurafab.errors import InputError, ProfileError
+from miurafab.fabrication.drawing.assembly_guide import assembly_guide
+from miurafab.fabrication.drawing.svg import sheet_svg
+from miurafab.fabrication.layout import write_layout
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.sheets import DrawnLayout, lay_out
+from miurafab.files import AnyPath, as_path
+from miurafab.gcode.job import Job
+from miurafab.options import read_options
+from miurafab.options.documented import described
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.formats.fold import write_fold
+from miurafab.posting import post
+from miurafab.profiles import (
+    MachineProfile,
+    Material,
+    Table,
+    find_file,
+    find_profile,
+    load_machine,
+    load_material,
+    read_toml,
+)
+from miurafab.workflow.drawings import drawings, read_formats
+from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run
+from miurafab.workflow.job_directory import GUIDE, JobDirectory, write_text
+from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
+from miurafab.workflow.patterns import PatternLike, as_pattern
+from miurafab.workflow.picture import first_sheet
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+OPENED = "-opened"
+"""What the name of a pattern that was opened for the job ends in."""
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SheetJob(Shown):
+    """A pattern laid out, with the G-code of its sheets, in memory.
+
+    Parameters
+    ----------
+    name : str
+        What the job is called in its drawings.
+    layout : DrawnLayout
+        Patches, sheets and strokes.
+    machine : MachineProfile
+        The machine that the job is made for.
+    material : Material
+        The material of the sheets.
+    jobs : tuple of Job
+        The G-code of each sheet, in the order in which they are made.
+    dry_runs : tuple of SheetPreview
+        What each job does and how long it takes.
+    machine_file, material_file : Path
+        The files of the profiles.
+    pattern_file : Path, optional
+        The FOLD file of the pattern, None where the pattern has none or was opened.
+    """
+
+    name: str
+    layout: DrawnLayout
+    machine: MachineProfile
+    material: Material
+    jobs: tuple[Job, ...]
+    dry_runs: tuple[SheetPreview, ...]
+    machine_file: Path
+    material_file: Path
+    pattern_file: Path | None
+    opened: bool = False
+
+    @property
+    def pattern(self) -> CreasePattern:
+        """The pattern whose facets and edges the layout names."""
+        return self.layout.pattern
+
+    @property
+    def most_power(self) -> float:
+        """The largest power of the material, as a fraction of full power."""
+        return self.material.max_power
+
+    @property
+    def seconds(self) -> float:
+        """The estimated time of all sheets, without changing sheets."""
+        return sum(sheet.seconds for sheet in self.dry_runs)
+
+    def write(
+        self,
+        directory: AnyPath,
+        *,
+        formats: str | Collection[str] = (),
+        on_progress: Progress | None = None,
+    ) -> JobDirectory:
+        """Write the job directory: G-code, drawings, assembly guide, layout, pattern.
+
+        All files are put in place at once. Sheets of an earlier job in the same directory are
+        removed; files that are no part of a job are left alone.
+
+        Parameters
+        ----------
+        directory : str or os.PathLike
+            The job directory. It is made if need be.
+        formats : str or collection of str
+            Drawings besides SVG: dxf, dxf-r2010, pdf, hpgl, tiled-a4, tiled-a3, tiled-letter,
+            tiled-legal, picture.
+        on_progress : callable, optional
+            Called with a fraction in 0..1 and a short text.
+
+        Returns
+        -------
+        JobDirectory
+
+        Raises
+        ------
+        InputError
+            Where the directory holds something else than a job, or cannot be written, and for an
+            unknown format.
+        """
+        folder = as_path(directory, "The job directory")
+        wanted = read_formats((formats,) if isinstance(formats, str) else formats)
+        tell = on_progress or (lambda fraction, note: None)
+        layout, machine = self.layout, self.machine
+        with job_files(folder) as staging:
+            keep_profiles(self.machine_file, self.material_file, folder, staging)
+            for number, (toolpath, job) in enumerate(zip(layout.passes, self.jobs, strict=True)):
+                tell(0.7 * number / len(self.jobs), f"drawing {toolpath.sheet}")
+                write_text(staging / f"{toolpath.sheet}{machine.job_suffix}", job.text)
+                write_text(staging / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
+            for name, content in drawings(layout, self.pattern, wanted, self.name):
+                (staging / name).write_bytes(content)
+            tell(0.7, "drawing the assembly guide")
+            guide = assembly_guide(layout, self.pattern, machine, self.material, self.name)
+            (staging / GUIDE).write_bytes(guide)
+            used = self._put_pattern(folder, staging)
+            digest = hashlib.sha256(used.read_bytes()).hexdigest()
+            write_text(staging / LAYOUT, write_layout(layout, used.name, digest))
+        tell(1.0, "done")
+        return JobDirectory(folder, layout, machine, self.most_power, self.jobs, self.dry_runs)
+
+    def _put_pattern(self, folder: Path, staging: Path) -> Path:
+        """The file of the pattern, which is put into ``staging`` unless it is in ``folder``."""
+        if self.pattern_file is None:
+            file = staging / f"{self.name}{OPENED if self.opened else ''}.fold"
+            write_fold(self.pattern, file, self.name)
+            return file
+        file = staging / self.pattern_file.name
+        if (folder / file.name).resolve() == self.pattern_file.resolve():
+            return self.pattern_file
+        shutil.copyfile(self.pattern_file, file)
+        return file
+
+    def plot(self) -> list[Axes]:
+        """Draw what is made of each sheet (:meth:`DrawnLayout.plot`)."""
+        return self.layout.plot()
+
+    def _summary(self) -> str:
+        return f"{self.name}: {self.layout._summary()}, {clock_text(self.seconds)}"
+
+    def _picture(self) -> str:
+        return first_sheet(self.dry_runs, self.machine)
+
+    def _facts(self) -> Mapping[str, object]:
+        totals = self.layout.totals
+        return {
+            "machine": self.machine.title,
+            "material": self.material.title,
+            "patches": totals.patches,
+            "tabs": totals.tabs,
+            "sheets": totals.sheets,
+            "cut_mm": totals.cut_mm,
+            "perforated_mm": totals.perforated_mm,
+            "time": clock_text(self.seconds),
+        }
+
+
+def sheets(
+    pattern: PatternLike,
+    machine: MachineProfile | AnyPath | None = None,
+    material: Material | AnyPath | None = None,
+    *,
+    design: AnyPath | None = None,
+    on_progress: Progress | None = None,
+    **options: Any,
+) -> SheetJob:
+    """Lay a pattern out on the sheets of a machine and make their G-code, all in memory.
+
+    Parameters
+    ----------
+    pattern : CreasePattern, FitResult, str or os.PathLike
+        The pattern, or a file that :func:`load` reads.
+    machine : MachineProfile, str or os.PathLike, optional
+        A shipped name (:func:`machines` lists them) or a TOML file. The default is that of
+        ``design``, then grbl-laser-400.
+    material : Material, str or os.PathLike, optional
+        A shipped name (:func:`materials` lists them) or a TOML file. The default is that of
+        ``design``, then card-250.
+    design : str or os.PathLike, optional
+        A design file whose ``[layout]`` gives options, machine and material. Arguments win.
+    on_progress : callable, optional
+        Called with a fraction in 0..1 and a short text.
+    {options}
+
+    Returns
+    -------
+    SheetJob
+        ``.write("jobs/hypar")`` puts it on disk; :func:`preview` and :func:`cut` take it.
+
+    Raises
+    ------
+    LayoutError
+        If a facet does not fit the bed, or the stock does not suffice.
+    ProfileError
+        For a machine or material that is unknown or has a fault.
+    OptionError
+        For options that cannot be taken.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> sheet = mf.fit("hypar", height=0.5, facets=(6, 6), size=120)
+    >>> job = mf.sheets(sheet, machine="grbl-laser-400", material="card-250")
+    >>> job.layout.totals.sheets
+    1
+    """
+    wanted, usual_machine, usual_material = layout_options(options, design)
+    machine = machine if machine is not None else usual_machine
+    material = material if material is not None else usual_material
+    given = as_pattern(pattern)
+    file = None if isinstance(pattern, CreasePattern | Shown) else as_path(pattern, "The pattern")
+    name = file.stem if file is not None else given.name or "sheet"
+    return make_job(given, name, machine, material, wanted, file=file, on_progress=on_progress)
+
+
+described(sheets, LayoutOptions)
+
+
+def make_job(
+    pattern: CreasePattern,
+    name: str,
+    machine: MachineProfile | AnyPath | None,
+    material: Material | AnyPath | None,
+    options: LayoutOptions | None,
+    *,
+    file: Path | None = None,
+    on_progress: Progress | None = None,
+) -> SheetJob:
+    """``pattern``, which ``file`` holds if it has one, laid out as ``options`` say."""
+    profile, machine_file = _machine(machine)
+    stock, material_file = _material(material)
+    tell = on_progress or (lambda fraction, note: None)
+    tell(0.0, "patches, tabs, perforation, nesting")
+    layout = lay_out(pattern, profile, stock, options=options)
+    labels = {patch.id: patch.label for patch in layout.patches}
+    jobs, dry_runs = [], []
+    for number, toolpath in enumerate(layout.passes):
+        tell(0.6 + 0.4 * number / len(layout.passes), f"dry run of {toolpath.sheet}")
+        job = post(toolpath, profile, stock, patch_labels=labels)
+        jobs.append(job)
+        size = (toolpath.width_mm, toolpath.height_mm)
+        dry_runs.append(dry_run(toolpath.sheet, job, profile, size, stock.max_power))
+    tell(1.0, "done")
+    seconds = round(float(sum(sheet.seconds for sheet in dry_runs)), 1)
+    opened = layout.pattern is not pattern
+    kept = None if file is None or opened or file.suffix.lower() != ".fold" else file
+    return SheetJob(
+        name,
+        replace(layout, totals=replace(layout.totals, seconds=seconds)),
+        profile,
+        stock,
+        tuple(jobs),
+        tuple(dry_runs),
+        machine_file,
+        material_file,
+        kept,
+        opened,
+    )
+
+
+def layout_options(
+    given: Mapping[str, Any], design: AnyPath | None = None
+) -> tuple[LayoutOptions, str | None, str | None]:
+    """The options ``given``, and for the rest those of the design file, with its machine and its
+    material. Raises :class:`~miurafab.errors.InputError` naming the key.
+    """
+    if design is None:
+        return read_options(LayoutOptions, given), None, None
+    file = as_path(design, "The design file")
+    table = Table(read_toml(file, InputError), file.name, InputError)
+    if not table.has("layout"):
+        raise InputError(f"{file} has no [layout], so there is nothing to take from it.")
+    layout = table.table("layout")
+    machine, material = (
+        layout.text(key) if layout.has(key) else None for key in ("machine", "material")
+    )
+    written = layout.rest()
+    options = read_options(
+        LayoutOptions,
+        written,
+        where=layout.where,
+        folder=file.parent,
+        over=given,
+        besides=("machine", "material"),
+    )
+    return options, machine, material
+
+
+def _machine(given: MachineProfile | AnyPath | None) -> tuple[MachineProfile, Path]:
+    if not isinstance(given, MachineProfile):
+        file = find_profile("firmware_profiles", given)
+        return load_machine(file), file
+    file = find_file("firmware_profiles", given.name)
+    if load_machine(file) != given:
+        raise _without_file(given)
+    return given, file
+
+
+def _material(given: Material | AnyPath | None) -> tuple[Material, Path]:
+    if not isinstance(given, Material):
+        file = find_profile("materials", given)
+        return load_material(file), file
+    file = find_file("materials", given.name)
+    if load_material(file) != given:
+        raise _without_file(given)
+    return given, file
+
+
+def _without_file(profile: MachineProfile | Material) -> ProfileError:
+    return ProfileError(
+        f"{reprlib.repr(profile.name)} is not as its file says; a job needs profiles with a file. "
+        "Write a TOML file and give its path."
+    )
