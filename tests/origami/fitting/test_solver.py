@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import sparse
 
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.fitting.solver import GramFactor, project
-
-Floats = NDArray[np.float64]
 
 
 def places(count: int) -> NDArray[np.int64]:
