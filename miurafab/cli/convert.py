@@ -51,10 +51,10 @@ def convert(
     The endings of the files name the formats: FOLD, SVG, DXF, CP, OPX, OBJ, STL and GLB.
     """
     done = miurafab.convert(source, target, folded=folded, form=form, tolerance=tolerance)
-    for remark in done.remarks:
-        console.note(remark)
+    for finding in done.findings:
+        console.note(finding.sentence)
     report = done.report()
     console.answer(
-        report, lambda: console.facts({k: v for k, v in report.items() if k != "remarks"})
+        report, lambda: console.facts({k: v for k, v in report.items() if k != "findings"})
     )
     return DONE

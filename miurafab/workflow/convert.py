@@ -13,20 +13,21 @@ import numpy as np
 
 from miurafab.display import Shown
 from miurafab.files import AnyPath, as_path, new_file
+from miurafab.findings import Finding, findings_json
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.formats.files import SOLIDS, WITHOUT_ANGLES, WRITTEN, load, write_pattern
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Conversion(Shown):
-    """A ``pattern`` that was read from ``source`` and written to ``target``; ``remarks`` are
-    sentences on what was lost.
+    """A ``pattern`` that was read from ``source`` and written to ``target``; ``findings``
+    say what the format could not hold.
     """
 
     source: Path
     target: Path
     pattern: CreasePattern
-    remarks: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
     def report(self) -> dict[str, Any]:
         """The JSON answer of ``convert``."""
@@ -41,7 +42,7 @@ class Conversion(Shown):
                 if (letters == letter).any()
             },
             "folded_form": self.pattern.folded_coords is not None,
-            "remarks": list(self.remarks),
+            "findings": findings_json(self.findings),
         }
 
 
@@ -72,7 +73,7 @@ def convert(
     Returns
     -------
     Conversion
-        With ``remarks`` on what the format could not hold.
+        With ``findings`` on what the format could not hold.
 
     Raises
     ------
@@ -84,21 +85,27 @@ def convert(
     source = as_path(source, "The pattern file")
     target = new_file(target, "The file to write", WRITTEN)
     pattern = load(source, folded=folded, tolerance=tolerance)
-    remarks = [] if source.suffix.lower() == ".fold" else _assumed(source, pattern)
+    findings = [] if source.suffix.lower() == ".fold" else _assumed(source, pattern)
     write_pattern(pattern, target, title=source.stem, form=form)
     ending = target.suffix.lower()
     if ending in SOLIDS:
-        remarks.append(f"{target.name} holds a shape and no creases.")
+        findings.append(_loss("no-creases", target, "holds a shape and no creases"))
     elif ending != ".fold":
         if pattern.folded_coords is not None:
-            remarks.append(f"{target.name} does not hold the folded form.")
+            findings.append(_loss("no-folded-form", target, "does not hold the folded form"))
         if ending in WITHOUT_ANGLES:
-            remarks.append(f"{target.name} tells mountains from valleys and no fold angles.")
-    return Conversion(source, target, pattern, tuple(remarks))
+            says = "tells mountains from valleys and no fold angles"
+            findings.append(_loss("no-fold-angles", target, says))
+    return Conversion(source, target, pattern, tuple(findings))
 
 
-def _assumed(source: Path, pattern: CreasePattern) -> list[str]:
+def _loss(code: str, target: Path, says: str) -> Finding:
+    return Finding(code, f"{target.name} {says}.", target.name)
+
+
+def _assumed(source: Path, pattern: CreasePattern) -> list[Finding]:
     """Assumptions for data that the format of ``source`` lacks."""
     if source.suffix.lower() in WITHOUT_ANGLES and (np.abs(pattern.edges_fold_angle) > 0).any():
-        return [f"{source.name} tells no fold angles: its creases are taken as folded flat."]
+        sentence = f"{source.name} tells no fold angles: its creases are taken as folded flat."
+        return [Finding("assumed-folded-flat", sentence, source.name)]
     return []

@@ -81,7 +81,7 @@ def test_convert_tells_what_was_lost(run, rigid, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     answer = json.loads(done.stdout)
     assert answer["facets"] == 20
-    assert answer["remarks"] == [
+    assert [finding["sentence"] for finding in answer["findings"]] == [
         "a.cp does not hold the folded form.",
         "a.cp tells mountains from valleys and no fold angles.",
     ]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from wires import BANNER, FakeWire
 
-from miurafab.errors import MiurafabError
+from miurafab.errors import GcodeError, MiurafabError
 from miurafab.gcode.job import Job
-from miurafab.machine.planning import SendOptions, plan_job
+from miurafab.machine.planning import JobPlan, SendOptions, plan_job
 from miurafab.machine.preflight import CHECKS
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
@@ -80,3 +80,30 @@ def test_a_check_fires_and_only_its_own_name_overrides_it(name: str) -> None:
         assert "'force'" not in str(caught.value)
     else:
         assert attempt(name, frozenset({name})).device.state == "Idle"
+
+
+def test_to_force_one_check_forces_no_other() -> None:
+    job = Job("job.nc", "M4 S1001\nG1 X401 F600\nM5\n")
+
+    def plan(job: Job, force: frozenset[str]) -> JobPlan:
+        return plan_job(job, MACHINE, SendOptions(force=force))
+
+    with pytest.raises(MiurafabError, match="'force' bounds"):
+        plan(job, frozenset())
+    with pytest.raises(MiurafabError, match="'force' power"):
+        plan(job, frozenset({"bounds"}))
+    with pytest.raises(MiurafabError, match="'force' bounds"):
+        plan(job, frozenset({"power"}))
+    codes = [finding.code for finding in plan(job, frozenset({"bounds", "power"})).forced]
+    assert codes == ["bounds", "power"]
+
+
+@pytest.mark.parametrize("text", ["G1 X2 F9 !\n", "G1 X2 é F9\n", f"G1 X2 F9.{80 * '0'}\n"])
+@pytest.mark.parametrize("check_mode", [False, True])
+def test_a_line_that_cannot_be_sent_is_refused_whatever_is_forced(
+    text: str, check_mode: bool
+) -> None:
+    options = SendOptions(force=frozenset(CHECKS), check_mode=check_mode)
+    with pytest.raises(GcodeError, match=r"job\.nc, line 2") as caught:
+        plan_job(Job("job.nc", "G0 X1\n" + text), MACHINE, options)
+    assert "overrides" not in str(caught.value)

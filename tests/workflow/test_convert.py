@@ -41,7 +41,7 @@ def test_every_format_is_written_the_same_every_time(saved: Path, ending: str) -
 def test_there_and_back_is_the_same_pattern(saved: Path, ending: str) -> None:
     middle, back = saved.with_name(f"middle{ending}"), saved.with_name("back.fold")
     convert(saved, middle)
-    lost = convert(middle, back).remarks
+    lost = convert(middle, back).findings
     first, last = read_fold(saved), read_fold(back)
     assert len(last.vertices_coords) == len(first.vertices_coords)
     assert len(last.faces_vertices) == len(first.faces_vertices)
@@ -52,7 +52,7 @@ def test_there_and_back_is_the_same_pattern(saved: Path, ending: str) -> None:
         assert np.sort(last.edges_fold_angle) == pytest.approx(np.sort(first.edges_fold_angle))
         assert lost == ()
     else:
-        assert "no fold angles" in lost[0]
+        assert "no fold angles" in lost[0].sentence
         assert rigid_motion(last, states_between(last, 5)).is_rigid
 
 
