@@ -3,7 +3,8 @@
 A page is a Markdown file. Its fenced blocks are examples:
 
 ``sh``      commands, run line by line in the page's folder
-``text``    directly after ``sh``: what the last command prints; ``...`` stands for anything
+``text``    directly after ``sh`` or ``python``: what the last command or all of the block prints;
+            ``...`` stands for anything
 ``python``  run in one namespace for the page, in the page's folder
 ``usage``   how a command is called; each word of it must be known to the command line
 ``toml``    with ``<!-- file: NAME -->`` before it: put into the page's folder under that name

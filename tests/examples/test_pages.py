@@ -1,6 +1,7 @@
 """Every example in print is run: each block of each page, in the order of the page."""
 
 import contextlib
+import io
 import re
 import shutil
 import sys
@@ -55,8 +56,10 @@ class Page:
             self._run_commands(block)
         elif block.language == "python":
             code = compile("\n" * (block.line - 1) + block.text, block.page, "exec")
-            with contextlib.chdir(self.folder):
+            printed = io.StringIO()
+            with contextlib.chdir(self.folder), contextlib.redirect_stdout(printed):
                 exec(code, self.names)
+            _compare(block, printed.getvalue())
         elif block.language == "toml":
             tomllib.loads(block.text)
 
@@ -66,8 +69,12 @@ class Page:
         for line in block.text.replace("\\\n", " ").splitlines():
             if line.split("#")[0].strip():
                 printed = run_line(line, self.folder, expected)
-        if block.shown is not None:
-            assert matches(block.shown, printed), f"shown:\n{block.shown}\nprinted:\n{printed}"
+        _compare(block, printed)
+
+
+def _compare(block, printed):
+    if block.shown is not None:
+        assert matches(block.shown, printed), f"shown:\n{block.shown}\nprinted:\n{printed}"
 
 
 def matches(shown, printed):
