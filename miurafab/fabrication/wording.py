@@ -1,4 +1,4 @@
-"""Words around numbers, for remarks and for printed pages."""
+"""Words around numbers, for findings and for printed pages."""
 
 from __future__ import annotations
 
