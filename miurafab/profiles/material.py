@@ -157,7 +157,7 @@ def load_material(name: AnyPath) -> Material:
     --------
     >>> import miurafab as mf
     >>> mf.load_material("card-250").thickness_mm
-    0.25
+    0.3
     """
     path = find_profile("materials", name)
     table = Table(read_toml(path), path.name)

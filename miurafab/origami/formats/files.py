@@ -82,7 +82,7 @@ def load(
     >>> import miurafab as mf
     >>> mf.fit("plane", facets=(4, 4)).pattern.save("plane.fold")
     >>> mf.load("plane.fold")
-    <CreasePattern 16 facets, 25 vertices, 88.1 x 200 mm flat, with folded form, of plane>
+    <CreasePattern 16 facets, 25 vertices, 196.2 x 234 mm flat, with folded form, of plane>
     """
     path = as_path(path, "The pattern file")
     ending = path.suffix.lower()
