@@ -81,9 +81,9 @@ if TYPE_CHECKING:
     from miurafab.workflow.fold import thick_panels as thick_panels
     from miurafab.workflow.job_directory import JobDirectory as JobDirectory
     from miurafab.workflow.job_directory import read_job as read_job
-    from miurafab.workflow.listings import machines as machines
-    from miurafab.workflow.listings import materials as materials
-    from miurafab.workflow.listings import surfaces as surfaces
+    from miurafab.workflow.listings import list_machines as list_machines
+    from miurafab.workflow.listings import list_materials as list_materials
+    from miurafab.workflow.listings import list_surfaces as list_surfaces
     from miurafab.workflow.patterns import check as check
     from miurafab.workflow.preview import Preview as Preview
     from miurafab.workflow.preview import preview as preview

@@ -170,7 +170,7 @@ def load_machine(name: AnyPath) -> MachineProfile:
     Parameters
     ----------
     name : str or os.PathLike
-        A shipped name (:func:`machines` lists them) or a TOML file.
+        A shipped name (:func:`list_machines` lists them) or a TOML file.
 
     Returns
     -------

@@ -142,7 +142,7 @@ def load_material(name: AnyPath) -> Material:
     Parameters
     ----------
     name : str or os.PathLike
-        A shipped name (:func:`materials` lists them) or a TOML file.
+        A shipped name (:func:`list_materials` lists them) or a TOML file.
 
     Returns
     -------

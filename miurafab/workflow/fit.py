@@ -25,7 +25,7 @@ def fit(
     target : str, os.PathLike, Design, trimesh.Trimesh, callable or array
         One of
 
-        - a built-in surface, ``"hypar"`` or ``"hypar:height=0.5"`` (:func:`surfaces` lists them);
+        - a built-in surface, ``"hypar"`` or ``"hypar:height=0.5"`` (:func:`list_surfaces`);
           its parameters are keywords;
         - a design ``.toml``, a mesh (``.stl``, ``.obj``, ``.ply``, ``.off``, ``.glb``), a
           ``trimesh.Trimesh`` or a :class:`Design`;

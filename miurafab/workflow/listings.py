@@ -6,7 +6,7 @@ from miurafab.profiles import load_machine, load_material, shipped_names
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface
 
 
-def surfaces() -> dict[str, str]:
+def list_surfaces() -> dict[str, str]:
     """List the built-in surfaces.
 
     Returns
@@ -17,7 +17,7 @@ def surfaces() -> dict[str, str]:
     Examples
     --------
     >>> import miurafab as mf
-    >>> mf.surfaces()["hypar"]
+    >>> mf.list_surfaces()["hypar"]
     'a hyperbolic paraboloid z = height x y, ruled along x and y (width=2, depth=2, height=0.5)'
     """
     return {name: f"{entry.summary} ({_defaults(entry)})" for name, entry in CATALOGUE.items()}
@@ -27,11 +27,11 @@ def _defaults(entry: NamedSurface) -> str:
     return ", ".join(f"{key}={each.default_text}" for key, each in entry.parameters.items())
 
 
-def machines() -> dict[str, str]:
+def list_machines() -> dict[str, str]:
     """List the shipped machines: the name of each profile, with its title."""
     return {name: load_machine(name).title for name in shipped_names("firmware_profiles")}
 
 
-def materials() -> dict[str, str]:
+def list_materials() -> dict[str, str]:
     """List the shipped materials: the name of each, with its title."""
     return {name: load_material(name).title for name in shipped_names("materials")}

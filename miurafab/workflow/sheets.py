@@ -204,10 +204,10 @@ def sheets(
     pattern : CreasePattern, FitResult, str or os.PathLike
         The pattern, or a file that :func:`load` reads.
     machine : MachineProfile, str or os.PathLike, optional
-        A shipped name (:func:`machines` lists them) or a TOML file. The default is that of
+        A shipped name (:func:`list_machines` lists them) or a TOML file. The default is that of
         ``design``, then grbl-laser-400.
     material : Material, str or os.PathLike, optional
-        A shipped name (:func:`materials` lists them) or a TOML file. The default is that of
+        A shipped name (:func:`list_materials` lists them) or a TOML file. The default is that of
         ``design``, then card-250.
     design : str or os.PathLike, optional
         A design file whose ``[layout]`` gives options, machine and material. Arguments win.
