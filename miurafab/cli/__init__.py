@@ -25,6 +25,7 @@ def main(serve_studio: ServeStudio) -> NoReturn:
     except KeyboardInterrupt:  # while loading, or a second Ctrl-C while the first is reported
         sys.stderr.write("miurafab: Interrupted.\n")
         code = 130
+    exec("")  # CPython keeps in mind a KeyboardInterrupt in code that was executed, to die of it
     try:
         sys.stdout.flush()
         sys.stderr.flush()

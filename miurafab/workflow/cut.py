@@ -142,6 +142,8 @@ def _from_value(
     wanted = thing if isinstance(thing, Design) and not options else design(thing, **options)
     tell(0.0, "fitting")
     result = fit(wanted, on_progress=lambda fraction, note: tell(0.4 * fraction, note))
+    if result.status == "interrupted":
+        raise KeyboardInterrupt  # the person wants no job now
     named = path is not None and path.suffix.lower() == ".toml"
     name = path.stem if path is not None and named else wanted.title
     directory = as_path(out or JOBS / name, "The job directory")

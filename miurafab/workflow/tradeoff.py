@@ -170,6 +170,8 @@ def sample(job: Job) -> Sample:
     target, options = job
     request = design(target, **options).request
     result = fit(request)
+    if result.status == "interrupted":
+        raise KeyboardInterrupt  # one sheet of the series is no answer
     if result.measurements is None:
         return Sample(request.columns, request.rows, result.status)
     found, last = result.measurements, result.attempts[-1]

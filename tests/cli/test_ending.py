@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,17 +17,17 @@ from miurafab.errors import EXIT_CODES, MiurafabError
 from miurafab.version import __version__
 
 COMMANDS = {
-    "check": ("load_pattern", ("check", "x.fold")),
-    "fit": ("design", ("fit", "hypar", "-o", "x.fold")),
-    "fold": ("read_pattern", ("fold", "x.fold")),
-    "energy": ("load_pattern", ("energy", "x.fold")),
-    "tradeoff": ("tradeoff", ("tradeoff", "hypar")),
-    "convert": ("convert", ("convert", "x.fold", "x.svg")),
-    "sheets": ("write_job", ("sheets", "x.fold", "-o", "job")),
-    "preview": ("preview", ("preview", "job")),
-    "cut": ("prepare", ("cut", "job", "--port", "virtual")),
-    "calibrate": ("calibrate", ("calibrate", "-o", "job")),
-    "doctor": ("examine", ("doctor",)),
+    "check": ("miurafab.check", ("check", "x.fold")),
+    "fit": ("miurafab.design", ("fit", "hypar", "-o", "x.fold")),
+    "fold": ("miurafab.load", ("fold", "x.fold")),
+    "energy": ("miurafab.energy", ("energy", "x.fold")),
+    "tradeoff": ("miurafab.tradeoff", ("tradeoff", "hypar")),
+    "convert": ("miurafab.convert", ("convert", "x.fold", "x.svg")),
+    "sheets": ("miurafab.sheets", ("sheets", "x.fold", "-o", "job")),
+    "preview": ("miurafab.preview", ("preview", "job")),
+    "cut": ("miurafab.workflow.cut.prepare", ("cut", "job", "--port", "virtual")),
+    "calibrate": ("miurafab.calibrate", ("calibrate", "-o", "job")),
+    "doctor": ("miurafab.doctor", ("doctor",)),
 }
 """The library function of a command, and a call of the command."""
 
@@ -49,7 +50,7 @@ def failing(error):
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_defect_is_one_sentence_with_a_log(run, monkeypatch, state, command, as_json):
     name, call = COMMANDS[command]
-    monkeypatch.setattr(miurafab, name, failing(RuntimeError("a\nb")), raising=False)
+    monkeypatch.setattr(name, failing(RuntimeError("a\nb")), raising=False)
     done = run(*call, *["--json"] * as_json)
     text = sentence(done, 4)
     (log,) = state.iterdir()
@@ -109,7 +110,7 @@ def test_a_defect_of_a_process_is_no_traceback(tmp_path):
 def test_ctrl_c_is_one_line(run, monkeypatch):
     for command in COMMANDS:
         name, call = COMMANDS[command]
-        monkeypatch.setattr(miurafab, name, failing(KeyboardInterrupt()), raising=False)
+        monkeypatch.setattr(name, failing(KeyboardInterrupt()), raising=False)
         assert sentence(run(*call), 130) == "miurafab: Interrupted."
     answer = json.loads(run(*call, "--json").stdout)
     assert answer == {"error": "Interrupted.", "kind": "Interrupted"}
@@ -120,12 +121,12 @@ def test_an_interrupted_fit_writes_its_best_sheet(run, monkeypatch, tmp_path):
     asked = miurafab.fit
     calls = iter([False, False, True])
 
-    def fit(request, on_progress):
+    def fit(target, *, on_progress):
         def interrupt(fraction, note):
             if next(calls, False):
                 raise KeyboardInterrupt
 
-        return asked(request, interrupt)
+        return asked(target, on_progress=interrupt)
 
     monkeypatch.setattr(miurafab, "fit", fit, raising=False)
     limits = ("--facets", "6x6", "--max-deviation", "0.001", "--report", "r.json")
@@ -137,12 +138,40 @@ def test_an_interrupted_fit_writes_its_best_sheet(run, monkeypatch, tmp_path):
     assert json.loads(run("check", "x.fold", "--json").stdout)["facets"] == 36
 
 
+@pytest.mark.parametrize(
+    "command", [("tradeoff", "hypar", "--workers", "1"), ("cut", "hypar", "--port", "virtual")]
+)
+def test_ctrl_c_in_a_fit_on_the_way_ends_the_command(run, monkeypatch, tmp_path, command):
+    """Although the fit has a sheet by then."""
+    from miurafab.workflow import fit, tradeoff
+
+    asked = tradeoff.fit
+
+    def interrupted(request, on_progress=None):
+        return replace(asked(replace(request, facets=(4, 4))), status="interrupted")
+
+    monkeypatch.setattr(tradeoff, "fit", interrupted)
+    monkeypatch.setattr(fit, "fit_request", interrupted)
+    assert sentence(run(*command), 130) == "miurafab: Interrupted."
+    assert not (tmp_path / "jobs").exists()
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them on POSIX")
-@pytest.mark.parametrize("seconds", [0.3, 1.5, 4.0])
+@pytest.mark.parametrize("seconds", [0.3, 6.0])
 def test_ctrl_c_reaches_a_pool_of_processes_and_none_prints(tmp_path, seconds):
-    """While modules load, while the workers start, and while they fit."""
+    """While modules load, and while the workers fit."""
     with subprocess.Popen(
-        [sys.executable, "-m", "miurafab", "tradeoff", "hypar", "--workers", "2"],
+        [
+            sys.executable,
+            "-m",
+            "miurafab",
+            "tradeoff",
+            "hypar",
+            "--sides",
+            "60,80,100,120",
+            "--workers",
+            "2",
+        ],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
