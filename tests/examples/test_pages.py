@@ -12,6 +12,8 @@ from commands import run_line
 from pages import PAGES, ROOT, blocks_of, indented_code, prose_of
 from tables import TABLES, tables_in, with_tables
 
+import miurafab
+
 BLOCKS = [block for page in PAGES for block in blocks_of(page)]
 
 NOT_RUN = {"README.md": 1, "studio.md": 1}
@@ -173,3 +175,11 @@ def test_the_drawing_of_the_rooms_is_that_of_the_import_rules():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     (rule, *_) = project["tool"]["importlinter"]["contracts"]
     assert drawn == [set(re.findall(r"\w+", layer)) for layer in rule["layers"]]
+
+
+def test_the_functions_in_the_table_of_python_exist():
+    prose = prose_of(ROOT / "docs" / "python.md")
+    named = [name for row in re.findall(r"^\| (`\w+\(.*?) \|", prose, re.MULTILINE)
+             for name in re.findall(r"`(\w+)\(", row)]  # fmt: skip
+    assert len(named) > 15
+    assert [name for name in named if not callable(getattr(miurafab, name, None))] == []
