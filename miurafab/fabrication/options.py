@@ -51,7 +51,7 @@ class NestingOptions(Shown):
         File(),
         "A TOML file with the sheets to use: sizes, quantities, defects.",
         group="Sheets",
-        default_text="as many sheets of the bed's size as it takes",
+        default_text="any number of sheets of the bed's size",
     )
     margin_mm: float | None = option(
         length(0, 100),
@@ -110,13 +110,13 @@ class LayoutOptions(Shown):
         LINES,
         "Open a closed ring after this row of facets, and count rows from it.",
         group="Patches",
-        default_text="where it is open already",
+        default_text="where the pattern is already open",
     )
     open_column: int | None = option(
         LINES,
         "Open a closed ring after this column of facets, and count columns from it.",
         group="Patches",
-        default_text="where it is open already",
+        default_text="where the pattern is already open",
     )
     tab_height_mm: float | None = option(
         length(0.5, 100),
