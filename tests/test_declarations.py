@@ -33,13 +33,19 @@ from miurafab.origami.fitting.request import FitOptions, FlatFoldability
 from miurafab.studio.form import FIT, LAYOUT, filled
 from miurafab.workflow.cut_sheets import CutOptions
 from miurafab.workflow.design import design
+from miurafab.workflow.energy import EnergyOptions
+from miurafab.workflow.fold import FoldOptions
+from miurafab.workflow.tradeoff import TradeoffOptions
 
-OPTIONS = [
-    (cls, option)
-    for cls in (FitOptions, LayoutOptions, CutOptions)
-    for option in declared(cls).values()
-]
-COMMANDS = {FitOptions: "fit", LayoutOptions: "sheets", CutOptions: "cut"}
+COMMANDS = {
+    FitOptions: "fit",
+    LayoutOptions: "sheets",
+    CutOptions: "cut",
+    FoldOptions: "fold",
+    EnergyOptions: "energy",
+    TradeoffOptions: "tradeoff",
+}
+OPTIONS = [(cls, option) for cls in COMMANDS for option in declared(cls).values()]
 
 every_option = pytest.mark.parametrize(
     ("cls", "option"), OPTIONS, ids=[f"{cls.__name__}-{option.name}" for cls, option in OPTIONS]
@@ -58,6 +64,8 @@ def example(kind: Kind) -> str:
         return kind.separator.join([example(kind.kind)] * 2)
     if isinstance(kind, Several):
         return example(kind.kind)
+    if kind.metavar == "N,N,...":  # the sides of a trade-off
+        return "4,6,8"
     return {
         Whole: lambda: str(max(kind.low, 3)),
         Choice: lambda: kind.names[-1],

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import miurafab
 from miurafab.cli.console import Console
-from miurafab.cli.declared import argument, option
+from miurafab.cli.declared import argument, option, takes
 from miurafab.errors import DONE, NO
 from miurafab.files import new_file
-from miurafab.options import File, Text, Whole, number
+from miurafab.options import File, Text
 
 if TYPE_CHECKING:
     from miurafab.origami.energy.path import EnergyCurve
@@ -21,6 +21,13 @@ EXAMPLES = (
 )
 
 
+def _own_options() -> type:
+    from miurafab.workflow.energy import EnergyOptions
+
+    return EnergyOptions
+
+
+@takes(_own_options)
 def energy(
     file: Annotated[Path, argument("FILE", "The pattern, a FOLD file.")],
     /,
@@ -37,19 +44,8 @@ def energy(
             "modulus.",
         ),
     ] = None,
-    steps: Annotated[int, option(Whole(1), "Steps from the folded form to flat.")] = 40,
-    crease: Annotated[
-        int | None,
-        option(
-            Whole(),
-            "The edge whose fold angle is driven.",
-            default_text="a crease in the middle",
-        ),
-    ] = None,
-    crease_ratio: Annotated[
-        float, option(number(0), "Stiffness of the creases over that of the facets.")
-    ] = 0.0,
     console: Console = Console(),
+    **given: Any,
 ) -> int:
     """Measure the energy on the way from folded to flat.
 
@@ -61,14 +57,7 @@ def energy(
 
         new_file(out, "The energy", RESULTS)
     with console.progress("unfolding") as progress:
-        curve = miurafab.energy(
-            file,
-            steps,
-            material=material,
-            crease=crease,
-            crease_ratio=crease_ratio,
-            on_progress=progress,
-        )
+        curve = miurafab.energy(file, material=material, on_progress=progress, **given)
     answer = curve.report()
     if out is not None:
         curve.save(out, title=file.stem)

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 
 import miurafab
 from miurafab.cli.console import Console
-from miurafab.cli.declared import argument, option
+from miurafab.cli.declared import argument, option, takes
 from miurafab.errors import DONE, NO
 from miurafab.files import new_file
-from miurafab.options import Choice, File, Whole, length
+from miurafab.options import File, read_options
 
 EXAMPLES = (
     "miurafab fold hypar.fold -o hypar.gif",
@@ -19,6 +19,13 @@ EXAMPLES = (
 )
 
 
+def _own_options() -> type:
+    from miurafab.workflow.fold import FoldOptions
+
+    return FoldOptions
+
+
+@takes(_own_options)
 def fold(
     file: Annotated[
         Path,
@@ -33,40 +40,31 @@ def fold(
         Path | None,
         option(File(), "The motion: .fold, .gif, .glb or .html.", "-o", "--out"),
     ] = None,
-    steps: Annotated[int, option(Whole(1), "The number of steps of the motion.")] = 40,
     csv: Annotated[
         Path | None, option(File(), "Write the fold angle of every crease in every frame.")
     ] = None,
-    colour: Annotated[
-        str, option(Choice(("side", "strain")), "Colour the facets by side or by strain.")
-    ] = "side",
-    thickness: Annotated[
-        float | None,
-        option(
-            length(above=True),
-            "Also say how to make panels of this thickness; exit 1 if such panels cannot fold.",
-        ),
-    ] = None,
     console: Console = Console(),
+    **given: str,
 ) -> int:
     """Fold a pattern and write its motion.
 
     The pattern folds rigidly if it can; otherwise its facets bend as little as possible.
     """
-    from miurafab.workflow.fold import ENDINGS, thickness_report
+    from miurafab.workflow.fold import ENDINGS, FoldOptions, thickness_report
 
+    asked = read_options(FoldOptions, given)
     if out is not None:
         new_file(out, "The motion", ENDINGS)
     pattern = miurafab.load(file)
     with console.progress("folding") as progress:
-        folding = miurafab.fold(pattern, steps, on_progress=progress)
+        folding = miurafab.fold(pattern, asked.steps, on_progress=progress)
         if out is not None:
-            folding.save(out, title=file.stem, colour=colour, on_progress=progress)
+            folding.save(out, title=file.stem, colour=asked.colour, on_progress=progress)
         if csv is not None:
             folding.save_angles(csv)
         panels = None
-        if thickness is not None:
-            panels = miurafab.thick_panels(pattern, thickness, on_progress=progress)
+        if asked.thickness_mm is not None:
+            panels = miurafab.thick_panels(pattern, asked.thickness_mm, on_progress=progress)
     answer: dict[str, Any] = folding.report()
     answer |= {"file": None if out is None else str(out), "csv": None if csv is None else str(csv)}
     answer["thickness"] = None if panels is None else thickness_report(panels)

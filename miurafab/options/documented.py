@@ -13,6 +13,9 @@ from miurafab.options import declared
 def described(function: Callable[..., Any], *classes: type, without: Collection[str] = ()) -> None:
     """Put the options of ``classes``, which ``function`` takes as keywords, into its signature and,
     for ``{options}``, into its docstring; all but those named by ``without``.
+
+    A parameter of ``function`` with the name of an option keeps its place, and gets the default of
+    the option.
     """
     entries = [
         entry for cls in classes for name, entry in declared(cls).items() if name not in without
@@ -28,10 +31,14 @@ def described(function: Callable[..., Any], *classes: type, without: Collection[
     text = inspect.cleandoc(function.__doc__ or "")
     function.__doc__ = text.replace("{options}", "\n".join(lines))
     signature = inspect.signature(function)
-    own = list(signature.parameters.values())
+    defaults = {entry.name: entry.default for entry in entries}
+    own = [
+        each.replace(default=defaults.pop(each.name, each.default))
+        for each in signature.parameters.values()
+    ]
     keywords = [
-        inspect.Parameter(entry.name, inspect.Parameter.KEYWORD_ONLY, default=entry.default)
-        for entry in entries
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default)
+        for name, default in defaults.items()
     ]
     last = own.pop() if own[-1].kind is inspect.Parameter.VAR_KEYWORD else None
     everything = [*own, *keywords, *([] if last is None else [last])]

@@ -212,16 +212,7 @@ def _from_file(path: Path, given: Values) -> Design:
     table = Table(read_toml(path, TargetError), path.name, TargetError)
     title = table.text("title", path.stem)
     target = table.table("target")
-    layout = table.table("layout", {})
-    machine = layout.text("machine") if layout.has("machine") else None
-    material = layout.text("material") if layout.has("material") else None
-    sheets = read_options(
-        LayoutOptions,
-        layout.rest(),
-        where=layout.where,
-        folder=path.parent,
-        besides=("machine", "material"),
-    )
+    sheets, machine, material = read_layout_table(table.table("layout", {}), path.parent)
     mesh = path.parent / target.text("mesh") if target.has("mesh") else None
     name = "" if mesh is not None else target.text("surface")
     known = () if mesh is not None else _parameters(name)
@@ -243,6 +234,26 @@ def _from_file(path: Path, given: Values) -> Design:
         where = "" if fault.option in given else path.name
         raise OptionError(fault.option, fault.complaint, where) from None
     return replace(design, machine=machine, material=material, layout=sheets)
+
+
+def read_layout_table(
+    layout: Table, folder: Path, over: Values | None = None
+) -> tuple[LayoutOptions, str | None, str | None]:
+    """The ``[layout]`` of a design file in ``folder``: the options, with those ``over`` the file's,
+    and the names of the machine and the material.
+    """
+    machine, material = (
+        layout.text(key) if layout.has(key) else None for key in ("machine", "material")
+    )
+    options = read_options(
+        LayoutOptions,
+        layout.rest(),
+        where=layout.where,
+        folder=folder,
+        over=over,
+        besides=("machine", "material"),
+    )
+    return options, machine, material
 
 
 def _from_mesh(path: Path, asked: FitOptions, title: str) -> Design:

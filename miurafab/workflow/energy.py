@@ -2,25 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 from miurafab.errors import InputError
 from miurafab.files import AnyPath
-from miurafab.options import Whole, number, read_value
+from miurafab.options import Whole, number, option, read_options
+from miurafab.options.documented import described
 from miurafab.origami.energy.bar_hinge import Paper, sheet_model
 from miurafab.origami.energy.path import EnergyCurve, Progress, energy_curve
 from miurafab.profiles import Material, load_material
 from miurafab.workflow.patterns import PatternLike, as_pattern
 
-STEPS = Whole(1, 100_000)
+
+@dataclass(frozen=True)
+class EnergyOptions:
+    """The options of an energy curve beside its pattern and its material."""
+
+    steps: int = option(Whole(1, 100_000), "Steps from the folded form to flat.", default=40)
+    crease: int | None = option(
+        Whole(),
+        "The edge whose fold angle is driven.",
+        default_text="a crease in the middle",
+    )
+    crease_ratio: float = option(
+        number(0), "Stiffness of the creases over that of the facets.", default=0.0
+    )
 
 
 def energy(
     pattern: PatternLike,
-    steps: int = 40,
+    steps: int | None = None,
     *,
     material: Material | AnyPath | None = None,
-    crease: int | None = None,
-    crease_ratio: float = 0.0,
     on_progress: Progress | None = None,
+    **options: Any,
 ) -> EnergyCurve:
     """Compute the energy of a pattern on the way from its folded form to flat.
 
@@ -28,17 +44,12 @@ def energy(
     ----------
     pattern : CreasePattern, FitResult, str or os.PathLike
         The pattern, or a file that :func:`load` reads. It needs a folded form.
-    steps : int
-        Steps from the folded form to flat, 40 by default.
     material : Material, str or os.PathLike, optional
         A profile with a modulus, its shipped name or its TOML file: energies are then in joules.
         Without it their unit is k_f times the mean edge.
-    crease : int, optional
-        The edge that is driven. The default is a crease in the middle.
-    crease_ratio : float
-        Stiffness of the creases over that of the facets, 0 by default.
     on_progress : callable, optional
         Called with a fraction in 0..1 and a short text.
+    {options}
 
     Returns
     -------
@@ -52,7 +63,7 @@ def energy(
     PatternError
         For a pattern without a folded form.
     OptionError
-        For a number out of range.
+        For a name that is no option, and for a value that cannot be taken.
 
     Examples
     --------
@@ -61,10 +72,7 @@ def energy(
     True
     """
     found = as_pattern(pattern)
-    steps = read_value("steps", STEPS, steps)
-    ratio = read_value("crease_ratio", number(0), crease_ratio)
-    if crease is not None:
-        crease = read_value("crease", Whole(), crease)
+    asked = read_options(EnergyOptions, options | {"steps": steps})
     paper = None
     if material is not None:
         stock = material if isinstance(material, Material) else load_material(material)
@@ -74,5 +82,10 @@ def energy(
                 'modulus = "3GPa" to its file, or leave `material` out.'
             )
         paper = Paper(stock.thickness_mm, stock.modulus_pa)
-    model = sheet_model(found, paper=paper, crease_ratio=ratio)
-    return energy_curve(found, steps, crease=crease, model=model, on_progress=on_progress)
+    model = sheet_model(found, paper=paper, crease_ratio=asked.crease_ratio)
+    return energy_curve(
+        found, asked.steps, crease=asked.crease, model=model, on_progress=on_progress
+    )
+
+
+described(energy, EnergyOptions)

@@ -18,7 +18,8 @@ from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError
 from miurafab.files import AnyPath, new_file
 from miurafab.geometry.arrays import Floats
-from miurafab.options import Choice, Whole, length, read_value
+from miurafab.options import Choice, Whole, declared, length, option, read_options, read_value
+from miurafab.options.documented import described
 from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.contact import triangulate
@@ -39,11 +40,26 @@ from miurafab.workflow.patterns import PatternLike, as_pattern
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-STEPS = Whole(2, 1000)
 ENDINGS = (".fold", ".gif", ".glb", ".html")
 """What a motion can be written as."""
 
 Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class FoldOptions:
+    """The options of a motion: of its steps, its picture and its panels."""
+
+    steps: int = option(Whole(2, 1000), "The number of steps of the motion.", default=40)
+    colour: str = option(
+        Choice(("side", "strain")),
+        "Colour the facets by side or by strain, in a .gif or .html file.",
+        default="side",
+    )
+    thickness_mm: float | None = option(
+        length(above=True),
+        "Also say how to make panels of this thickness; exit 1 if such panels cannot fold.",
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,7 +86,7 @@ class Folding(Shown):
         path: AnyPath,
         *,
         title: str = "",
-        colour: str = "side",
+        colour: str | None = None,
         on_progress: Progress | None = None,
     ) -> None:
         """Write the motion, in the format of the ending of ``path``.
@@ -81,8 +97,7 @@ class Folding(Shown):
             A ``.fold``, ``.gif``, ``.glb`` or ``.html`` file.
         title : str
             The title inside the file. The default is the name of the target.
-        colour : {"side", "strain"}
-            What the facets of a ``.gif`` and ``.html`` are coloured by.
+        {options}
         on_progress : callable, optional
             Called with a fraction in 0..1 and a short text.
 
@@ -92,7 +107,7 @@ class Folding(Shown):
             For another ending, and for a folder that does not exist.
         """
         file = new_file(path, "The motion", ENDINGS)
-        by_strain = read_value("colour", Choice(("side", "strain")), colour) == "strain"
+        by_strain = read_options(FoldOptions, {"colour": colour}).colour == "strain"
         motion, ending = self.motion, file.suffix.lower()
         pattern, title = motion.pattern, title or motion.pattern.name
         if ending == ".fold":
@@ -166,7 +181,12 @@ class Folding(Shown):
         }
 
 
-def fold(pattern: PatternLike, steps: int = 40, *, on_progress: Progress | None = None) -> Folding:
+described(Folding.save, FoldOptions, without=("steps", "thickness"))
+
+
+def fold(
+    pattern: PatternLike, steps: int | None = None, *, on_progress: Progress | None = None
+) -> Folding:
     """Compute the folding motion of a pattern.
 
     A sheet that folds rigidly goes from flat through its folded form to flat-folded. Any other
@@ -176,8 +196,7 @@ def fold(pattern: PatternLike, steps: int = 40, *, on_progress: Progress | None 
     ----------
     pattern : CreasePattern, FitResult, str or os.PathLike
         The pattern, or a file that :func:`load` reads.
-    steps : int
-        Steps of the motion, 2 to 1000, 40 by default.
+    {options}
     on_progress : callable, optional
         Called with a fraction in 0..1 and a short text.
 
@@ -201,7 +220,7 @@ def fold(pattern: PatternLike, steps: int = 40, *, on_progress: Progress | None 
     <Folding rigid, 11 frames of 16 facets, no contacts>
     """
     pattern = as_pattern(pattern)
-    steps = read_value("steps", STEPS, steps)
+    steps = read_options(FoldOptions, {"steps": steps}).steps
     motion = rigid_motion(pattern, states_between(pattern, steps))
     assert motion.mismatch is not None
     mismatch = float(motion.mismatch.max())
@@ -220,6 +239,9 @@ def fold(pattern: PatternLike, steps: int = 40, *, on_progress: Progress | None 
                 f"{mismatch:.2g} mean edges), and it cannot be bent either: {fault}"
             ) from None
     return Folding(motion, contacts(motion, on_progress), mismatch)
+
+
+described(fold, FoldOptions, without=("colour", "thickness"))
 
 
 def _strain(motion: FoldingMotion) -> Floats:
@@ -266,7 +288,7 @@ def thick_panels(
     OptionError
         For a thickness that is not positive.
     """
-    panel_mm = read_value("thickness", length(above=True), thickness)
+    panel_mm = read_value("thickness", declared(FoldOptions)["thickness"].kind, thickness)
     return make_panels(as_pattern(pattern), panel_mm, on_progress)
 
 

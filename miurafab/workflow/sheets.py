@@ -34,6 +34,7 @@ from miurafab.profiles import (
     load_material,
     read_toml,
 )
+from miurafab.workflow.design import read_layout_table
 from miurafab.workflow.drawings import drawings, read_formats
 from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run
 from miurafab.workflow.job_directory import GUIDE, JobDirectory, write_text
@@ -303,20 +304,7 @@ def layout_options(
     table = Table(read_toml(file, InputError), file.name, InputError)
     if not table.has("layout"):
         raise InputError(f"{file} has no [layout], so there is nothing to take from it.")
-    layout = table.table("layout")
-    machine, material = (
-        layout.text(key) if layout.has(key) else None for key in ("machine", "material")
-    )
-    written = layout.rest()
-    options = read_options(
-        LayoutOptions,
-        written,
-        where=layout.where,
-        folder=file.parent,
-        over=given,
-        besides=("machine", "material"),
-    )
-    return options, machine, material
+    return read_layout_table(table.table("layout"), file.parent, given)
 
 
 def _machine(given: MachineProfile | AnyPath | None) -> tuple[MachineProfile, Path]:

@@ -97,8 +97,6 @@ def tradeoff(
     ----------
     target : str, os.PathLike, Design, trimesh.Trimesh, callable or array
         What :func:`fit` takes; the parameters of a surface are keywords here too.
-    sides : sequence of int, optional
-        Facets along a side, three different numbers or more: 8, 12, 16, 24, 32, 48 by default.
     on_progress : callable, optional
         Called with a fraction in 0..1 and a short text.
     {options}
@@ -144,7 +142,7 @@ def tradeoff(
     return summarise(samples, asked.weights)
 
 
-described(tradeoff, TradeoffOptions, FitOptions, without=("sides", "facets"))
+described(tradeoff, TradeoffOptions, FitOptions, without=("facets",))
 
 
 def _as_text(
