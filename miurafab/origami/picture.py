@@ -91,16 +91,10 @@ def fills(view: View) -> NDArray[np.uint8]:
     return np.clip(base * view.shade[:, None], 0, 255).astype(np.uint8)
 
 
-def flat_svg(pattern: CreasePattern, width: float = 320.0) -> str:
+def flat_svg(pattern: CreasePattern, width: float) -> str:
     """The flat pattern, mountains red and dash-dotted, valleys blue and dashed."""
     points, height = _placed(pattern.vertices_coords, width)
     return _svg(width, height, _creases(pattern, points))
-
-
-def folded_svg(pattern: CreasePattern, width: float = 320.0) -> str:
-    """The folded form. Raises ``AssertionError`` for a pattern without one."""
-    height, polygons = _folded(pattern, width)
-    return _svg(width, height, polygons)
 
 
 def pattern_svg(pattern: CreasePattern, width: float = 640.0) -> str:

@@ -16,10 +16,10 @@ from typing import Any
 
 import miurafab
 from miurafab.errors import MiurafabError, PatternError
-from miurafab.fabrication.drawing.svg import pattern_svg
 from miurafab.findings import Finding, findings_json
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.fold import read_fold
+from miurafab.origami.picture import flat_svg
 from miurafab.origami.verify import Audit
 from miurafab.studio.recipe import job_name
 from miurafab.surfaces.description import no_target
@@ -122,7 +122,7 @@ def _with_mesh_in(folder: Path, pattern: CreasePattern) -> CreasePattern:
 def _show(order: Order, pattern: CreasePattern, part: dict[str, Any], tell: Tell) -> None:
     """Report the pattern as a drawing and in space, first still, then folding."""
     folder = order.folder
-    write_text(folder / PICTURE, pattern_svg(pattern))
+    write_text(folder / PICTURE, flat_svg(pattern, 640.0))
     write_page(folder / PAGE, title=order.name, pattern=pattern)
     tell(part | {"files": {**part["files"], "picture": PICTURE, "page": PAGE}})
     tell({"progress": _FITTING, "note": "folding"})

@@ -25,7 +25,7 @@ from miurafab.errors import InputError
 from miurafab.fabrication.drawing.dxf import sheet_dxf
 from miurafab.fabrication.drawing.hpgl import sheet_hpgl
 from miurafab.fabrication.drawing.pdf import sheets_pdf
-from miurafab.fabrication.drawing.svg import pattern_svg
+from miurafab.fabrication.drawing.svg import layout_svg
 from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, tiled_pdf
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.sheets import DrawnLayout
@@ -80,7 +80,7 @@ def drawings(
     letters = edge_letters(layout, pattern)
     for name in formats:
         if name == "picture":
-            yield PICTURE, pattern_svg(pattern, layout).encode("utf-8")
+            yield PICTURE, layout_svg(pattern, layout).encode("utf-8")
             continue
         ending, draw = _SHEETS[name]
         for toolpath in layout.passes:

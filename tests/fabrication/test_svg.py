@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from flat_patterns import bed, card, fan, miura, triangles, zigzag
 
-from miurafab.fabrication.drawing.svg import COLOURS, pattern_svg, sheet_svg
+from miurafab.fabrication.drawing.svg import COLOURS, layout_svg, sheet_svg
 from miurafab.fabrication.sheets import lay_out
+from miurafab.origami.picture import CREASES, flat_svg
 from miurafab.profiles import OPERATIONS
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -86,8 +87,9 @@ def test_the_same_toolpath_gives_the_same_bytes(toolpath):
 
 
 @pytest.mark.parametrize("pattern", [miura(6, 5), triangles(1, 6, 200.0)])
-def test_the_picture_of_a_pattern_shows_every_edge_once(pattern):
-    root = ElementTree.fromstring(pattern_svg(pattern))
+def test_the_picture_of_a_layout_shows_every_edge_once(pattern):
+    layout = lay_out(pattern, bed(400.0, 400.0), card())
+    root = ElementTree.fromstring(layout_svg(pattern, layout))
     shown = {
         path.get("id"): len(strokes_of(path.get("d")))
         for path in root.iter(SVG + "path")
@@ -101,10 +103,18 @@ def test_the_picture_of_a_pattern_shows_every_edge_once(pattern):
     assert height == pytest.approx(tall[1] + 0.04 * tall.max(), abs=1e-3)
 
 
+def test_the_picture_of_a_pattern_shows_every_edge_once():
+    pattern = miura(6, 5)
+    root = ElementTree.fromstring(flat_svg(pattern, 640.0))
+    shown = {path.get("stroke"): path.get("d").count("M") for path in root.iter(SVG + "path")}
+    for letter in "MVB":
+        assert shown[CREASES[letter]] == (pattern.edges_assignment == letter).sum()
+
+
 def test_the_picture_of_a_layout_names_its_patches():
     pattern = miura(30, 26)
     layout = lay_out(pattern, bed(200.0, 150.0), card())
-    root = ElementTree.fromstring(pattern_svg(pattern, layout))
+    root = ElementTree.fromstring(layout_svg(pattern, layout))
     names = [text.text for text in root.iter(SVG + "text")]
     # Each with a rim of its own below: many programs do not know paint-order.
     assert names == [patch.label for patch in layout.patches for _ in range(2)]

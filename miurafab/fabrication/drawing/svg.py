@@ -1,4 +1,4 @@
-"""Drawings as SVG: sheets for the machine, and a picture of the pattern for people.
+"""Drawings as SVG: sheets for the machine, and a picture of a layout for people.
 
 A sheet is drawn true to scale: width, height and viewBox in mm, so that importers do not guess a
 resolution. The y axis of SVG points down and that of the sheet up, so y is mirrored. Each operation
@@ -70,10 +70,10 @@ def sheet_svg(toolpath: Toolpath) -> str:
     return _text(drawing)
 
 
-def pattern_svg(pattern: CreasePattern, layout: Layout | None = None) -> str:
-    """A picture of the flat pattern: mountains red, valleys blue, border black.
+def layout_svg(pattern: CreasePattern, layout: Layout) -> str:
+    """A picture of the flat pattern with the patches of ``layout`` tinted and named.
 
-    With a ``layout`` the patches are tinted and named.
+    Mountains are red, valleys blue, the border black.
     """
     points = pattern.vertices_coords * np.array([1.0, -1.0])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -97,21 +97,17 @@ def pattern_svg(pattern: CreasePattern, layout: Layout | None = None) -> str:
         weight = line * (1.8 if letter in "BC" else 1.0)
         style = {"fill": "none", "stroke": colour, "stroke_linecap": "round"}
         drawing.add(drawing.path(d="".join(data), id=name, stroke_width=_short(weight), **style))
-    if layout is not None:
-        _add_names(drawing, pattern, points, layout)
+    _add_names(drawing, pattern, points, layout)
     return _text(drawing)
 
 
 def _add_facets(
-    drawing: svgwrite.Drawing, pattern: CreasePattern, points: Floats, layout: Layout | None
+    drawing: svgwrite.Drawing, pattern: CreasePattern, points: Floats, layout: Layout
 ) -> None:
-    groups = [np.arange(len(pattern.faces_vertices))]
-    if layout is not None:
-        groups = [patch.faces for patch in layout.model.patches]
-    for number, faces in enumerate(groups):
+    for number, patch in enumerate(layout.model.patches):
         tint = hex_of(patch_colour(number, 0.6))
         data = []
-        for corners in pattern.faces_vertices[faces].tolist():
+        for corners in pattern.faces_vertices[patch.faces].tolist():
             ring = [points[v] for v in corners if v >= 0]
             data.append("M" + "L".join(f"{_short(x)} {_short(y)}" for x, y in ring) + "Z")
         hair = {"stroke": tint, "stroke_width": _short(np.ptp(points) / 3000)}
