@@ -13,12 +13,15 @@ from cyclopts import Parameter
 from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, argument, option, takes
 from miurafab.errors import DONE
-from miurafab.options import Flag, Text, Whole, feed, length, read_options
+from miurafab.options import Flag, Text, Whole, declared, feed, length, read_options
+from miurafab.profiles.machine import Controller
 
 if TYPE_CHECKING:
     from miurafab.grbl.events import StatusReport
 
 PORT = "A serial device, a pyserial URL (socket://HOST:PORT), or 'virtual'."
+
+_BAUD = declared(Controller)["baud"]
 
 
 @Parameter(name="*")
@@ -27,7 +30,7 @@ class Line:
     """The line to a controller: the options that all actions with a port share."""
 
     port: Annotated[str, option(Text("PORT"), PORT)]
-    baud: Annotated[int, option(Whole(1), "The speed of a serial line, bits a second.")] = 115_200
+    baud: Annotated[int, option(_BAUD.kind, _BAUD.help)] = _BAUD.default
 
 
 def list_(*, console: Console = Console()) -> int:

@@ -11,7 +11,8 @@ import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option
 from miurafab.errors import DONE
-from miurafab.options import File, Text, length
+from miurafab.options import File, Text
+from miurafab.profiles.material import KERF
 
 NameArgument = Annotated[
     str | None, argument("NAME", "A shipped name or a TOML file; without it, all are listed.")
@@ -41,7 +42,7 @@ def add_material(
     cut: Annotated[
         str | None, option(Text("LABEL"), "The first square that falls out, as X3.")
     ] = None,
-    kerf: Annotated[float | None, option(length(), "What the kerf gauge reads.")] = None,
+    kerf: Annotated[float | None, option(KERF, "What the kerf gauge reads.")] = None,
     title: Annotated[str | None, option(Text(), "The material's title in lists.")] = None,
     console: Console = Console(),
 ) -> int:

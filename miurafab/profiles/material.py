@@ -33,6 +33,9 @@ CREASE_KINDS = ("mountain", "valley", "tab")
 """The kinds of crease, which may be made differently; ``tab`` is the fold of a tab."""
 
 MODES = ("perforate", "score", "cut", "none")
+KERF = length(0, 2)
+"""The width of a cut, as it is written."""
+
 MIN_HOLE_PATH_MM = 0.1
 """A beam and its controller make a dot of a circle with a smaller diameter (judged)."""
 
@@ -162,7 +165,7 @@ def load_material(name: AnyPath) -> Material:
     path = find_profile("materials", name)
     table = Table(read_toml(path), path.name)
     max_power = table.value("max_power", number(0.01, 1), 1.0)
-    kerf = table.value("kerf", length(0, 2))
+    kerf = table.value("kerf", KERF)
     perforation = table.table("perforation").options(Perforation)
     creases, relief_hole = _creases(table.table("creases", {}), perforation, kerf)
     material = Material(

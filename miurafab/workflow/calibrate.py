@@ -28,7 +28,7 @@ from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.perforation import MIN_STROKE_MM
 from miurafab.fabrication.sheets import Layout, Sheet, Totals
 from miurafab.files import AnyPath, as_path
-from miurafab.options import length, read_value
+from miurafab.options import read_value
 from miurafab.origami.formats.fold import fold_text
 from miurafab.posting.sections import post_sections
 from miurafab.profiles import (
@@ -39,6 +39,7 @@ from miurafab.profiles import (
     load_material,
     read_toml,
 )
+from miurafab.profiles.material import KERF
 from miurafab.workflow.dry_run import dry_run
 from miurafab.workflow.job_directory import JobDirectory, write_text
 from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
@@ -192,7 +193,7 @@ def add_material(
     values = read_toml(base)
     values["title"] = title or f"{values['title']}, calibrated"
     if kerf is not None:
-        values["kerf"] = _mm(read_value("kerf", length(0, 2), kerf))
+        values["kerf"] = _mm(read_value("kerf", KERF, kerf))
     if cell is not None:
         chosen = _labelled(choices["cells"], cell, directory)
         _take_dashes(values, chosen["perforation"])

@@ -71,8 +71,8 @@ def energy(
     >>> mf.energy(mf.fit("plane", facets=(4, 4)), steps=5).rigid
     True
     """
-    found = as_pattern(pattern)
     asked = read_options(EnergyOptions, options | {"steps": steps})
+    found = as_pattern(pattern)
     paper = None
     if material is not None:
         stock = material if isinstance(material, Material) else load_material(material)

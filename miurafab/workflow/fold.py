@@ -219,8 +219,8 @@ def fold(
     >>> mf.fold(mf.fit("plane", facets=(4, 4)), steps=10)
     <Folding rigid, 11 frames of 16 facets, no contacts>
     """
-    pattern = as_pattern(pattern)
     steps = read_options(FoldOptions, {"steps": steps}).steps
+    pattern = as_pattern(pattern)
     motion = rigid_motion(pattern, states_between(pattern, steps))
     assert motion.mismatch is not None
     mismatch = float(motion.mismatch.max())
