@@ -19,9 +19,8 @@ def main(serve_studio: ServeStudio) -> NoReturn:
     """Run the command line on ``sys.argv`` and exit; ``serve_studio`` serves the web page."""
     try:
         from miurafab.cli.ending import exit_code_of
-        from miurafab.cli.program import run
 
-        code = exit_code_of(lambda: run(sys.argv[1:], serve_studio))
+        code = exit_code_of(lambda: _run(serve_studio))
     except KeyboardInterrupt:  # while loading, or a second Ctrl-C while the first is reported
         sys.stderr.write("miurafab: Interrupted.\n")
         code = 130
@@ -32,3 +31,9 @@ def main(serve_studio: ServeStudio) -> NoReturn:
     except OSError:  # the reader went away; the interpreter must not try to flush again
         os._exit(code)
     sys.exit(code)
+
+
+def _run(serve_studio: ServeStudio) -> int:
+    from miurafab.cli.program import run
+
+    return run(sys.argv[1:], serve_studio)

@@ -19,6 +19,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from miurafab.cli.ctrl_c import CtrlC
 from miurafab.errors import BAD_INPUT, DEFECT, DONE, INTERRUPTED, MiurafabError, spell_options
 from miurafab.version import __version__
 from miurafab.workflow.json_text import json_text
@@ -43,7 +44,11 @@ def spelled(value: Any) -> Any:
 def exit_code_of(command: Callable[[], int]) -> int:
     """Run ``command``, report how it failed if it did, and return the exit code."""
     try:
-        return command()
+        with CtrlC() as ctrl_c:
+            code = command()
+            if code == DONE:
+                ctrl_c.check()
+            return code
     except KeyboardInterrupt:
         return _fail("Interrupted.", "Interrupted", INTERRUPTED)
     except MiurafabError as error:

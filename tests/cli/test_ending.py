@@ -156,8 +156,57 @@ def test_ctrl_c_in_a_fit_on_the_way_ends_the_command(run, monkeypatch, tmp_path,
     assert not (tmp_path / "jobs").exists()
 
 
+LOST = {
+    "a module that catches everything as it loads": """
+import os, signal
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+    for _ in range(1000):
+        pass
+except BaseException:
+    pass
+""",
+    "a finaliser": """
+import os, signal
+class Thing:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(1000):
+            pass
+Thing()
+""",
+}
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them on POSIX")
-@pytest.mark.parametrize("seconds", [0.3, 6.0])
+@pytest.mark.parametrize("where", LOST)
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_ctrl_c_that_python_or_a_library_drops_ends_the_command(tmp_path, where, goes_on):
+    """Although the command goes on, or is about to end with success."""
+    (tmp_path / "lost.py").write_text(LOST[where])
+    (tmp_path / "sitecustomize.py").write_text(
+        "import time, miurafab\n"
+        "def doctor(*a, **k):\n"
+        "    import lost\n"
+        f"    end = time.monotonic() + {30 if goes_on else 0}\n"
+        "    while time.monotonic() < end: pass\n"
+        "import miurafab.cli.program as program\n"
+        "program.run = lambda *a: doctor() or 0\n"
+    )
+    root = Path(miurafab.__file__).parent.parent
+    started = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-m", "miurafab", "doctor"],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join((str(tmp_path), str(root)))},
+        capture_output=True,
+        text=True,
+    )
+    assert time.monotonic() - started < 20
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "miurafab: Interrupted.\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them on POSIX")
+@pytest.mark.parametrize("seconds", [0.3, 1.5, 4.0, 6.0])
 def test_ctrl_c_reaches_a_pool_of_processes_and_none_prints(tmp_path, seconds):
     """While modules load, and while the workers fit."""
     with subprocess.Popen(
