@@ -13,7 +13,7 @@ from miurafab.cli.declared import MachineOption, MaterialOption, argument, optio
 from miurafab.cli.fit import RigidOption, fit_options
 from miurafab.cli.machine import PORT
 from miurafab.errors import DONE, MACHINE_FAILED, NO, InputError, MachineError, OptionError
-from miurafab.findings import findings_json, refusals
+from miurafab.findings import findings_json
 from miurafab.options import File, Flag, Text, Whole, read_options
 
 if TYPE_CHECKING:

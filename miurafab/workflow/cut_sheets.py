@@ -22,7 +22,6 @@ from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import Keys
 from miurafab.machine.planning import JobPlan, SendOptions, plan_job
 from miurafab.machine.resume import resume
-from miurafab.machine.sender import Progress as StreamProgress
 from miurafab.machine.sender import StreamResult, stream_plan
 from miurafab.machine.trace_box import MOST_POINTER, frame_job
 from miurafab.machine.transport import VIRTUAL
@@ -41,8 +40,7 @@ from miurafab.options import (
 from miurafab.options.documented import described
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.cut import Prepared, prepare
-from miurafab.workflow.dry_run import SheetPreview
-from miurafab.workflow.timeline import Timeline
+from miurafab.workflow.timeline import SheetProgress, placed
 
 
 @dataclass(frozen=True, repr=False)
@@ -63,17 +61,6 @@ class CutSheet(Shown):
 
     def _summary(self) -> str:
         return f"{self.name}: {self.lines} lines in {self.result.seconds:.1f} s"
-
-
-@dataclass(frozen=True, slots=True)
-class SheetProgress:
-    """Where sheet ``number`` (from 1) is: strokes done of all, and the seconds left."""
-
-    number: int
-    stroke: int
-    strokes: int
-    seconds_left: float
-    stream: StreamProgress
 
 
 @dataclass(frozen=True, repr=False)
@@ -259,7 +246,9 @@ def cut_sheet(
         port,
         journal_path=journal_path(prepared, job),
         transcript_path=_beside(prepared, job, ".transcript"),
-        on_progress=_placed(on_progress, number, expected, prepared.machine),
+        on_progress=placed(
+            on_progress, number, expected, prepared.machine.controller.planner_blocks
+        ),
     )
     return CutSheet(
         expected.name,
@@ -358,23 +347,6 @@ def frame(
     start = replace(options.send, check_mode=False, allow_m3=False)
     plan = plan_job(box, prepared.machine, start)
     return _stream(port)(plan, port, virtual_speed=options.virtual_speed)
-
-
-def _placed(
-    on_progress: Callable[[SheetProgress], None] | None,
-    number: int,
-    expected: SheetPreview,
-    machine: MachineProfile,
-) -> Callable[[StreamProgress], None] | None:
-    if on_progress is None:
-        return None
-    timeline = Timeline(expected, machine.controller.planner_blocks)
-
-    def tell(now: StreamProgress) -> None:
-        done, left = timeline.place(now)
-        on_progress(SheetProgress(number, done, timeline.strokes, left, now))
-
-    return tell
 
 
 def can_go_on(prepared: Prepared) -> bool:

@@ -7,12 +7,26 @@ is the rest of the dry run, at the overridden feed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 
 from miurafab.gcode.program import strokes
 from miurafab.geometry.arrays import Floats
 from miurafab.machine.sender import Progress
 from miurafab.workflow.dry_run import SheetPreview
+
+
+@dataclass(frozen=True, slots=True)
+class SheetProgress:
+    """Where sheet ``number`` (from 1) is: strokes done of all, and the seconds left."""
+
+    number: int
+    stroke: int
+    strokes: int
+    seconds_left: float
+    stream: Progress
 
 
 class Timeline:
@@ -48,6 +62,24 @@ class Timeline:
         ended = self._ends[min(first + 1, len(self._ends) - 1)]
         left = self._ends[-1] - begun - share * (ended - begun)
         return done, max(0.0, float(left)) * 100.0 / max(now.feed_override, 1)
+
+
+def placed(
+    on_progress: Callable[[SheetProgress], None] | None,
+    number: int,
+    sheet: SheetPreview,
+    blocks: int,
+) -> Callable[[Progress], None] | None:
+    """The callback of a sender that tells ``on_progress`` where ``sheet``, the ``number``-th, is."""
+    if on_progress is None:
+        return None
+    timeline = Timeline(sheet, blocks)
+
+    def tell(now: Progress) -> None:
+        done, left = timeline.place(now)
+        on_progress(SheetProgress(number, done, timeline.strokes, left, now))
+
+    return tell
 
 
 def _nearest(at: Floats, start: Floats, end: Floats) -> tuple[Floats, Floats]:
