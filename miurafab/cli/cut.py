@@ -18,7 +18,8 @@ from miurafab.options import File, Flag, Text, Whole, read_options
 
 if TYPE_CHECKING:
     from miurafab.workflow.cut import Prepared
-    from miurafab.workflow.cut_sheets import CutOptions, CutSheet, SheetProgress
+    from miurafab.workflow.cut_sheets import CutOptions, CutSheet
+    from miurafab.workflow.timeline import SheetProgress
 
 EXAMPLES = (
     "miurafab cut jobs/hypar --port /dev/ttyUSB0 --frame",
@@ -200,14 +201,14 @@ def _share(
 def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -> int:
     """Say what would be cut, and what the pre-flight checks find; no if they refuse it."""
     from miurafab.machine.preflight import require_known
-    from miurafab.workflow.dry_run import clock_text
+    from miurafab.workflow.dry_run import clock_text, readiness
 
     require_known(options.send.force)
     findings = [finding for sheet in prepared.dry_runs for finding in sheet.findings]
     passed = options.send.force | ({"m3"} if options.send.allow_m3 else set())
-    refused = any(finding.code not in passed for finding in refusals(findings))
+    status = readiness(prepared.dry_runs, passed)
     answer = {
-        "status": "refused" if refused else "ready",
+        "status": status,
         "job": prepared.name,
         "machine": prepared.machine.name,
         "seconds": round(sum(sheet.seconds for sheet in prepared.dry_runs), 3),
@@ -233,7 +234,7 @@ def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -
         console.findings(findings)
 
     console.answer(answer, show)
-    return NO if refused else DONE
+    return NO if status == "refused" else DONE
 
 
 @contextmanager

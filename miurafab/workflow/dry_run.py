@@ -5,7 +5,8 @@ All figures come from the text alone, so they hold for a foreign file as well as
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from miurafab.display import Shown
 from miurafab.errors import InputError
-from miurafab.findings import Finding, findings_json
+from miurafab.findings import Finding, findings_json, refusals
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program, strokes
 from miurafab.gcode.reading import read_program
@@ -150,6 +151,12 @@ def dry_run(
         paper_mm=paper_mm,
         view_mm=_box(np.vstack([program.start[:1, :2], program.end[:, :2], (0, 0), bed, paper_mm])),
     )
+
+
+def readiness(sheets: Iterable[SheetPreview], forced: AbstractSet[str] = frozenset()) -> str:
+    """``ready``, or ``refused`` for a refusal of a sheet whose code is not ``forced``."""
+    found = (finding for sheet in sheets for finding in refusals(sheet.findings))
+    return "refused" if any(finding.code not in forced for finding in found) else "ready"
 
 
 def read_gcode(path: Path) -> Job:

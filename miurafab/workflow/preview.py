@@ -20,7 +20,14 @@ from miurafab.gcode.job import Job
 from miurafab.grbl.settings import parse_dump
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import DEFAULT_MACHINE, MachineProfile, load_machine, read_machine
-from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run, length_text, read_gcode
+from miurafab.workflow.dry_run import (
+    SheetPreview,
+    clock_text,
+    dry_run,
+    length_text,
+    read_gcode,
+    readiness,
+)
 from miurafab.workflow.job_files import job_machine, job_material
 
 if TYPE_CHECKING:
@@ -108,6 +115,7 @@ class Preview(Shown):
     def as_dict(self) -> dict[str, Any]:
         """The JSON answer of ``preview``."""
         return {
+            "status": readiness(self.sheets),
             "job": self.name,
             "machine": self.machine.name,
             "seconds": round(self.seconds, 3),

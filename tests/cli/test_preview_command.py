@@ -39,6 +39,7 @@ def test_a_file_in_figures_and_pictures(run, file, tmp_path):
     assert sheet["bounds_mm"] == [10, 10, 110, 10]
     assert 5.0 < sheet["beam_on_seconds"] < 5.2 < sheet["seconds"] < 6
     assert sheet["warnings"] == []
+    assert answer["status"] == "ready"
     assert answer["machine"] == "grbl-laser-400"
     assert sorted(path.name for path in (tmp_path / "plate-preview").iterdir()) == [
         *("plate.png", "plate.svg", "preview.html")
@@ -61,11 +62,14 @@ def test_people_get_a_table_and_every_warning(run, file, tmp_path):
 )
 def test_a_preview_and_a_dry_run_judge_in_the_same_words(run, name, codes):
     where = (str(DATA / name), "--machine", "grbl-laser-400")
-    seen = json.loads(run("preview", *where, "-o", "seen", "--json").stdout)["sheets"][0]
+    done = run("preview", *where, "-o", "seen", "--json")
+    assert done.returncode == 0
+    preview = json.loads(done.stdout)
+    seen = preview["sheets"][0]
     told = run("cut", *where, "--dry-run", "--json")
     assert told.returncode == 1
     answer = json.loads(told.stdout)
-    assert answer["status"] == "refused"
+    assert answer["status"] == preview["status"] == "refused"
     assert answer["findings"] == seen["findings"]
     assert [finding["code"] for finding in seen["findings"]] == codes
     assert {finding["severity"] for finding in seen["findings"]} == {"refusal"}
