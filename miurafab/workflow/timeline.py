@@ -70,7 +70,7 @@ def placed(
     sheet: SheetPreview,
     blocks: int,
 ) -> Callable[[Progress], None] | None:
-    """The callback of a sender that tells ``on_progress`` where ``sheet``, the ``number``-th, is."""
+    """The callback of a sender that tells ``on_progress`` where sheet ``number`` is."""
     if on_progress is None:
         return None
     timeline = Timeline(sheet, blocks)
