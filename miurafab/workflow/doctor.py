@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import platform
+import re
 import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,14 +17,13 @@ from miurafab.machine.transport import list_ports
 from miurafab.profiles import load_machine, load_material, shipped_names
 from miurafab.version import __version__
 
-DEPENDENCIES = ("numpy", "scipy", "shapely", "trimesh", "svgwrite", "pyserial", "pillow")
 ROOM_NEEDED_MB = 100
 """Free disk below which drawings, journal and transcript of a large job may not fit."""
 
 
 @dataclass(frozen=True)
 class Port:
-    """A serial port of this computer; ``trouble`` says why it cannot be used, if so."""
+    """A serial port of this computer; ``trouble`` says why you cannot use it, if so."""
 
     device: str
     description: str
@@ -32,7 +32,18 @@ class Port:
 
 @dataclass(frozen=True, repr=False)
 class Examination(Shown):
-    """Versions by name, the ports, and the problems, one sentence each."""
+    """What :func:`doctor` found on this computer.
+
+    Attributes
+    ----------
+    versions : dict of str
+        The version of miurafab, of Python and of each package that miurafab needs, or
+        ``"missing"``, by name.
+    ports : tuple of Port
+        The serial ports: ``device``, ``description``, and ``trouble`` where you cannot use one.
+    problems : tuple of str
+        What would stop a job, one sentence each; empty if nothing would.
+    """
 
     versions: dict[str, str]
     ports: tuple[Port, ...]
@@ -54,18 +65,29 @@ def doctor() -> Examination:
     -------
     Examination
         ``problems`` are sentences on what would stop a job; nothing is sent to any port.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> "numpy" in mf.doctor().versions
+    True
     """
     versions = {
         "miurafab": __version__,
         "python": f"{platform.python_version()} on {platform.system()} {platform.machine()}",
     }
     problems = []
-    for name in DEPENDENCIES:
+    try:
+        needed = importlib.metadata.requires("miurafab") or []
+    except importlib.metadata.PackageNotFoundError:
+        needed = []
+        problems.append("miurafab runs from its source and is not installed; run pip install .")
+    for name in _names(needed):
         try:
             versions[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
             versions[name] = "missing"
-            problems.append(f"{name} is not installed; run pip install miurafab again.")
+            problems.append(f"{name} is not installed; run pip install {name}.")
     ports = tuple(Port(device, text, _trouble(device)) for device, text in list_ports())
     problems.extend(f"{port.device}: {port.trouble}." for port in ports if port.trouble)
     problems.extend(_profile_problems())
@@ -73,6 +95,12 @@ def doctor() -> Examination:
     if free < ROOM_NEEDED_MB:
         problems.append(f"Only {free} MB are free on this disk; a job needs {ROOM_NEEDED_MB} MB.")
     return Examination(versions, ports, tuple(problems))
+
+
+def _names(requirements: list[str]) -> list[str]:
+    """The names in lines such as ``numpy>=2.1``, without those that only an extra asks for."""
+    always = (line for line in requirements if "extra ==" not in line)
+    return sorted({re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in always})
 
 
 def _trouble(device: str) -> str | None:
