@@ -1,4 +1,4 @@
-"""``doctor`` names each package that the installed miurafab needs, and a missing one is a problem."""
+"""``doctor`` names each package that miurafab needs; a missing one stops a job."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def test_a_missing_package_stops_a_job(installed, run):
     assert found.versions["resvg_py"] == "missing"
     assert "resvg_py is not installed; run pip install resvg_py." in found.problems
     done = run("doctor")
-    assert done.code == 1
-    assert "Would stop a job: resvg_py is not installed" in done.out
+    assert done.returncode == 1
+    assert "Would stop a job: resvg_py is not installed" in done.stdout
 
 
 def test_a_source_tree_is_named_as_one(monkeypatch):
