@@ -22,9 +22,7 @@ def as_path(value: object, what: str) -> Path:
     """
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     if not isinstance(text, str):
-        raise InputError(
-            f"{what} is {reprlib.repr(value)}, which is a {type(value).__name__} and no path."
-        )
+        raise InputError(f"{what} is {reprlib.repr(value)}, which is not a path.")
     if not text or "\0" in text:
         raise InputError(f"{what} is {text!r}, which is no path.")
     return Path(text)

@@ -1,4 +1,4 @@
-"""26 calls that a newcomer writes first: each works, or answers in one sentence."""
+"""29 calls that a newcomer writes first: each works, or answers in one sentence."""
 
 from __future__ import annotations
 
@@ -57,7 +57,13 @@ ANSWERS = {
     "23 a misspelt surface": (lambda: mf.fit("hyper"), "did you mean 'hypar'"),
     "24 a misspelt option": (lambda: mf.fit("hypar", facet=(6, 6)), "did you mean 'facets'"),
     "25 a file that is not there": (lambda: mf.load("none.fold"), "does not exist"),
-    "26 no port": (lambda: mf.cut("job"), "'port' is missing; name the machine's, or 'virtual'"),
+    "26 a design that is not there": (lambda: mf.fit(Path("none.toml")), "'none.toml' is not"),
+    "27 a number for a material": (lambda: mf.sheets("hypar.fold", material=3), "is not a path"),
+    "28 a pattern to convert": (
+        lambda: mf.convert(mf.load("hypar.fold"), "b.svg"),
+        "which is not a path",
+    ),
+    "29 no port": (lambda: mf.cut("job"), "'port' is missing; name the machine's, or 'virtual'"),
 }
 
 

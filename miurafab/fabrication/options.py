@@ -85,7 +85,13 @@ class NestingOptions(Shown):
 
 @dataclass(frozen=True, repr=False)
 class LayoutOptions(Shown):
-    """How a pattern is laid out. Sizes are (longer, shorter) side in mm."""
+    """How a pattern is laid out. Sizes are (longer, shorter) side in mm.
+
+    Attributes
+    ----------
+    nesting : NestingOptions
+        How patches are placed on sheets.
+    """
 
     gap_mm: float = option(
         length(0, 100),

@@ -74,9 +74,20 @@ class CostCurve:
 class Tradeoff(Shown):
     """The samples by facets, and the laws of those that converged, None for fewer than three.
 
-    ``coefficient`` is c of d = c / n; ``exponent`` the power of n if it is fitted too (-1 by the
-    law); ``law_error`` the largest relative distance of a sample from c / n. ``area_limit`` and
-    ``area_slope`` are a and b.
+    Attributes
+    ----------
+    samples : tuple of Sample
+        One for each number of facets, also where no sheet was found.
+    coefficient : float or None
+        c of the law d = c / n, where d is the distance from the target and n the facets on a side.
+    exponent : float or None
+        The power of n if it is fitted too; the law says -1.
+    law_error : float or None
+        The largest relative distance of a sample from c / n.
+    area_limit, area_slope : float or None
+        a and b of the law of the area of the paper.
+    curves : tuple of CostCurve
+        The cost of each sheet, for each weight on effort.
     """
 
     samples: tuple[Sample, ...]

@@ -33,10 +33,28 @@ DEGENERATE = invariants.DEGENERATE
 class Measurements(Shown):
     """The numbers of the fit report; None without the folded form or the target that they need.
 
-    Angles in radians, lengths in mm, as :mod:`~miurafab.origami.invariants` defines them.
-    ``hausdorff_mm`` is the largest distance of a sheet point from the target or of a target point
-    from the sheet; ``hausdorff_midsurface_mm`` the largest distance of a facet mean from the
-    target; ``area_ratio`` the area of the paper over the area of the target.
+    :mod:`~miurafab.origami.invariants` defines the residuals.
+
+    Attributes
+    ----------
+    facets, vertices : int
+        The numbers of facets and vertices.
+    min_edge_mm : float
+        The shortest edge.
+    overlaps : int
+        The pairs of facets that overlap in the flat pattern.
+    max_planarity, max_developability, max_flat_foldability, max_isometry : float or None
+        The largest residuals: angles in radians, the isometry relative to the length of the edge.
+    self_intersections : int or None
+        The pairs of facets that pass through each other in the folded form.
+    hausdorff_mm : float or None
+        The largest distance of a sheet point from the target or of a target point from the sheet.
+    hausdorff_relative : float or None
+        The same distance over the diagonal of the box around the folded form.
+    hausdorff_midsurface_mm : float or None
+        The largest distance of a facet mean from the target, mm.
+    area_ratio : float or None
+        The area of the paper over the area of the target.
     """
 
     facets: int

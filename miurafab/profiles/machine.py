@@ -136,7 +136,24 @@ class Controller:
 class MachineProfile(Shown):
     """One machine class.
 
-    ``settings`` are the controller settings a job expects, ``{30: 1000.0}`` for ``$30=1000``.
+    Attributes
+    ----------
+    name : str
+        The stem of the file of the profile.
+    title : str
+        What lists call the machine.
+    dialect : str
+        The language of the controller, such as ``"grbl-1.1"``.
+    bed : Bed
+        The work area and its margin, mm.
+    motion : MotionLimits
+        Rates in mm/min and accelerations in mm/s² of the firmware's planner.
+    tool : Tool
+        What marks the sheet, and its S values.
+    controller : Controller
+        The serial port's speed and buffers.
+    settings : dict of int to float
+        The controller settings that a job expects, ``{30: 1000.0}`` for ``$30=1000``.
     """
 
     name: str

@@ -115,10 +115,33 @@ class Operation:
 class Material(Shown):
     """One material on one class of laser.
 
-    ``modulus_pa`` is Young's modulus in bending, None where the file does not give it: it is
-    needed for energies in joules and for nothing else. ``creases`` holds all of
-    :data:`CREASE_KINDS`; ``relief_hole_mm`` is the diameter burnt out at a vertex, 0 for none.
-    ``grain`` is one of :data:`GRAINS`.
+    Attributes
+    ----------
+    name : str
+        The stem of the file of the material.
+    title : str
+        What lists call the material.
+    thickness_mm : float
+        The thickness of the sheet.
+    kerf_mm : float
+        The width of the cut.
+    max_power : float
+        The most power that a job may use, as a fraction of full power.
+    perforation : Perforation
+        The dashes of creases that have none of their own, mm.
+    tabs : TabRule
+        The tabs that join patches, mm.
+    operations : dict of str to Operation
+        Power, feed and passes of each operation.
+    modulus_pa : float or None
+        Young's modulus in bending, None where the file does not give it. Only energies in joules
+        need it.
+    creases : dict of str to Crease
+        How each of :data:`CREASE_KINDS` is made.
+    relief_hole_mm : float
+        The diameter burnt out at a vertex, 0 for none.
+    grain : {"none", "x", "y"}
+        The direction of the grain.
     """
 
     name: str

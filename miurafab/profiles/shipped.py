@@ -53,7 +53,7 @@ def find_file(
         return own
     if len(own.parts) > 1:
         raise error(f"{name} does not exist.")
-    name = name.removesuffix(suffix)
+    asked, name = name, name.removesuffix(suffix)
     shipped = shipped_directory(kind) / f"{name}{suffix}"
     if shipped.is_file():
         return shipped
@@ -61,4 +61,4 @@ def find_file(
     near = difflib.get_close_matches(name, names, n=1)
     hint = f"did you mean '{near[0]}'" if near else f"there are {', '.join(names)}"
     noun = _NOUN[kind]
-    raise error(f"'{name}' is not a known {noun}; {hint}, or give the path of a {suffix} file.")
+    raise error(f"'{asked}' is not a known {noun}; {hint}, or give the path of a {suffix} file.")

@@ -53,7 +53,15 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Calibration(Shown):
-    """A calibration sheet and the job directory that it was written to."""
+    """A calibration sheet and the job directory that it was written to.
+
+    Attributes
+    ----------
+    job : JobDirectory
+        What :func:`preview` and :func:`cut` take.
+    sheet : CalibrationSheet
+        The flaps, the squares and their labels.
+    """
 
     job: JobDirectory
     sheet: CalibrationSheet
@@ -90,6 +98,12 @@ def calibrate(
         For a bed that is too small.
     InputError
         For a directory that holds something else.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> mf.calibrate("test-sheet", material="card-250")
+    <Calibration test-sheet: 24 flaps, 6 squares>
     """
     directory = as_path(directory, "The job directory")
     machine_file = find_profile("firmware_profiles", machine)
@@ -177,6 +191,14 @@ def add_material(
         For a label that is not on the sheet, and for a name that cannot be one.
     ProfileError
         Where the choices do not make a material.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> _ = mf.calibrate("test-sheet")
+    >>> path, material = mf.add_material("my-card", "test-sheet", kerf="0.2mm")
+    >>> material.kerf_mm
+    0.2
     """
     name = str(as_path(name, "The material"))
     directory = as_path(directory, "The job directory")

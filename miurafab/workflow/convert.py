@@ -20,14 +20,25 @@ from miurafab.origami.formats.files import SOLIDS, WITHOUT_ANGLES, WRITTEN, load
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Conversion(Shown):
-    """A ``pattern`` that was read from ``source`` and written to ``target``; ``findings``
-    say what the format could not hold.
+    """A pattern that was read from one file and written to another.
+
+    Attributes
+    ----------
+    source, target : pathlib.Path
+        The file that was read and the file that was written.
+    pattern : CreasePattern
+        The pattern.
+    findings : tuple of Finding
+        What the format could not hold.
     """
 
     source: Path
     target: Path
     pattern: CreasePattern
     findings: tuple[Finding, ...]
+
+    def _summary(self) -> str:
+        return f"{self.source} to {self.target}: {len(self.pattern.faces_vertices)} facets"
 
     def report(self) -> dict[str, Any]:
         """The JSON answer of ``convert``."""
@@ -81,6 +92,13 @@ def convert(
         For endings and options that do not go together.
     PatternError
         For a file that cannot be read.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> mf.fit("plane", facets=(4, 4)).pattern.save("plane.fold")
+    >>> mf.convert("plane.fold", "plane.dxf")
+    <Conversion plane.fold to plane.dxf: 16 facets>
     """
     source = as_path(source, "The pattern file")
     target = new_file(target, "The file to write", WRITTEN)

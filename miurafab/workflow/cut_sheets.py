@@ -45,10 +45,22 @@ from miurafab.workflow.timeline import SheetProgress, placed
 
 @dataclass(frozen=True, repr=False)
 class CutSheet(Shown):
-    """One sheet that was cut: ``estimated_s`` before, and what the sender says after.
+    """One sheet that was cut.
 
-    ``findings`` are those of the job and of the machine that did not stop it; one with the code
-    ``resumed`` says where an interrupted sheet went on.
+    Attributes
+    ----------
+    name : str
+        The name of the sheet.
+    lines : int
+        The lines of its G-code.
+    cut_mm, travel_mm : float
+        The length of the burnt strokes and of the dark moves.
+    estimated_s : float
+        The time that the dry run gave before the cut.
+    result : StreamResult
+        What the sender says after the cut.
+    findings : tuple of Finding
+        What did not stop the job. The code ``resumed`` says where an interrupted sheet went on.
     """
 
     name: str
@@ -65,9 +77,20 @@ class CutSheet(Shown):
 
 @dataclass(frozen=True, repr=False)
 class CutOptions(Shown):
-    """How sheets are cut; ``pointer`` is a fraction of full power.
+    """How sheets are cut; :func:`cut` names each option.
 
-    ``virtual_speed`` is how much faster than real time the virtual machine runs.
+    Attributes
+    ----------
+    send : SendOptions
+        How the sender starts and watches the machine.
+    resume : bool
+        Whether to continue an interrupted job.
+    frame : bool
+        Whether to trace the box around each sheet first.
+    pointer : float
+        The beam power of the frame, as a fraction of full power.
+    virtual_speed : float or None
+        How much faster than real time the virtual machine runs.
     """
 
     send: SendOptions = field(default_factory=SendOptions)

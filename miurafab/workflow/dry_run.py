@@ -51,13 +51,32 @@ _TRAVEL, _OTHER = 0, len(LAYERS) - 1
 class SheetPreview(Shown):
     """One G-code file, dry-run.
 
-    ``lines`` of the file; ``seconds`` in all and with the beam on; ``cut_mm`` burnt and
-    ``travel_mm`` dark; ``bounds_mm`` (x0, y0, x1, y1) of the burnt strokes, None without any;
-    ``findings`` of :func:`~miurafab.machine.judge_job.judge_job`.
-    Per move of ``program``: ``layer`` (n,) int8, into :data:`LAYERS`, and ``end_seconds`` (n,)
-    float64, when it ends. ``layer_mm`` and ``layer_strokes``: length and number, by layer.
-    ``paper_mm`` is the sheet, or the bed where no sheet is known; ``view_mm`` (x0, y0, x1, y1) the
-    smallest box that holds the bed, the sheet and every move.
+    Attributes
+    ----------
+    name : str
+        The name of the sheet.
+    lines : int
+        The lines of the file.
+    seconds, beam_on_seconds : float
+        The time in all, and the time with the beam on.
+    cut_mm, travel_mm : float
+        The length of the burnt strokes and of the dark moves.
+    bounds_mm : (x0, y0, x1, y1) or None
+        The box around the burnt strokes, None without strokes.
+    findings : tuple of Finding
+        What :func:`~miurafab.machine.judge_job.judge_job` says of the file.
+    program : Program
+        The n moves of the file.
+    layer : (n,) int8
+        The layer of each move, an index into :data:`LAYERS`.
+    end_seconds : (n,) float64
+        When each move ends.
+    layer_mm, layer_strokes : tuple
+        The length and the number of the strokes of each layer.
+    paper_mm : (float, float)
+        Width and height of the sheet, or of the bed where no sheet is known.
+    view_mm : (x0, y0, x1, y1)
+        The smallest box that holds the bed, the sheet and every move.
     """
 
     name: str

@@ -287,6 +287,13 @@ def thick_panels(
         For a sheet that does not fold rigidly.
     OptionError
         For a thickness that is not positive.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> sheet = mf.fit("plane", facets=(4, 4), flat_foldable="exact")
+    >>> mf.thick_panels(sheet, "0.5mm").thickness_mm
+    0.5
     """
     panel_mm = read_value("thickness", declared(FoldOptions)["thickness"].kind, thickness)
     return make_panels(as_pattern(pattern), panel_mm, on_progress)

@@ -76,6 +76,7 @@ def read_job(directory: AnyPath) -> JobDirectory:
     Parameters
     ----------
     directory : str or os.PathLike
+        The job directory.
 
     Returns
     -------
@@ -84,7 +85,15 @@ def read_job(directory: AnyPath) -> JobDirectory:
     Raises
     ------
     InputError
-        If it holds no whole job.
+        If the directory holds no whole job.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> sheet = mf.fit("plane", facets=(4, 4))
+    >>> _ = mf.sheets(sheet).write("jobs/plane")
+    >>> len(mf.read_job("jobs/plane").dry_runs)
+    1
     """
     directory = as_path(directory, "The job directory")
     path = directory / LAYOUT

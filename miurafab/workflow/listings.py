@@ -28,10 +28,34 @@ def _defaults(entry: NamedSurface) -> str:
 
 
 def list_machines() -> dict[str, str]:
-    """List the shipped machines: the name of each profile, with its title."""
+    """List the shipped machines.
+
+    Returns
+    -------
+    dict
+        The name of each machine, with its title.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> "grbl-laser-400" in mf.list_machines()
+    True
+    """
     return {name: load_machine(name).title for name in shipped_names("firmware_profiles")}
 
 
 def list_materials() -> dict[str, str]:
-    """List the shipped materials: the name of each, with its title."""
+    """List the shipped materials.
+
+    Returns
+    -------
+    dict
+        The name of each material, with its title.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> "card-250" in mf.list_materials()
+    True
+    """
     return {name: load_material(name).title for name in shipped_names("materials")}

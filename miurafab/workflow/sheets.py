@@ -72,6 +72,8 @@ class SheetJob(Shown):
         The files of the profiles.
     pattern_file : Path, optional
         The FOLD file of the pattern, None where the pattern has none or was opened.
+    opened : bool
+        Whether the pattern was opened for the job.
     """
 
     name: str

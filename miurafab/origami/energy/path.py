@@ -77,12 +77,25 @@ class StableState:
 class EnergyCurve(Shown):
     """The energy along ``path``, with its barrier and stable states.
 
-    ``barrier`` is the highest maximum of the energy between the folded form and flat, 0 without a
-    maximum, and ``barrier_angle`` the driven angle there, or None. ``stable`` are the local minima
-    from the folded form to flat, empty if the sheet is ``rigid`` and prefers no state.
-    ``flat_energy`` is the energy of the flat sheet, ``stiffness`` d2E/d rho2 at the folded form.
-    Energies are in the units of ``path.model``, angles in radians; ``crease`` is the driven edge of
-    the pattern.
+    Attributes
+    ----------
+    path : Path
+        The states between folded and flat. Its ``model`` sets the unit of all energies.
+    crease : int
+        The driven edge of the pattern.
+    barrier : float
+        The highest maximum of the energy between the folded form and flat, 0 without a maximum.
+    barrier_angle : float or None
+        The fold angle of the driven crease at the barrier, radians; None without a barrier.
+    stable : tuple of StableState
+        The local minima from the folded form to flat, empty for a rigid sheet.
+    rigid : bool
+        Whether the sheet folds without bending, so that it prefers no state.
+    flat_energy : float
+        The energy of the flat sheet.
+    stiffness : float
+        The second derivative of the energy by the driven angle in the folded form, per radian
+        squared.
     """
 
     path: Path

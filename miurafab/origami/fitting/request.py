@@ -228,7 +228,14 @@ class FitOptions(Shown):
 class FitRequest(FitOptions):
     """What is asked of one fit: its options, and the ``surface`` that the sheet is to follow.
 
-    ``target`` describes the surface in the file. A ``size_mm`` of None is the surface's own size.
+    A ``size_mm`` of None is the surface's own size.
+
+    Attributes
+    ----------
+    surface : TargetSurface
+        The surface that the sheet follows.
+    target : dict
+        The description of the surface in the file of the pattern.
     """
 
     surface: TargetSurface = field(kw_only=True)

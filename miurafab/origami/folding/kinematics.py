@@ -41,10 +41,19 @@ _POINT = 1e-6  # of the mean edge; a shorter crease has no direction
 class FoldingMotion(Shown):
     """A folding motion of ``pattern`` in T frames.
 
-    ``states`` (T,) float64 are the values of s, 1 in the folded form. ``frames`` (T, V, 3)
-    float64, mm; ``fold_angles`` (T, E) float64, radians, valley positive. ``mismatch`` (T,) float64
-    is the loop mismatch of each frame in mean edges, or None where facets bend and loops close by
-    construction.
+    Attributes
+    ----------
+    pattern : CreasePattern
+        The pattern that folds, with V vertices and E edges.
+    states : (T,) float64
+        The state s of each frame: 0 is flat, 1 the folded form, infinity folded flat.
+    frames : (T, V, 3) float64
+        The vertices in each frame, mm.
+    fold_angles : (T, E) float64
+        Radians from flat, positive for a valley.
+    mismatch : (T,) float64 or None
+        The loop mismatch of each frame in mean edges; None where facets bend, so that loops close
+        by construction.
     """
 
     pattern: CreasePattern

@@ -43,13 +43,24 @@ folded form panels touch along their sides.
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ThickPanels(Shown):
-    """``pattern`` made of panels ``thickness_mm`` thick, folding from flat to its folded form.
+    """A pattern made of thick panels, which folds from flat to its folded form.
 
-    ``hinge_side`` (E,) is "top" where the panels close on the top (valleys), "bottom" where they
-    close on the bottom (mountains), "" on borders and flat creases. ``offset_mm`` (E,) is the
-    distance from the crease to the panels' surface on that side, infinite for a crease folded by
-    180 degrees. ``limit_mm`` (F,) is the thickness up to which each facet keeps all its sides.
-    ``collisions`` are (state, facet, facet) where trimmed panels still pass through each other.
+    Attributes
+    ----------
+    pattern : CreasePattern
+        The pattern of the panels, with E edges and F facets.
+    thickness_mm : float
+        The thickness of the panels.
+    hinge_side : (E,) str
+        "top" where the panels close on the top (valleys), "bottom" where they close on the bottom
+        (mountains), "" on borders and flat creases.
+    offset_mm : (E,) float64
+        The distance from the crease to the surface of the panels on the hinge side, infinite for
+        a crease folded by 180 degrees.
+    limit_mm : (F,) float64
+        The thickness up to which each facet keeps all its sides.
+    collisions : tuple of (float, int, int)
+        State, facet and facet where trimmed panels still pass through each other.
     """
 
     pattern: CreasePattern
