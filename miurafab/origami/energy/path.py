@@ -13,7 +13,7 @@ the higher is the barrier that keeps its folded form (Dudte et al., Nature Mater
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,6 +25,7 @@ from miurafab.files import AnyPath
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
+from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate, follow
 from miurafab.origami.energy.equilibrium import Driven, EquilibriumState, Factored, solve
 from miurafab.origami.energy.hinges import hinge_angles
 
@@ -35,9 +36,6 @@ Progress = Callable[[float, str], None]
 
 NEARLY_FLAT = math.radians(2.5)
 """The last angle of the driven crease, radians, a little short of flat."""
-HISTORY = 4
-"""The number of states for the prediction: a cubic through the last four."""
-MAX_HALVINGS = 7
 NOISE = 1e-15
 """Energies up to this, in the model's unit, are rounding; the sheet then folds rigidly."""
 MAX_FALSI = 30
@@ -284,41 +282,6 @@ def pulled_path(
     return replace(path, drives=path.drives * model.unit_mm)
 
 
-def follow(
-    driven: Driven, start: EquilibriumState, drives: Floats, on_progress: Progress | None = None
-) -> list[EquilibriumState]:
-    """The equilibria at ``drives`` (n,), the first of them near ``start``.
-
-    The polynomial through the last four states predicts the next. A step that does not converge is
-    halved, up to seven times; if that fails, the list is shorter than ``drives``.
-    """
-    known: list[_Known] = []
-    states: list[EquilibriumState] = []
-    factored: Factored | None = None
-    for number, drive in enumerate(drives):
-        goals = [float(drive)]
-        while goals:
-            guess = _extrapolate(known, goals[-1]) if known else start
-            solution = solve(driven, guess, goals[-1], factored)
-            factored = solution.factored
-            if solution.converged:
-                new = _Known(goals.pop(), solution.state)
-                known = [*(k for k in known[1 - HISTORY :] if k.drive != new.drive), new]
-            elif known and len(goals) <= MAX_HALVINGS:
-                goals.append((known[-1].drive + goals[-1]) / 2)
-            else:
-                return states
-        states.append(known[-1].state)
-        if on_progress is not None:
-            on_progress((number + 1) / len(drives), f"step {number} of {len(drives) - 1}")
-    return states
-
-
-class _Known(NamedTuple):
-    drive: float
-    state: EquilibriumState
-
-
 class _Traced(NamedTuple):
     """A path as the solver sees it; ``place`` is the index of the driven crease in the model."""
 
@@ -326,16 +289,6 @@ class _Traced(NamedTuple):
     place: int
     drives: Floats
     states: list[EquilibriumState]
-
-
-def _extrapolate(known: Sequence[_Known], drive: float) -> EquilibriumState:
-    """The polynomial through ``known`` states (Lagrange) at ``drive``."""
-    at = np.array([k.drive for k in known])
-    guess = EquilibriumState(np.zeros(()), np.zeros(()), 0.0)
-    for i, k in enumerate(known):
-        others = np.delete(at, i)
-        guess = guess.plus(k.state, float(np.prod((drive - others) / (at[i] - others))))
-    return guess
 
 
 def _trace(
@@ -402,7 +355,7 @@ def _stationary(traced: _Traced, path: Path) -> tuple[list[StableState], list[St
         first = max(0, min(int(k) - 1, len(path.drives) - HISTORY))
         near = slice(first, first + HISTORY)
         known = [
-            _Known(float(drive), state)
+            Known(float(drive), state)
             for drive, state in zip(path.drives[near], traced.states[near], strict=True)
         ]
         rising = path.loads[k] * (traced.drives[k + 1] - traced.drives[k]) > 0
@@ -411,7 +364,7 @@ def _stationary(traced: _Traced, path: Path) -> tuple[list[StableState], list[St
     return maxima, minima
 
 
-def _zero_load(driven: Driven, known: list[_Known], before: int) -> StableState:
+def _zero_load(driven: Driven, known: list[Known], before: int) -> StableState:
     """The state without load between two neighbours in ``known``, by regula falsi (Illinois)."""
     left, right = known[before], known[before + 1]
     a, b = (left.drive, left.state.mu), (right.drive, right.state.mu)
@@ -422,11 +375,11 @@ def _zero_load(driven: Driven, known: list[_Known], before: int) -> StableState:
         if abs(best.state.mu) <= ZERO_LOAD * scale:
             break
         drive = (a[0] * b[1] - b[0] * a[1]) / (b[1] - a[1])
-        solution = solve(driven, _extrapolate(known, drive), drive, factored)
+        solution = solve(driven, extrapolate(known, drive), drive, factored)
         if not solution.converged:
             break
         factored, mu = solution.factored, solution.state.mu
-        best = _Known(drive, solution.state)
+        best = Known(drive, solution.state)
         a = (a[0], a[1] / 2) if (mu < 0) == (b[1] < 0) else b
         b = (drive, mu)
     return StableState(best.drive, driven.model.energy(best.state.points))

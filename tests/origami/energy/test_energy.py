@@ -25,13 +25,13 @@ from miurafab.errors import InputError, PatternError
 from miurafab.geometry.angles import sector_angles
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.energy.bar_hinge import Paper, sheet_model
+from miurafab.origami.energy.continuation import follow
 from miurafab.origami.energy.equilibrium import Driven, EquilibriumState, solve
 from miurafab.origami.energy.hinges import hinge_angles, hinge_derivatives, hinge_gradients
 from miurafab.origami.energy.path import (
     NEARLY_FLAT,
     energy_curve,
     folding_path,
-    follow,
     pulled_path,
 )
 
