@@ -112,6 +112,7 @@ def all_options(draw):
     """Every field of the options, with the stock of the bed."""
     lines = st.lists(st.integers(1, 7), max_size=2, unique=True).map(lambda n: tuple(sorted(n)))
     pair = st.tuples(sizes(20.0, 300.0), sizes(20.0, 300.0)).map(lambda p: (max(p), min(p)))
+    bridges = draw(st.sampled_from([0, 0, 2, 3, 5]))
     given_ = LayoutOptions(
         gap_mm=draw(sizes(0.0, 5.0)),
         offcuts_mm=tuple(draw(st.lists(pair, max_size=1))),
@@ -126,8 +127,8 @@ def all_options(draw):
         tab_side=draw(st.sampled_from(TAB_SIDES)),
         full_facet=draw(st.booleans()),
         two_sided=draw(st.booleans()),
-        bridges=draw(st.sampled_from([0, 0, 2, 3, 5])),
-        bridge_mm=draw(sizes(0.1, 3.0)),
+        bridges=bridges,
+        bridge_mm=draw(sizes(0.1, 3.0)) if bridges else 0.5,
         spread_heat=draw(st.booleans()),
         nesting=NestingOptions(
             quantity=draw(st.sampled_from([1, 1, 2])),
