@@ -21,17 +21,18 @@ _AGAIN_S = 0.1
 class CtrlC:
     """``with CtrlC() as ctrl_c``, in the main thread; inactive where Ctrl-C is ignored.
 
-    At the end of the block :meth:`check` raises a ``KeyboardInterrupt`` that was dropped.
+    ``came`` says whether Ctrl-C has come. At the end of the block :meth:`check` raises a
+    ``KeyboardInterrupt`` that was dropped.
     """
 
     def __init__(self) -> None:
-        self._came = False
+        self.came = False
         self._again: threading.Timer | None = None
         self._hook: Any = None
 
     def check(self) -> None:
         """Raise ``KeyboardInterrupt`` if Ctrl-C has come."""
-        if self._came:
+        if self.came:
             raise KeyboardInterrupt
 
     def __enter__(self) -> CtrlC:
@@ -53,7 +54,7 @@ class CtrlC:
             sys.unraisablehook = self._hook
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        self._came = True
+        self.came = True
         if _loads_a_module(frame):
             self._raise_again()
         raise KeyboardInterrupt

@@ -43,20 +43,30 @@ def spelled(value: Any) -> Any:
 
 def exit_code_of(command: Callable[[], int]) -> int:
     """Run ``command``, report how it failed if it did, and return the exit code."""
+    ctrl_c = CtrlC()
     try:
-        with CtrlC() as ctrl_c:
+        with ctrl_c:
             code = command()
             if code == DONE:
                 ctrl_c.check()
             return code
     except KeyboardInterrupt:
-        return _fail("Interrupted.", "Interrupted", INTERRUPTED)
-    except MiurafabError as error:
-        return _fail(error.sentence, type(error).__name__, error.exit_code)
-    except OSError as error:
-        return _end_of_os_error(error)
+        return _interrupted()
     except Exception as error:  # noqa: BLE001 - this is the last net: nothing catches it above
-        return _defect(error)
+        # What fails after Ctrl-C fails because of it, such as a module that was half loaded.
+        return _interrupted() if ctrl_c.came else _failed(error)
+
+
+def _interrupted() -> int:
+    return _fail("Interrupted.", "Interrupted", INTERRUPTED)
+
+
+def _failed(error: Exception) -> int:
+    if isinstance(error, MiurafabError):
+        return _fail(error.sentence, type(error).__name__, error.exit_code)
+    if isinstance(error, OSError):
+        return _end_of_os_error(error)
+    return _defect(error)
 
 
 def _end_of_os_error(error: OSError) -> int:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from miurafab.errors import LayoutError
 from miurafab.fabrication.layout import SCHEMA, read_layout, write_layout
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.sheets import lay_out
+from miurafab.fabrication.sheets import Layout, lay_out
 from miurafab.profiles import OPERATIONS
 
 CUT, PERFORATE = OPERATIONS.index("cut"), OPERATIONS.index("perforate")
@@ -198,12 +198,12 @@ def test_the_file_reads_back_as_it_was_written(case):
     assert document["pattern"] == {"file": "pattern.fold", "sha256": "0" * 64}
     assert set(document["totals"]) == {
         "patches", "sheets", "seam_mm", "tabs", "density", "cut_mm", "perforated_mm",
-        "travel_mm", "seconds",
+        "travel_mm", "seconds", "sheets_bound",
     }  # fmt: skip
     again = read_layout(text)
     assert again.sheets == layout.sheets
     assert again.totals == layout.totals
-    assert not again.toolpaths
+    assert type(again) is Layout, "a file holds no toolpaths"
     assert write_layout(again, "pattern.fold", "0" * 64) == text
 
 
