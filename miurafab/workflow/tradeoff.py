@@ -12,6 +12,7 @@ import importlib.util
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -217,19 +218,26 @@ def _ignore_ctrl_c() -> None:
 
 @contextmanager
 def _deaf_children() -> Iterator[None]:
-    """Start processes here that Ctrl-C does not reach even while they load their modules.
+    """Start processes here, whole, and such that Ctrl-C does not reach them while they load.
 
-    A blocked signal stays blocked in a new process; here it comes when the block ends. Windows has
-    no such block.
+    A blocked signal stays blocked in a new process (Windows has no such block). In this process
+    Ctrl-C comes when the block ends: a process that is started half complains of its missing input.
     """
-    if not hasattr(signal, "pthread_sigmask"):
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    came: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    blocks = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if blocks else set()
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if blocks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, handler)
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _on_cluster(jobs: list[Job], address: str) -> Iterator[Sample]:
