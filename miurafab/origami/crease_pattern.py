@@ -3,6 +3,9 @@
 Arrays carry their FOLD names. A crease is an edge with an assignment (B border, M mountain,
 V valley, F flat, U unassigned, C cut, J join) and a fold angle, positive for a valley, measured
 from flat (FOLD 1.2, https://github.com/edemaine/fold).
+
+A pattern may have several pieces. They lie apart in the flat pattern and meet along seams in the
+folded form. The vertices of a seam are doubled: each piece has its own.
 """
 
 from __future__ import annotations
@@ -50,6 +53,12 @@ class CreasePattern(Shown):
         The folded form, mm. None where only the flat pattern is known.
     grid : (int, int), optional
         Columns and rows of vertices, where the vertices form a grid in row-major order.
+    pieces : (F,) int64, optional
+        The piece of each facet, numbered from 0. None for one piece.
+    seams : (S, 2) int64, optional
+        The pairs of border edges that meet in the folded form. None for no seam.
+    cells : (F, 2) int64, optional
+        The column and row of each facet in the lattice of the tessellation.
     scale : float
         The folded form lies on ``scale`` times the target.
     target : dict
@@ -68,6 +77,9 @@ class CreasePattern(Shown):
     faces_vertices: Ints
     folded_coords: Floats | None = None
     grid: tuple[int, int] | None = None
+    pieces: Ints | None = None
+    seams: Ints | None = None
+    cells: Ints | None = None
     scale: float = 1.0
     target: dict[str, Any] = field(default_factory=dict)
 
@@ -90,6 +102,17 @@ class CreasePattern(Shown):
                 raise PatternError(f"{name} refers to a vertex that does not exist.")
         if self.grid is not None and self.grid[0] * self.grid[1] != vertices:
             raise PatternError(f"The grid {self.grid} does not have {vertices} vertices.")
+        if self.cells is not None and self.cells.shape != (len(self.faces_vertices), 2):
+            raise PatternError("`cells` does not have one column and row for each facet.")
+        if self.pieces is not None:
+            _check_pieces(self.pieces, self.faces_vertices, vertices)
+        if self.seams is not None:
+            _check_seams(self.seams, self.edges_assignment)
+
+    @property
+    def pieces_count(self) -> int:
+        """The number of pieces."""
+        return 1 if self.pieces is None else int(self.pieces.max(initial=0)) + 1
 
     @property
     def name(self) -> str:
@@ -163,8 +186,9 @@ class CreasePattern(Shown):
         width, height = np.ptp(self.vertices_coords, axis=0).tolist()
         form = "with folded form" if self.folded_coords is not None else "without folded form"
         of = f", of {self.name}" if self.name else ""
+        pieces = f" in {self.pieces_count} pieces" if self.pieces_count > 1 else ""
         return (
-            f"{len(self.faces_vertices)} facets, {len(self.vertices_coords)} vertices, "
+            f"{len(self.faces_vertices)} facets{pieces}, {len(self.vertices_coords)} vertices, "
             f"{width:.4g} x {height:.4g} mm flat, {form}{of}"
         )
 
@@ -178,6 +202,7 @@ class CreasePattern(Shown):
         letters = self.edges_assignment
         return {
             "facets": len(self.faces_vertices),
+            "pieces": self.pieces_count,
             "vertices": len(self.vertices_coords),
             "mountains": int((letters == "M").sum()),
             "valleys": int((letters == "V").sum()),
@@ -194,6 +219,25 @@ class CreasePattern(Shown):
     def edges_faces(self) -> Ints:
         """(E, 2) the faces left and right of each edge in its own direction, -1 for none."""
         return self._faces_edges_and_edges_faces[1]
+
+    @cached_property
+    def seam_vertices(self) -> Ints:
+        """(S, 2, 2) the pairs of vertices that meet at the two ends of each seam.
+
+        Facets run counter-clockwise seen from one side of the sheet. So two facets run along their
+        seam in opposite directions, and the end of one edge meets the start of the other.
+
+        Raises :class:`~miurafab.errors.PatternError` for a seam edge that is no border.
+        """
+        seams = np.empty((0, 2), dtype=np.int64) if self.seams is None else self.seams
+        owners = self.edges_faces[seams] >= 0
+        inner = np.flatnonzero((owners.sum(axis=2) != 1).any(axis=1))
+        if len(inner):
+            one, other = seams[inner[0]].tolist()
+            raise PatternError(f"The seam of edges {one} and {other} does not join two borders.")
+        along = owners[:, :, :1]
+        ends = np.where(along, self.edges_vertices[seams], self.edges_vertices[seams][:, :, ::-1])
+        return np.stack([ends[:, 0], ends[:, 1, ::-1]], axis=2)
 
     @cached_property
     def _faces_edges_and_edges_faces(self) -> tuple[Ints, Ints]:
@@ -222,3 +266,34 @@ class CreasePattern(Shown):
             raise PatternError("Two facets lie on the same side of one edge.")
         edges_faces[edge, right] = face
         return faces_edges, edges_faces
+
+
+def _check_pieces(pieces: Ints, faces: Ints, vertices: int) -> None:
+    if pieces.shape != (len(faces),):
+        raise PatternError("`pieces` does not have one number for each facet.")
+    numbers = np.unique(pieces)
+    if not np.array_equal(numbers, np.arange(len(numbers))):
+        raise PatternError("`pieces` is not numbered from 0 without a gap.")
+    real = faces >= 0
+    owner = np.full(vertices, -1, dtype=np.int64)
+    each = np.broadcast_to(pieces[:, None], faces.shape)[real]
+    owner[faces[real]] = each
+    shared = np.flatnonzero(owner[faces[real]] != each)
+    if len(shared):
+        raise PatternError(
+            f"Vertex {faces[real][shared[0]]} belongs to facets of two pieces; each piece needs a "
+            "vertex of its own."
+        )
+
+
+def _check_seams(seams: Ints, assignment: NDArray[np.str_]) -> None:
+    if seams.ndim != 2 or seams.shape[1] != 2:
+        raise PatternError("`seams` is not a list of two edges each.")
+    if seams.size and (seams.min() < 0 or seams.max() >= len(assignment)):
+        raise PatternError("`seams` refers to an edge that does not exist.")
+    edges, uses = np.unique(seams, return_counts=True)
+    if (uses > 1).any():
+        raise PatternError(f"Edge {edges[uses > 1][0]} is in two seams; an edge has one mate.")
+    inner = edges[assignment[edges] != "B"]
+    if len(inner):
+        raise PatternError(f"Edge {inner[0]} is in a seam and is no border (B).")
