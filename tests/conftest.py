@@ -1,5 +1,7 @@
 """Tests are the same every time: Hypothesis draws the same examples, and the closing of a terminal
 ends programs even where the tests were started to outlive theirs.
+
+The program is imported before numpy, so that the tests have one thread of OpenBLAS, as it has.
 """
 
 import signal
