@@ -7,7 +7,6 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import sparse
 
 from miurafab.geometry.arrays import places_in_runs, run_starts
 from miurafab.geometry.polygons import (
@@ -23,7 +22,6 @@ from miurafab.geometry.polygons import (
     signed_areas,
 )
 from miurafab.geometry.shapes import common_area
-from miurafab.geometry.sparse import factor_symmetric, minimum_degree
 
 FACES = np.array([[0, 1, 2, -1, -1], [0, 2, 3, 4, 5], [5, 4, 6, 7, -1]])
 
@@ -88,15 +86,3 @@ def test_principal_axes_point_in_the_positive_direction(angle, seed):
     assert abs(axes[:, 1] @ [c, s]) > 0.9
     assert axes.T @ axes == pytest.approx(np.eye(2))
     assert (axes[np.abs(axes).argmax(axis=0), [0, 1]] > 0).all()
-
-
-@pytest.mark.parametrize("reorder", [True, False])
-def test_a_factor_solves_and_a_singular_matrix_is_refused(reorder):
-    random = np.random.default_rng(4)
-    dense = random.normal(size=(30, 30))
-    matrix = sparse.csc_array(dense @ dense.T + np.eye(30))
-    right = random.normal(size=(30, 2))
-    assert matrix @ factor_symmetric(matrix, reorder=reorder).solve(right) == pytest.approx(right)
-    assert sorted(minimum_degree(matrix).tolist()) == list(range(30))
-    with pytest.raises(RuntimeError):
-        factor_symmetric(sparse.csc_array((3, 3)), reorder=reorder)
