@@ -97,7 +97,7 @@ class MeshChart:
         domain = placement.domain
         if not covered(frame, self.faces, domain):
             raise TargetError(self._not_covered(frame))
-        edge = _median_edge(frame, self.faces)
+        edge = median_edge(frame, self.faces)
         wide = Domain(
             domain.u0 - MARGIN * domain.width,
             domain.u1 + MARGIN * domain.width,
@@ -110,7 +110,7 @@ class MeshChart:
                 f"{self.name}: only {len(points)} vertices of the mesh lie on the rectangle of the "
                 f"sheet, and {FEWEST} are needed; subdivide the triangles of the mesh."
             )
-        smoothed = smooth(places, points, wide, _spans(wide, edge, _SPANS), stiffness)
+        smoothed = smooth(places, points, wide, spans(wide, edge, _SPANS), stiffness)
         triangles = even_triangles(self.vertices, self.faces[: self.real])
         return MeshSurface(smoothed.spline, domain, triangles, placement, stiffness, self)
 
@@ -333,10 +333,10 @@ def _smoothed(points: Floats, flat: Floats, faces: Ints) -> Smoothed:
     low, high = flat.min(axis=0), flat.max(axis=0)
     domain = Domain(low[0], high[0], low[1], high[1])
     faces = faces[(faces < len(flat)).all(axis=1)]
-    return smooth(flat, points, domain, _spans(domain, _median_edge(flat, faces), _ROUGH_SPANS))
+    return smooth(flat, points, domain, spans(domain, median_edge(flat, faces), _ROUGH_SPANS))
 
 
-def _spans(domain: Domain, edge: float, most: int) -> tuple[int, int]:
+def spans(domain: Domain, edge: float, most: int) -> tuple[int, int]:
     """Knots stand about one and a half edges apart, with at most ``most`` spans to a side."""
     step = max(1.5 * edge, max(domain.width, domain.height) / most)
     return max(math.ceil(domain.width / step), 4), max(math.ceil(domain.height / step), 4)
@@ -348,5 +348,5 @@ def _within(places: Floats, points: Floats, domain: Domain) -> tuple[Floats, Flo
     return places[inside], points[inside]
 
 
-def _median_edge(points: Floats, faces: Ints) -> float:
+def median_edge(points: Floats, faces: Ints) -> float:
     return float(np.median(side_lengths(points, faces)))
