@@ -68,6 +68,16 @@ def facet_normals(points: Floats, faces: Ints) -> Floats:
         return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
+def facet_areas(points: Floats, faces: Ints) -> Floats:
+    """(F,) the areas of planar ``faces`` (F, k) in ``points`` (V, 3): half the length of the area
+    vector, sum (p_i - p_0) x (p_i+1 - p_0).
+    """
+    corners = points[filled(faces)]
+    spokes = corners - corners[:, :1]
+    vector = np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
+    return np.asarray(np.linalg.norm(vector, axis=1) / 2)
+
+
 def edge_lengths(points: Floats, edges: Ints) -> Floats:
     """(E,) the lengths of ``edges`` (E, 2) in ``points`` (V, d)."""
     return np.asarray(np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1))
