@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import trimesh
 
+from miurafab.geometry.polygons import facet_means
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.fit import FitRequest, FitResult, fit
 from miurafab.origami.miura import MiuraCell, regular_miura
@@ -35,8 +36,8 @@ def assert_mountains_and_valleys(pattern: CreasePattern) -> None:
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
     near, far = faces[pattern.edges_faces[inner, 0]], faces[pattern.edges_faces[inner, 1]]
     p = points[near]
-    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-    beyond = points[far].mean(axis=1) - points[pattern.edges_vertices[inner, 0]]
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    beyond = facet_means(points, far) - points[pattern.edges_vertices[inner, 0]]
     height = np.einsum("ek,ek->e", normal, beyond)
     letters, angles = pattern.edges_assignment[inner], pattern.edges_fold_angle[inner]
     assert set(letters) == {"M", "V"}

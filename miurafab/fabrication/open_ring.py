@@ -82,7 +82,10 @@ def open_ring(pattern: CreasePattern, axis: int, line: int) -> CreasePattern:
     letters[ends], letters[joint], angles[ends] = "B", "U", 0.0
     made = replace(
         pattern,
-        vertices_coords=turned_upright(_spliced(moved, flat, axis, line)).reshape(-1, 2),
+        vertices_coords=turned_upright(
+            _spliced(moved, flat, axis, line).reshape(-1, 2),
+            grid.edges_vertices[: parts.along.size],
+        ),
         edges_vertices=grid.edges_vertices,
         edges_assignment=letters,
         edges_fold_angle=angles,

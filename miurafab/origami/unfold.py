@@ -1,29 +1,31 @@
 """Unfolding: a developable tessellation laid flat without stretching, with its fold angles.
 
-The heading of each facet follows from that of its neighbour and the corner angles at their common
-side, first up the middle column and then along each row. The vertices follow by adding up sides.
-Both are sums of lengths and angles of the folded form, so that rounding adds up and is not
-amplified. (Placing each row from the positions of the row before amplifies rounding, by 1e8 on a
-spiral of 20 rows.) The flat pattern is isometric as far as the sheet is developable and planar;
-verification measures that independently.
+Each piece is developed by itself (:mod:`miurafab.origami.development`), turned with its rows along
+x, and laid beside the others. The flat pattern is isometric as far as the sheet is developable and
+planar; verification measures that independently.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from miurafab.geometry.angles import angle_between, fold_angles
-from miurafab.geometry.arrays import Bools, Floats
-from miurafab.geometry.polygons import facet_normals
-from miurafab.geometry.quads import QuadGrid
+from miurafab.geometry.angles import fold_angles
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import edge_lengths, facet_normals
+from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.development import Development, develop
 from miurafab.origami.tessellation import Tessellation
 
 FLAT_ANGLE = 1e-9
 """Radians; an edge with a smaller fold angle is flat and not folded."""
+
+SHELF = 3.0
+"""The width at which pieces go on above, in sides of the square that holds their boxes."""
 
 
 def unfold(
@@ -31,23 +33,104 @@ def unfold(
 ) -> CreasePattern:
     """The crease pattern of ``tessellation``, with rows along x, in the first quadrant."""
     grid = tessellation.grid
-    flat = turned_upright(_develop(tessellation.points))
-    folded = tessellation.vertices
-    edges = grid.edges_vertices
-    angle = grid_fold_angles(folded, grid)
-    border = _border(grid)
-    assignment = np.where(angle > FLAT_ANGLE, "V", np.where(angle < -FLAT_ANGLE, "M", "F"))
-    return CreasePattern(
-        vertices_coords=flat.reshape(-1, 2),
+    whole = np.ones((grid.rows - 1, grid.columns - 1), dtype=bool)
+    charts = QuadCharts.of_cells(whole)
+    return unfold_charts(charts, tessellation.vertices, scale=scale, target=target)
+
+
+def unfold_charts(
+    charts: QuadCharts,
+    points: Floats,
+    *,
+    scale: float = 1.0,
+    target: dict[str, Any] | None = None,
+) -> CreasePattern:
+    """The crease pattern of ``charts`` at ``points`` (V, 3), one piece for each chart.
+
+    A chart that does not hang together by creases gives several pieces. A chart that closes on
+    itself is opened along a seam. The pattern has ``pieces`` if there are several, ``grid`` if it
+    is one full grid and else ``cells``. Facets keep their order; vertices are ordered by piece, row
+    and column.
+    """
+    flat = develop(charts, points)
+    f = flat.faces_vertices
+    along = np.unique(np.concatenate([f[:, [0, 1]], f[:, [3, 2]]]), axis=0)
+    across = np.unique(np.concatenate([f[:, [0, 3]], f[:, [1, 2]]]), axis=0)
+    edges = np.concatenate([along, across])
+    pieces = int(flat.pieces.max()) + 1
+    seams = _seams(flat.vertices[edges])
+    grid = _full_grid(charts.cells, len(flat.vertices)) if pieces == 1 else None
+    pattern = CreasePattern(
+        vertices_coords=_laid_apart(flat, along, edges),
         edges_vertices=edges,
-        edges_assignment=np.where(border, "B", assignment),
-        edges_fold_angle=np.where(border, 0.0, angle),
-        faces_vertices=grid.faces_vertices,
-        folded_coords=folded,
-        grid=(grid.columns, grid.rows),
+        edges_assignment=np.full(len(edges), "U"),
+        edges_fold_angle=np.zeros(len(edges)),
+        faces_vertices=f,
+        folded_coords=points[flat.vertices],
+        grid=grid,
+        pieces=flat.pieces if pieces > 1 else None,
+        cells=charts.cells if grid is None else None,
         scale=scale,
         target=target or {},
     )
+    return replace(with_angles_of_the_folded_form(pattern), seams=seams if len(seams) else None)
+
+
+def _seams(ends: Ints) -> Ints:
+    """(S, 2) the pairs of edges whose ``ends`` (E, 2) are the same two vertices of the charts."""
+    ends = np.sort(ends, axis=1)
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    twice = np.flatnonzero((ends[order[1:]] == ends[order[:-1]]).all(axis=1))
+    pairs = np.stack([order[twice], order[twice + 1]], axis=1)
+    return pairs[np.argsort(pairs[:, 0])]
+
+
+def _full_grid(cells: Ints, vertices: int) -> tuple[int, int] | None:
+    """Columns and rows of vertices, if ``cells`` (F, 2) fill a grid row by row; else None."""
+    columns, rows = (np.ptp(cells, axis=0) + 1).tolist()
+    column, row = (cells - cells.min(axis=0)).T
+    in_order = np.array_equal(row * columns + column, np.arange(columns * rows))
+    whole = in_order and vertices == (columns + 1) * (rows + 1)
+    return (columns + 1, rows + 1) if whole else None
+
+
+def _laid_apart(flat: Development, along: Ints, edges: Ints) -> Floats:
+    """(V, 2) the vertices with each piece upright, the pieces apart in the first quadrant.
+
+    Pieces stand in a row, with the mean edge for a gap, and go on above at :data:`SHELF`.
+    """
+    places = flat.places.copy()
+    piece = np.empty(len(places), dtype=np.int64)
+    piece[flat.faces_vertices] = flat.pieces[:, None]
+    starts = np.flatnonzero(np.diff(piece, prepend=-1))
+    ends = np.append(starts[1:], len(places))
+    for start, end in zip(starts, ends, strict=True):
+        own = along[(along[:, 0] >= start) & (along[:, 0] < end)]
+        places[start:end] = turned_upright(places[start:end], own - start)
+    if len(starts) == 1:
+        return places
+    gap = float(edge_lengths(places, edges).mean())
+    sizes = np.stack(
+        [places[start:end].max(axis=0) for start, end in zip(starts, ends, strict=True)]
+    )
+    widest = max(SHELF * math.sqrt(float(sizes.prod(axis=1).sum())), float(sizes[:, 0].max()))
+    x = y = top = 0.0
+    for start, end, (width, height) in zip(starts, ends, sizes.tolist(), strict=True):
+        if x + width > widest and x > 0.0:
+            x, y = 0.0, top + gap
+        places[start:end] += [x, y]
+        x, top = x + width + gap, max(top, y + height)
+    return places
+
+
+def turned_upright(flat: Floats, along: Ints) -> Floats:
+    """``flat`` (V, 2) turned until its edges ``along`` (n, 2) point on average along x, with its
+    bounding box in the first quadrant.
+    """
+    c, s = (flat[along[:, 1]] - flat[along[:, 0]]).sum(axis=0)
+    length = math.hypot(c, s)
+    turned = flat @ (np.array([[c, -s], [s, c]]) / length) if length > 0 else flat
+    return np.asarray(turned - turned.min(axis=0))
 
 
 def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
@@ -72,68 +155,3 @@ def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
         edges_assignment=np.where(folds, letter, kept),
         edges_fold_angle=np.where(folds, angle, 0.0),
     )
-
-
-def grid_fold_angles(points: Floats, grid: QuadGrid) -> Floats:
-    """(E,) signed fold angles of ``points`` (V, 3) in the order of the grid's edges; borders 0."""
-    normals = facet_normals(points, grid.faces_vertices).reshape(grid.rows - 1, grid.columns - 1, 3)
-    along = np.zeros((grid.rows, grid.columns - 1))
-    across = np.zeros((grid.rows - 1, grid.columns))
-    v = grid.vertices
-    edges = np.stack([v[1:-1, :-1].ravel(), v[1:-1, 1:].ravel()], axis=1)
-    # on the left of an edge along +i lies the facet of larger j, along +j that of smaller i
-    along[1:-1] = fold_angles(
-        points, edges, normals[1:].reshape(-1, 3), normals[:-1].reshape(-1, 3)
-    ).reshape(along[1:-1].shape)
-    edges = np.stack([v[:-1, 1:-1].ravel(), v[1:, 1:-1].ravel()], axis=1)
-    across[:, 1:-1] = fold_angles(
-        points, edges, normals[:, :-1].reshape(-1, 3), normals[:, 1:].reshape(-1, 3)
-    ).reshape(across[:, 1:-1].shape)
-    return np.concatenate([along.ravel(), across.ravel()])
-
-
-def _border(grid: QuadGrid) -> Bools:
-    along = np.zeros((grid.rows, grid.columns - 1), dtype=bool)
-    across = np.zeros((grid.rows - 1, grid.columns), dtype=bool)
-    along[[0, -1]] = True
-    across[:, [0, -1]] = True
-    return np.concatenate([along.ravel(), across.ravel()])
-
-
-def _develop(points: Floats) -> Floats:
-    """(rows, columns, 2) flat positions of ``points`` (rows, columns, 3)."""
-    right = points[:, 1:] - points[:, :-1]
-    up = points[1:] - points[:-1]
-    # corner angles of each facet: lower left, lower right, upper left
-    left_corner = angle_between(right[:-1], up[:, :-1])
-    right_corner = angle_between(-right[:-1], up[:, 1:])
-    upper_corner = angle_between(right[1:], -up[:, :-1])
-
-    # the heading of each facet's lower side: up the middle column, then along each row in both
-    # directions, so that rounding adds up over half a row
-    middle = (points.shape[1] - 1) // 2
-    rising = left_corner[:, middle] + upper_corner[:, middle] - np.pi
-    first = np.concatenate([[0.0], np.cumsum(rising[:-1])])
-    turning = np.pi - right_corner[:, :-1] - left_corner[:, 1:]
-    turned = np.concatenate([np.zeros((len(first), 1)), np.cumsum(turning, axis=1)], axis=1)
-    heading = first[:, None] + turned - turned[:, [middle]]
-    last_row = heading[-1] + left_corner[-1] + upper_corner[-1] - np.pi
-    along = np.linalg.norm(right, axis=2)[..., None] * _unit(np.vstack([heading, last_row]))
-    upward = heading[:, middle] + left_corner[:, middle]
-    across = np.linalg.norm(up[:, middle], axis=1)[:, None] * _unit(upward)
-    start = np.concatenate([np.zeros((1, 2)), np.cumsum(across, axis=0)])
-    steps = np.concatenate([np.zeros((len(start), 1, 2)), np.cumsum(along, axis=1)], axis=1)
-    return np.asarray(start[:, None, :] + steps - steps[:, [middle]])
-
-
-def _unit(angle: Floats) -> Floats:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def turned_upright(flat: Floats) -> Floats:
-    """``flat`` with its mean row direction along x, its bounding box in the first quadrant."""
-    heading = flat[:, -1] - flat[:, 0]
-    mean = heading.sum(axis=0)
-    c, s = mean / np.linalg.norm(mean)
-    turned = flat @ np.array([[c, -s], [s, c]])
-    return np.asarray(turned - turned.reshape(-1, 2).min(axis=0))
