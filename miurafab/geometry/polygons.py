@@ -10,6 +10,8 @@ import itertools
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Floats, Ints
 
@@ -36,6 +38,20 @@ def reversed_faces(faces: Ints) -> Ints:
     sizes = (faces >= 0).sum(axis=1)[:, None]
     slot = np.arange(faces.shape[1])
     return np.take_along_axis(faces, np.where(slot < sizes, sizes - 1 - slot, slot), axis=1)
+
+
+def connected_parts(faces: Ints) -> tuple[int, Ints]:
+    """The number of parts of ``faces`` (F, k), and the part (F,) of each face.
+
+    Faces with a common corner belong to one part. Parts are numbered by their first face.
+    """
+    face, corner = np.nonzero(faces >= 0)
+    vertex = faces[face, corner] + len(faces)
+    count = len(faces) + int(faces.max(initial=-1)) + 1
+    graph = coo_array((np.ones(len(face)), (face, vertex)), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    _, first, part = np.unique(label[: len(faces)], return_index=True, return_inverse=True)
+    return len(first), np.argsort(np.argsort(first))[part].astype(np.int64)
 
 
 def sides_and_diagonals(faces: Ints) -> Iterator[tuple[Ints, Ints]]:

@@ -103,7 +103,7 @@ class CreasePattern(Shown):
         if self.grid is not None and self.grid[0] * self.grid[1] != vertices:
             raise PatternError(f"The grid {self.grid} does not have {vertices} vertices.")
         if self.cells is not None and self.cells.shape != (len(self.faces_vertices), 2):
-            raise PatternError("`cells` does not have one column and row for each facet.")
+            raise PatternError("The cells do not have one column and row for each facet.")
         if self.pieces is not None:
             _check_pieces(self.pieces, self.faces_vertices, vertices)
         if self.seams is not None:
@@ -270,10 +270,10 @@ class CreasePattern(Shown):
 
 def _check_pieces(pieces: Ints, faces: Ints, vertices: int) -> None:
     if pieces.shape != (len(faces),):
-        raise PatternError("`pieces` does not have one number for each facet.")
+        raise PatternError("The pieces do not have one number for each facet.")
     numbers = np.unique(pieces)
     if not np.array_equal(numbers, np.arange(len(numbers))):
-        raise PatternError("`pieces` is not numbered from 0 without a gap.")
+        raise PatternError("The pieces are not numbered from 0 without a gap.")
     real = faces >= 0
     owner = np.full(vertices, -1, dtype=np.int64)
     each = np.broadcast_to(pieces[:, None], faces.shape)[real]
@@ -288,9 +288,9 @@ def _check_pieces(pieces: Ints, faces: Ints, vertices: int) -> None:
 
 def _check_seams(seams: Ints, assignment: NDArray[np.str_]) -> None:
     if seams.ndim != 2 or seams.shape[1] != 2:
-        raise PatternError("`seams` is not a list of two edges each.")
+        raise PatternError("The seams are not a list of two edges each.")
     if seams.size and (seams.min() < 0 or seams.max() >= len(assignment)):
-        raise PatternError("`seams` refers to an edge that does not exist.")
+        raise PatternError("A seam refers to an edge that does not exist.")
     edges, uses = np.unique(seams, return_counts=True)
     if (uses > 1).any():
         raise PatternError(f"Edge {edges[uses > 1][0]} is in two seams; an edge has one mate.")

@@ -58,7 +58,7 @@ def test_a_pattern_without_pieces_is_one_piece_without_seams() -> None:
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"pieces": np.array([0])}, "pieces.*one number for each facet"),
+        ({"pieces": np.array([0])}, "one number for each facet"),
         ({"pieces": np.array([0, 2])}, "numbered from 0 without a gap"),
         ({"pieces": np.array([-1, 0])}, "numbered from 0 without a gap"),
         (

@@ -5,6 +5,11 @@ and the frames of a folding motion follow. In files of other programs the flat p
 frame, facets may run clockwise or be missing, and fold angles may have to come from the folded form
 (FOLD 1.2, https://github.com/edemaine/fold/blob/main/doc/spec.md).
 
+A pattern of several pieces has the keys ``miurafab:pieces`` (the piece of each facet) and
+``miurafab:seams`` (pairs of border edges that meet in the folded form). Without the first, the
+parts of the pattern that do not touch are its pieces. ``miurafab:cells`` has the column and row of
+each facet where they do not fill the grid of ``miurafab:grid``.
+
 Numbers have as many digits as are needed to read them back bit for bit. The same pattern gives the
 same bytes.
 """
@@ -25,7 +30,12 @@ from numpy.typing import NDArray
 from miurafab.errors import PatternError
 from miurafab.files import read_text
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.polygons import filled, reversed_faces, signed_areas
+from miurafab.geometry.polygons import (
+    connected_parts,
+    filled,
+    reversed_faces,
+    signed_areas,
+)
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.formats.planar_graph import faces_of_plane_graph
@@ -74,6 +84,13 @@ def fold_text(pattern: CreasePattern, title: str = "", motion: FoldingMotion | N
         keys["file_frames"] = frames
     if pattern.grid is not None:
         keys["miurafab:grid"] = list(pattern.grid)
+    for name, numbers in (
+        ("cells", pattern.cells),
+        ("pieces", pattern.pieces),
+        ("seams", pattern.seams),
+    ):
+        if numbers is not None:
+            keys[f"miurafab:{name}"] = numbers.tolist()
     if pattern.target:
         keys["miurafab:target"] = pattern.target
         keys["miurafab:scale"] = pattern.scale
@@ -164,6 +181,9 @@ def parse_fold(document: Any) -> CreasePattern:
         faces_vertices=faces,
         folded_coords=_folded(others, len(flat), factor),
         grid=_grid(document, len(flat)),
+        pieces=_pieces(document, faces),
+        seams=_numbers(document, "miurafab:seams", 2),
+        cells=_numbers(document, "miurafab:cells", 2),
         scale=_scale(document),
         target=_target(document),
     )
@@ -325,6 +345,31 @@ def _grid(document: Mapping[str, Any], vertices: int) -> tuple[int, int] | None:
     ):
         raise PatternError(f"'miurafab:grid' is {grid}, which does not give {vertices} vertices.")
     return grid[0], grid[1]
+
+
+def _pieces(document: Mapping[str, Any], faces: Ints) -> Ints | None:
+    """The file's pieces, or else the parts of the pattern that do not touch; None for one."""
+    given = _numbers(document, "miurafab:pieces", None)
+    if given is not None:
+        return given
+    count, part = connected_parts(faces)
+    return part if count > 1 else None
+
+
+def _numbers(document: Mapping[str, Any], key: str, width: int | None) -> Ints | None:
+    """The whole numbers (n,), or (n, ``width``), under ``key``; None where the key is missing."""
+    given = document.get(key)
+    if given is None:
+        return None
+    try:
+        numbers = np.array(given)
+    except ValueError:
+        numbers = np.empty(0)
+    shaped = numbers.ndim == 1 if width is None else numbers.shape[1:] == (width,)
+    if not shaped or numbers.dtype.kind != "i":
+        what = "whole numbers" if width is None else f"{width} whole numbers each"
+        raise PatternError(f"'{key}' is not a list of {what}.")
+    return numbers.astype(np.int64)
 
 
 def _scale(document: Mapping[str, Any]) -> float:

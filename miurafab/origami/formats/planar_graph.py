@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.boxes import meeting_pairs
+from miurafab.geometry.polygons import connected_parts, filled
 from miurafab.origami.crease_pattern import CreasePattern
 
 TOLERANCE = 1e-4
@@ -56,10 +57,10 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
     Ends within ``tolerance`` (mm; default :data:`TOLERANCE` of the median line) of each other are
     one vertex, an end within ``tolerance`` of a line lies on the line, and crossing lines get a
     vertex. A mountain or valley of unknown angle is folded flat. Lines that bound no facet are left
-    out.
+    out. The parts of a drawing that lie apart are the pieces of the pattern.
 
-    Raises :class:`~miurafab.errors.PatternError` if the lines enclose no facet, or if the drawing
-    has separate pieces.
+    Raises :class:`~miurafab.errors.PatternError` if the lines enclose no facet, or if a part of
+    the drawing lies loose inside a facet of another.
     """
     if not len(lines.ends):
         raise PatternError("The drawing holds no straight line.")
@@ -72,15 +73,13 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
     points, sides, source = _without_loose_ends(points, sides, source)
     if not len(sides):
         raise PatternError("The lines of the drawing enclose no facet; is the border there?")
-    pieces, _ = connected_components(_graph(sides, len(points)), directed=False)
-    if pieces > 1:
-        raise PatternError(
-            f"The drawing falls into {pieces} pieces that do not touch; put one pattern in a file, "
-            "or give a larger `tolerance`."
-        )
     faces = faces_of_plane_graph(points, sides)
     letter = lines.assignment[source]
-    faces = _without_holes(faces, sides, letter, len(points))
+    pieces, piece = connected_parts(faces)
+    whole = _without_holes(faces, piece, sides, letter, len(points))
+    faces, piece = faces[whole], piece[whole]
+    if pieces > 1:
+        _refuse_loose(points, faces, piece)
     count = _sides_of_faces(faces, sides, len(points))
     keep = count > 0
     sides, source, letter, count = sides[keep], source[keep], letter[keep], count[keep]
@@ -97,6 +96,7 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
         edges_assignment=letter,
         edges_fold_angle=angle,
         faces_vertices=renumber[faces],
+        pieces=piece if pieces > 1 else None,
     )
 
 
@@ -219,12 +219,32 @@ def _without_loose_ends(points: Floats, sides: Ints, source: Ints) -> tuple[Floa
     return points[used], renumber[sides], source
 
 
-def _without_holes(faces: Ints, sides: Ints, letter: NDArray[np.str_], vertices: int) -> Ints:
-    """Without the facets that only border lines enclose, unless all facets are such."""
+def _without_holes(
+    faces: Ints, piece: Ints, sides: Ints, letter: NDArray[np.str_], vertices: int
+) -> Bools:
+    """(F,) all but the facets that only border lines enclose; in a piece of only such, all."""
     face, side = _face_sides(faces, sides, vertices)
     cut = np.isin(letter[side], ("B", "C"))
     creased = np.bincount(face, ~cut, minlength=len(faces)) > 0
-    return faces[creased] if creased.any() else faces
+    bare = np.bincount(piece, creased) == 0
+    return np.asarray(creased | bare[piece])
+
+
+def _refuse_loose(points: Floats, faces: Ints, piece: Ints) -> None:
+    """Refuse a piece that lies inside a facet of another: its first corner shows it."""
+    start, end = points[filled(faces)], np.roll(points[filled(faces)], -1, axis=1)
+    for number in range(int(piece.max()) + 1):
+        x, y = points[faces[np.argmax(piece == number), 0]]
+        over = (start[..., 1] > y) != (end[..., 1] > y)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            part = (y - start[..., 1]) / (end[..., 1] - start[..., 1])
+            right = over & (start[..., 0] + part * (end[..., 0] - start[..., 0]) > x)
+        inside = (right.sum(axis=1) % 2 == 1) & (piece != number)
+        if inside.any():
+            raise PatternError(
+                f"A part of the drawing, at ({x:.6g}, {y:.6g}), lies loose inside a facet of "
+                "another; join them by a crease, or give a larger `tolerance`."
+            )
 
 
 def _sides_of_faces(faces: Ints, sides: Ints, vertices: int) -> Ints:

@@ -10,14 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from problems import fitted, regular
+from piece_problems import gores, trimmed, two_pieces, two_trimmed_pieces
+from problems import CELL, fitted, regular
 
 from miurafab.errors import PatternError
+from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.kinematics import rigid_motion, states_between
 from miurafab.origami.formats.fold import fold_text, parse_fold, read_fold, write_fold
+from miurafab.origami.miura import regular_miura
+from miurafab.origami.unfold import unfold_charts
 
 
 def document(pattern: CreasePattern | None = None) -> dict[str, Any]:
@@ -36,6 +40,10 @@ def same(one: CreasePattern, other: CreasePattern) -> bool:
         and np.array_equal(one.faces_vertices, other.faces_vertices)
         and bool(np.abs(one.edges_fold_angle - other.edges_fold_angle).max() < 1e-14)
         and one.grid == other.grid
+        and all(
+            np.array_equal(getattr(one, name), getattr(other, name))
+            for name in ("pieces", "seams", "cells")
+        )
         and one.target == other.target
         and one.scale == other.scale
     )
@@ -53,6 +61,38 @@ def test_a_fitted_sheet_is_read_back_as_it_was(tmp_path: Path) -> None:
     assert {k: v for k, v in first.items() if k != "edges_foldAngle"} == {
         k: v for k, v in second.items() if k != "edges_foldAngle"
     }
+
+
+@pytest.mark.parametrize("make", [two_pieces, gores, trimmed, two_trimmed_pieces])
+def test_pieces_and_trimmed_facets_are_read_back_as_they_were(make: Any) -> None:
+    pattern = make()
+    written = json.loads(fold_text(pattern))
+    assert same(parse_fold(written), pattern)
+    assert "miurafab:grid" not in written
+    assert len(written["miurafab:cells"]) == len(written["faces_vertices"])
+    assert ("miurafab:pieces" in written) == (pattern.pieces_count > 1)
+
+
+@settings(max_examples=30)
+@given(
+    kept=st.integers(0, 2**20 - 1).map(lambda bits: [bits >> n & 1 for n in range(20)]),
+    after=st.integers(1, 4),
+)
+def test_any_cells_in_any_pieces_are_read_back(kept: list[int], after: int) -> None:
+    cells = np.array(kept, dtype=bool).reshape(4, 5)
+    cells[0, 0] = True
+    charts = QuadCharts.of_cells(cells, (np.arange(5) >= after).astype(np.int64))
+    used = np.unique(QuadCharts.of_cells(np.ones((4, 5), dtype=bool)).faces_vertices[cells.ravel()])
+    pattern = unfold_charts(charts, regular_miura(CELL, 6, 5).vertices[used])
+    assert same(parse_fold(json.loads(fold_text(pattern))), pattern)
+
+
+def test_parts_that_do_not_touch_are_pieces_in_the_file_of_another_program() -> None:
+    written = json.loads(fold_text(two_pieces()))
+    del written["miurafab:pieces"], written["miurafab:seams"], written["miurafab:cells"]
+    found = parse_fold(written)
+    assert np.array_equal(found.pieces, two_pieces().pieces)
+    assert found.seams is None
 
 
 def test_the_frames_of_a_motion_follow_the_folded_form() -> None:
@@ -158,6 +198,15 @@ def test_mixed_polygons_are_padded() -> None:
         ({"file_frames": [{"frame_inherit": True, "frame_parent": 7}]}, "inherits 7"),
         ({"miurafab:grid": [3, 3]}, "miurafab:grid"),
         ({"miurafab:scale": -1}, "miurafab:scale"),
+        ({"miurafab:pieces": [0]}, "one number for each facet"),
+        ({"miurafab:pieces": 3}, "'miurafab:pieces' is not a list of whole numbers"),
+        ({"miurafab:pieces": [0.5] * 6}, "'miurafab:pieces' is not a list of whole numbers"),
+        ({"miurafab:pieces": [0, 0, 0, 0, 0, 1]}, "facets of two pieces"),
+        ({"miurafab:seams": [[0, 1, 2]]}, "'miurafab:seams' is not a list of 2 whole numbers"),
+        ({"miurafab:seams": [[0], [1, 2]]}, "'miurafab:seams' is not a list of 2 whole numbers"),
+        ({"miurafab:seams": [[0, 17]]}, "edge that does not exist"),
+        ({"miurafab:seams": [[0, 4]]}, "Edge 4 is in a seam and is no border"),
+        ({"miurafab:cells": [[0, 0]]}, "one column and row for each facet"),
     ],
 )
 def test_a_fault_is_named(change: dict[str, Any], words: str) -> None:
@@ -183,7 +232,7 @@ def test_the_same_pattern_gives_the_same_bytes() -> None:
 def test_any_value_in_any_place_is_read_or_refused_in_a_sentence() -> None:
     values = [None, [], {}, "x", -1, 1e400, [1], [[1, 2]], 3.5, True, [None], [[None, None]], "M"]
     random = Random(1)
-    text = fold_text(regular(4, 3))
+    text = fold_text(two_pieces(5, 3, 2))
     refused = []
     for _ in range(600):
         damaged = json.loads(text)

@@ -86,9 +86,26 @@ def test_what_is_no_pattern_is_refused() -> None:
         pattern_from_lines(drawn())
     with pytest.raises(PatternError, match="enclose no facet"):
         pattern_from_lines(drawn(("M", 0, 0, 1, 0)))
+    loose = [(letter, *(0.5 + 0.25 * at for at in ends)) for letter, *ends in SQUARE]
+    with pytest.raises(PatternError, match=r"at \(0.5, 0.5\), lies loose inside a facet"):
+        pattern_from_lines(drawn(*SQUARE, *loose))
+
+
+def test_parts_that_lie_apart_are_pieces() -> None:
     apart = [(letter, x0 + 5, y0, x1 + 5, y1) for letter, x0, y0, x1, y1 in SQUARE]
-    with pytest.raises(PatternError, match="2 pieces"):
-        pattern_from_lines(drawn(*SQUARE, *apart))
+    found = pattern_from_lines(drawn(*SQUARE, ("M", 0, 0, 2, 2), *apart))
+    assert found.pieces_count == 2
+    assert sorted((found.faces_vertices >= 0).sum(axis=1).tolist()) == [3, 3, 4]
+    assert np.bincount(found.pieces).tolist() in ([2, 1], [1, 2])
+
+
+def test_a_piece_may_lie_in_the_hole_of_another() -> None:
+    inner = [(letter, *(0.9 + 0.1 * at for at in ends)) for letter, *ends in SQUARE]
+    hole = [(letter, *(0.5 + 0.5 * at for at in ends)) for letter, *ends in SQUARE]
+    creases = (("V", 0, 0, 0.5, 0.5), ("V", 2, 2, 1.5, 1.5))
+    found = pattern_from_lines(drawn(*SQUARE, *hole, *creases, *inner))
+    assert found.pieces_count == 2
+    assert len(found.faces_vertices) == 3
 
 
 def test_a_concave_outline_is_gone_round_counter_clockwise() -> None:
