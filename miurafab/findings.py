@@ -55,6 +55,7 @@ RULES = {
     "no-target": Rule("note", "distances left out, since the target is missing or has changed"),
     "degenerate-edge": Rule("refusal", "an edge too short to be creased or cut"),
     "overlap": Rule("refusal", "facets that overlap in the flat pattern"),
+    "seam": Rule("refusal", "a seam whose two edges differ in length or do not meet when folded"),
     "planarity": Rule("refusal", "a facet that is not flat in the folded form"),
     "developability": Rule(
         "refusal", "an interior vertex whose angles do not add up to 360 degrees"
@@ -65,6 +66,7 @@ RULES = {
     "no-creases": Rule("note", "a format that holds a shape and no creases"),
     "no-folded-form": Rule("note", "a format that does not hold the folded form"),
     "no-fold-angles": Rule("note", "a format that tells mountains from valleys and no fold angles"),
+    "no-seams": Rule("note", "a format that does not hold which edges meet along seams"),
     "assumed-folded-flat": Rule("note", "a file without fold angles, taken as folded flat"),
     # A pattern, folded (miurafab.studio.work)
     "bent-facets": Rule("note", "a pattern that does not fold rigidly"),

@@ -137,3 +137,22 @@ def isometry(pattern: CreasePattern) -> Floats:
         difference = np.where(sound, np.abs(flat - folded) / np.where(sound, longer, 1.0), 0.0)
         worst[facets] = np.maximum(worst[facets], difference)
     return worst
+
+
+def seam_gaps(pattern: CreasePattern) -> Floats:
+    """(S,) how far the two edges of each seam are from being one, in mean edges.
+
+    It is the difference of their lengths when flat or, if larger, the distance of their ends in the
+    folded form.
+    """
+    pairs = pattern.seam_vertices
+    if not len(pairs):
+        return np.empty(0)
+    ends = pattern.vertices_coords[pairs]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=2)
+    gaps = np.abs(lengths[:, 1] - lengths[:, 0])
+    if pattern.folded_coords is not None:
+        ends = pattern.folded_coords[pairs]
+        gaps = np.maximum(gaps, np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1))
+    mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
+    return np.asarray(gaps / mean)

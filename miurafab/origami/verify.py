@@ -214,13 +214,16 @@ def _findings(pattern: CreasePattern, measured: Measurements) -> list[Finding]:
             )
         )
     if measured.overlaps:
-        pairs = overlaps(pattern)
+        found.append(_overlap(pattern))
+    gaps = invariants.seam_gaps(pattern)
+    open_seams = np.flatnonzero(~(gaps <= EXACT))
+    if len(open_seams):
         found.append(
             Finding(
-                "overlap",
-                f"{len(pairs)} pairs of facets overlap in the flat pattern, the first being facets "
-                f"{pairs[0][0]} and {pairs[0][1]}: it cannot be cut from one piece.",
-                tuple(np.unique(pairs).tolist()),
+                "seam",
+                f"{_these(open_seams, 'seam')} not closed: the two edges differ by up to "
+                f"{gaps[open_seams].max():.1e} mean edges in length or in place.",
+                tuple(open_seams.tolist()),
             )
         )
     if pattern.folded_coords is None:
@@ -237,6 +240,25 @@ def _findings(pattern: CreasePattern, measured: Measurements) -> list[Finding]:
             )
         )
     return found
+
+
+def _overlap(pattern: CreasePattern) -> Finding:
+    pairs = overlaps(pattern)
+    within = pairs
+    if pattern.pieces is not None:
+        within = pairs[pattern.pieces[pairs[:, 0]] == pattern.pieces[pairs[:, 1]]]
+    (one, other), *_ = pairs if not len(within) else within
+    if len(within):
+        sentence = (
+            f"{len(within)} pairs of facets overlap in the flat pattern, the first being facets "
+            f"{one} and {other}: it cannot be cut from one piece."
+        )
+    else:
+        sentence = (
+            f"Pieces lie on each other in the flat pattern ({len(pairs)} pairs of facets, the "
+            f"first being {one} and {other}): they have to lie apart."
+        )
+    return Finding("overlap", sentence, tuple(np.unique(pairs).tolist()))
 
 
 def _inexact(pattern: CreasePattern, folded: Floats) -> list[Finding]:

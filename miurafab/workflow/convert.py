@@ -46,6 +46,7 @@ class Conversion(Shown):
         return {
             "file": str(self.target),
             "facets": len(self.pattern.faces_vertices),
+            "pieces": self.pattern.pieces_count,
             "vertices": len(self.pattern.vertices_coords),
             "edges": {
                 letter: int((letters == letter).sum())
@@ -111,6 +112,9 @@ def convert(
     elif ending != ".fold":
         if pattern.folded_coords is not None:
             findings.append(_loss("no-folded-form", target, "does not hold the folded form"))
+        if pattern.seams is not None:
+            says = "does not hold which edges meet along seams"
+            findings.append(_loss("no-seams", target, says))
         if ending in WITHOUT_ANGLES:
             says = "tells mountains from valleys and no fold angles"
             findings.append(_loss("no-fold-angles", target, says))

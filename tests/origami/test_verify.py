@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from piece_problems import two_pieces
 from problems import CELL, fitted, regular
 from test_contact import fan, rolled
 
@@ -65,6 +66,33 @@ def test_a_vertex_of_the_folded_form_lifted_is_a_fault_of_all_that_hang_on_it():
     assert found["planarity"] == facets_at(pattern, vertex)
     assert vertex in found["developability"]
     assert set(found["developability"]) <= {vertex, vertex - 1, vertex + 1, vertex - 9, vertex + 9}
+
+
+def test_a_seam_that_gapes_is_a_fault_of_that_seam_alone():
+    pattern = two_pieces()
+    second = pattern.faces_vertices[pattern.pieces == 1]
+    shift = np.zeros((len(pattern.vertices_coords), 3))
+    shift[np.unique(second)] = [0.0, 0.0, 1e-6]
+    broken = replace(pattern, folded_coords=pattern.folded_coords + shift)
+    assert codes(broken) == {"seam": tuple(range(len(pattern.seams)))}
+
+
+def test_a_seam_whose_edges_differ_in_length_is_found_without_a_folded_form():
+    pattern = two_pieces()
+    edge = pattern.edges_vertices[pattern.seams[0, 1]]
+    flat = moved(pattern.vertices_coords, edge[0], 0.0, -1e-6)
+    broken = replace(pattern, vertices_coords=flat, folded_coords=None)
+    assert codes(broken) == {"seam": (0,)}
+
+
+def test_pieces_that_lie_on_each_other_when_flat_are_told_from_facets_that_do():
+    pattern = two_pieces()
+    second = np.unique(pattern.faces_vertices[pattern.pieces == 1])
+    flat = pattern.vertices_coords.copy()
+    flat[second, 0] -= flat[second, 0].min()
+    finding = audit(replace(pattern, vertices_coords=flat)).findings
+    assert [f.code for f in finding] == ["overlap"]
+    assert "Pieces lie on each other" in finding[0].sentence
 
 
 def test_a_corner_vertex_lifted_off_its_facet_spoils_no_developability():

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+from piece_problems import gores, trimmed, two_pieces, two_trimmed_pieces
 from problems import fitted, regular, saddle_mesh
 
 from miurafab.errors import InputError, PatternError
@@ -54,6 +56,44 @@ def test_there_and_back_is_the_same_pattern(saved: Path, ending: str) -> None:
     else:
         assert "no fold angles" in lost[0].sentence
         assert rigid_motion(last, states_between(last, 5)).is_rigid
+
+
+@pytest.mark.parametrize("make", [two_pieces, gores, trimmed, two_trimmed_pieces])
+@pytest.mark.parametrize("ending", [".fold", ".svg", ".cp", ".opx", ".dxf"])
+def test_pieces_and_trimmed_facets_go_there_and_back(make, ending: str, tmp_path: Path) -> None:
+    pattern, first, middle = make(), tmp_path / "first.fold", tmp_path / f"middle{ending}"
+    pattern.save(first)
+    lost = {finding.code for finding in convert(first, middle).findings}
+    assert ("no-seams" in lost) == (pattern.seams is not None and ending != ".fold")
+    last = load(middle)
+    assert last.pieces_count == pattern.pieces_count
+    sizes = [np.sort((p.faces_vertices >= 0).sum(axis=1)) for p in (last, pattern)]
+    assert np.array_equal(*sizes)
+    for letter in "BMV":
+        same = (last.edges_assignment == letter).sum() == (pattern.edges_assignment == letter).sum()
+        assert same
+    of_pieces = [np.sort(np.bincount(p.pieces)) for p in (last, pattern) if p.pieces is not None]
+    assert len(of_pieces) == 0 or np.array_equal(*of_pieces)
+
+
+@pytest.mark.parametrize("make", [two_pieces, two_trimmed_pieces])
+def test_solids_hold_every_piece(make, tmp_path: Path) -> None:
+    pattern = make()
+    flat, folded = tmp_path / "flat.obj", tmp_path / "folded.obj"
+    pattern.save(flat, form="flat")
+    pattern.save(folded, form="folded")
+    read = load(flat, folded=folded)
+    assert read.pieces_count == 2
+    assert np.array_equal(read.faces_vertices, pattern.faces_vertices)
+    assert np.array_equal(read.folded_coords, pattern.folded_coords)
+    assert audit(read).valid
+    triangles = int(((pattern.faces_vertices >= 0).sum(axis=1) - 2).sum())
+    pattern.save(tmp_path / "sheet.stl")
+    assert (tmp_path / "sheet.stl").stat().st_size == 84 + 50 * triangles
+    pattern.save(tmp_path / "sheet.glb")
+    scene = trimesh.load(tmp_path / "sheet.glb")
+    front_and_back = [len(part.faces) for part in scene.geometry.values()]
+    assert front_and_back == [triangles, triangles]
 
 
 def test_two_obj_files_make_the_pattern_again(saved: Path) -> None:

@@ -1,8 +1,9 @@
 """A pattern from two Wavefront OBJ files: the same mesh lying flat and folded.
 
 Many research codes store their origami in this way. Both files must list vertices and facets in the
-same order; the fold angles follow from the folded form. OBJ has no unit: one unit is read as 1 mm.
-(Wavefront, Advanced Visualizer manual, appendix B1: the ``v`` and ``f`` statements.)
+same order. The fold angles follow from the folded form; parts that do not touch are pieces. OBJ has
+no unit: one unit is read as 1 mm. (Wavefront, Advanced Visualizer manual, appendix B1: the ``v``
+and ``f`` statements.)
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from miurafab.errors import PatternError
 from miurafab.files import read_text
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.polygons import next_corners, reversed_faces, signed_areas
+from miurafab.geometry.polygons import connected_parts, next_corners, reversed_faces, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.unfold import with_angles_of_the_folded_form
@@ -44,6 +45,7 @@ def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
     if areas.sum() < 0:
         faces = reversed_faces(faces)
     edges = _edges(faces)
+    pieces, piece = connected_parts(faces)
     pattern = CreasePattern(
         vertices_coords=plane,
         edges_vertices=edges,
@@ -51,6 +53,7 @@ def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
         edges_fold_angle=np.zeros(len(edges)),
         faces_vertices=faces,
         folded_coords=shape,
+        pieces=piece if pieces > 1 else None,
     )
     try:
         return with_angles_of_the_folded_form(pattern)
