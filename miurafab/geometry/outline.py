@@ -19,9 +19,6 @@ from miurafab.geometry.arrays import Bools, Floats, Ints
 _PAIRS = 2_000_000
 """Points are taken in blocks of so many pairs of point and side, for the memory."""
 
-CROSSED = 1e-9
-"""A side crosses a cell if more than this part of the cell lies on each side of it."""
-
 
 @dataclass(frozen=True, eq=False)
 class Outline:
@@ -106,16 +103,19 @@ class Outline:
         """(n,) the signed distance of ``points`` (n, 2), positive inside."""
         return self.nearest(points)[0]
 
-    def shares(self, u: Floats, v: Floats) -> Floats:
+    def shares(self, u: Floats, v: Floats, zigzag: float = 0.0) -> Floats:
         """(rows, columns) the part of each cell between the lines ``u`` (columns + 1,) and ``v``
         (rows + 1,) that lies in the region.
+
+        The corners on even lines u are moved by ``-zigzag / 2`` along v, the others by
+        ``+zigzag / 2``.
         """
-        low_u, low_v = np.meshgrid(u[:-1], v[:-1])
-        high_u, high_v = np.meshgrid(u[1:], v[1:])
-        cells = shapely.box(low_u, low_v, high_u, high_v)
-        return np.asarray(shapely.area(shapely.intersection(self._polygon, cells))) / (
-            (high_u - low_u) * (high_v - low_v)
-        )
+        shift = ((np.arange(len(u)) % 2) - 0.5) * zigzag
+        lattice = np.stack(np.broadcast_arrays(u[None, :], v[:, None] + shift), axis=-1)
+        corners = (lattice[:-1, :-1], lattice[:-1, 1:], lattice[1:, 1:], lattice[1:, :-1])
+        cells = shapely.polygons(np.stack(corners, axis=2))
+        common = shapely.area(shapely.intersection(self._polygon, cells))
+        return np.asarray(common / shapely.area(cells))
 
     def along(self, start: tuple[int, Floats], end: tuple[int, Floats]) -> Floats:
         """(m, 2) the corners of the loop from ``start`` to ``end``, in the loop's direction.

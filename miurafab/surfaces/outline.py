@@ -1,11 +1,12 @@
 """A disk mesh with its own outline as a target: all of the mesh, not a rectangle of it.
 
-The layout of the mesh is turned by an angle, as for a rectangle. The domain is the box around the
-layout and a margin, and one spline through all vertices of the mesh is the target over it. The
-outline is the border of the layout. Beyond it the spline goes on for the cells that the outline
-cuts, and no farther: a spline means nothing far from its data.
+One spline through all vertices of the layout is the target; turning the layout turns its parameters
+only. The domain is the box around the turned layout and a margin. The outline is the border of the
+layout. Beyond it the spline goes on for the cells that the outline cuts, and no farther: a spline
+means nothing far from its data.
 
-A lattice of cells lies over the domain. A cell is kept if it meets the region inside the outline.
+A lattice of cells lies over the domain. The rows of vertices of a sheet zig-zag: the corners on
+every other line across are moved along v. A cell is kept if it meets the region inside the outline.
 A kept cell that the outline cuts is at the rim: there the sheet has to reach out at least as far as
 the middle p = S(c) of its cell, along the outward direction across the outline
 
@@ -18,7 +19,7 @@ a point of the sheet is inside where its nearest point of the spline has a signe
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -35,18 +36,18 @@ from miurafab.surfaces.mesh_repair import even_triangles
 from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.placement import turned
 from miurafab.surfaces.smoothing import continued, smooth
-from miurafab.surfaces.surface import Domain, tangents, unit
+from miurafab.surfaces.surface import Domain, unit
 
-MARGIN = 0.04
-"""The domain reaches beyond the layout by this part of its size."""
-
-LEAST_SHARE = 0.02
+LEAST_SHARE = 0.05
 """A cell with a smaller part inside the outline is not kept."""
+
+REACH = 0.1
+"""The spline has knots up to this part of the size of the layout beyond it."""
 
 EVEN = (0.6, 1.6)
 """Outside the layout, the spline may shrink and stretch lengths by these factors."""
 
-STIFFER = (0.0, 1e-3, 1e-2, 1e-1)
+STIFFER = (1e-3, 1e-2, 1e-1)
 """The stiffnesses tried until the spline is even beyond the layout."""
 
 _SPANS = 40
@@ -56,8 +57,9 @@ _STEPS = 30
 
 @dataclass(frozen=True, eq=False)
 class WholeMesh:
-    """All of a disk mesh. ``spline`` maps ``domain`` to space, ``outline`` is the border of the
-    mesh in the layout, turned by ``angle``; ``triangles`` (T, 3, 3) are the mesh itself.
+    """All of a disk mesh. ``outline`` is its border in the layout turned by ``angle``, ``domain`` a
+    rectangle around it. ``spline`` maps the layout, not turned, to space; ``triangles`` (T, 3, 3)
+    are the mesh itself.
     """
 
     spline: NdBSpline
@@ -68,13 +70,35 @@ class WholeMesh:
     stiffness: float
     layout: MeshChart = field(repr=False)
 
+    def laid(self, angle: float, margins: tuple[float, float] = (0.0, 0.0)) -> WholeMesh:
+        """The same mesh with its layout turned by ``angle`` (radians); the domain is the box around
+        it and ``margins`` beyond along u and v.
+        """
+        loops = [turned(loop, angle - self.angle) for loop in self.outline.loops]
+        outline = Outline(tuple(loops))
+        low, high = outline.box
+        du, dv = margins
+        domain = Domain(low[0] - du, high[0] + du, low[1] - dv, high[1] + dv)
+        return replace(self, domain=domain, outline=outline, angle=angle)
+
     def point(self, uv: Floats) -> Floats:
         """The spline, and beyond its knots its straight continuation."""
-        return continued(self.spline, uv)
+        return continued(self.spline, self._in_layout(uv))
 
     def normal(self, uv: Floats) -> Floats:
-        along, across = tangents(self, uv)
-        return unit(np.cross(along, across))
+        return unit(np.cross(*self.tangents(uv)))
+
+    def tangents(self, uv: Floats) -> tuple[Floats, Floats]:
+        """dS/du and dS/dv at ``uv`` (..., 2) from the derivatives of the spline."""
+        knots = self.spline.t
+        low, high = (np.array([k[n] for k in knots]) for n in (0, -1))
+        at = np.clip(self._in_layout(uv), low, high)
+        along, across = (np.asarray(self.spline(at, nu=nu)) for nu in ((1, 0), (0, 1)))
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        return c * along + s * across, c * across - s * along
+
+    def _in_layout(self, uv: Floats) -> Floats:
+        return turned(uv, -self.angle)
 
     def closest_point(self, points: Floats) -> Floats:
         return closest_on_mesh(points, self.triangles)
@@ -92,16 +116,23 @@ class WholeMesh:
         d = self.domain
         return np.linspace(d.u0, d.u1, columns + 1), np.linspace(d.v0, d.v1, rows + 1)
 
-    def kept(self, columns: int, rows: int) -> Bools:
-        """(rows, columns) the cells that meet the region inside the outline."""
-        return self.outline.shares(*self.lines(columns, rows)) > LEAST_SHARE
+    def kept(self, columns: int, rows: int, zigzag: float = 0.0) -> Bools:
+        """(rows, columns) the cells that meet the region inside the outline.
 
-    def rim(self, columns: int, rows: int, cells: Ints) -> tuple[Ints, Floats, Floats]:
+        The rows of vertices of the sheet zig-zag: every other line of vertices across is moved by
+        ``zigzag`` times the column spacing, half of it down and half of it up.
+        """
+        shares = self.outline.shares(*self.lines(columns, rows), zigzag)
+        return shares > LEAST_SHARE
+
+    def rim(
+        self, columns: int, rows: int, cells: Ints, zigzag: float = 0.0
+    ) -> tuple[Ints, Floats, Floats]:
         """Of ``cells`` (F, 2), column and row, those that the outline cuts (k,), their places
         (k, 3) and the outward directions (k, 3).
         """
         u, v = self.lines(columns, rows)
-        share = self.outline.shares(u, v)[cells[:, 1], cells[:, 0]]
+        share = self.outline.shares(u, v, zigzag)[cells[:, 1], cells[:, 0]]
         cut = np.flatnonzero(share < 1 - 1e-9)
         step = np.array([u[1] - u[0], v[1] - v[0]])
         centres = np.array([u[0], v[0]]) + (cells[cut] + 0.5) * step
@@ -133,7 +164,7 @@ class WholeMesh:
         active = np.arange(len(points))
         for _ in range(_STEPS):
             at = uv[active]
-            along, across = self._tangents(at)
+            along, across = self.tangents(at)
             gap = self.point(at) - points[active]
             a, b, c = _dot(along, along), _dot(along, across), _dot(across, across)
             f, g = _dot(along, gap), _dot(across, gap)
@@ -146,37 +177,29 @@ class WholeMesh:
                 break
         return uv
 
-    def _tangents(self, uv: Floats) -> tuple[Floats, Floats]:
-        """dS/du and dS/dv at ``uv`` (n, 2) by the derivative of the spline, which is exact."""
-        low = np.array([knots[0] for knots in self.spline.t])
-        high = np.array([knots[-1] for knots in self.spline.t])
-        at = np.clip(uv, low, high)
-        return np.asarray(self.spline(at, nu=(1, 0))), np.asarray(self.spline(at, nu=(0, 1)))
 
-
-def whole_mesh(layout: MeshChart, angle: float = 0.0, stiffness: float = 0.0) -> WholeMesh:
-    """The target of all of ``layout``, turned by ``angle`` (radians), its spline at least as stiff
-    as ``stiffness``, and stiff enough to be even one cell beyond the border.
+def whole_mesh(layout: MeshChart, stiffness: float = 0.0) -> WholeMesh:
+    """The target of all of ``layout``. The spline is at least as stiff as ``stiffness``, and stiff
+    enough to be even a little beyond the outline.
 
     Raises :class:`~miurafab.errors.TargetError` where the layout lies over itself.
     """
-    frame = turned(layout.flat, angle)
-    outline = Outline.of_loops([frame[loop] for loop in border_loops(layout.faces)])
+    outline = Outline.of_loops([layout.flat[loop] for loop in border_loops(layout.faces)])
     if not outline.simple:
         raise TargetError(
             f"{layout.name}: its outline crosses itself when the mesh is laid flat; cut the mesh "
             "apart, or give `edge` as rectangle."
         )
     low, high = outline.box
-    reach = MARGIN * (high - low)
-    domain = Domain(low[0] - reach[0], high[0] + reach[0], low[1] - reach[1], high[1] + reach[1])
+    size = high - low
+    wide = Domain(*np.stack([low - REACH * size, high + REACH * size], axis=1).ravel().tolist())
+    domain = Domain(*np.stack([low, high], axis=1).ravel().tolist())
     triangles = even_triangles(layout.vertices, layout.faces[: layout.real])
-    places, points = frame[: layout.known], layout.vertices[: layout.known]
-    count = spans(domain, median_edge(frame, layout.faces), _SPANS)
-    for stiff in [s for s in STIFFER if s > stiffness] or [stiffness]:
-        tried = max(stiff, stiffness) if stiff else stiffness
-        smoothed = smooth(places, points, domain, count, tried)
-        target = WholeMesh(smoothed.spline, domain, outline, triangles, angle, tried, layout)
+    places, points = layout.flat[: layout.known], layout.vertices[: layout.known]
+    count = spans(wide, median_edge(layout.flat, layout.faces), _SPANS)
+    for stiff in [stiffness, *(s for s in STIFFER if s > stiffness)]:
+        smoothed = smooth(places, points, wide, count, stiff)
+        target = WholeMesh(smoothed.spline, domain, outline, triangles, 0.0, stiff, layout)
         if _even_beyond(target):
             break
     return target
@@ -186,11 +209,14 @@ def _even_beyond(target: WholeMesh) -> bool:
     """Whether the spline keeps lengths within ``EVEN`` in a strip of a twentieth of the size
     around the outline.
     """
-    lattice = target.domain.lattice(_SAMPLES, _SAMPLES).reshape(-1, 2)
+    low, high = target.outline.box
+    strip = 0.05 * float((high - low).max())
+    wide = target.laid(0.0, (strip, strip)).domain
+    lattice = wide.lattice(_SAMPLES, _SAMPLES).reshape(-1, 2)
     phi = target.outline.signed_distance(lattice)
-    strip = lattice[(phi < 0) & (phi > -0.05 * max(target.domain.width, target.domain.height))]
-    speeds = np.concatenate([np.linalg.norm(t, axis=1) for t in target._tangents(strip)])
-    return bool(len(speeds) == 0 or (speeds.min() > EVEN[0] and speeds.max() < EVEN[1]))
+    near = lattice[(phi < 0) & (phi > -strip)]
+    speeds = np.concatenate([np.linalg.norm(t, axis=1) for t in target.tangents(near)])
+    return bool(speeds.min() > EVEN[0] and speeds.max() < EVEN[1])
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -39,7 +39,7 @@ def bowl() -> tuple[CreasePattern, WholeMesh]:
     assert isinstance(surface, MeshSurface)
     pattern = fit(FitRequest(facets=(COUNT, COUNT), surface=surface)).pattern
     assert pattern is not None
-    return pattern, whole_mesh(surface.layout, surface.placement.angle)
+    return pattern, whole_mesh(surface.layout).laid(surface.placement.angle)
 
 
 def cut(bowl: tuple[CreasePattern, WholeMesh], shape: str) -> tuple[CreasePattern, WholeMesh]:

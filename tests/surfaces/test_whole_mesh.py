@@ -9,6 +9,8 @@ from miurafab.errors import TargetError
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.surfaces.mesh import MeshChart, lay_out
 from miurafab.surfaces.outline import WholeMesh, whole_mesh
+from miurafab.surfaces.placement import turned
+from miurafab.surfaces.surface import tangents
 
 
 def squares(kept: list[list[int]], step: int = 4) -> tuple[Floats, Ints]:
@@ -26,7 +28,8 @@ def squares(kept: list[list[int]], step: int = 4) -> tuple[Floats, Ints]:
 @pytest.fixture(scope="module")
 def panel() -> WholeMesh:
     """An L of three unit squares."""
-    return whole_mesh(lay_out(*squares([[0, 0], [1, 0], [0, 1]]), "L")[0])
+    whole = whole_mesh(lay_out(*squares([[0, 0], [1, 0], [0, 1]]), "L")[0])
+    return whole.laid(0.0, (0.1, 0.1))
 
 
 def test_the_outline_is_that_of_the_mesh(panel: WholeMesh) -> None:
@@ -72,10 +75,23 @@ def test_nearest_points_are_found_again(panel: WholeMesh) -> None:
 
 
 def test_turning_the_layout_turns_the_outline(panel: WholeMesh) -> None:
-    turned = whole_mesh(panel.layout, np.pi / 2)
-    assert turned.domain.width == pytest.approx(panel.domain.height)
-    assert turned.outline.area == pytest.approx(panel.outline.area)
-    assert turned.description == {"rotate": 90.0, "stiffness": turned.stiffness}
+    other = panel.laid(np.pi / 2, (0.1, 0.1))
+    assert other.domain.width == pytest.approx(panel.domain.height)
+    assert other.outline.area == pytest.approx(panel.outline.area)
+    assert other.description == {"rotate": 90.0, "stiffness": panel.stiffness}
+    uv = panel.domain.lattice(7, 5).reshape(-1, 2)
+    assert other.point(turned(uv, np.pi / 2)) == pytest.approx(panel.point(uv), abs=1e-12)
+    assert other.normal(turned(uv, np.pi / 2)) == pytest.approx(panel.normal(uv), abs=1e-12)
+    one, two = panel.laid(0.3), panel.laid(0.3).laid(0.7).laid(0.3)
+    assert two.point(uv) == pytest.approx(one.point(uv), abs=1e-12)
+    assert two.outline.loops[0] == pytest.approx(one.outline.loops[0], abs=1e-12)
+
+
+def test_the_tangents_are_the_differences_of_the_points(panel: WholeMesh) -> None:
+    target = panel.laid(0.4)
+    uv = target.domain.lattice(6, 6).reshape(-1, 2)
+    for tangent, expected in zip(target.tangents(uv), tangents(target, uv), strict=True):
+        assert tangent == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_layout_that_lies_over_itself_is_refused() -> None:
