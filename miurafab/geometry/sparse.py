@@ -1,11 +1,11 @@
-"""Factors of sparse symmetric matrices; no other module calls the library that makes them.
+"""Factors of sparse symmetric matrices; no other module calls a library that makes them.
 
-The matrices are positive definite or nearly so, and need no pivoting. A fill-reducing order can
-therefore be chosen before the factorisation. The library is SuperLU (X. S. Li, ACM Trans. Math.
-Softw. 31 (2005)).
+Two kinds of matrices, and so two factors:
 
-An iteration factors matrices of one sparsity pattern in turn. A ``SymmetricSolver`` finds the order
-of elimination once for them all.
+- positive definite: ``SymmetricSolver``, a multifrontal Cholesky factor. What depends on the
+  sparsity pattern alone is kept between the matrices of an iteration.
+- symmetric, perhaps with negative eigenvalues: ``factor_symmetric``, SuperLU without pivoting
+  (X. S. Li, ACM Trans. Math. Softw. 31 (2005)).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.multifrontal import FrontalPlan
 
 
 class Factor(Protocol):
@@ -31,52 +32,25 @@ class Factor(Protocol):
 class SymmetricSolver:
     """Factors positive definite matrices of one sparsity pattern in turn.
 
-    What depends on the pattern alone is kept from call to call: the fill-reducing order, and where
-    each number of the matrix goes in that order. A matrix of another pattern begins anew. Entries
-    that are sometimes zero should be stored as zeros, so that the pattern stays.
+    The order of elimination, and where each number of the matrix goes, are kept from call to call.
+    A matrix of another pattern begins anew. Entries that are sometimes zero should be stored as
+    zeros, so that the pattern stays.
     """
 
     def __init__(self) -> None:
         self._indptr = self._indices = np.zeros(0, dtype=np.int32)
-        self._order = self._source = np.zeros(0, dtype=np.int64)
-        self._ordered = sparse.csc_array((0, 0))
+        self._plan: FrontalPlan | None = None
 
     def factor(self, matrix: sparse.csc_array) -> Factor:
-        """The factor of ``matrix``, whose indices are sorted within each column.
+        """The factor of ``matrix``, which stores both triangles, with sorted indices.
 
-        Raises ``RuntimeError`` where the matrix is singular to the last digit.
+        Raises ``RuntimeError`` where the matrix is not positive definite.
         """
         known = np.array_equal(self._indptr, matrix.indptr)
-        if not known or not np.array_equal(self._indices, matrix.indices):
-            factor = _factor(matrix, reorder=True)
-            self._keep(matrix, np.argsort(factor.perm_c).astype(np.int64))
-            return factor
-        self._ordered.data = matrix.data[self._source]
-        return _OrderedFactor(self._order, _factor(self._ordered, reorder=False))
-
-    def _keep(self, matrix: sparse.csc_array, order: Ints) -> None:
-        self._indptr, self._indices = matrix.indptr.copy(), matrix.indices.copy()
-        numbered = sparse.csc_array(
-            (np.arange(matrix.nnz, dtype=np.int64), matrix.indices, matrix.indptr), matrix.shape
-        )
-        ordered = numbered[order][:, order].tocsc()
-        ordered.sort_indices()
-        self._order, self._source = order, ordered.data
-        self._ordered = sparse.csc_array(
-            (matrix.data[ordered.data], ordered.indices, ordered.indptr), matrix.shape
-        )
-
-
-class _OrderedFactor:
-    """The ``factor`` of a matrix whose rows and columns stand in the ``order`` (n,)."""
-
-    def __init__(self, order: Ints, factor: Factor) -> None:
-        self._order, self._factor = order, factor
-
-    def solve(self, rhs: NDArray[Any], /) -> Floats:
-        solution = np.empty_like(rhs, dtype=np.float64)
-        solution[self._order] = self._factor.solve(rhs[self._order])
-        return solution
+        if self._plan is None or not known or not np.array_equal(self._indices, matrix.indices):
+            self._indptr, self._indices = matrix.indptr.copy(), matrix.indices.copy()
+            self._plan = FrontalPlan(matrix)
+        return self._plan.factor(matrix.data)
 
 
 def factor_symmetric(matrix: sparse.csc_array, *, reorder: bool = True) -> Factor:

@@ -1,4 +1,4 @@
-"""Factors of sparse symmetric matrices, and what is kept between those of one pattern."""
+"""Factors of sparse symmetric matrices, and the order in which unknowns are eliminated."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from miurafab.geometry.dissection import dissect
 from miurafab.geometry.sparse import SymmetricSolver, factor_symmetric, minimum_degree
 
 
@@ -47,10 +48,62 @@ def test_earlier_factors_of_a_solver_stay_good():
         assert matrix @ factor.solve(right) == pytest.approx(right)
 
 
-def test_a_solver_goes_on_after_a_singular_matrix():
+def test_a_solver_goes_on_after_a_matrix_that_is_not_positive_definite():
     solver, matrix = SymmetricSolver(), positive_definite(12, 1)
     solver.factor(matrix)
-    singular = matrix * 0.0
-    with pytest.raises(RuntimeError):
-        solver.factor(singular)
+    shifted = (matrix - 5 * sparse.eye_array(144)).tocsc()
+    for other in (matrix * 0.0, shifted):
+        with pytest.raises(RuntimeError):
+            solver.factor(other)
     assert matrix @ solver.factor(matrix).solve(np.ones(144)) == pytest.approx(np.ones(144))
+
+
+def scattered(side, seed):
+    """Two grids without a join and five lone unknowns, in a random order."""
+    grids = [positive_definite(side, seed), positive_definite(side // 2, seed + 1)]
+    matrix = sparse.block_diag([*grids, sparse.eye_array(5)], format="csr")
+    mixed = np.random.default_rng(seed).permutation(matrix.shape[0])
+    result = matrix[mixed][:, mixed].tocsc()
+    result.sort_indices()
+    return result
+
+
+@pytest.mark.parametrize("side", [2, 9, 30])
+def test_a_solver_factors_matrices_that_fall_apart(side):
+    matrix = scattered(side, 3)
+    right = np.random.default_rng(1).normal(size=(matrix.shape[0], 2))
+    assert matrix @ SymmetricSolver().factor(matrix).solve(right) == pytest.approx(right)
+
+
+def test_an_empty_matrix_has_an_empty_solution():
+    assert SymmetricSolver().factor(sparse.csc_array((0, 0))).solve(np.zeros(0)).shape == (0,)
+
+
+@pytest.mark.parametrize("matrix", [positive_definite(40, 2), scattered(30, 5)])
+def test_a_separator_parts_what_is_eliminated_before_it(matrix):
+    separators = dissect(matrix)
+    every = np.concatenate([separator.columns for separator in separators])
+    assert sorted(every.tolist()) == list(range(matrix.shape[0]))
+    assert len(separators) > 5
+    beneath = []
+    for separator in separators:
+        parts = [beneath[child] for child in separator.children]
+        for k, part in enumerate(parts):
+            for other in parts[k + 1 :]:
+                assert matrix[part][:, other].nnz == 0
+        beneath.append(np.concatenate([separator.columns, *parts]))
+    tops = set(range(len(separators))) - {c for s in separators for c in s.children}
+    assert sum(len(beneath[top]) for top in tops) == matrix.shape[0]
+
+
+def test_the_last_separator_of_a_grid_is_thin_and_lies_in_the_middle():
+    """Unknowns are coupled two lines apart, so no separator of the grid has under two lines."""
+    separators = dissect(positive_definite(60, 7))
+    middle = len(separators[-1].columns)
+    assert 2 * 60 <= middle <= 1.2 * 2 * 60
+    below = [0] * len(separators)
+    for k, separator in enumerate(separators):
+        below[k] = len(separator.columns) + sum(below[child] for child in separator.children)
+    sides = [below[child] for child in separators[-1].children]
+    assert min(sides) >= 0.3 * 60**2
+    assert sum(sides) == 60**2 - middle
