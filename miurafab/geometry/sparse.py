@@ -30,27 +30,62 @@ class Factor(Protocol):
 
 
 class SymmetricSolver:
-    """Factors positive definite matrices of one sparsity pattern in turn.
+    """Factors positive definite matrices of about one sparsity pattern in turn.
 
-    The order of elimination, and where each number of the matrix goes, are kept from call to call.
-    A matrix of another pattern begins anew. Entries that are sometimes zero should be stored as
-    zeros, so that the pattern stays.
+    The order of elimination, and where each number of a matrix goes, are kept from call to call.
+    SciPy's products leave out entries that happen to be zero, so patterns of the same problem
+    differ a little: a matrix with fewer entries is filled up with zeros, and new entries join the
+    pattern for all calls that follow. A matrix of another size begins anew.
     """
 
     def __init__(self) -> None:
-        self._indptr = self._indices = np.zeros(0, dtype=np.int32)
-        self._plan: FrontalPlan | None = None
+        self._pattern = sparse.csc_array((0, 0))
+        self._plan = FrontalPlan(self._pattern)
 
     def factor(self, matrix: sparse.csc_array) -> Factor:
         """The factor of ``matrix``, which stores both triangles, with sorted indices.
 
         Raises ``RuntimeError`` where the matrix is not positive definite.
         """
-        known = np.array_equal(self._indptr, matrix.indptr)
-        if self._plan is None or not known or not np.array_equal(self._indices, matrix.indices):
-            self._indptr, self._indices = matrix.indptr.copy(), matrix.indices.copy()
-            self._plan = FrontalPlan(matrix)
-        return self._plan.factor(matrix.data)
+        if matrix.shape != self._pattern.shape:
+            self._pattern = _ones(matrix)
+            self._plan = FrontalPlan(self._pattern)
+        numbers = self._filled_up(matrix)
+        if numbers is None:
+            self._pattern = _ones(self._pattern + _ones(matrix))
+            self._plan = FrontalPlan(self._pattern)
+            numbers = self._filled_up(matrix)
+            assert numbers is not None
+        return self._plan.factor(numbers)
+
+    def _filled_up(self, matrix: sparse.csc_array) -> Floats | None:
+        """The numbers of ``matrix`` at the entries of the pattern; None if it lacks entries."""
+        mine = self._pattern
+        if np.array_equal(mine.indptr, matrix.indptr) and np.array_equal(
+            mine.indices, matrix.indices
+        ):
+            return matrix.data
+        known, wanted = _keys(mine), _keys(matrix)
+        at = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
+        if not np.array_equal(known[at], wanted):
+            return None
+        numbers = np.zeros(len(known))
+        numbers[at] = matrix.data
+        return numbers
+
+
+def _ones(matrix: sparse.csc_array) -> sparse.csc_array:
+    """The pattern of ``matrix`` with a one at each entry, its indices sorted."""
+    ones = np.ones(matrix.nnz)
+    pattern = sparse.csc_array((ones, matrix.indices, matrix.indptr), matrix.shape, copy=True)
+    pattern.sort_indices()
+    return pattern
+
+
+def _keys(matrix: sparse.csc_array) -> Ints:
+    """(nnz,) a number for each entry; ascending if the indices are sorted."""
+    columns = np.repeat(np.arange(matrix.shape[1], dtype=np.int64), np.diff(matrix.indptr))
+    return columns * matrix.shape[0] + matrix.indices
 
 
 def factor_symmetric(matrix: sparse.csc_array, *, reorder: bool = True) -> Factor:

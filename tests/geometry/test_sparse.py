@@ -39,6 +39,17 @@ def test_a_solver_factors_matrices_of_one_pattern_and_of_another():
             assert matrix @ solver.factor(matrix).solve(right) == pytest.approx(right)
 
 
+def test_a_solver_fills_up_patterns_with_fewer_entries_and_learns_new_entries():
+    solver, whole = SymmetricSolver(), positive_definite(12, 1)
+    right = np.ones(144)
+    for reach in (1, 12, 0, 144, 13):
+        band = sparse.diags_array(
+            np.ones(2 * reach + 1), offsets=range(-reach, reach + 1), shape=whole.shape
+        )
+        matrix = (whole * band + 40 * sparse.eye_array(144)).tocsc()
+        assert matrix @ solver.factor(matrix).solve(right) == pytest.approx(right)
+
+
 def test_earlier_factors_of_a_solver_stay_good():
     solver = SymmetricSolver()
     matrices = [positive_definite(12, seed) for seed in range(3)]
