@@ -20,9 +20,9 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Bools, Floats, Ints
-from miurafab.geometry.polygons import edge_lengths, facet_areas, next_corners
+from miurafab.geometry.polygons import edge_lengths, facet_areas, facet_means, next_corners
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.trim_cuts import EdgeCuts, bend, edge_cuts
+from miurafab.origami.trim_cuts import EdgeCuts, bend, edge_cuts, meeting_vertices
 from miurafab.surfaces.outline import WholeMesh
 
 SLIVER = 0.12
@@ -44,8 +44,32 @@ def trimmed(pattern: CreasePattern, target: WholeMesh) -> CreasePattern:
         polygons += parts
         owner += [facet] * len(parts)
     faces, parents = _filled([p[0] for p in polygons]), _filled([p[1] for p in polygons])
-    vertices, folded, meeting = cutter.tables()
-    owners = np.array(owner, dtype=np.int64)
+    return _assembled(pattern, cutter.tables(), faces, parents, np.array(owner, dtype=np.int64))
+
+
+def inner_facets(pattern: CreasePattern, target: WholeMesh) -> CreasePattern:
+    """The whole facets of ``pattern`` whose means are inside the outline of ``target``."""
+    assert pattern.folded_coords is not None
+    means = facet_means(pattern.folded_coords, pattern.faces_vertices) / pattern.scale
+    owners = np.flatnonzero(target.outline.signed_distance(target.feet(means)) > 0)
+    tables = pattern.vertices_coords, pattern.folded_coords, meeting_vertices(pattern)
+    faces, parents = pattern.faces_vertices[owners], pattern.faces_edges[owners]
+    return _assembled(pattern, tables, faces, parents, owners)
+
+
+def _assembled(
+    pattern: CreasePattern,
+    tables: tuple[Floats, Floats, Ints],
+    faces: Ints,
+    parents: Ints,
+    owners: Ints,
+) -> CreasePattern:
+    """The pattern of those of ``faces`` (F, k) that can be made and hang together.
+
+    ``tables`` are the vertices flat and folded, and the points in space at which they lie. The
+    facets are parts of the facets ``owners`` (F,), their sides of the edges ``parents`` (F, k).
+    """
+    flat, folded, meeting = tables
     area = facet_areas(folded, faces)
     whole = facet_areas(folded, pattern.faces_vertices)
     kept = np.flatnonzero(area >= SLIVER * np.median(whole))
@@ -60,7 +84,7 @@ def trimmed(pattern: CreasePattern, target: WholeMesh) -> CreasePattern:
                 break
             largest[loose] = False
         kept = kept[largest]
-    return _assembled(pattern, vertices, folded, faces[kept], owners[kept], sides)
+    return _pattern(pattern, flat, folded, faces[kept], owners[kept], sides)
 
 
 @dataclass(eq=False)
@@ -278,7 +302,7 @@ def _largest(links: sparse.coo_array, area: Floats) -> Bools:
     return np.asarray(part == np.bincount(part, area).argmax())
 
 
-def _assembled(
+def _pattern(
     pattern: CreasePattern,
     flat: Floats,
     folded: Floats,

@@ -101,7 +101,13 @@ class WholeMesh:
         return turned(uv, -self.angle)
 
     def closest_point(self, points: Floats) -> Floats:
-        return closest_on_mesh(points, self.triangles)
+        """(n, 3) the points of the mesh nearest to ``points`` (n, 3), and beyond the outline those
+        of the spline."""
+        feet = self.feet(points)
+        closest = closest_on_mesh(points, self.triangles)
+        beyond = self.outline.signed_distance(feet) < 0
+        closest[beyond] = self.point(feet[beyond])
+        return closest
 
     def __repr__(self) -> str:
         return f"<WholeMesh {self.layout.name}: {len(self.triangles)} triangles>"

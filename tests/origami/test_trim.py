@@ -14,7 +14,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.fit import fit
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.folding.contact import triangulate
-from miurafab.origami.trim import CREASE, SLIVER, trimmed
+from miurafab.origami.trim import CREASE, SLIVER, inner_facets, trimmed
 from miurafab.origami.verify import audit
 from miurafab.surfaces.mesh import MeshSurface, mesh_surface
 from miurafab.surfaces.outline import WholeMesh, whole_mesh
@@ -136,6 +136,24 @@ def test_all_parts_hang_on_creases(bowl: tuple[CreasePattern, WholeMesh]) -> Non
         if len(reached) == len(pattern.faces_vertices):
             break
     assert len(reached) == len(pattern.faces_vertices)
+
+
+def test_whole_facets_are_those_with_their_means_inside(
+    bowl: tuple[CreasePattern, WholeMesh],
+) -> None:
+    whole, target = bowl
+    d = target.domain
+    outline = Outline.of_loops([72 * CIRCLE + np.array([(d.u0 + d.u1) / 2, (d.v0 + d.v1) / 2])])
+    target = replace(target, outline=outline)
+    pattern = inner_facets(whole, target)
+    assert whole.folded_coords is not None
+    assert pattern.folded_coords is not None
+    assert pattern.faces_vertices.shape[1] == 4
+    assert audit(pattern).valid
+    means = whole.folded_coords[whole.faces_vertices].mean(axis=1)
+    inside = outline.contains(target.feet(means))
+    kept = pattern.folded_coords[pattern.faces_vertices].mean(axis=1)
+    assert np.abs(np.sort(kept, axis=0) - np.sort(means[inside], axis=0)).max() < 1e-12
 
 
 def test_a_sheet_of_two_pieces_is_cut_as_one(bowl: tuple[CreasePattern, WholeMesh]) -> None:

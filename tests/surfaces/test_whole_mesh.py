@@ -74,6 +74,13 @@ def test_nearest_points_are_found_again(panel: WholeMesh) -> None:
     assert panel.feet(panel.point(uv) + off * panel.normal(uv)) == pytest.approx(uv, abs=1e-8)
 
 
+def test_closest_points_go_on_beyond_the_outline(panel: WholeMesh) -> None:
+    inside, beyond = np.array([[0.3, 0.4, 0.2]]), np.array([[1.5, 1.06, 0.1], [-0.05, 0.5, 0.3]])
+    assert panel.closest_point(inside) == pytest.approx(np.array([[0.3, 0.4, 0.0]]), abs=1e-9)
+    below = beyond * np.array([1.0, 1.0, 0.0])
+    assert panel.closest_point(beyond) == pytest.approx(below, abs=1e-6)
+
+
 def test_turning_the_layout_turns_the_outline(panel: WholeMesh) -> None:
     other = panel.laid(np.pi / 2, (0.1, 0.1))
     assert other.domain.width == pytest.approx(panel.domain.height)
