@@ -37,6 +37,7 @@ def tree(module: Path) -> ast.Module:
     return ast.parse(module.read_text(encoding="utf-8"))
 
 
+@cache
 def imported(module: Path) -> set[str]:
     """The top-level packages that ``module`` imports, in functions too."""
     packages = set()
@@ -82,6 +83,7 @@ def test_only_the_command_line_names_its_flags() -> None:
     assert named == []
 
 
+@cache
 def called(module: Path) -> dict[str, list[ast.Call]]:
     """The calls in ``module`` by the dotted name of what is called."""
     calls = defaultdict(list)

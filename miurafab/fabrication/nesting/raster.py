@@ -1,15 +1,15 @@
 """First-fit nesting on a raster.
 
 A sheet grown by half the gap is divided into cells. An outline, also grown by half the gap, marks
-every cell that it may touch; outlines without a common cell keep their gap. The number of cells
-that a part would share with the parts on a sheet is, for all positions at once, a correlation of
-two masks, computed by Fourier transforms; positions where it is 0 are free. Defects mark their
+every cell that it may touch; outlines without a common cell keep their gap. A position is free if
+no cell of the part is marked there (:mod:`~miurafab.fabrication.nesting.cells`). Defects mark their
 cells before any part.
 
 Parts are placed by size, each on the first sheet with a free position, at the free position that a
 rule prefers. A corner rule prefers the position nearest to a side or a corner. The contact rule
 prefers the position where the largest share of the rim around the part is marked already or off the
-sheet, which is another correlation; it packs closer, the more so on finer cells, and takes longer.
+sheet: for all positions at once this share is a correlation of two masks, computed by Fourier
+transforms. It packs closer, the more so on finer cells, and takes longer.
 Several orders and rules are tried. The layout that takes the least stock wins, and a layout that
 meets the lower bound ends the search. A sheet whose free area is smaller than a part is not
 searched, and a corner rule puts the first part of an empty sheet in its corner without a search; so
@@ -29,12 +29,12 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.nesting.cells import Part, Raster
 from miurafab.fabrication.nesting.problem import Problem, Slot, Stock, cost, layout_faults
+from miurafab.geometry.arrays import Bools, Ints
 
 WORK = 4_000_000_000
 """The limit of the search in cells transformed: about 40 s on one core of 2020 (measured:
@@ -46,6 +46,9 @@ take longer."""
 
 _FINE = 600
 """The same for the contact rule."""
+
+_FIRST = 64
+"""Positions that are tried at once, the best first."""
 
 _RIM = 12
 """The width of the rim around a part in cells (tried: 1 to 16)."""
@@ -115,8 +118,9 @@ class _Sheet:
         self.placed: list[tuple[int, Slot]] = []
         self._refused: set[int] = set()
         self._waiting: list[tuple[int, int, int, int]] = []
-        self._taken: NDArray[np.float32] | None = None
-        self._transform: NDArray[np.complex64] | None = None
+        self._marked: Bools | None = None
+        self._room: NDArray[np.int16]
+        self._spectrum: NDArray[np.complex64] | None = None
 
     def take(self, number: int, part: int, rule: Rule) -> bool:
         """Place outline ``number``, of shape ``part``, at the free position that ``rule`` prefers;
@@ -149,40 +153,67 @@ class _Sheet:
 
     def _best(self, part: int, rotation: int, rule: Rule) -> tuple[float, int, int] | None:
         raster = self.raster
-        mask = raster.mask(part, rotation)
-        marked = self._marked()
-        wide, high = mask.cells.shape
-        columns, rows = raster.cells[0] - wide + 1, raster.cells[1] - high + 1
-        near = raster.rim
-        raster.work += math.prod(raster.whole) * (2 if rule is None else 1)
-        shared = scipy.fft.irfft2(marked * mask.transform, raster.whole)
-        free = np.flatnonzero(shared[near : near + columns, near : near + rows] < 0.5)
-        if not len(free):
+        raster.hold(part)
+        mask, room = raster.mask(part, rotation), self._free()
+        i, j = raster.open_positions(room, mask)
+        if not len(i):
             return None
-        i, j = np.divmod(free, rows)
         if rule is None:
-            assert mask.rim is not None
-            around = scipy.fft.irfft2(marked * mask.rim, raster.whole)[:columns, :rows]
+            touched = raster.correlated(self._transform(), raster.rim_of(part, rotation))
             # Rounding keeps the noise of the transforms out of the decision.
-            order = -np.round(around.ravel()[free], 3)
+            order = -np.round(touched[i, j], 3)
         else:
-            far = (i + wide) * raster.cell[0], (j + high) * raster.cell[1]
-            order = far[0] * rule[0] + far[1] * rule[1]
-        at = int(np.argmin(order))
-        return float(order[at]), int(i[at]), int(j[at])
+            wide, high = mask.cells.shape
+            across, along = raster.cell * rule
+            order = (i + wide) * across + (j + high) * along
+        for at in _best_first(order):
+            clear = np.flatnonzero(raster.clear(room, mask, i[at], j[at]))
+            if len(clear):
+                best = at[clear[0]]
+                return float(order[best]), int(i[best]), int(j[best])
+        return None
 
-    def _marked(self) -> NDArray[np.complex64]:
+    def _free(self) -> NDArray[np.int16]:
+        """(columns, rows) the number of free cells from each cell upward."""
+        if self._marked is None:
+            self._marked = self.raster.blank(self.allowed)
+            self._room = _room(self._marked)
+        for part, rotation, i, j in self._waiting:
+            cells = self.raster.mask(part, rotation).cells
+            x, y = i + self.raster.rim, j + self.raster.rim
+            new = slice(x, x + cells.shape[0])
+            self._marked[new, y : y + cells.shape[1]] |= cells
+            self._room[new] = _room(self._marked[new])
+            self._spectrum = None
+        self._waiting.clear()
+        return self._room
+
+    def _transform(self) -> NDArray[np.complex64]:
         """The transform of the marked cells."""
-        if self._taken is None:
-            self._taken = self.raster.blank(self.allowed)
-        if self._transform is None or self._waiting:
-            for part, rotation, i, j in self._waiting:
-                cells = self.raster.marked(part, rotation)
-                x, y = i + self.raster.rim, j + self.raster.rim
-                self._taken[x : x + cells.shape[0], y : y + cells.shape[1]] += cells
-            self._waiting.clear()
-            self._transform = scipy.fft.rfft2(self._taken)
-        return self._transform
+        if self._spectrum is None:
+            assert self._marked is not None
+            self._spectrum = self.raster.transformed(self._marked.astype(np.float32))
+        return self._spectrum
+
+
+def _best_first(order: NDArray[np.floating]) -> Iterator[Ints]:
+    """The places of ``order`` from the least to the greatest, in parts; equals as they stand."""
+    done = 0
+    while done < len(order):
+        last = min(2 * done + _FIRST, len(order)) - 1
+        limit = np.partition(order, last)[last]
+        near = np.flatnonzero(order <= limit)
+        near = near[np.argsort(order[near], kind="stable")][done:]
+        yield near
+        done += len(near)
+
+
+def _room(marked: Bools) -> NDArray[np.int16]:
+    """The number of cells from each cell upward that are not ``marked``."""
+    rows = marked.shape[1]
+    row = np.arange(rows, dtype=np.int16)
+    above = np.where(marked, row, np.int16(rows))[:, ::-1]
+    return np.asarray(np.minimum.accumulate(above, axis=1)[:, ::-1] - row)
 
 
 class _Rack:

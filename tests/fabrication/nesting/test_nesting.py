@@ -213,7 +213,7 @@ def test_sheets_of_several_sizes_are_begun_in_the_order_of_the_stock():
 def test_patches_that_fill_a_sheet_each_are_placed_without_a_search(monkeypatch):
     outlines = [rectangle(90.0 + n * 0.01, 80.0) for n in range(60)]
     asked = problem(outlines, SheetKind(100.0, 90.0, ANY))
-    monkeypatch.setattr("scipy.fft.rfft2", None)
+    monkeypatch.setattr(cells.Raster, "open_positions", None)
     found = nest(asked)
     assert_sound(asked, found.slots)
     assert (sheets_of(found.slots), found.bound) == (60, 60)
@@ -236,6 +236,33 @@ def test_copies_of_an_outline_share_their_masks(monkeypatch):
     nest(problem([rectangle(30.0, 20.0)] * 50, SheetKind(200.0, 100.0, (0, 90))))
     # At two rotations: the cells of the coarse raster, those of the fine one, and its rims.
     assert len(made) == 6
+
+
+@pytest.mark.parametrize("share", [0.0, 0.0005, 0.004, 0.03, 1.0])
+def test_free_positions_are_those_where_no_cell_is_marked(share):
+    """Against every position, with many free positions left, few, and none."""
+    part = cells.Part(star(7), 1.0)
+    grid = cells.Raster(SheetKind(150.0, 120.0, (0,)), 1.0, [part], 64, 2)
+    marked = grid.blank(SheetKind(150.0, 120.0, (0,)))
+    marked |= np.random.default_rng(1).random(marked.shape) < share
+    mask = grid.mask(0, 0)
+    shape = np.array(mask.cells.shape)
+    windows = np.lib.stride_tricks.sliding_window_view(marked[2:-2, 2:-2], tuple(shape))
+    expected = ~(windows & mask.cells).any(axis=(2, 3))
+    room = raster._room(marked)
+    opened = grid.open_positions(room, mask)
+    clear = grid.clear(room, mask, *opened)
+    np.testing.assert_array_equal(np.argwhere(expected), np.column_stack(opened)[clear])
+    every = np.indices(expected.shape).reshape(2, -1)
+    np.testing.assert_array_equal(grid.clear(room, mask, *every), expected.ravel())
+    assert (share in (0.03, 1.0)) == (not expected.any())
+
+
+def test_positions_are_tried_from_the_best_on_and_equals_in_their_order():
+    order = np.random.default_rng(2).integers(0, 40, 1000).astype(np.float32)
+    found = list(raster._best_first(order))
+    np.testing.assert_array_equal(np.concatenate(found), np.argsort(order, kind="stable"))
+    assert len(found[0]) < 150
 
 
 def test_the_rule_of_most_company_lays_a_part_where_it_touches_most():
