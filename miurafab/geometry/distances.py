@@ -9,6 +9,8 @@ the bound for all others.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -47,44 +49,63 @@ def closest_on_triangle(points: Floats, triangles: Floats) -> Floats:
 
 def closest_on_mesh(points: Floats, triangles: Floats) -> Floats:
     """(n, 3) the points of the mesh ``triangles`` (m, 3, 3) nearest to ``points`` (n, 3)."""
+    return closest_triangles(points, triangles)[0]
+
+
+def closest_triangles(points: Floats, triangles: Floats) -> tuple[Floats, Ints]:
+    """The points (n, 3) of :func:`closest_on_mesh`, and the triangle (n,) that each lies on."""
     centres = (triangles.min(axis=1) + triangles.max(axis=1)) / 2
     radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
     classes = np.floor(np.log2(np.maximum(radii, 1e-6 * radii.max()))).astype(np.int64)
-    best, bound = points.copy(), np.full(len(points), np.inf)
+    found = _Nearest(points.copy(), np.full(len(points), np.inf), np.zeros(len(points), np.int64))
     for size in np.unique(classes)[::-1].tolist():
         members = np.flatnonzero(classes == size)
-        _nearer_in_class(points, triangles[members], centres[members], radii[members], best, bound)
-    return best
+        _nearer_in_class(points, triangles, members, centres[members], radii[members], found)
+    return found.feet, found.triangle
+
+
+@dataclass(frozen=True, eq=False)
+class _Nearest:
+    """The nearest so far of n points: their ``feet`` (n, 3), the distances to these (n,), and the
+    ``triangle`` (n,) of each. The search writes into the arrays.
+    """
+
+    feet: Floats
+    distance: Floats
+    triangle: Ints
 
 
 def _nearer_in_class(
-    points: Floats, triangles: Floats, centres: Floats, radii: Floats, best: Floats, bound: Floats
+    points: Floats,
+    triangles: Floats,
+    members: Ints,
+    centres: Floats,
+    radii: Floats,
+    found: _Nearest,
 ) -> None:
-    """Lower ``bound`` (n,) and move ``best`` (n, 3) where a triangle of this class is nearer."""
+    """Enter in ``found`` what is nearer among the ``members`` of this class."""
     tree = cKDTree(centres)
     largest = float(radii.max())
     active = np.arange(len(points))
     few = 1
     while len(active):
-        few = min(few, len(triangles))
+        few = min(few, len(members))
         # All few again, not the new ones alone: the tree may list equal distances in another order.
         nearest = tree.query(points[active], k=np.arange(1, few + 1))
         gaps, near = np.asarray(nearest[0]), np.asarray(nearest[1])
-        promising = gaps - radii[near] < bound[active][:, None]
+        promising = gaps - radii[near] < found.distance[active][:, None]
         row, column = np.nonzero(promising)
-        _keep_nearest(points, triangles, active[row], near[row, column], best, bound)
-        if few == len(triangles):
+        _keep_nearest(points, triangles, active[row], members[near[row, column]], found)
+        if few == len(members):
             return
-        active = active[gaps[:, -1] - largest < bound[active]]
+        active = active[gaps[:, -1] - largest < found.distance[active]]
         few = 4 * few + 6
 
 
 def _keep_nearest(
-    points: Floats, triangles: Floats, rows: Ints, columns: Ints, best: Floats, bound: Floats
+    points: Floats, triangles: Floats, rows: Ints, columns: Ints, found: _Nearest
 ) -> None:
-    """Lower ``bound`` (n,) and move ``best`` (n, 3) by the pairs (point row, triangle column),
-    which are sorted by row.
-    """
+    """Enter what is nearer of the pairs (point row, triangle column), sorted by row."""
     for start in range(0, len(rows), _CHUNK):
         row, column = rows[start : start + _CHUNK], columns[start : start + _CHUNK]
         foot = closest_on_triangle(points[row], triangles[column])
@@ -92,9 +113,10 @@ def _keep_nearest(
         first = np.flatnonzero(np.diff(row, prepend=-1))
         least = np.minimum.reduceat(gap, first)
         won = np.flatnonzero(gap == np.repeat(least, np.diff(first, append=len(row))))
-        won = won[gap[won] < bound[row[won]]]
-        best[row[won]] = foot[won]
-        bound[row[won]] = gap[won]
+        won = won[gap[won] < found.distance[row[won]]]
+        found.feet[row[won]] = foot[won]
+        found.distance[row[won]] = gap[won]
+        found.triangle[row[won]] = column[won]
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -22,7 +22,14 @@ from miurafab.errors import TargetError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats
 from miurafab.surfaces.smoothing import continued
-from miurafab.surfaces.surface import Domain, closest_parameters, tangents, unit
+from miurafab.surfaces.surface import (
+    Domain,
+    closest_parameters,
+    nearest_parameters,
+    patch_tiles,
+    tangents,
+    unit,
+)
 
 SAMPLES = (17, 33, 65)
 """Samples to a side that are tried in turn, until the spline follows the function."""
@@ -79,6 +86,14 @@ class SampledSurface:
     def closest_point(self, points: Floats) -> Floats:
         """(n, 3) nearest points of the spline to ``points`` (n, 3)."""
         return self.point(closest_parameters(self, points, 80))
+
+    def nearest(self, points: Floats) -> Floats:
+        """(n, 3) nearest points of the spline over ``domain`` to ``points`` (n, 3)."""
+        return self.point(nearest_parameters(self, points, 80))
+
+    def tiles(self) -> Floats:
+        """(n, 3, 3) triangles that tile the spline over ``domain``."""
+        return patch_tiles(self)
 
     @property
     def description(self) -> dict[str, Any]:

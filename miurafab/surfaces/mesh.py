@@ -161,6 +161,13 @@ class MeshSurface:
     def closest_point(self, points: Floats) -> Floats:
         return closest_on_mesh(points, self.triangles)
 
+    def nearest(self, points: Floats) -> Floats:
+        return closest_on_mesh(points, self.triangles)
+
+    def tiles(self) -> Floats:
+        mesh = self.layout
+        return mesh.vertices[mesh.faces[: mesh.real]]
+
     def __repr__(self) -> str:
         return f"<MeshSurface {self.layout.name}: {len(self.triangles)} triangles>"
 

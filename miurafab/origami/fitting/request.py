@@ -97,8 +97,8 @@ class FitOptions(Shown):
 
     facets: tuple[int, int] | None = option(
         FACETS,
-        "Columns and rows of facets; left out with both `max_deviation` and `min_edge`, the "
-        "coarsest sheet that meets them.",
+        "Columns and rows of facets; left out with `min_edge` and `max_distance` or "
+        "`max_deviation`, the coarsest sheet that meets them.",
         group="Sheet",
         default_text=FACETS.show(DEFAULT_FACETS),
         page="first",
@@ -156,6 +156,13 @@ class FitOptions(Shown):
         group="Limits",
         page="more",
     )
+    max_distance_mm: float | None = option(
+        length(above=True),
+        "The farthest that the sheet may lie from the whole target, and the target from the sheet: "
+        "the Hausdorff distance.",
+        group="Limits",
+        page="more",
+    )
     min_angle: float | None = option(
         angle(0, 90), "The least sector angle allowed.", group="Limits"
     )
@@ -209,8 +216,9 @@ class FitOptions(Shown):
 
     @property
     def search(self) -> bool:
-        """Whether the coarsest sheet that meets both limits is looked for."""
-        return self.facets is None and None not in (self.min_edge_mm, self.max_deviation_mm)
+        """Whether the coarsest sheet that meets the limits is looked for."""
+        close = self.max_deviation_mm is not None or self.max_distance_mm is not None
+        return self.facets is None and self.min_edge_mm is not None and close
 
     @property
     def angles(self) -> tuple[float, float]:

@@ -1,8 +1,9 @@
-"""The coarsest sheet within a largest deviation and a shortest edge.
+"""The coarsest sheet within a largest distance and a shortest edge.
 
-More facets bring the sheet closer to the target and make its edges shorter, so the two limits bound
-the number of facets from both sides. The search refines the sheet in steps until both limits are
-met, then bisects the last step for the coarsest such sheet. Each size is tried with several
+More facets bring the sheet closer to the target and make its edges shorter, so the limits bound the
+number of facets from both sides. The distance is that of the middle (`max_deviation`), or that of
+the whole sheet both ways (`max_distance`), or each within its own limit. The search refines the
+sheet in steps until all limits are met, then bisects the last step for the coarsest such sheet. Each size is tried with several
 corrugations and polished. If no size meets both limits, the answer says which limit fails, and by
 how much, on the nearest sheet.
 """
@@ -16,6 +17,7 @@ from dataclasses import replace
 
 from miurafab.findings import Finding
 from miurafab.geometry.polygons import edge_lengths
+from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.request import INTERRUPTED, FitRequest, FitResult
 
 COARSEST = 4
@@ -130,8 +132,8 @@ def _too_fine(request: FitRequest, result: FitResult) -> bool:
     return float(lengths.mean()) < request.min_edge_mm
 
 
-def _deviation(result: FitResult) -> float:
-    return float("inf") if result.deviation_mm is None else result.deviation_mm
+def _closeness(request: FitRequest, result: FitResult) -> Closeness:
+    return Closeness.of(request, result.measurements, result.deviation_mm)
 
 
 def _miss(request: FitRequest) -> Callable[[FitResult], tuple[bool, float]]:
@@ -141,9 +143,7 @@ def _miss(request: FitRequest) -> Callable[[FitResult], tuple[bool, float]]:
         m = result.measurements
         if m is None:
             return True, float("inf")
-        factors = [1.0]
-        if request.max_deviation_mm is not None:
-            factors.append(_deviation(result) / request.max_deviation_mm)
+        factors = [1.0, _closeness(request, result).factor]
         if request.min_edge_mm is not None:
             factors.append(request.min_edge_mm / max(m.min_edge_mm, 1e-12))
         return bool(m.overlaps or m.self_intersections), max(factors)
@@ -156,25 +156,31 @@ def _why(request: FitRequest, results: list[FitResult], best: FitResult) -> str:
     sound = [r for r in results if r.measurements and not _miss(request)(r)[0]]
     if not sound or best.measurements is None:
         return f"No valid sheet was found at any of {len(results)} sizes. {best.advice}".strip()
-    edge, limit = request.min_edge_mm or 0.0, request.max_deviation_mm or float("inf")
+    edge = request.min_edge_mm or 0.0
+    limits = " and ".join(f"{limit:.3g} mm" for _, _, limit in _closeness(request, best).pairs)
     parts = []
     wide = [r for r in sound if r.measurements and r.measurements.min_edge_mm >= edge]
     if wide:
-        nearest = min(wide, key=_deviation)
+        nearest = min(wide, key=lambda r: _closeness(request, r).factor)
         assert nearest.measurements is not None
+        far = " and ".join(
+            f"{distance:.3g} mm from the target {part}, {distance - limit:.3g} mm over the "
+            f"{limit:.3g} mm allowed"
+            for part, distance, limit in _closeness(request, nearest).pairs
+            if distance > limit
+        )
         parts.append(
             f"with edges of {edge:.3g} mm the closest sheet ({nearest.measurements.facets} facets) "
-            f"lies {_deviation(nearest):.3g} mm from the target, {_deviation(nearest) - limit:.3g} "
-            f"mm over the {limit:.3g} mm allowed"
+            f"lies {far}"
         )
-    close = [r for r in sound if _deviation(r) <= limit]
+    close = [r for r in sound if _closeness(request, r).factor <= 1]
     if close:
         longest = max(close, key=lambda r: r.measurements.min_edge_mm if r.measurements else 0.0)
         assert longest.measurements is not None
         parts.append(
-            f"within {limit:.3g} mm the longest shortest edge ({longest.measurements.facets} "
+            f"within {limits} the longest shortest edge ({longest.measurements.facets} "
             f"facets) is {longest.measurements.min_edge_mm:.3g} mm, "
             f"{edge - longest.measurements.min_edge_mm:.3g} mm under the {edge:.3g} mm asked for"
         )
     nearest_sheets = "; ".join(parts) or best.advice
-    return f"No sheet meets both limits: {nearest_sheets}. Loosen one of them, or enlarge `size`."
+    return f"No sheet meets all limits: {nearest_sheets}. Loosen one of them, or enlarge `size`."

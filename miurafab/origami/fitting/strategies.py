@@ -19,6 +19,7 @@ from miurafab.findings import Finding
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cylinder import cylinder_on
+from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.constraints import flat_foldability
 from miurafab.origami.fitting.continuation import COARSEST, STEP_CAP, bend, refine, shaken, solve
 from miurafab.origami.fitting.inequalities import Bounds, limits
@@ -376,13 +377,7 @@ def _faults(
             f"The shortest edge is {measured.min_edge_mm:.3g} mm, under the {least:.3g} mm asked "
             "for; ask for fewer `facets` or a larger `size`.",
         )
-    if request.max_deviation_mm is not None and deviation > request.max_deviation_mm:
-        what = "mid-surface" if request.follow == "middle" else request.follow
-        yield Finding(
-            "max-deviation",
-            f"The {what} lies up to {deviation:.3g} mm from the target, over the "
-            f"{request.max_deviation_mm:.3g} mm allowed; ask for more `facets`.",
-        )
+    yield from Closeness.of(request, measured, deviation).faults(request.follow)
     if unmeasured.any:
         broken = unmeasured(sheet.vertices.ravel())[0] < -1e-9
         for kind, number in unmeasured.count(broken).items():

@@ -195,7 +195,7 @@ class TestSearch:
         one = {"amplitude": 0.8, "zigzag": 1.0}
         result = fit(request("saddle", max_deviation_mm=0.01, min_edge_mm=45.0, facets=None, **one))
         assert result.status == "infeasible"
-        assert "No sheet meets both limits" in result.advice
+        assert "No sheet meets all limits" in result.advice
         assert "mm over the 0.01 mm allowed" in result.advice
 
 
