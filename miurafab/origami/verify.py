@@ -16,11 +16,11 @@ import numpy as np
 from miurafab.display import Shown
 from miurafab.findings import Finding, findings_json, refusals
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.distances import closest_on_mesh
-from miurafab.geometry.polygons import edge_lengths, facet_means
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami import invariants
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import overlaps, self_intersections, triangulate
+from miurafab.origami.nearness import nearness
 from miurafab.surfaces.surface import TargetSurface, tangents
 
 EXACT = 1e-10
@@ -47,8 +47,10 @@ class Measurements(Shown):
         The largest residuals: angles in radians, the isometry relative to the length of the edge.
     self_intersections : int or None
         The pairs of facets that pass through each other in the folded form.
+    sheet_to_target_mm, target_to_sheet_mm : float or None
+        The largest distance of a point of the sheet from the whole target, and the reverse.
     hausdorff_mm : float or None
-        The largest distance of a sheet point from the target or of a target point from the sheet.
+        The larger of the two.
     hausdorff_relative : float or None
         The same distance over the diagonal of the box around the folded form.
     hausdorff_midsurface_mm : float or None
@@ -66,6 +68,8 @@ class Measurements(Shown):
     max_flat_foldability: float | None = None
     max_isometry: float | None = None
     self_intersections: int | None = None
+    sheet_to_target_mm: float | None = None
+    target_to_sheet_mm: float | None = None
     hausdorff_mm: float | None = None
     hausdorff_relative: float | None = None
     hausdorff_midsurface_mm: float | None = None
@@ -163,29 +167,16 @@ def _largest(values: Floats) -> float:
 def _distances(pattern: CreasePattern, surface: TargetSurface) -> dict[str, Any]:
     """Distances sheet to target both ways, in mm, and the area ratio."""
     assert pattern.folded_coords is not None
-    scale, folded = pattern.scale, pattern.folded_coords
-    triangles, _ = triangulate(pattern.faces_vertices)
-    corners = folded[triangles]
-    middle = facet_means(folded, pattern.faces_vertices)
-    sheet = np.concatenate([folded, folded[pattern.edges_vertices].mean(axis=1), middle])
-
-    def to_target(points: Floats) -> float:
-        gap = surface.closest_point(points / scale) * scale - points
-        return float(np.linalg.norm(gap, axis=1).max())
-
-    count = int(np.clip(2 * np.sqrt(len(pattern.faces_vertices)), 40, 400))
-    lattice = surface.domain.lattice(count, count)
-    target = surface.point(lattice).reshape(-1, 3) * scale
-    back = np.linalg.norm(closest_on_mesh(target, corners) - target, axis=1).max()
-    hausdorff = max(to_target(sheet), float(back))
-    diagonal = float(np.linalg.norm(folded.max(axis=0) - folded.min(axis=0)))
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    found = nearness(pattern, surface)
+    a, b, c = pattern.folded_coords[triangulate(pattern.faces_vertices)[0]].transpose(1, 0, 2)
     paper = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
     return {
-        "hausdorff_mm": hausdorff,
-        "hausdorff_relative": hausdorff / diagonal,
-        "hausdorff_midsurface_mm": to_target(middle),
-        "area_ratio": paper / (surface_area(surface) * scale**2),
+        "sheet_to_target_mm": found.sheet_to_target,
+        "target_to_sheet_mm": found.target_to_sheet,
+        "hausdorff_mm": found.hausdorff,
+        "hausdorff_relative": found.hausdorff / found.diagonal,
+        "hausdorff_midsurface_mm": found.means_to_target,
+        "area_ratio": paper / (surface_area(surface) * pattern.scale**2),
     }
 
 

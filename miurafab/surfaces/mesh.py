@@ -87,6 +87,11 @@ class MeshChart:
     rough: bool
     name: str
 
+    @property
+    def triangles(self) -> Floats:
+        """(T, 3, 3) the triangles of the mesh, without those that fill holes."""
+        return self.vertices[self.faces[: self.real]]
+
     def surface(self, placement: GridPlacement, stiffness: float = 0.0) -> MeshSurface:
         """The target over ``placement``; the spline is as stiff as the data ask, or ``stiffness``.
 
@@ -165,8 +170,7 @@ class MeshSurface:
         return closest_on_mesh(points, self.triangles)
 
     def tiles(self) -> Floats:
-        mesh = self.layout
-        return mesh.vertices[mesh.faces[: mesh.real]]
+        return self.layout.triangles
 
     def __repr__(self) -> str:
         return f"<MeshSurface {self.layout.name}: {len(self.triangles)} triangles>"

@@ -109,6 +109,12 @@ class WholeMesh:
         closest[beyond] = self.point(feet[beyond])
         return closest
 
+    def nearest(self, points: Floats) -> Floats:
+        return closest_on_mesh(points, self.triangles)
+
+    def tiles(self) -> Floats:
+        return self.layout.triangles
+
     def __repr__(self) -> str:
         return f"<WholeMesh {self.layout.name}: {len(self.triangles)} triangles>"
 

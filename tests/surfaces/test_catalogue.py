@@ -6,10 +6,20 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from miurafab.errors import TargetError
+from miurafab.geometry.distances import closest_on_mesh
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface, parse_target
-from miurafab.surfaces.surface import Bent, Swapped, curvature_along_u, tangents, unit
+from miurafab.surfaces.surface import (
+    CHORD,
+    Bent,
+    Domain,
+    Swapped,
+    curvature_along_u,
+    tangents,
+    unit,
+)
 
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
@@ -28,6 +38,30 @@ class TestEverySurface:
         foot = surface.point(uv).reshape(-1, 3)
         off = foot + 0.01 * surface.normal(uv).reshape(-1, 3)
         assert np.abs(surface.closest_point(off) - foot).max() < 1e-6
+
+    def test_the_whole_target_ends_at_its_border(self, name: str) -> None:
+        """Points all about it, against a fine lattice over its domain."""
+        surface, _ = make_surface(name, {})
+        fine = surface.point(surface.domain.lattice(801, 801)).reshape(-1, 3)
+        size = np.linalg.norm(np.ptp(fine, axis=0))
+        d = surface.domain
+        wide = Domain(d.u0 - 0.1 * d.width, d.u1 + 0.1 * d.width, d.v0 - 0.1 * d.height, d.v1)
+        uv = wide.lattice(12, 12).reshape(-1, 2)
+        points = surface.point(uv) + 0.03 * size * surface.normal(uv)
+        found = np.linalg.norm(surface.nearest(points) - points, axis=1)
+        best = cKDTree(fine).query(points)[0]
+        assert (found < best * (1 + 1e-9)).all()
+        assert (found**2 > best**2 - (size / 400) ** 2).all()
+
+    def test_tiles_lie_on_the_whole_target(self, name: str) -> None:
+        surface, _ = make_surface(name, {})
+        tiles = surface.tiles()
+        size = np.linalg.norm(np.ptp(tiles.reshape(-1, 3), axis=0))
+        for points, sag in ((tiles[::7, 0], 1e-9), (tiles[::7].mean(axis=1), 2 * CHORD)):
+            assert np.linalg.norm(surface.nearest(points) - points, axis=1).max() < sag * size
+        lattice = surface.point(surface.domain.lattice(7, 7)).reshape(-1, 3)
+        gap = closest_on_mesh(lattice, tiles) - lattice
+        assert np.linalg.norm(gap, axis=1).max() < 2 * CHORD * size
 
     def test_it_goes_on_a_little_beyond_its_domain(self, name: str) -> None:
         surface, _ = make_surface(name, {})
@@ -116,3 +150,13 @@ def test_a_target_is_parsed_into_name_and_parameters() -> None:
     assert parse_target("hypar:height=0.5, width=3") == ("hypar", {"height": "0.5", "width": "3"})
     with pytest.raises(TargetError, match="parameter=value"):
         parse_target("hypar:height")
+
+
+def test_all_round_a_revolution_there_is_no_border_along_the_profile() -> None:
+    """Points over the two sides of the domain that are one line in space."""
+    surface, _ = make_surface("vase", {"angle": 360})
+    turns = np.linspace(-0.02, 0.02, 9) + surface.domain.v1
+    uv = np.stack([np.full(9, 0.4), turns], axis=1)
+    foot = surface.point(uv)
+    off = foot + 0.1 * surface.normal(uv)
+    assert np.abs(surface.nearest(off) - foot).max() < 1e-9

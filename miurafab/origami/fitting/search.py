@@ -3,9 +3,9 @@
 More facets bring the sheet closer to the target and make its edges shorter, so the limits bound the
 number of facets from both sides. The distance is that of the middle (`max_deviation`), or that of
 the whole sheet both ways (`max_distance`), or each within its own limit. The search refines the
-sheet in steps until all limits are met, then bisects the last step for the coarsest such sheet. Each size is tried with several
-corrugations and polished. If no size meets both limits, the answer says which limit fails, and by
-how much, on the nearest sheet.
+sheet in steps until all limits are met, then bisects the last step for the coarsest such sheet.
+Each size is tried with several corrugations and polished. If no size meets all limits, the answer
+says which limit fails, and by how much, on the nearest sheet.
 """
 
 from __future__ import annotations

@@ -1,0 +1,55 @@
+"""How far a sheet lies from its whole target, both ways.
+
+The *sheet to target* distance is the largest distance of any point of the sheet from the target,
+the *target to sheet* distance the reverse. The larger is the Hausdorff distance, the epsilon of
+the paper (Dudte, Vouga, Tachi and Mahadevan, Nature Materials 15, 2016). Both are taken over whole
+facets and the whole target, which is all that the user gave
+(:class:`~miurafab.surfaces.surface.TargetSurface`), and not over their vertices alone. Each is true
+to :data:`~miurafab.geometry.hausdorff.WITHIN`, and never too large.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from miurafab.geometry.hausdorff import farthest_from_map, farthest_from_mesh
+from miurafab.geometry.polygons import facet_means
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.contact import triangulate
+from miurafab.surfaces.surface import TargetSurface
+
+
+@dataclass(frozen=True)
+class Nearness:
+    """Distances in mm: of the sheet from the target, of the target from the sheet, of the facet
+    means from the target; and the diagonal of the box around the folded form.
+    """
+
+    sheet_to_target: float
+    target_to_sheet: float
+    means_to_target: float
+    diagonal: float
+
+    @property
+    def hausdorff(self) -> float:
+        """The larger of the two distances."""
+        return max(self.sheet_to_target, self.target_to_sheet)
+
+
+def nearness(pattern: CreasePattern, surface: TargetSurface) -> Nearness:
+    """The distances of the folded ``pattern`` from ``surface``, which is in its own frame."""
+    assert pattern.folded_coords is not None
+    scale, folded = pattern.scale, pattern.folded_coords / pattern.scale
+    triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
+    sheet = folded[triangles]
+    means = facet_means(folded, pattern.faces_vertices)
+    off = np.linalg.norm(surface.nearest(means) - means, axis=1).max()
+    diagonal = np.linalg.norm(np.ptp(pattern.folded_coords, axis=0))
+    return Nearness(
+        scale * farthest_from_map(sheet, surface.nearest),
+        scale * farthest_from_mesh(surface.tiles(), sheet),
+        scale * float(off),
+        float(diagonal),
+    )
