@@ -39,7 +39,8 @@ RULES = {
     "mesh-unit": Rule("warning", "a mesh whose size suggests a unit that is not the millimetre"),
     "filled-holes": Rule("note", "small holes of a mesh that were filled"),
     "sampling": Rule("warning", "a function that turns faster than its samples show"),
-    "smoothed": Rule("note", "a height map that was smoothed"),
+    "smoothed": Rule("note", "a height map or a body that was smoothed"),
+    "polar-holes": Rule("note", "holes that the sheet leaves at the poles of a closed body"),
     # A fit (miurafab.origami.fitting)
     "interrupted": Rule("refusal", "a fit that was interrupted; the sheet is the best so far"),
     "no-sheet": Rule("refusal", "no exact sheet was found"),

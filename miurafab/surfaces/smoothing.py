@@ -24,6 +24,8 @@ from miurafab.surfaces.surface import Domain
 
 _DEGREE = 3
 _PROBES = 8
+_RISEN = 4.0
+"""The search for the stiffness ends where the score is this many times the least."""
 _STEPS = np.arange(-6.0, 3.1, 1.0)
 """Powers of ten of the stiffness, in units of the fourth power of a twentieth of the rectangle."""
 
@@ -45,22 +47,35 @@ def smooth(
     domain: Domain,
     spans: tuple[int, int],
     stiffness: float = 0.0,
+    closed: bool = False,
 ) -> Smoothed:
     """The spline with ``spans`` knot intervals along u and v near ``points`` (n, 3) at the
     parameters ``places`` (n, 2) in ``domain``. Its stiffness is at least ``stiffness``.
+
+    Where ``closed``, the spline has the period of the domain's width in u, with two continuous
+    derivatives; it still takes parameters in the domain only.
     """
     knots = [
-        _knots(low, high, span)
-        for low, high, span in (
-            (domain.u0, domain.u1, spans[0]),
-            (domain.v0, domain.v1, spans[1]),
-        )
+        _periodic_knots(domain.u0, domain.u1, spans[0])
+        if closed
+        else _knots(domain.u0, domain.u1, spans[0]),
+        _knots(domain.v0, domain.v1, spans[1]),
     ]
     basis = _rows_of_products(
         *(BSpline.design_matrix(places[:, k], knots[k], _DEGREE) for k in (0, 1))
     )
+    shape = tuple(len(knot) - _DEGREE - 1 for knot in knots)
+    # the coefficient of the spline that each basis function takes
+    own = np.arange(shape[0] * shape[1])
+    if closed:
+        own = own % (spans[0] * shape[1])
+    count = int(own.max()) + 1
+    gather = sparse.csr_array(
+        (np.ones(len(own)), (np.arange(len(own)), own)), shape=(len(own), count)
+    )
+    basis = basis @ gather
     gram = (basis.T @ basis).tocsc() / len(points)
-    penalty = _bending(knots[0], knots[1])
+    penalty = (gather.T @ _bending(knots[0], knots[1]) @ gather).tocsc()
     unit = (0.05 * max(domain.width, domain.height)) ** 4 / (domain.width * domain.height)
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(points), _PROBES))
     right = basis.T @ np.concatenate([points, signs], axis=1) / len(points)
@@ -77,27 +92,33 @@ def smooth(
         score = residual / freedom**2
         if best is None or score < 0.999 * best[0]:
             best = (score, factor, c, residual)
+        elif score > _RISEN * best[0]:
+            break
     assert best is not None
-    shape = tuple(len(knot) - _DEGREE - 1 for knot in knots)
-    spline = NdBSpline((knots[0], knots[1]), best[2].reshape(*shape, 3), _DEGREE, extrapolate=True)
+    coefficients = best[2][own].reshape(*shape, 3)
+    spline = NdBSpline((knots[0], knots[1]), coefficients, _DEGREE, extrapolate=True)
     return Smoothed(spline, best[1], float(np.sqrt(best[3] / len(points))))
 
 
 def continued(spline: NdBSpline, uv: Floats) -> Floats:
     """(..., 3) points of ``spline`` at ``uv`` (..., 2); beyond its knots it goes straight on."""
-    low = np.array([knots[0] for knots in spline.t])
-    high = np.array([knots[-1] for knots in spline.t])
+    low = np.array([knots[_DEGREE] for knots in spline.t])
+    high = np.array([knots[-1 - _DEGREE] for knots in spline.t])
     inside = np.clip(uv, low, high)
     beyond = uv - inside
-    points = np.asarray(spline(inside))
+    points = np.asarray(spline(inside), dtype=np.float64)
     if beyond.any():
-        points = points + beyond[..., :1] * spline(inside, nu=(1, 0))
-        points = points + beyond[..., 1:] * spline(inside, nu=(0, 1))
+        points += beyond[..., :1] * spline(inside, nu=(1, 0))
+        points += beyond[..., 1:] * spline(inside, nu=(0, 1))
     return points
 
 
 def _knots(low: float, high: float, spans: int) -> Floats:
     return np.concatenate([[low] * 3, np.linspace(low, high, spans + 1), [high] * 3])
+
+
+def _periodic_knots(low: float, high: float, spans: int) -> Floats:
+    return np.asarray(low + (high - low) / spans * np.arange(-_DEGREE, spans + _DEGREE + 1))
 
 
 def _rows_of_products(a: sparse.csr_array, b: sparse.csr_array) -> sparse.csr_array:
@@ -122,7 +143,7 @@ def _bending(u: Floats, v: Floats) -> sparse.csc_array:
 def _products(knots: Floats) -> list[sparse.csr_array]:
     """Integrals of products of the basis functions, of their first and second derivatives."""
     nodes, weights = np.polynomial.legendre.leggauss(4)
-    edges = np.unique(knots)
+    edges = np.unique(knots[_DEGREE : len(knots) - _DEGREE])
     half = np.diff(edges)[:, None] / 2
     at = (edges[:-1, None] + half * (1 + nodes)).ravel()
     weight = (half * weights).ravel()
