@@ -21,8 +21,9 @@ from scipy import sparse
 
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import Paper, sheet_model
-from miurafab.origami.energy.path import EnergyCurve, energy_curve, pulled_path
+from miurafab.origami.energy.curve import EnergyCurve, energy_curve
 from miurafab.origami.energy.path import Path as FoldingPath
+from miurafab.origami.energy.path import pulled_path
 from miurafab.origami.fitting.constraints import OrigamiConstraints
 from miurafab.origami.fitting.fit import FitRequest, FitResult, fit
 from miurafab.origami.fitting.solver import project

@@ -47,7 +47,8 @@ if TYPE_CHECKING:
     from miurafab.fabrication.sheets import Layout as Layout
     from miurafab.findings import Finding as Finding
     from miurafab.origami.crease_pattern import CreasePattern as CreasePattern
-    from miurafab.origami.energy.path import EnergyCurve as EnergyCurve
+    from miurafab.origami.energy.curve import EnergyCurve as EnergyCurve
+    from miurafab.origami.energy.pieces import PieceEnergies as PieceEnergies
     from miurafab.origami.fitting.request import FitOptions as FitOptions
     from miurafab.origami.fitting.request import FitRequest as FitRequest
     from miurafab.origami.fitting.request import FitResult as FitResult

@@ -13,7 +13,8 @@ from miurafab.files import new_file
 from miurafab.options import File, Text
 
 if TYPE_CHECKING:
-    from miurafab.origami.energy.path import EnergyCurve
+    from miurafab.origami.energy.curve import EnergyCurve
+    from miurafab.origami.energy.pieces import PieceEnergies
 
 EXAMPLES = (
     "miurafab energy hypar.fold",
@@ -50,7 +51,7 @@ def energy(
     """Measure the energy on the way from folded to flat.
 
     Prints the barrier and where it is, the stable states, and the stiffness at the folded form.
-    Exits with 1 if the way to flat was lost.
+    Exits with 1 if the way to flat was lost. Each of several pieces is measured by itself.
     """
     if out is not None:
         from miurafab.origami.plotting import RESULTS
@@ -63,12 +64,16 @@ def energy(
         curve.save(out, title=file.stem)
         answer["file"] = str(out)
     console.answer(answer, lambda: _show(console, curve, answer))
-    return DONE if curve.path.converged else NO
+    return DONE if curve.converged else NO
 
 
-def _show(console: Console, curve: EnergyCurve, answer: dict[str, Any]) -> None:
-    console.facts({key: value for key, value in answer.items() if key != "stable_states"})
-    if curve.stable:
-        rows = [(state["angle_deg"], state["energy"]) for state in answer["stable_states"]]
+def _show(console: Console, curve: EnergyCurve | PieceEnergies, answer: dict[str, Any]) -> None:
+    console.facts({key: answer[key] for key in answer if key not in ("stable_states", "pieces")})
+    if "pieces" in answer:
+        keys = ("piece", "facets", "rigid", "bistable", "barrier", "barrier_angle_deg", "stiffness")
+        rows = [[piece.get(key, "") for key in keys] for piece in answer["pieces"]]
+        console.rows([key.replace("_", " ") for key in keys], rows)
+    elif answer["stable_states"]:
+        rows = [[state["angle_deg"], state["energy"]] for state in answer["stable_states"]]
         console.rows(("stable at (deg)", f"energy ({answer['energy_unit']})"), rows)
     console.line(curve.verdict())

@@ -19,13 +19,11 @@ from miurafab.geometry.polygons import edge_lengths, facet_normals
 from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.development import Development, develop
+from miurafab.origami.piece import shelved
 from miurafab.origami.tessellation import Tessellation
 
 FLAT_ANGLE = 1e-9
 """Radians; an edge with a smaller fold angle is flat and not folded."""
-
-SHELF = 3.0
-"""The width at which pieces go on above, in sides of the square that holds their boxes."""
 
 
 def unfold(
@@ -97,7 +95,7 @@ def _full_grid(cells: Ints, vertices: int) -> tuple[int, int] | None:
 def _laid_apart(flat: Development, along: Ints, edges: Ints) -> Floats:
     """(V, 2) the vertices with each piece upright, the pieces apart in the first quadrant.
 
-    Pieces stand in a row, with the mean edge for a gap, and go on above at :data:`SHELF`.
+    They stand in rows, with the mean edge for a gap.
     """
     places = flat.places.copy()
     piece = np.empty(len(places), dtype=np.int64)
@@ -110,16 +108,9 @@ def _laid_apart(flat: Development, along: Ints, edges: Ints) -> Floats:
     if len(starts) == 1:
         return places
     gap = float(edge_lengths(places, edges).mean())
-    sizes = np.stack(
-        [places[start:end].max(axis=0) for start, end in zip(starts, ends, strict=True)]
-    )
-    widest = max(SHELF * math.sqrt(float(sizes.prod(axis=1).sum())), float(sizes[:, 0].max()))
-    x = y = top = 0.0
-    for start, end, (width, height) in zip(starts, ends, sizes.tolist(), strict=True):
-        if x + width > widest and x > 0.0:
-            x, y = 0.0, top + gap
-        places[start:end] += [x, y]
-        x, top = x + width + gap, max(top, y + height)
+    sizes = np.array([places[a:b].max(axis=0) for a, b in zip(starts, ends, strict=True)])
+    for start, end, move in zip(starts, ends, shelved(sizes, gap), strict=True):
+        places[start:end] += move
     return places
 
 

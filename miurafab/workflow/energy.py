@@ -10,7 +10,9 @@ from miurafab.files import AnyPath
 from miurafab.options import Whole, number, option, read_options
 from miurafab.options.documented import described
 from miurafab.origami.energy.bar_hinge import Paper, sheet_model
-from miurafab.origami.energy.path import EnergyCurve, Progress, energy_curve
+from miurafab.origami.energy.curve import EnergyCurve, energy_curve
+from miurafab.origami.energy.path import Progress
+from miurafab.origami.energy.pieces import PieceEnergies, energies_of_pieces
 from miurafab.profiles import Material, load_material
 from miurafab.workflow.patterns import PatternLike, as_pattern
 
@@ -37,7 +39,7 @@ def energy(
     material: Material | AnyPath | None = None,
     on_progress: Progress | None = None,
     **options: Any,
-) -> EnergyCurve:
+) -> EnergyCurve | PieceEnergies:
     """Compute the energy of a pattern on the way from its folded form to flat.
 
     Parameters
@@ -53,8 +55,9 @@ def energy(
 
     Returns
     -------
-    EnergyCurve
-        With barrier and stable states; ``.plot()`` draws it, ``.save("x.png")`` writes it.
+    EnergyCurve or PieceEnergies
+        With barrier and stable states; ``.plot()`` draws it, ``.save("x.png")`` writes it. A
+        pattern of several pieces has a curve for each, since each piece folds by itself.
 
     Raises
     ------
@@ -82,6 +85,15 @@ def energy(
                 'modulus = "3GPa" to its file, or leave `material` out.'
             )
         paper = Paper(stock.thickness_mm, stock.modulus_pa)
+    if found.pieces_count > 1:
+        return energies_of_pieces(
+            found,
+            asked.steps,
+            crease=asked.crease,
+            paper=paper,
+            crease_ratio=asked.crease_ratio,
+            on_progress=on_progress,
+        )
     model = sheet_model(found, paper=paper, crease_ratio=asked.crease_ratio)
     return energy_curve(
         found, asked.steps, crease=asked.crease, model=model, on_progress=on_progress

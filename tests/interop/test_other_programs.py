@@ -18,7 +18,8 @@ import pytest
 from problems import fitted, regular
 
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.folding.kinematics import laid_on, rigid_motion
+from miurafab.origami.folding.kinematics import rigid_motion
+from miurafab.origami.folding.laying import laid_on
 from miurafab.origami.formats.fold import read_fold, write_fold
 from miurafab.origami.formats.lines import opx_text
 from miurafab.origami.formats.planar_graph import lines_of

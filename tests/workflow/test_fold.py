@@ -20,7 +20,8 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.angles_csv import angles_csv, contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.contact import self_intersections
-from miurafab.origami.folding.kinematics import FoldingMotion, facet_strain, laid_on, place
+from miurafab.origami.folding.kinematics import FoldingMotion, facet_strain, place
+from miurafab.origami.folding.laying import laid_on
 from miurafab.origami.folding.thick_panels import thick_panels
 from miurafab.origami.formats.files import load
 from miurafab.origami.formats.fold import read_fold

@@ -1,6 +1,6 @@
 """The bar-and-hinge model of paper: edges that keep their length, and folds that resist bending.
 
-Each quad is split on its shorter diagonal. The energy of a shape x is
+Each facet is split into triangles on its short diagonals. The energy of a shape x is
 
     E(x) = sum over hinges 1/2 k (rho - rho_0)^2 + sum over bars c^2 / (2 delta),
     c = (|d|^2 - L^2) / (2 L)
@@ -28,6 +28,7 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.hinges import hinge_angles
+from miurafab.origami.energy.triangles import split_facets
 
 POISSON_RATIO = 0.3
 """For a material that gives only its modulus; D changes by 4 % between 0.25 and 0.35."""
@@ -89,32 +90,38 @@ class Paper:
 
 
 def sheet_model(
-    pattern: CreasePattern, *, paper: Paper | None = None, crease_ratio: float = 0.0
+    pattern: CreasePattern,
+    *,
+    paper: Paper | None = None,
+    crease_ratio: float = 0.0,
+    unit_mm: float | None = None,
 ) -> BarHingeModel:
     """The bars and hinges of ``pattern``, at rest in its folded form.
 
     ``crease_ratio`` is k_c / k_f, or with ``paper`` the stiffness of a crease over that of a
-    diagonal of its length. Raises :class:`~miurafab.errors.PatternError` for a pattern without
-    a folded form, with facets of more than four corners, or without a crease.
+    diagonal of its length. ``unit_mm`` is the unit of length, by default the mean edge. Raises
+    :class:`~miurafab.errors.PatternError` for a pattern without a folded form or without a crease,
+    and for one of several pieces.
     """
     if pattern.folded_coords is None:
         raise PatternError(
             "The pattern has no folded form, so the energy of folding it is not defined; fit it, "
             "or convert it with its folded mesh as `folded`."
         )
-    if pattern.faces_vertices.shape[1] > 4:
+    if pattern.pieces_count > 1:
         raise PatternError(
-            "The pattern has facets of more than four corners; split them into triangles or quads."
+            f"The pattern has {pattern.pieces_count} pieces; the energy is that of one of them."
         )
-    unit = float(edge_lengths(pattern.folded_coords, pattern.edges_vertices).mean())
+    mean = float(edge_lengths(pattern.folded_coords, pattern.edges_vertices).mean())
+    unit = mean if unit_mm is None else unit_mm
     points = pattern.folded_coords / unit
-    facets = _diagonals(points, pattern.faces_vertices)
+    triangles, split = split_facets(points, pattern.faces_vertices)
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
-    across = _across_edges(pattern, facets, inner)
+    across = _hinges(triangles, pattern.edges_vertices[inner])
     flat = pattern.edges_assignment[inner] == "F"
     if flat.all():
         raise PatternError("The pattern has no crease between two facets, so nothing folds.")
-    diagonals = facets[facets[:, 0] >= 0]
+    diagonals = _hinges(triangles, split)
     _refuse_degenerate(points, pattern.edges_vertices, np.concatenate([diagonals, across]))
     creases = across[~flat]
     bending = np.concatenate([diagonals, across[flat]])
@@ -158,40 +165,15 @@ def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:
             raise PatternError(f"A facet at vertex {hinges[thin[0], wing]} has no width.")
 
 
-def _diagonals(points: Floats, faces: Ints) -> Ints:
-    """(F, 4) the hinge u, v, a, b on each facet's shorter diagonal, -1 for triangles.
-
-    In a quad that is not convex it is the diagonal from the reflex corner, which lies inside.
+def _hinges(triangles: Ints, edges: Ints) -> Ints:
+    """(n, 4) the hinge u, v, a, b of each of ``edges`` (n, 2): its ends, and the third corners of
+    the triangles on its left and on its right.
     """
-    hinges = np.full((len(faces), 4), -1, dtype=np.int64)
-    if faces.shape[1] < 4:
-        return hinges
-    quads = faces[:, 3] >= 0
-    q = faces[quads]
-    p = points[q]
-    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-    turn = np.stack(
-        [np.cross(p[:, k] - p[:, k - 1], p[:, (k + 1) % 4] - p[:, k]) for k in range(4)], axis=1
-    )
-    reflex = np.einsum("qck,qk->qc", turn, normal) < 0
-    first, second = edge_lengths(points, q[:, [0, 2]]), edge_lengths(points, q[:, [1, 3]])
-    across = np.where(reflex.any(axis=1), reflex[:, 1] | reflex[:, 3], second < first)
-    # the corner after v is on the left of u -> v
-    hinges[quads] = np.where(across[:, None], q[:, [1, 3, 0, 2]], q[:, [0, 2, 3, 1]])
-    return hinges
-
-
-def _across_edges(pattern: CreasePattern, diagonals: Ints, edges: Ints) -> Ints:
-    """(n, 4) the hinge of each of ``edges``: its ends and the third corners of its triangles."""
-    faces, ends = pattern.faces_vertices, pattern.edges_vertices[edges]
-    third = []
-    for side in (0, 1):
-        face = pattern.edges_faces[edges, side]
-        corners, split = faces[face], diagonals[face]
-        off_edge = (corners >= 0) & (corners != ends[:, :1]) & (corners != ends[:, 1:])
-        # the end of the face's diagonal that is not on the edge; in a triangle the third corner
-        beyond = off_edge & (
-            (corners == split[:, :1]) | (corners == split[:, 1:2]) | (split[:, :1] < 0)
-        )
-        third.append(corners[np.arange(len(corners)), beyond.argmax(axis=1)])
-    return np.concatenate([ends, np.stack(third, axis=1)], axis=1)
+    tails, heads, thirds = (np.roll(triangles, -turn, axis=1).ravel() for turn in range(3))
+    count = int(triangles.max()) + 1
+    key = tails * count + heads
+    order = np.argsort(key)
+    sides = []
+    for u, v in (edges.T, edges[:, ::-1].T):
+        sides.append(thirds[order[np.searchsorted(key, u * count + v, sorter=order)]])
+    return np.concatenate([edges, np.stack(sides, axis=1)], axis=1)

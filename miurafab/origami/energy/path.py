@@ -1,48 +1,32 @@
-"""The energy of a folded sheet along the quasi-static path to flat, with barrier and stable states.
+"""The quasi-static path of a folded sheet: one crease is driven, the rest is in equilibrium.
 
-One crease is driven from its angle in the folded form towards flat in equal steps. At each step the
-whole sheet is in static equilibrium (:mod:`miurafab.origami.energy.equilibrium`). The torque is the
-slope of the energy, dE/d rho. Its zeros are the stable states and the barriers; regula falsi finds
-them between the steps. The flat state is a branch point, where very many motions meet, so the path
-stops a little short of it.
-
-The energy of a sheet that folds rigidly is zero along the path. The less flat-foldable a sheet is,
-the higher is the barrier that keeps its folded form (Dudte et al., Nature Materials 15 (2016)).
+The crease goes from its angle in the folded form towards flat. At each step the whole sheet is in
+static equilibrium (:mod:`miurafab.origami.energy.equilibrium`). The flat state is a branch point,
+where very many motions meet, so the path stops a little short of it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError
-from miurafab.files import AnyPath
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
-from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate, follow
-from miurafab.origami.energy.equilibrium import Driven, EquilibriumState, Factored, solve
+from miurafab.origami.energy.continuation import follow
+from miurafab.origami.energy.equilibrium import Driven, EquilibriumState
 from miurafab.origami.energy.hinges import hinge_angles
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Progress = Callable[[float, str], None]
 
 NEARLY_FLAT = math.radians(2.5)
 """The last angle of the driven crease, radians, a little short of flat."""
-NOISE = 1e-15
-"""Energies up to this, in the model's unit, are rounding; the sheet then folds rigidly."""
-MAX_FALSI = 30
-ZERO_LOAD = 1e-9
-"""Relative torque tolerance at a stationary point of the energy."""
-SMALL_TURN = 1e-3
-"""Radians to either side of the folded form, for the difference quotient of its stiffness."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,182 +45,6 @@ class Path(Shown):
     loads: Floats
     converged: bool
     model: BarHingeModel
-
-
-@dataclass(frozen=True)
-class StableState:
-    """A local minimum of the energy along the path: the driven fold ``angle`` in radians."""
-
-    angle: float
-    energy: float
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class EnergyCurve(Shown):
-    """The energy along ``path``, with its barrier and stable states.
-
-    Attributes
-    ----------
-    path : Path
-        The states between folded and flat. Its ``model`` sets the unit of all energies.
-    crease : int
-        The driven edge of the pattern.
-    barrier : float
-        The highest maximum of the energy between the folded form and flat, 0 without a maximum.
-    barrier_angle : float or None
-        The fold angle of the driven crease at the barrier, radians; None without a barrier.
-    stable : tuple of StableState
-        The local minima from the folded form to flat, empty for a rigid sheet.
-    rigid : bool
-        Whether the sheet folds without bending, so that it prefers no state.
-    flat_energy : float
-        The energy of the flat sheet.
-    stiffness : float
-        The second derivative of the energy by the driven angle in the folded form, per radian
-        squared.
-    """
-
-    path: Path
-    crease: int
-    barrier: float
-    barrier_angle: float | None
-    stable: tuple[StableState, ...]
-    rigid: bool
-    flat_energy: float
-    stiffness: float
-
-    @property
-    def bistable(self) -> bool:
-        """Whether a barrier lies between two stable states."""
-        return self.barrier > 0 and len(self.stable) > 1
-
-    def save(self, path: AnyPath, *, title: str = "") -> None:
-        """Write a plot (``.png``, ``.svg``) or a table (``.csv``), by the ending of ``path``.
-
-        Raises
-        ------
-        InputError
-            For another ending, and for a folder that does not exist.
-        """
-        from miurafab.origami.energy.plot import energy_plot, energy_table
-        from miurafab.origami.plotting import write_result
-
-        write_result(
-            path,
-            "The energy",
-            lambda: energy_table(self),
-            lambda kind: energy_plot(self, kind, title),
-        )
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the energy over the driven fold angle with matplotlib.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw. The default is a new figure.
-
-        Returns
-        -------
-        matplotlib Axes
-        """
-        from miurafab.origami.energy.plot import SIZE, draw_energy
-        from miurafab.origami.plotting import shown
-
-        axes = shown(SIZE, ax)
-        draw_energy(self, axes)
-        return axes
-
-    def _summary(self) -> str:
-        said = "rigid" if self.rigid else "bistable" if self.bistable else "one stable state"
-        unit = self.path.model.unit_joule
-        barrier = f"{self.barrier * (unit or 1.0):.3g} {'k_f L' if unit is None else 'J'}"
-        return f"{said}, barrier {barrier}, {len(self.path.drives)} steps"
-
-    def _picture(self) -> str:
-        from miurafab.origami.energy.plot import energy_plot
-
-        return energy_plot(self, "svg", "").decode("utf-8")
-
-    def _facts(self) -> Mapping[str, object]:
-        report = self.report()
-        return {key: report[key] for key in report if not isinstance(report[key], list)}
-
-    def verdict(self) -> str:
-        """The result in one sentence."""
-        if not self.path.converged:
-            reached = math.degrees(abs(self.path.drives[-1]))
-            return (
-                f"The path was lost at {reached:.1f} degrees, where the sheet jumps to another "
-                "shape; take more `steps`, or drive another `crease`."
-            )
-        if self.rigid:
-            return "It folds rigidly: no energy is stored on the way to flat."
-        if self.bistable:
-            return "It is bistable: a barrier on the way to flat holds the folded form."
-        return "It is not bistable: there is no barrier on the way to flat."
-
-    def report(self) -> dict[str, Any]:
-        """The curve's numbers, ready for JSON; energies in joules if a material was given."""
-        model = self.path.model
-        unit = 1.0 if model.unit_joule is None else model.unit_joule
-        angle = self.barrier_angle
-        return {
-            "converged": self.path.converged,
-            "barrier": self.barrier * unit,
-            "barrier_angle_deg": None if angle is None else math.degrees(angle),
-            "bistable": self.bistable,
-            "rigid": self.rigid,
-            "stable_states": [
-                {"angle_deg": math.degrees(state.angle), "energy": state.energy * unit}
-                for state in self.stable
-            ],
-            "stiffness": self.stiffness * unit,
-            "flat_energy": self.flat_energy * unit,
-            "highest_energy": float(self.path.energies.max()) * unit,
-            "energy_unit": "k_f L" if model.unit_joule is None else "J",
-            "crease": self.crease,
-            "folded_angle_deg": math.degrees(self.path.drives[0]),
-            "last_angle_deg": math.degrees(self.path.drives[-1]),
-            "steps": len(self.path.drives) - 1,
-        }
-
-
-def energy_curve(
-    pattern: CreasePattern,
-    steps: int = 40,
-    *,
-    crease: int | None = None,
-    model: BarHingeModel | None = None,
-    on_progress: Progress | None = None,
-) -> EnergyCurve:
-    """The energy of ``pattern`` from its folded form to nearly flat, with barrier and stable
-    states; arguments, errors and path as for :func:`folding_path`.
-    """
-    model = sheet_model(pattern) if model is None else model
-    traced = _trace(model, steps, crease, NEARLY_FLAT, on_progress)
-    path = _path(traced)
-    flat = np.column_stack([pattern.vertices_coords, np.zeros(len(pattern.vertices_coords))])
-    flat_energy = model.energy(flat / model.unit_mm)
-    rigid = bool(path.energies.max() <= NOISE)
-    maxima, minima = ([], []) if rigid else _stationary(traced, path)
-    ends = []
-    towards_flat = -math.copysign(1.0, path.drives[0])
-    if not rigid and path.converged and path.loads[-1] * towards_flat < 0:
-        ends = [StableState(0.0, flat_energy)]
-    at_rest = float(path.energies[0]) if path.energies[0] > NOISE else 0.0
-    folded = [] if rigid else [StableState(float(path.drives[0]), at_rest)]
-    top = max(maxima, key=lambda state: state.energy, default=None)
-    return EnergyCurve(
-        path=path,
-        crease=int(model.creases_edges[traced.place]),
-        barrier=0.0 if top is None else top.energy,
-        barrier_angle=None if top is None else top.angle,
-        stable=(*folded, *minima, *ends),
-        rigid=rigid,
-        flat_energy=flat_energy,
-        stiffness=_stiffness(traced),
-    )
 
 
 def folding_path(
@@ -259,7 +67,7 @@ def folding_path(
     :class:`~miurafab.errors.InputError` for an edge that is no crease or is flat.
     """
     model = sheet_model(pattern) if model is None else model
-    return _path(_trace(model, steps, crease, until, on_progress))
+    return path_of(trace(model, crease, towards(until, steps), on_progress))
 
 
 def pulled_path(
@@ -278,11 +86,11 @@ def pulled_path(
     distance = driven.value(driven.rest.points)
     drives = np.linspace(distance, distance * (1 + strain), steps + 1)
     states = follow(driven, driven.rest, drives, on_progress)
-    path = _path(_Traced(driven, -1, drives, states))
+    path = path_of(Traced(driven, -1, drives, states))
     return replace(path, drives=path.drives * model.unit_mm)
 
 
-class _Traced(NamedTuple):
+class Traced(NamedTuple):
     """A path as the solver sees it; ``place`` is the index of the driven crease in the model."""
 
     driven: Driven
@@ -291,11 +99,24 @@ class _Traced(NamedTuple):
     states: list[EquilibriumState]
 
 
-def _trace(
-    model: BarHingeModel, steps: int, edge: int | None, until: float, on_progress: Progress | None
-) -> _Traced:
+def towards(until: float, steps: int) -> Callable[[float], Floats]:
+    """From a fold angle to +-``until`` radians, of the same sign, in equal ``steps``."""
     if steps < 1:
         raise InputError(f"`steps` is {steps}; the path needs at least one.")
+    return lambda angle: np.linspace(angle, math.copysign(until, angle), steps + 1)
+
+
+def trace(
+    model: BarHingeModel,
+    edge: int | None,
+    drives: Callable[[float], Floats],
+    on_progress: Progress | None = None,
+) -> Traced:
+    """The path on which the crease at ``edge``, or the main crease, goes through ``drives``.
+
+    ``drives`` gives the fold angles, radians, from the angle in the folded form. Raises what
+    :func:`folding_path` raises.
+    """
     place = main_crease(model) if edge is None else _place_of(model, edge)
     driven = Driven(model, model.creases[place])
     angle = driven.value(driven.rest.points)
@@ -304,14 +125,14 @@ def _trace(
             f"The crease at edge {model.creases_edges[place]} is folded by only "
             f"{math.degrees(abs(angle)):.2g} degrees, too little to drive; take another `crease`."
         )
-    drives = np.linspace(angle, math.copysign(until, angle), steps + 1)
-    states = follow(driven, driven.rest, drives, on_progress)
+    goals = drives(angle)
+    states = follow(driven, driven.rest, goals, on_progress)
     if not states:
         raise PatternError(
             "The folded form is not in equilibrium: its facets are not flat, or it has a crease of "
             "no width; check the pattern."
         )
-    return _Traced(driven, place, drives, states)
+    return Traced(driven, place, goals, states)
 
 
 def main_crease(model: BarHingeModel) -> int:
@@ -332,7 +153,8 @@ def _place_of(model: BarHingeModel, edge: int) -> int:
     return int(places[0])
 
 
-def _path(traced: _Traced) -> Path:
+def path_of(traced: Traced) -> Path:
+    """The shapes, energies and loads of a traced path."""
     driven, _, drives, states = traced
     model = driven.model
     turned = np.stack([state.points for state in states])
@@ -344,52 +166,3 @@ def _path(traced: _Traced) -> Path:
         converged=len(states) == len(drives),
         model=model,
     )
-
-
-def _stationary(traced: _Traced, path: Path) -> tuple[list[StableState], list[StableState]]:
-    """The maxima and minima of the energy strictly between the first and the last state."""
-    maxima: list[StableState] = []
-    minima: list[StableState] = []
-    turns = np.flatnonzero(path.loads[1:-1] * path.loads[2:] < 0) + 1
-    for k in turns:
-        first = max(0, min(int(k) - 1, len(path.drives) - HISTORY))
-        near = slice(first, first + HISTORY)
-        known = [
-            Known(float(drive), state)
-            for drive, state in zip(path.drives[near], traced.states[near], strict=True)
-        ]
-        rising = path.loads[k] * (traced.drives[k + 1] - traced.drives[k]) > 0
-        states = maxima if rising else minima
-        states.append(_zero_load(traced.driven, known, int(k) - first))
-    return maxima, minima
-
-
-def _zero_load(driven: Driven, known: list[Known], before: int) -> StableState:
-    """The state without load between two neighbours in ``known``, by regula falsi (Illinois)."""
-    left, right = known[before], known[before + 1]
-    a, b = (left.drive, left.state.mu), (right.drive, right.state.mu)
-    scale = max(abs(a[1]), abs(b[1]))
-    best = left if abs(a[1]) < abs(b[1]) else right
-    factored: Factored | None = None
-    for _ in range(MAX_FALSI):
-        if abs(best.state.mu) <= ZERO_LOAD * scale:
-            break
-        drive = (a[0] * b[1] - b[0] * a[1]) / (b[1] - a[1])
-        solution = solve(driven, extrapolate(known, drive), drive, factored)
-        if not solution.converged:
-            break
-        factored, mu = solution.factored, solution.state.mu
-        best = Known(drive, solution.state)
-        a = (a[0], a[1] / 2) if (mu < 0) == (b[1] < 0) else b
-        b = (drive, mu)
-    return StableState(best.drive, driven.model.energy(best.state.points))
-
-
-def _stiffness(traced: _Traced) -> float:
-    """d load / d drive at the first state, by a central difference."""
-    driven, _, drives, states = traced
-    loads = []
-    for turn in (-SMALL_TURN, SMALL_TURN):
-        solution = solve(driven, states[0], float(drives[0]) + turn)
-        loads.append(-solution.state.mu if solution.converged else math.nan)
-    return (loads[1] - loads[0]) / (2 * SMALL_TURN)

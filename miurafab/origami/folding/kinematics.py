@@ -6,7 +6,7 @@ eqs 1-3). One number s therefore moves a whole sheet:
 
     rho_e(s) = 2 atan(s tan(rho_e* / 2)),    s = 0 flat, 1 the folded form, infinity flat-folded
 
-Facets are placed breadth-first from the middle of the sheet, each turned about the crease to its
+Facets are placed breadth-first from the middle of each piece, each turned about the crease to its
 parent. The other creases are not used: the distance between their two facets, the loop mismatch,
 certifies that the sheet folds rigidly.
 """
@@ -18,13 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import shortest_path
+from scipy.sparse.csgraph import dijkstra
 
 from miurafab.display import Shown
 from miurafab.errors import PatternError
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, run_starts
 from miurafab.geometry.polygons import edge_lengths, facet_means, sides_and_diagonals
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.laying import laid_on_each_other
 from miurafab.origami.folding.multipliers import fold_angle_multipliers
 
 RIGID = 1e-6
@@ -76,8 +77,8 @@ class FoldingMotion(Shown):
 class FacetPlacement:
     """The places of the facets in T frames: a flat point p of facet f goes to turn p + shift.
 
-    ``turn`` (T, F, 3, 3) and ``shift`` (T, F, 3) float64; the facet in the middle keeps its place.
-    ``depth`` (F,) int64 is the number of creases between a facet and that facet.
+    ``turn`` (T, F, 3, 3) and ``shift`` (T, F, 3) float64; the facet in the middle of each piece
+    keeps its place. ``depth`` (F,) int64 is the number of creases between a facet and that facet.
     """
 
     turn: Floats
@@ -93,10 +94,10 @@ class FacetPlacement:
 def rigid_motion(pattern: CreasePattern, states: ArrayLike) -> FoldingMotion:
     """The rigid motion of ``pattern`` through ``states`` (T,) of s, each in [0, infinity].
 
-    The frame nearest to s = 1 is laid on the folded form (without a folded form, the frame nearest
-    to 0 on the flat pattern) and each other frame on its neighbour, by the best rigid motion.
+    :mod:`miurafab.origami.folding.laying` says where the frames lie.
 
-    Raises :class:`~miurafab.errors.PatternError` if the facets are not all joined by creases.
+    Raises :class:`~miurafab.errors.PatternError` if the facets of a piece are not all joined by
+    creases.
     """
     s = np.atleast_1d(np.asarray(states, dtype=np.float64))
     if not (s >= 0).all():
@@ -162,7 +163,8 @@ def states_between(pattern: CreasePattern, steps: int, last: float = np.inf) -> 
 def place(pattern: CreasePattern, fold_angles: Floats) -> FacetPlacement:
     """The placement of all facets in T frames with the creases at ``fold_angles`` (T, E), radians.
 
-    Raises :class:`~miurafab.errors.PatternError` if the facets are not all joined by creases.
+    Raises :class:`~miurafab.errors.PatternError` if the facets of a piece are not all joined by
+    creases.
     """
     frames, facets = len(fold_angles), len(pattern.faces_vertices)
     before, crease, depth = _tree(pattern)
@@ -230,8 +232,8 @@ def _joined(pattern: CreasePattern) -> Ints:
 
 
 def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
-    """Breadth-first over the facets from the middle: (F,) the parent of each facet, the crease
-    between them, and the number of creases from the middle.
+    """Breadth-first over the facets from the middle of each piece: (F,) the parent of each facet,
+    the crease between them, and the number of creases from the middle.
     """
     facets = len(pattern.faces_vertices)
     joined = _joined(pattern)
@@ -239,8 +241,13 @@ def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
     joined = joined[lengths[joined] > _POINT * lengths.mean()]
     left, right = pattern.edges_faces[joined].T
     graph = coo_array((np.ones(len(joined)), (left, right)), shape=(facets, facets)).tocsr()
-    distance, before = shortest_path(
-        graph, directed=False, unweighted=True, indices=_middle(pattern), return_predecessors=True
+    distance, before, _ = dijkstra(
+        graph,
+        directed=False,
+        unweighted=True,
+        indices=_middles(pattern),
+        return_predecessors=True,
+        min_only=True,
     )
     if np.isinf(distance).any():
         loose = int(np.isinf(distance).sum())
@@ -261,10 +268,14 @@ def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
     return previous, crease, depth
 
 
-def _middle(pattern: CreasePattern) -> int:
-    """The facet nearest to the middle of the flat pattern."""
+def _middles(pattern: CreasePattern) -> Ints:
+    """The facet of each piece nearest to the middle of the piece when flat."""
     means = facet_means(pattern.vertices_coords, pattern.faces_vertices)
-    return int(np.argmin(np.linalg.norm(means - means.mean(axis=0), axis=1)))
+    number = np.zeros(len(means), dtype=np.int64) if pattern.pieces is None else pattern.pieces
+    size = np.bincount(number)
+    middles = np.stack([np.bincount(number, means[:, axis]) / size for axis in (0, 1)], axis=1)
+    away = np.linalg.norm(means - middles[number], axis=1)
+    return np.lexsort((away, number))[run_starts(size)]
 
 
 def first_facets(pattern: CreasePattern, depth: Ints) -> Ints:
@@ -278,32 +289,3 @@ def first_facets(pattern: CreasePattern, depth: Ints) -> Ints:
     if len(loose):
         raise PatternError(f"Vertex {loose[0]} of the pattern belongs to no facet.")
     return first
-
-
-def laid_on_each_other(pattern: CreasePattern, states: Floats, frames: Floats) -> Floats:
-    """``frames`` moved rigidly, the first onto the known form and the rest onto neighbours."""
-    known = pattern.folded_coords
-    if known is None:
-        known = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
-    goal = 0.0 if pattern.folded_coords is None else 1.0
-    order = np.argsort(states, kind="stable")
-    start = int(np.argmin(np.abs(states[order] - goal)))
-    laid = np.empty_like(frames)
-    laid[order[start]] = laid_on(frames[order[start]], known)
-    for step in (1, -1):
-        at = start + step
-        while 0 <= at < len(order):
-            laid[order[at]] = laid_on(frames[order[at]], laid[order[at - step]])
-            at += step
-    return laid
-
-
-def laid_on(points: Floats, onto: Floats) -> Floats:
-    """``points`` (V, 3) moved rigidly to lie on ``onto`` (V, 3) with the least squared distance.
-
-    (W. Kabsch, Acta Cryst. A 32 (1976) 922.)
-    """
-    centre, goal = points.mean(axis=0), onto.mean(axis=0)
-    u, _, vt = np.linalg.svd((points - centre).T @ (onto - goal))
-    mirror = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    return np.asarray((points - centre) @ ((u * mirror) @ vt) + goal)

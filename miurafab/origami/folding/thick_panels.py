@@ -162,6 +162,8 @@ def _collisions(
         pairs = self_intersections(solids.as_pattern(placed))
         panels = np.sort(solids.triangle_facet[pairs], axis=1)
         panels = np.unique(panels[panels[:, 0] != panels[:, 1]], axis=0)
+        if pattern.pieces is not None:  # each piece folds by itself
+            panels = panels[pattern.pieces[panels[:, 0]] == pattern.pieces[panels[:, 1]]]
         collisions.extend((float(state), int(a), int(b)) for a, b in panels)
     return tuple(collisions)
 

@@ -19,10 +19,10 @@ from miurafab.origami.folding.kinematics import (
     FoldingMotion,
     facet_strain,
     half_tangents,
-    laid_on,
     rigid_motion,
     states_between,
 )
+from miurafab.origami.folding.laying import laid_on
 from miurafab.origami.miura import regular_miura
 
 EXACT = ("plane", "hypar", "sphere", "saddle", "cylinder", "paraboloid")

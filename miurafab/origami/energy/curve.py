@@ -1,0 +1,276 @@
+"""The energy of a folded sheet on its way to flat, with barrier and stable states.
+
+The torque on the driven crease is the slope of the energy, dE/d rho. Its zeros are the stable
+states and the barriers; regula falsi finds them between the steps of the path
+(:mod:`miurafab.origami.energy.path`).
+
+The energy of a sheet that folds rigidly is zero along the path. The less flat-foldable a sheet is,
+the higher is the barrier that keeps its folded form (Dudte et al., Nature Materials 15 (2016)).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from miurafab.display import Shown
+from miurafab.files import AnyPath
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
+from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate
+from miurafab.origami.energy.equilibrium import Driven, Factored, solve
+from miurafab.origami.energy.path import (
+    NEARLY_FLAT,
+    Path,
+    Progress,
+    Traced,
+    path_of,
+    towards,
+    trace,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+NOISE = 1e-15
+"""Energies up to this, in the model's unit, are rounding; the sheet then folds rigidly."""
+MAX_FALSI = 30
+ZERO_LOAD = 1e-9
+"""Relative torque tolerance at a stationary point of the energy."""
+SMALL_TURN = 1e-3
+"""Radians to either side of the folded form, for the difference quotient of its stiffness."""
+
+
+@dataclass(frozen=True)
+class StableState:
+    """A local minimum of the energy along the path: the driven fold ``angle`` in radians."""
+
+    angle: float
+    energy: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EnergyCurve(Shown):
+    """The energy along ``path``, with its barrier and stable states.
+
+    Attributes
+    ----------
+    path : Path
+        The states between folded and flat. Its ``model`` sets the unit of all energies.
+    crease : int
+        The driven edge of the pattern.
+    barrier : float
+        The highest maximum of the energy between the folded form and flat, 0 without a maximum.
+    barrier_angle : float or None
+        The fold angle of the driven crease at the barrier, radians; None without a barrier.
+    stable : tuple of StableState
+        The local minima from the folded form to flat, empty for a rigid sheet.
+    rigid : bool
+        Whether the sheet folds without bending, so that it prefers no state.
+    flat_energy : float
+        The energy of the flat sheet.
+    stiffness : float
+        The second derivative of the energy by the driven angle in the folded form, per radian
+        squared.
+    """
+
+    path: Path
+    crease: int
+    barrier: float
+    barrier_angle: float | None
+    stable: tuple[StableState, ...]
+    rigid: bool
+    flat_energy: float
+    stiffness: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether the way to flat was found."""
+        return self.path.converged
+
+    @property
+    def bistable(self) -> bool:
+        """Whether a barrier lies between two stable states."""
+        return self.barrier > 0 and len(self.stable) > 1
+
+    def save(self, path: AnyPath, *, title: str = "") -> None:
+        """Write a plot (``.png``, ``.svg``) or a table (``.csv``), by the ending of ``path``.
+
+        Raises
+        ------
+        InputError
+            For another ending, and for a folder that does not exist.
+        """
+        from miurafab.origami.energy.plot import energy_plot, energy_table
+        from miurafab.origami.plotting import write_result
+
+        write_result(
+            path,
+            "The energy",
+            lambda: energy_table(self),
+            lambda kind: energy_plot(self, kind, title),
+        )
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the energy over the driven fold angle with matplotlib.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw. The default is a new figure.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        from miurafab.origami.energy.plot import SIZE, draw_energy
+        from miurafab.origami.plotting import shown
+
+        axes = shown(SIZE, ax)
+        draw_energy(self, axes)
+        return axes
+
+    def _summary(self) -> str:
+        said = "rigid" if self.rigid else "bistable" if self.bistable else "one stable state"
+        unit = self.path.model.unit_joule
+        barrier = f"{self.barrier * (unit or 1.0):.3g} {'k_f L' if unit is None else 'J'}"
+        return f"{said}, barrier {barrier}, {len(self.path.drives)} steps"
+
+    def _picture(self) -> str:
+        from miurafab.origami.energy.plot import energy_plot
+
+        return energy_plot(self, "svg", "").decode("utf-8")
+
+    def _facts(self) -> Mapping[str, object]:
+        report = self.report()
+        return {key: report[key] for key in report if not isinstance(report[key], list)}
+
+    def verdict(self) -> str:
+        """The result in one sentence."""
+        if not self.converged:
+            reached = math.degrees(abs(self.path.drives[-1]))
+            return (
+                f"The path was lost at {reached:.1f} degrees, where the sheet jumps to another "
+                "shape; take more `steps`, or drive another `crease`."
+            )
+        if self.rigid:
+            return "It folds rigidly: no energy is stored on the way to flat."
+        if self.bistable:
+            return "It is bistable: a barrier on the way to flat holds the folded form."
+        return "It is not bistable: there is no barrier on the way to flat."
+
+    def report(self) -> dict[str, Any]:
+        """The curve's numbers, ready for JSON; energies in joules if a material was given."""
+        model = self.path.model
+        unit = 1.0 if model.unit_joule is None else model.unit_joule
+        angle = self.barrier_angle
+        return {
+            "converged": self.converged,
+            "barrier": self.barrier * unit,
+            "barrier_angle_deg": None if angle is None else math.degrees(angle),
+            "bistable": self.bistable,
+            "rigid": self.rigid,
+            "stable_states": [
+                {"angle_deg": math.degrees(state.angle), "energy": state.energy * unit}
+                for state in self.stable
+            ],
+            "stiffness": self.stiffness * unit,
+            "flat_energy": self.flat_energy * unit,
+            "highest_energy": float(self.path.energies.max()) * unit,
+            "energy_unit": "k_f L" if model.unit_joule is None else "J",
+            "crease": self.crease,
+            "folded_angle_deg": math.degrees(self.path.drives[0]),
+            "last_angle_deg": math.degrees(self.path.drives[-1]),
+            "steps": len(self.path.drives) - 1,
+        }
+
+
+def energy_curve(
+    pattern: CreasePattern,
+    steps: int = 40,
+    *,
+    crease: int | None = None,
+    model: BarHingeModel | None = None,
+    on_progress: Progress | None = None,
+) -> EnergyCurve:
+    """The energy of ``pattern`` from its folded form to nearly flat, with barrier and stable
+    states; arguments, errors and path as for
+    :func:`~miurafab.origami.energy.path.folding_path`.
+    """
+    model = sheet_model(pattern) if model is None else model
+    traced = trace(model, crease, towards(NEARLY_FLAT, steps), on_progress)
+    path = path_of(traced)
+    flat = np.column_stack([pattern.vertices_coords, np.zeros(len(pattern.vertices_coords))])
+    flat_energy = model.energy(flat / model.unit_mm)
+    rigid = bool(path.energies.max() <= NOISE)
+    maxima, minima = ([], []) if rigid else _stationary(traced, path)
+    ends = []
+    towards_flat = -math.copysign(1.0, path.drives[0])
+    if not rigid and path.converged and path.loads[-1] * towards_flat < 0:
+        ends = [StableState(0.0, flat_energy)]
+    at_rest = float(path.energies[0]) if path.energies[0] > NOISE else 0.0
+    folded = [] if rigid else [StableState(float(path.drives[0]), at_rest)]
+    top = max(maxima, key=lambda state: state.energy, default=None)
+    return EnergyCurve(
+        path=path,
+        crease=int(model.creases_edges[traced.place]),
+        barrier=0.0 if top is None else top.energy,
+        barrier_angle=None if top is None else top.angle,
+        stable=(*folded, *minima, *ends),
+        rigid=rigid,
+        flat_energy=flat_energy,
+        stiffness=_stiffness(traced),
+    )
+
+
+def _stationary(traced: Traced, path: Path) -> tuple[list[StableState], list[StableState]]:
+    """The maxima and minima of the energy strictly between the first and the last state."""
+    maxima: list[StableState] = []
+    minima: list[StableState] = []
+    turns = np.flatnonzero(path.loads[1:-1] * path.loads[2:] < 0) + 1
+    for k in turns:
+        first = max(0, min(int(k) - 1, len(path.drives) - HISTORY))
+        near = slice(first, first + HISTORY)
+        known = [
+            Known(float(drive), state)
+            for drive, state in zip(path.drives[near], traced.states[near], strict=True)
+        ]
+        rising = path.loads[k] * (traced.drives[k + 1] - traced.drives[k]) > 0
+        states = maxima if rising else minima
+        states.append(_zero_load(traced.driven, known, int(k) - first))
+    return maxima, minima
+
+
+def _zero_load(driven: Driven, known: list[Known], before: int) -> StableState:
+    """The state without load between two neighbours in ``known``, by regula falsi (Illinois)."""
+    left, right = known[before], known[before + 1]
+    a, b = (left.drive, left.state.mu), (right.drive, right.state.mu)
+    scale = max(abs(a[1]), abs(b[1]))
+    best = left if abs(a[1]) < abs(b[1]) else right
+    factored: Factored | None = None
+    for _ in range(MAX_FALSI):
+        if abs(best.state.mu) <= ZERO_LOAD * scale:
+            break
+        drive = (a[0] * b[1] - b[0] * a[1]) / (b[1] - a[1])
+        solution = solve(driven, extrapolate(known, drive), drive, factored)
+        if not solution.converged:
+            break
+        factored, mu = solution.factored, solution.state.mu
+        best = Known(drive, solution.state)
+        a = (a[0], a[1] / 2) if (mu < 0) == (b[1] < 0) else b
+        b = (drive, mu)
+    return StableState(best.drive, driven.model.energy(best.state.points))
+
+
+def _stiffness(traced: Traced) -> float:
+    """d load / d drive at the first state, by a central difference."""
+    driven, _, drives, states = traced
+    loads = []
+    for turn in (-SMALL_TURN, SMALL_TURN):
+        solution = solve(driven, states[0], float(drives[0]) + turn)
+        loads.append(-solution.state.mu if solution.converged else math.nan)
+    return (loads[1] - loads[0]) / (2 * SMALL_TURN)
