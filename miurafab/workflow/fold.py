@@ -173,6 +173,7 @@ class Folding(Shown):
             "max_mismatch": self.mismatch,
             "max_strain": float(strain.max()),
             "frames": len(motion.frames),
+            "pieces": motion.pattern.pieces_count,
             "states": motion.states.tolist(),
             "self_contacts": [
                 {"frame": c.frame, "state": c.state, "facets": [list(pair) for pair in c.facets]}

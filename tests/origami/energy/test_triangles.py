@@ -1,0 +1,74 @@
+"""Facets split into triangles: they cover the facet, and their diagonals lie inside it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from piece_problems import trimmed
+
+from miurafab.geometry.polygons import signed_areas
+from miurafab.origami.energy.triangles import split_facets
+
+TURN = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+
+
+def in_space(flat: np.ndarray) -> np.ndarray:
+    return np.pad(flat, ((0, 0), (0, 1))) @ TURN.T
+
+
+@settings(max_examples=60)
+@given(
+    corners=st.integers(3, 9),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_a_star_shaped_facet_is_covered_once(corners: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    turn = np.sort(random.uniform(0, 2 * np.pi, corners))
+    if np.diff(np.append(turn, turn[0] + 2 * np.pi)).max() > 3.0:
+        turn = 2 * np.pi * np.arange(corners) / corners
+    flat = random.uniform(0.3, 1.0, (corners, 1)) * np.column_stack([np.cos(turn), np.sin(turn)])
+    face = np.arange(corners)[None]
+    triangles, diagonals = split_facets(
+        in_space(flat), np.pad(face, ((0, 0), (0, 1)), constant_values=-1)
+    )
+    assert len(triangles) == corners - 2
+    assert len(diagonals) == corners - 3
+    areas = signed_areas(flat[triangles])
+    assert (areas > 0).all()
+    assert areas.sum() == pytest.approx(signed_areas(flat[face])[0])
+
+
+def test_a_quad_is_split_on_its_shorter_diagonal_and_a_dart_inside() -> None:
+    kite = np.array([[0.0, 0.0], [3.0, -1.0], [6.0, 0.0], [3.0, 1.0]])
+    dart = np.array([[0.0, 0.0], [4.0, 0.0], [1.0, 1.0], [0.0, 4.0]])
+    for flat, expected in ((kite, {1, 3}), (dart, {0, 2})):
+        _, diagonals = split_facets(in_space(flat), np.arange(4)[None])
+        assert set(diagonals[0].tolist()) == expected
+
+
+def test_ears_are_cut_at_the_shortest_diagonals() -> None:
+    """A rectangle with a small corner cut off loses that corner first."""
+    flat = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 2.5], [3.5, 3.0], [0.0, 3.0]])
+    _, diagonals = split_facets(in_space(flat), np.arange(5)[None])
+    assert {frozenset(pair) for pair in diagonals.tolist()} == {
+        frozenset({1, 3}),
+        frozenset({0, 3}),
+    }
+
+
+def test_corners_on_a_straight_side_leave_no_triangle_without_width() -> None:
+    flat = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]])
+    triangles, _ = split_facets(in_space(flat), np.arange(6)[None])
+    assert signed_areas(flat[triangles]).min() > 0.4
+
+
+def test_the_facets_of_a_trimmed_sheet_are_covered() -> None:
+    pattern = trimmed()
+    triangles, diagonals = split_facets(pattern.folded_coords, pattern.faces_vertices)
+    sizes = (pattern.faces_vertices >= 0).sum(axis=1)
+    assert sizes.max() > 4
+    assert len(triangles) == (sizes - 2).sum()
+    assert len(diagonals) == (sizes - 3).sum()
+    assert signed_areas(pattern.vertices_coords[triangles]).min() > 0
