@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from miurafab.geometry.arrays import Bools
 from miurafab.geometry.hausdorff import farthest_from_map, farthest_from_mesh
 from miurafab.geometry.polygons import facet_means
 from miurafab.origami.crease_pattern import CreasePattern
@@ -23,8 +24,8 @@ from miurafab.surfaces.surface import TargetSurface
 
 @dataclass(frozen=True)
 class Nearness:
-    """Distances in mm: of the sheet from the target, of the target from the sheet, of the facet
-    means from the target; and the diagonal of the box around the folded form.
+    """Distances in mm: of the sheet from the target, of the target from the sheet, of the means of
+    whole facets from the target; and the diagonal of the box around the folded form.
     """
 
     sheet_to_target: float
@@ -44,7 +45,7 @@ def nearness(pattern: CreasePattern, surface: TargetSurface) -> Nearness:
     scale, folded = pattern.scale, pattern.folded_coords / pattern.scale
     triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
     sheet = folded[triangles]
-    means = facet_means(folded, pattern.faces_vertices)
+    means = facet_means(folded, pattern.faces_vertices[_uncut(pattern)])
     off = np.linalg.norm(surface.nearest(means) - means, axis=1).max()
     diagonal = np.linalg.norm(np.ptp(pattern.folded_coords, axis=0))
     return Nearness(
@@ -53,3 +54,20 @@ def nearness(pattern: CreasePattern, surface: TargetSurface) -> Nearness:
         scale * float(off),
         float(diagonal),
     )
+
+
+def _uncut(pattern: CreasePattern) -> Bools:
+    """(F,) the facets that no outline has cut, all facets where there are no others.
+
+    The mean of half a facet lies above or below the middle of the sheet. Where a sheet was trimmed,
+    each facet at the border may be cut; a seam is no such border.
+    """
+    facets = np.ones(len(pattern.faces_vertices), dtype=bool)
+    if pattern.target.get("edge") != "trim":
+        return facets
+    border = pattern.edges_assignment == "B"
+    if pattern.seams is not None:
+        border[pattern.seams] = False
+    sides = pattern.faces_edges
+    facets = ~((sides >= 0) & border[sides]).any(axis=1)
+    return np.asarray(facets if facets.any() else ~facets)

@@ -14,6 +14,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.fit import fit
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.nearness import nearness
 from miurafab.origami.trim import CREASE, SLIVER, inner_facets, trimmed
 from miurafab.origami.verify import audit
 from miurafab.surfaces.mesh import MeshSurface, mesh_surface
@@ -154,6 +155,18 @@ def test_whole_facets_are_those_with_their_means_inside(
     inside = outline.contains(target.feet(means))
     kept = pattern.folded_coords[pattern.faces_vertices].mean(axis=1)
     assert np.abs(np.sort(kept, axis=0) - np.sort(means[inside], axis=0)).max() < 1e-12
+
+
+def test_cut_facets_do_not_count_as_the_middle_of_a_sheet(
+    bowl: tuple[CreasePattern, WholeMesh],
+) -> None:
+    pattern, target = cut(bowl, "circle")
+    as_cut = replace(pattern, target=pattern.target | {"edge": "trim"})
+    all_means, uncut = nearness(pattern, target), nearness(as_cut, target)
+    before = nearness(bowl[0], target)
+    assert uncut.means_to_target <= before.means_to_target
+    assert all_means.means_to_target > 2 * before.means_to_target
+    assert uncut.sheet_to_target == all_means.sheet_to_target
 
 
 def test_a_sheet_of_two_pieces_is_cut_as_one(bowl: tuple[CreasePattern, WholeMesh]) -> None:
