@@ -30,11 +30,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, sparse
 
+from miurafab.geometry.polygons import edge_lengths
+from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.fitting.constraints import OrigamiConstraints
-from miurafab.origami.fitting.continuation import STEP_CAP
 from miurafab.origami.fitting.fit import FitRequest, fit
+from miurafab.origami.fitting.polish import STEP_CAP
 from miurafab.origami.fitting.reduction import Unknowns
-from miurafab.origami.fitting.request import FitResult
+from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.fitting.seed import Corrugation, seed
 from miurafab.origami.fitting.solver import project
 from miurafab.surfaces.analytic import revolution
@@ -46,12 +48,13 @@ FACETS = (400, 900, 2304, 4900, 10000, 25600, 48400, 100000)
 CORRUGATION = Corrugation.from_stretches(1.3, 1.3)
 
 
-def start(target: str, facets: int) -> tuple[Floats, OrigamiConstraints]:
+def start(target: str, facets: int) -> tuple[Floats, Unknowns]:
     """The seed on ``target`` as a vector, and the constraints on it."""
-    side = round(math.sqrt(facets)) + 1
-    tessellation, _ = seed(make_surface(target, {})[0], side, side, CORRUGATION)
-    length = float(tessellation.edge_lengths.mean())
-    return tessellation.vertices.ravel(), OrigamiConstraints(tessellation.grid, length)
+    side = round(math.sqrt(facets))
+    charts = QuadCharts.of_cells(np.ones((side, side), dtype=bool))
+    made = seed(make_surface(target, {})[0], charts, side, side, CORRUGATION)
+    length = float(edge_lengths(made.vertices, charts.edges_vertices).mean())
+    return made.vertices.ravel(), Unknowns.all_of(charts, length)
 
 
 def whole_fit(target: str, facets: int) -> dict[str, Any]:

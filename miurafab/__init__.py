@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from miurafab.origami.energy.pieces import PieceEnergies as PieceEnergies
     from miurafab.origami.fitting.request import FitOptions as FitOptions
     from miurafab.origami.fitting.request import FitRequest as FitRequest
-    from miurafab.origami.fitting.request import FitResult as FitResult
+    from miurafab.origami.fitting.result import FitResult as FitResult
     from miurafab.origami.folding.kinematics import FoldingMotion as FoldingMotion
     from miurafab.origami.folding.thick_panels import ThickPanels as ThickPanels
     from miurafab.origami.formats.files import load as load

@@ -43,6 +43,8 @@ RULES = {
     "polar-holes": Rule("note", "holes that the sheet leaves at the poles of a closed body"),
     # A fit (miurafab.origami.fitting)
     "interrupted": Rule("refusal", "a fit that was interrupted; the sheet is the best so far"),
+    "timeout": Rule("note", "the `timeout` ended the search with the best sheet up to then"),
+    "bow-tie": Rule("refusal", "a facet is folded over itself"),
     "no-sheet": Rule("refusal", "no exact sheet was found"),
     "no-sheet-in-limits": Rule("refusal", "no sheet meets all limits at any number of facets"),
     "residual": Rule("refusal", "facets that are not exactly planar, developable or isometric"),

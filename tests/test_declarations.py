@@ -29,7 +29,8 @@ from miurafab.options import (
     declared,
     read_options,
 )
-from miurafab.origami.fitting.request import FitOptions, FlatFoldability
+from miurafab.origami.fitting.kinds import CutColumns, FlatFoldability, Pieces
+from miurafab.origami.fitting.request import FitOptions
 from miurafab.studio.form import FIT, LAYOUT, filled
 from miurafab.workflow.cut_sheets import CutOptions
 from miurafab.workflow.design import design
@@ -72,6 +73,8 @@ def example(kind: Kind) -> str:
         Flag: lambda: "true",
         File: lambda: "stock.toml",
         FlatFoldability: lambda: "0.9deg",
+        Pieces: lambda: "3",
+        CutColumns: lambda: "1,2",
     }.get(type(kind), lambda: "0.1,0.9,0.2,0.8")()
 
 

@@ -122,6 +122,12 @@ class QuadCharts:
             facet[self.faces_vertices[:, corner], corner] = np.arange(len(self.faces_vertices))
         return facet
 
+    def next_facets(self, direction: int) -> Ints:
+        """(F,) the next facet in the same chart along i (``direction`` 0) or j (1), -1 for none."""
+        corner = self.faces_vertices[:, 1 if direction == 0 else 3]
+        facet = self._facet_with_corner[corner, 0]
+        return np.where((facet >= 0) & (self.pieces[facet] == self.pieces), facet, -1)
+
     @cached_property
     def interior_vertices(self) -> Ints:
         """(I,) the vertices with four facets of one chart around them."""
@@ -150,6 +156,15 @@ class QuadCharts:
         two = np.flatnonzero(np.diff(first) == 2)
         pairs = np.stack([facets[order[first[two]]], facets[order[first[two] + 1]]], axis=1)
         return np.asarray(pairs[self.pieces[pairs[:, 0]] == self.pieces[pairs[:, 1]]])
+
+    def on_two_facets(self, edges: Ints) -> Bools:
+        """(n,) whether a facet lies on both sides of each of ``edges`` (n, 2), from any chart."""
+        f = self.faces_vertices
+        sides = np.sort(np.concatenate([f[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1)
+        key = sides[:, 0] * self.vertices_count + sides[:, 1]
+        found, count = np.unique(key, return_counts=True)
+        ends = np.sort(edges, axis=1)
+        return np.isin(ends[:, 0] * self.vertices_count + ends[:, 1], found[count == 2])
 
     @cached_property
     def lattice(self) -> Ints:

@@ -136,51 +136,6 @@ class Swapped:
         return self.surface.tiles()
 
 
-@dataclass(frozen=True)
-class Bent:
-    """A blend of plane and target: ``bend`` 0 is flat, 1 is the target.
-
-    The plane is the tangent plane at the centre with the mean speeds of the parameters, so that
-    lengths change little in (1 - bend) * plane + bend * target.
-    """
-
-    surface: TargetSurface
-    bend: float
-
-    @property
-    def domain(self) -> Domain:
-        return self.surface.domain
-
-    def point(self, uv: Floats) -> Floats:
-        d = self.domain
-        centre = np.array([(d.u0 + d.u1) / 2, (d.v0 + d.v1) / 2])
-        along, across = tangents(self.surface, d.lattice(9, 9))
-        speed_u = float(np.linalg.norm(along, axis=-1).mean())
-        speed_v = float(np.linalg.norm(across, axis=-1).mean())
-        e1, e2 = (unit(t) for t in tangents(self.surface, centre))
-        e2 = unit(e2 - e1 * (e1 @ e2))
-        offset = uv - centre
-        plane = (
-            self.surface.point(centre)
-            + offset[..., :1] * speed_u * e1
-            + offset[..., 1:] * speed_v * e2
-        )
-        return np.asarray((1 - self.bend) * plane + self.bend * self.surface.point(uv))
-
-    def normal(self, uv: Floats) -> Floats:
-        along, across = tangents(self, uv)
-        return unit(np.cross(along, across))
-
-    def closest_point(self, points: Floats) -> Floats:
-        return self.point(closest_parameters(self, points, 60))
-
-    def nearest(self, points: Floats) -> Floats:
-        return self.point(nearest_parameters(self, points, 60))
-
-    def tiles(self) -> Floats:
-        return patch_tiles(self)
-
-
 def unit(vectors: Floats) -> Floats:
     """(..., 3) vectors scaled to length one."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

@@ -114,7 +114,7 @@ def _from_value(
 ) -> Prepared:
     """A job in memory, a pattern, or a target: what is missing is made and written."""
     from miurafab.origami.crease_pattern import CreasePattern
-    from miurafab.origami.fitting.request import FitResult
+    from miurafab.origami.fitting.result import FitResult
     from miurafab.workflow.design import Design, design
     from miurafab.workflow.fit import fit
     from miurafab.workflow.job_directory import JobDirectory

@@ -8,7 +8,8 @@ from typing import Any
 
 from miurafab.options.documented import described
 from miurafab.origami.fitting.fit import fit as fit_request
-from miurafab.origami.fitting.request import FitOptions, FitResult
+from miurafab.origami.fitting.request import FitOptions
+from miurafab.origami.fitting.result import FitResult
 from miurafab.workflow.design import design
 
 

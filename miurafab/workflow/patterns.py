@@ -9,7 +9,7 @@ from dataclasses import replace
 from miurafab.errors import InputError, PatternError
 from miurafab.files import AnyPath
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fitting.request import FitResult
+from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.formats.files import load
 from miurafab.origami.verify import Audit, audit
 from miurafab.surfaces.description import described_surface

@@ -127,7 +127,7 @@ def test_a_tube_that_is_fitted_is_closed_wherever_it_is_opened() -> None:
     [
         ("cylinder", {"facets": "8x9"}, "needs an even number of rows of facets"),
         ("cylinder", {"facets": "8x2"}, "has 2 rows; a closed tube has an inside from 4 rows on"),
-        ("cylinder", {"polish": "on"}, "is on, which would open the seam of a closed tube"),
+        ("cylinder", {"pieces": 2}, "is over 1, and a closed tube is one piece"),
         ("log-spiral", {}, "needs a surface of revolution or a circular cylinder"),
     ],
 )

@@ -13,7 +13,6 @@ from miurafab.geometry.distances import closest_on_mesh
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface, parse_target
 from miurafab.surfaces.surface import (
     CHORD,
-    Bent,
     Domain,
     Swapped,
     curvature_along_u,
@@ -69,13 +68,10 @@ class TestEverySurface:
         beyond = np.array([[d.u0 - 0.04 * d.width, d.v0 - 0.04 * d.height]])
         assert np.isfinite(surface.point(beyond)).all()
 
-    def test_swapping_and_bending_keep_the_points(self, name: str) -> None:
+    def test_swapping_keeps_the_points(self, name: str) -> None:
         surface, _ = make_surface(name, {})
         uv = surface.domain.lattice(5, 5)
         assert np.array_equal(Swapped(surface).point(uv[..., ::-1]), surface.point(uv))
-        assert np.allclose(Bent(surface, 1.0).point(uv), surface.point(uv))
-        flat = Bent(surface, 0.0).normal(uv)
-        assert np.abs(flat - flat[0, 0]).max() < 1e-6
 
     def test_every_default_lies_within_its_range(self, name: str) -> None:
         for parameter in CATALOGUE[name].parameters.values():

@@ -23,7 +23,7 @@ from scipy import sparse
 
 from miurafab.geometry.angles import sector_angles, sectors
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.quads import QuadGrid
+from miurafab.geometry.quads import QuadCharts, QuadGrid
 
 
 def flat_foldability(points: Floats, grid: QuadGrid) -> Floats:
@@ -40,15 +40,9 @@ class OrigamiConstraints:
     developability and, with ``flat_foldable``, flat-foldability of the interior vertices.
     """
 
-    grid: QuadGrid
+    grid: QuadGrid | QuadCharts
     length: float
     flat_foldable: bool = False
-
-    @cached_property
-    def places(self) -> Ints:
-        """(3V, 2) the column and row in the grid of the vertex of each unknown."""
-        vertex = np.arange(self.grid.columns * self.grid.rows, dtype=np.int64).repeat(3)
-        return np.stack([vertex % self.grid.columns, vertex // self.grid.columns], axis=1)
 
     @cached_property
     def _pattern(self) -> tuple[Ints, Ints]:
@@ -64,8 +58,7 @@ class OrigamiConstraints:
 
     @property
     def count(self) -> int:
-        interior = (self.grid.columns - 2) * (self.grid.rows - 2)
-        facets = (self.grid.columns - 1) * (self.grid.rows - 1)
+        facets, interior = len(self.grid.faces_vertices), len(self.grid.interior_vertices)
         return facets + interior * (2 if self.flat_foldable else 1)
 
     def __call__(self, x: Floats) -> tuple[Floats, sparse.csr_array]:

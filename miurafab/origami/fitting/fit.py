@@ -1,38 +1,47 @@
-"""Fitting: from a target to a tessellation that lies on it and folds from one flat sheet.
+"""Fitting: from a target to a tessellation that lies on it and folds from flat sheets.
 
-A fit tries strategies in a fixed order, each a start and a projection. The first sheet that meets
-everything asked is the answer. The order:
+A fit makes starts, which are cheap and tell how steep a slide their seed asks for, and puts them in
+order. The likeliest few are brought to fair sheets, exact and judged, and the best is the answer: a
+sheet without faults and with the least score. The search ends early at a sheet that is as good as
+asked. Without such a sheet more pieces are tried, if the number of pieces is free; without any
+clean sheet, steeper starts and, on a mesh, smaller parts of the target.
 
-1. on a surface of revolution, one period is solved and turned about the axis;
-2. the seed is projected as it is, with several stretches along and across the rows, and with the
-   rows in both directions; the direction along which the normal turns less comes first;
-3. the sheet is bent step by step from flat to the full target;
-4. the sheet is refined step by step from a coarse grid;
-5. the seeds are shaken at random, by the request's ``seed``.
-
-On a mesh, seeds and bends are then tried with the scan smoothed more, with the grid turned, and
-last on a smaller part of the rectangle. The advice says where the sheet lies.
-
-Exact flat-foldability starts from the developable solution. The sheet is then polished where a
-limit is not met or flat-foldability is asked for: brought as close to the target as constraints and
-limits allow. The result says what was tried and, without a sheet, what to change.
+A generalized cylinder is constructed directly. The result says what was tried and, without a sheet,
+what to change.
 """
 
 from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from miurafab.findings import Finding
-from miurafab.origami.fitting.request import INTERRUPTED, Attempt, FitRequest, FitResult
+from miurafab.origami.fitting.candidate import Candidate
+from miurafab.origami.fitting.polish import plain, polished
+from miurafab.origami.fitting.request import FitRequest
+from miurafab.origami.fitting.result import INTERRUPTED, TIME_RAN_OUT, Attempt, FitResult
 from miurafab.origami.fitting.search import coarsest
-from miurafab.origami.fitting.strategies import Candidate, strategies_for
+from miurafab.origami.fitting.starts import STEEP, Start, direct, starts_for
+from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
 
-LAST_RESORTS = ("bent", "refined", "shaken")
-"""The strategies for targets on which the seed alone finds no sheet."""
+TRIED = 3
+"""The starts that are brought to fair sheets, for each number of pieces."""
+LARGE = 900
+"""A sheet of more facets is brought to the end from the likeliest start alone, if it is clean."""
+PIECES = (1, 2, 3, 4)
+PIECES_ROUND = (1, 2, 6, 8, 12)
+"""The numbers of pieces that ``auto`` tries, on a sheet and all round an axis."""
+PATIENCE = 25.0
+"""Seconds of processor time for 400 facets, after which no new start is begun."""
+FAR = 4.0
+"""The plain search goes on while the deviation is over this many times that of a good sheet."""
 
 __all__ = ["Attempt", "FitRequest", "FitResult", "fit"]
+
+
+class _TimeUp(Exception):
+    """The time of the request is over."""
 
 
 def fit(
@@ -41,89 +50,166 @@ def fit(
 ) -> FitResult:
     """Fit a sheet to the target of ``request``.
 
-    ``on_progress`` gets the fraction done and a description of the strategy. A fit without a sheet
-    is a result with advice. Ctrl-C ends the attempts: the result is then the best exact sheet so
-    far, with status ``interrupted``; ``KeyboardInterrupt`` is raised only if there is none.
+    ``on_progress`` gets the fraction done and a description of the start. A fit without a sheet is
+    a result with advice. Ctrl-C ends the search: the result is then the best exact sheet so far,
+    with status ``interrupted``; ``KeyboardInterrupt`` is raised only if there is none.
     """
     if request.search:
-        return coarsest(request, lambda size, attempts: _fit(size, None, attempts), on_progress)
-    return _fit(request, on_progress)
+        return coarsest(request, lambda size: _FitSearch(size, None).result(), on_progress)
+    return _FitSearch(request, on_progress).result()
 
 
-def _fit(
-    request: FitRequest,
-    on_progress: Callable[[float, str], None] | None,
-    attempts: int | None = None,
-) -> FitResult:
-    """The fit at one number of facets, in at most ``attempts`` attempts."""
-    started = time.perf_counter()
-    made: list[Attempt] = []
-    best: Candidate | None = None
-    interrupted = False
-    try:
-        for number, strategy in enumerate(itertools.islice(strategies_for(request), attempts)):
-            if best is not None and best.settles and strategy.way in LAST_RESORTS:
-                break
-            if on_progress is not None:
-                # the number of attempts is not known beforehand; most sheets need one or two
-                on_progress(1 - 0.9**number, strategy.describe())
-            outcome = strategy.run(request)
-            if isinstance(outcome, Attempt):
-                made.append(outcome)
-                continue
-            made.append(outcome.attempt)
-            if best is None or outcome.rank < best.rank:
-                best = outcome
-            if outcome.rank == (0, False):
-                break
-    except KeyboardInterrupt:
+class _FitSearch:
+    """One search at one number of facets; holds what was made and the best sheet so far."""
+
+    def __init__(
+        self, request: FitRequest, on_progress: Callable[[float, str], None] | None
+    ) -> None:
+        self.request = request
+        self.on_progress = on_progress
+        self.started = time.perf_counter()
+        self.began = time.process_time()
+        self.made: list[Attempt] = []
+        self.best: Candidate | None = None
+
+    def result(self) -> FitResult:
+        """Run to the end, the time limit or Ctrl-C."""
+        ended: Finding | None = None
+        try:
+            for outcome in self._outcomes():
+                self.made.append(outcome if isinstance(outcome, Attempt) else outcome.attempt)
+                if isinstance(outcome, Attempt):
+                    continue
+                if self.best is None or outcome.rank < self.best.rank:
+                    self.best = outcome
+        except _TimeUp:
+            ended = TIME_RAN_OUT
+        except KeyboardInterrupt:
+            if self.best is None:
+                raise
+            ended = INTERRUPTED
+        if self.on_progress is not None:
+            self.on_progress(1.0, "done")
+        return self._result(ended)
+
+    def _outcomes(self) -> Iterator[Candidate | Attempt]:
+        """Everything that is tried, in order."""
+        request = self.request
+        if isinstance(request.surface, GeneralizedCylinder):
+            for start in direct(request):
+                yield plain(request, start)
+                if self._settled():
+                    return
+            if request.is_tube:
+                return
+        for pieces in self._pieces():
+            starts = starts_for(request, pieces)
+            likely = [s for s in starts if s.steepest < STEEP and not s.place]
+            yield from self._tried(likely)
+            if self._settled():
+                return
+        if self.best is None or self.best.rank[0]:
+            fewest = self._pieces()[0]
+            others = [s for s in starts_for(request, fewest) if s.steepest >= STEEP or s.place]
+            yield from self._tried(others)
+
+    def _pieces(self) -> tuple[int, ...]:
+        request = self.request
+        if request.cut_columns is not None:
+            return (len(request.cut_columns) + 1,)
+        if request.pieces is not None:
+            return (request.pieces,)
+        closed = isinstance(request.surface, Revolution) and request.surface.closed
+        if request.polish == "off":
+            return (1,)
+        return PIECES_ROUND if closed else PIECES
+
+    def _settled(self) -> bool:
+        """Whether more is not worth trying: the sheet is good, or only limits are in its way, or
+        the time that a fit may take without being asked is over.
+        """
+        best = self.best
+        if best is not None and self.request.polish == "off":
+            return not best.faults and best.score.deviation <= FAR
+        if best is not None and best.good:
+            return True
+        facets = self.request.columns * self.request.rows
+        return time.process_time() - self.began > PATIENCE * max(1.0, facets / 400)
+
+    def _tried(self, starts: list[Start]) -> Iterator[Candidate | Attempt]:
+        request = self.request
+        if request.polish == "off":
+            for start in starts:
+                self._tell(start)
+                yield plain(request, start)
+                if self._settled():
+                    return
+            return
+        if starts and request.timeout is not None and self.best is None:
+            yield plain(request, starts[0])
+        large = request.columns * request.rows > LARGE
+        for start in itertools.islice(starts, TRIED):
+            self._tell(start)
+            shaken = start.shaken(request.seed) if request.seed else start
+            yield from polished(request, shaken, self._check_time)
+            clean = self.best is not None and not self.best.rank[0]
+            if self._settled() or (large and clean):
+                return
+
+    def _tell(self, start: Start) -> None:
+        self._check_time()
+        if self.on_progress is not None:
+            # the number of attempts is not known beforehand; most sheets need one or two
+            self.on_progress(1 - 0.8 ** len(self.made), start.describe())
+
+    def _check_time(self) -> None:
+        limit = self.request.timeout
+        if limit is not None and time.perf_counter() - self.started > limit:
+            raise _TimeUp
+
+    def _result(self, ended: Finding | None) -> FitResult:
+        best, made = self.best, tuple(self.made)
+        iterations = sum(a.iterations for a in made)
+        seconds = time.perf_counter() - self.started
         if best is None:
-            raise
-        interrupted = True
-    if on_progress is not None:
-        on_progress(1.0, "done")
-    iterations = sum(a.iterations for a in made)
-    seconds = time.perf_counter() - started
-    if best is None:
-        stalled = _no_sheet(made)
+            why = _no_sheet(made, ended)
+            return FitResult(
+                "stalled", why.sentence, None, None, made, iterations, seconds, findings=(why,)
+            )
+        status = "infeasible" if best.faults else "converged"
+        if ended is INTERRUPTED:
+            status = "interrupted"
+        findings = [*([ended] if ended is not None else []), *best.faults]
+        if place := best.attempt.place:
+            sentence = f"On the whole rectangle no clean sheet was found; this one has {place}."
+            findings.append(Finding("smaller-part", sentence))
+        if best.score.deviation > FAR:
+            sentence = "The mid-surface lies far from the target; ask for more `facets`."
+            findings.append(Finding("far-from-target", sentence))
         return FitResult(
-            "stalled",
-            stalled.sentence,
-            None,
-            None,
-            tuple(made),
+            status,
+            " ".join(finding.sentence for finding in findings),
+            best.pattern,
+            best.measurements,
+            made,
             iterations,
             seconds,
-            findings=(stalled,),
+            best.deviation_mm,
+            best.score,
+            best.polished,
+            best.active_bounds,
+            findings=tuple(findings),
         )
-    status = "interrupted" if interrupted else "infeasible" if best.faults else "converged"
-    findings = [INTERRUPTED, *best.faults] if interrupted else list(best.faults)
-    if place := best.attempt.place:
-        sentence = f"On the whole rectangle no sheet was found; this one has {place}."
-        findings.append(Finding("smaller-part", sentence))
-    if best.rank[1]:
-        sentence = "The mid-surface lies far from the target; ask for more `facets`."
-        findings.append(Finding("far-from-target", sentence))
-    return FitResult(
-        status,
-        " ".join(finding.sentence for finding in findings),
-        best.pattern,
-        best.measurements,
-        tuple(made),
-        iterations,
-        seconds,
-        best.deviation_mm,
-        best.polished,
-        best.active_bounds,
-        findings=tuple(findings),
-    )
 
 
-def _no_sheet(attempts: list[Attempt]) -> Finding:
-    residual = min(a.residual for a in attempts)
+def _no_sheet(attempts: tuple[Attempt, ...], ended: Finding | None) -> Finding:
+    if ended is not None:
+        sentence = "The `timeout` ended the search before an exact sheet was found; allow more."
+        return Finding("no-sheet", sentence)
+    residual = min((a.residual for a in attempts), default=float("inf"))
     return Finding(
         "no-sheet",
         f"No exact sheet was found in {len(attempts)} attempts (best residual {residual:.1e}): "
-        "the target bends too much for one sheet of this pattern. Ask for more `facets`, raise "
+        "the target bends too much for this pattern. Ask for more `facets` or `pieces`, raise "
         "`zigzag` and `amplitude`, drop `flat_foldable`, or take a smaller part of the target.",
     )

@@ -18,7 +18,7 @@ from scipy import sparse
 
 from miurafab.geometry.angles import sectors
 from miurafab.geometry.arrays import Bools, Floats, Ints
-from miurafab.geometry.quads import QuadGrid
+from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.fitting.reduction import Unknowns
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.origami.verify import EXACT
@@ -26,14 +26,14 @@ from miurafab.origami.verify import EXACT
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """The bounds on one grid; None is no bound. x is (3V,) row-major.
+    """The bounds on one sheet over ``charts``; None is no bound. x is (3V,).
 
     ``min_edge`` in the unit of x, ``angles`` the least and greatest sector angle in radians,
     ``aspect`` the greatest ratio of two sides of a facet, ``kawasaki`` the greatest
     |a0 + a2 - pi| in radians.
     """
 
-    grid: QuadGrid
+    charts: QuadCharts
     length: float
     min_edge: float | None = None
     angles: tuple[float, float] | None = None
@@ -55,10 +55,9 @@ class Bounds:
 
     def count(self, held: Bools) -> dict[str, int]:
         """The number of inequalities of each kind among ``held`` (p,)."""
-        faces = (self.grid.columns - 1) * (self.grid.rows - 1)
-        interior = (self.grid.columns - 2) * (self.grid.rows - 2)
+        faces, interior = len(self.charts.faces_vertices), len(self.charts.interior_vertices)
         sizes = {
-            "edge": len(self.grid.edges_vertices) if self.min_edge is not None else 0,
+            "edge": len(self.charts.edges_vertices) if self.min_edge is not None else 0,
             "angle": 8 * faces if self.angles is not None else 0,
             "aspect": 12 * faces if self.aspect is not None else 0,
             "kawasaki": 2 * interior if self.kawasaki is not None else 0,
@@ -70,7 +69,7 @@ class Bounds:
     def _blocks(self, points: Floats) -> list[tuple[str, tuple[Floats, sparse.csr_array]]]:
         blocks: list[tuple[str, tuple[Floats, sparse.csr_array]]] = []
         if self.min_edge is not None:
-            lengths, along = _lengths(points, self.grid.edges_vertices)
+            lengths, along = _lengths(points, self.charts.edges_vertices)
             gradient = sparse.csr_array(along / self.length)
             blocks.append(("edge", ((lengths - self.min_edge) / self.length, gradient)))
         if self.angles is not None:
@@ -88,18 +87,18 @@ class Bounds:
         return blocks
 
     def _corner_angles(self, points: Floats) -> tuple[Floats, sparse.csr_array]:
-        faces = self.grid.faces_vertices
+        faces = self.charts.faces_vertices
         corners = np.stack([faces, np.roll(faces, -1, axis=1), np.roll(faces, 1, axis=1)], axis=-1)
         return _angles(points, corners.reshape(-1, 3))
 
     def _kawasaki(self, points: Floats) -> tuple[Floats, sparse.csr_array]:
-        centre, ring = self.grid.interior_vertices, self.grid.interior_neighbours
+        centre, ring = self.charts.interior_vertices, self.charts.interior_neighbours
         first, by_first = _angles(points, np.stack([centre, ring[:, 0], ring[:, 1]], axis=1))
         third, by_third = _angles(points, np.stack([centre, ring[:, 2], ring[:, 3]], axis=1))
         return first + third - np.pi, by_first + by_third
 
     def _aspect(self, points: Floats, limit: float) -> tuple[Floats, sparse.csr_array]:
-        faces = self.grid.faces_vertices
+        faces = self.charts.faces_vertices
         sides = [_lengths(points, faces[:, [k, (k + 1) % 4]]) for k in range(4)]
         values, rows = [], []
         for (short, by_short), (long, by_long) in itertools.permutations(sides, 2):
@@ -118,7 +117,7 @@ def limits(options: FitOptions, unknowns: Unknowns, scale: float, margin: float 
     low, high = options.angles
     tolerance = options.flat_foldable
     return Bounds(
-        unknowns.grid,
+        unknowns.charts,
         unknowns.length,
         min_edge=None if options.min_edge_mm is None else options.min_edge_mm / scale * tighter,
         angles=(low * tighter, np.pi - (np.pi - high) * tighter) if bounded else None,

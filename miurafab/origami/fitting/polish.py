@@ -1,236 +1,155 @@
-"""Polishing: the exact sheet near a solution that follows the target most closely.
+"""From a start to exact sheets: by the projection alone, or by the fair objective.
 
-The points m_k of the sheet that follow the target are the means of the facets (the middle of the
-sheet), or the vertices of the upper or of the lower rows. With f_k the point of the target nearest
-to m_k, n_k the normal there, and u = x - x0 the displacement from the first solution, each round
-minimises
+The plain way projects the seed onto the constraints: fast, and the first exact sheet. The fair way
+minimises the objective from the seed, first with a small penalty on the constraints, so that the
+sheet may pass through inexact states on its way, then with the full penalty, and is projected at
+the end. It finds exact sheets where the projection of the seed ends in crumpled ones.
 
-    1/2 sum_k (n_k . (m_k - f_k))^2  +  w/2 sum_edges |u_a - u_b|^2
-
-linearised (Gauss-Newton), over the steps that keep the constraints and held bounds to first order.
-This is a quadratic problem in the null space of J. Projected conjugate gradients solve it; the
-projection I - J^T (J J^T)^-1 J uses the solver's own factor (Gould, Hribar and Nocedal, SIAM J.
-Sci. Comput. 23 (2001), algorithm 6.2), and no KKT matrix is formed. The solver then projects the
-sheet onto the constraints exactly. A round without gain is undone and repeated with a shorter step.
+Exact flat-foldability joins the constraints. Limits of the user's are hinges of the objective and
+inequalities of the projection. Limits in mm depend on the scale of the sheet, and the scale on the
+sheet, so the fair way is repeated until the limits hold.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
-from scipy import sparse
 
-from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.quads import QuadGrid
-from miurafab.origami.fitting.reduction import Unknowns
-from miurafab.origami.fitting.solver import (
-    Constraints,
-    GramFactor,
-    Projection,
-    elimination_order,
-    project,
-)
-from miurafab.surfaces.surface import TargetSurface
+from miurafab.geometry.arrays import Floats
+from miurafab.origami.fitting.candidate import Candidate, candidate, turned_follow
+from miurafab.origami.fitting.fair import fairest
+from miurafab.origami.fitting.inequalities import Bounds, limits
+from miurafab.origami.fitting.objective import FairObjective, Weights
+from miurafab.origami.fitting.request import FitRequest
+from miurafab.origami.fitting.result import Attempt
+from miurafab.origami.fitting.solver import Projection, project
+from miurafab.origami.fitting.starts import Start
 
-Follow = Literal["middle", "top", "bottom"]
-
-FAIRNESS = 1e-4
-"""w: large enough to keep neighbours together, small enough to let the sheet move."""
-ROUNDS = 6
-INNER = 60
-"""Conjugate gradient iterations in one round."""
-CAP = 0.25
-"""The largest move of a coordinate in one round, in mean edge lengths."""
-CLOSE = 0.003
-"""A sheet this close to the target, in mean edge lengths, is close enough: paper is thicker."""
-ENOUGH = 0.98
-"""A round that lowers the objective by less than 1 - ENOUGH of it is the last."""
+STEP_CAP = 0.25
+"""The largest move of a coordinate in one step of the projection, in mean edge lengths."""
+EASING = (1e3,)
+"""The penalties before the full one."""
+EASING_STEPS = 8
+LEGS = (8, 14)
+"""Steps with the full penalty, in legs; after each the sheet is projected and judged."""
+SCALINGS = 4
+"""The most rounds, each at the scale that the last round left."""
+BOUND_MARGIN = 2e-3
+"""The limits are tightened by this part, since the scale of the sheet still changes."""
 
 
-def followers(grid: QuadGrid, follow: Follow, first_row: int = 0) -> sparse.csr_array:
-    """(K, V) the weights that make the points which follow the target from the vertices.
+def plain(request: FitRequest, start: Start) -> Candidate | Attempt:
+    """The projection of the seed, or the record of the attempt without an exact sheet."""
+    solution = _projected(request, start, start.x, None)
+    if not solution.converged:
+        return _failed(start, solution)
+    return candidate(request, start, solution.x, solution.iterations, polished=False)
 
-    Rows of the sheet with odd index are upper rows; the grid starts at row ``first_row``.
+
+def polished(
+    request: FitRequest, start: Start, on_step: Callable[[], None] | None = None
+) -> Iterator[Candidate | Attempt]:
+    """The fair sheets of ``start``, each better than the one before unless it crosses itself.
+
+    ``on_step`` is called before each step, and may end the search by an exception.
     """
-    if follow == "middle":
-        faces = grid.faces_vertices
-        starts = np.arange(0, faces.size + 1, 4)
-        weights = np.full(faces.size, 0.25)
-        return sparse.csr_array((weights, faces.ravel(), starts), (len(faces), grid.vertices.size))
-    upper = (np.arange(grid.rows) + first_row) % 2 == 1
-    chosen = grid.vertices[upper if follow == "top" else ~upper].ravel()
-    return sparse.csr_array(sparse.eye_array(grid.vertices.size, format="csr")[chosen])
+    scale = 1.0
+    if request.size_mm is not None:
+        extent = np.ptp(start.unknowns.whole(start.x)[1], axis=0).max()
+        scale = request.size_mm / float(extent)
+    x, eased = start.x, False
+    iterations = 0
+    for _ in range(SCALINGS):
+        bounds = limits(request, start.unknowns, scale, BOUND_MARGIN)
+        objective = _objective(request, start, x, bounds)
+        constraints = start.unknowns.constraints(request.exactly_flat_foldable)
+        tick = _ticking(on_step)
+        if not eased:
+            for penalty in EASING:
+                sheet = fairest(
+                    objective,
+                    start.unknowns,
+                    constraints,
+                    x,
+                    steps=EASING_STEPS,
+                    penalty=penalty,
+                    on_step=tick,
+                )
+                x, objective = sheet.x, replace(objective, feet=sheet.feet)
+                iterations += sheet.steps
+            eased = True
+        best: Candidate | None = None
+        for steps in LEGS:
+            sheet = fairest(objective, start.unknowns, constraints, x, steps=steps, on_step=tick)
+            x, objective = sheet.x, replace(objective, feet=sheet.feet)
+            iterations += sheet.steps
+            solution = _projected(request, start, x, bounds if bounds.any else None)
+            if not solution.converged:
+                yield _failed(start, solution)
+                continue
+            best = candidate(request, start, solution.x, iterations + solution.iterations, True)
+            if bounds.any:
+                best = replace(best, active_bounds=bounds.count(solution.active))
+            yield best
+            if sheet.steps < steps:
+                break
+        if best is None or not bounds.any or not best.faults:
+            return
+        scale = best.pattern.scale
 
 
-@dataclass(frozen=True, eq=False)
-class Polish:
-    """The polished sheet as the solver left it, and the objective before and after."""
-
-    projection: Projection
-    rounds: int
-    before: float
-    after: float
+def _ticking(on_step: Callable[[], None] | None) -> Callable[[int, float], None] | None:
+    return None if on_step is None else lambda _number, _value: on_step()
 
 
-def polish(
-    start: Projection,
-    surface: TargetSurface,
-    unknowns: Unknowns,
-    constraints: Constraints,
-    *,
-    follow: Follow = "middle",
-    bounds: Constraints | None = None,
-) -> Polish:
-    """Bring the exact sheet ``start`` closer to ``surface``, within ``constraints`` and ``bounds``.
-
-    Both are functions of ``unknowns``. A sheet that cannot come closer is returned unchanged.
-    """
-    places, length = unknowns.places, unknowns.length
-    problem = _Objective.of(start.x, surface, unknowns, follow)
-    now = start
-    value, _ = problem.value(start.x)
-    before = value
-    cap = CAP
-    rounds = 0
-    while rounds < ROUNDS and cap > CAP / 30:
-        rounds += 1
-        step = problem.step(now, constraints, places, bounds)
-        if step is None:
-            break
-        longest = float(np.abs(step).max())
-        trial = now.x + step * min(1.0, cap * length / longest) if longest > 0 else now.x
-        back = project(
-            constraints,
-            trial,
-            places,
-            inequalities=bounds,
-            cap=CAP * length,
-            max_iterations=25,
+def _objective(request: FitRequest, start: Start, x: Floats, bounds: Bounds) -> FairObjective:
+    """The fair objective with the limits ``bounds`` as hinges."""
+    weights = Weights()
+    if bounds.min_edge is not None:
+        shortest = max(weights.shortest_edge, 1.02 * bounds.min_edge / start.unknowns.length)
+        weights = replace(weights, shortest_edge=shortest)
+    if bounds.angles is not None:
+        low, high = bounds.angles
+        weights = replace(
+            weights,
+            least_sector=max(weights.least_sector, low + 0.01),
+            greatest_sector=min(weights.greatest_sector, high - 0.01),
         )
-        reached, farthest = problem.value(back.x) if back.converged else (np.inf, np.inf)
-        if reached >= value:
-            cap = min(cap, longest / length) / 3
-            continue
-        done = reached > ENOUGH * value or farthest < CLOSE * length
-        now, value = back, reached
-        if done:
-            break
-    return Polish(now, rounds, before, value)
+    return FairObjective.of(
+        start.surface,
+        start.unknowns.charts,
+        start.cells,
+        start.unknowns.vertices(x),
+        follow=turned_follow(request.follow, start.rows_along),
+        rim=start.rim,
+        weights=weights,
+        aspect=None if bounds.aspect is None else 0.98 * bounds.aspect,
+        kawasaki=None if bounds.kawasaki is None else 0.95 * bounds.kawasaki,
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class _Objective:
-    """``points`` (3K, n) makes the points that follow the target from the unknowns, and
-    ``differences`` (3E, n) the edges.
-    """
-
-    surface: TargetSurface
-    points: sparse.csr_array
-    differences: sparse.csr_array
-    origin: Floats
-
-    @classmethod
-    def of(
-        cls, x: Floats, surface: TargetSurface, unknowns: Unknowns, follow: Follow
-    ) -> _Objective:
-        grid = unknowns.grid
-        edges = grid.edges_vertices
-        ends = sparse.csr_array(
-            (np.tile([1.0, -1.0], len(edges)), edges.ravel(), np.arange(0, edges.size + 1, 2)),
-            shape=(len(edges), grid.vertices.size),
-        )
-
-        def of_unknowns(weights: sparse.csr_array) -> sparse.csr_array:
-            coordinates = sparse.kron(weights, np.eye(3), format="csr")
-            return sparse.csr_array(coordinates @ unknowns.substitution)
-
-        points = followers(grid, follow, unknowns.first_row)
-        return cls(surface, of_unknowns(points), of_unknowns(ends), x.copy())
-
-    def value(self, x: Floats) -> tuple[float, float]:
-        """The objective, and the greatest distance."""
-        gap, _ = self._gaps(x)
-        fair = self.differences @ (x - self.origin)
-        return float((gap**2).sum() + FAIRNESS * (fair**2).sum()) / 2, float(gap.max())
-
-    def _gaps(self, x: Floats) -> tuple[Floats, Floats]:
-        """The distances (K,) and the directions (K, 3) in which they grow."""
-        points = (self.points @ x).reshape(-1, 3)
-        offset = points - self.surface.closest_point(points)
-        gap = np.linalg.norm(offset, axis=1)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            direction = offset / gap[:, None]
-        # a point on the surface has no such direction and needs none
-        return gap, np.where(gap[:, None] > 0, direction, 0.0)
-
-    def step(
-        self,
-        now: Projection,
-        constraints: Constraints,
-        places: Ints,
-        bounds: Constraints | None,
-    ) -> Floats | None:
-        """The minimiser in the null space of the constraints and held bounds, (3V,)."""
-        x = now.x
-        gap, direction = self._gaps(x)
-        along = sparse.csr_array(
-            (direction.ravel(), np.arange(direction.size), np.arange(0, direction.size + 1, 3)),
-            shape=(len(gap), direction.size),
-        )
-        distances = along @ self.points
-        distances_t, differences_t = distances.T.tocsr(), self.differences.T.tocsr()
-
-        moved = differences_t @ (self.differences @ (x - self.origin))
-        slope = np.asarray(distances_t @ gap + FAIRNESS * moved)
-
-        equalities = constraints(x)[1]
-        jacobian, held = equalities, np.zeros(0, dtype=np.int64)
-        if bounds is not None:
-            held, gradient = np.flatnonzero(now.active), bounds(x)[1]
-            jacobian = sparse.vstack([equalities, gradient[held]], format="csr")
-        factor = GramFactor.of(jacobian, elimination_order(jacobian, places))
-        if factor is not None and len(held):
-            # release the bounds that the objective moves away from
-            pressing = factor.solve(jacobian @ slope)[equalities.shape[0] :] > 0
-            if not pressing.all():
-                jacobian = sparse.vstack([equalities, gradient[held[pressing]]], format="csr")
-                factor = GramFactor.of(jacobian, elimination_order(jacobian, places))
-        if factor is None:
-            return None
-        solve, transposed = factor.solve, jacobian.T.tocsr()
-
-        def times(d: Floats) -> Floats:
-            fair = differences_t @ (self.differences @ d)
-            return np.asarray(distances_t @ (distances @ d) + FAIRNESS * fair)
-
-        def onto_null_space(r: Floats) -> Floats:
-            return np.asarray(r - transposed @ solve(jacobian @ r))
-
-        return _conjugate_gradients(times, onto_null_space, -slope)
+def _projected(request: FitRequest, start: Start, x: Floats, bounds: Bounds | None) -> Projection:
+    unknowns = start.unknowns
+    return project(
+        unknowns.constraints(request.exactly_flat_foldable),
+        x,
+        unknowns.places,
+        inequalities=None if bounds is None else unknowns.of_unknowns(bounds),
+        cap=STEP_CAP * unknowns.length,
+    )
 
 
-def _conjugate_gradients(
-    times: Callable[[Floats], Floats], onto_null_space: Callable[[Floats], Floats], right: Floats
-) -> Floats:
-    """The solution d of H d = ``right`` in the null space, to a thousandth."""
-    solution = np.zeros_like(right)
-    residual = onto_null_space(onto_null_space(right))
-    direction = residual.copy()
-    size = first = float(residual @ residual)
-    for _ in range(INNER):
-        if size <= 1e-6 * first:
-            break
-        image = times(direction)
-        curvature = float(direction @ image)
-        if curvature <= 0:
-            break
-        length = size / curvature
-        solution += length * direction
-        residual = onto_null_space(residual - length * image)
-        following = float(residual @ residual)
-        direction = residual + following / size * direction
-        size = following
-    return solution
+def _failed(start: Start, solution: Projection) -> Attempt:
+    return Attempt(
+        start.way,
+        start.rows_along,
+        start.corrugation,
+        solution.residual,
+        solution.iterations,
+        solution.reason,
+        start.place,
+        start.pieces,
+        start.steepest,
+    )

@@ -1,109 +1,160 @@
-"""The unknowns of a fit: the vertices of a whole sheet, or of one period of it.
+"""The unknowns of a fit: all vertices of a sheet, or those of the part that it repeats.
 
-Conditions are stated on a grid of vertices, which for a whole sheet is the sheet's own grid. A
-sheet on a surface of revolution repeats itself after two rows, turned about the axis,
+Conditions are stated on charts of vertices. For a whole sheet these are the sheet's own, and the
+unknowns are their vertices. A sheet on a surface of revolution repeats itself, and only the part
+that repeats is unknown:
 
-    X_{j+2} = R_z(2 beta) X_j,
+ring    X_{j+2} = R_z(2 beta) X_j. The unknowns are the rows 0 and 1; the charts have the five rows
+        R^-1 X_1, X_0, X_1, R X_0, R X_1, so that each row has neighbours on both sides.
+gore    each gore is the one before, turned by beta. The unknowns are the columns 0 to C - 1 of one
+        gore; the charts are that gore, whose last column is R X_0.
 
-so its unknowns are the rows 0 and 1 alone, and the grid has the four rows
-
-    R^-1 X_1,  X_0,  X_1,  R X_0.
-
-The grid is T times the unknowns, with a constant matrix T, and the Jacobian by the unknowns is that
-of the grid times T. The number of unknowns does not depend on the number of periods.
+The vertices of the charts are T times the unknowns, with a constant matrix T, and the Jacobian by
+the unknowns is that of the charts times T. The number of unknowns does not depend on the number of
+repetitions.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy import sparse
 
-from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.quads import QuadGrid
+from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.fitting.constraints import OrigamiConstraints
 from miurafab.origami.fitting.solver import Constraints
-from miurafab.origami.tessellation import Tessellation
 
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """The vertices of a sheet of ``columns`` x ``rows``; x (n,) is row-major.
+    """The unknowns x (n,) of a sheet; ``charts`` is where the conditions are stated.
 
-    ``turn`` is the angle 2 beta of a period in radians, or None where the unknowns are the whole
-    sheet; ``length`` is the mean edge length.
+    ``places`` (n, 2) are whole-number places of the unknowns in the plane, for the elimination
+    order. ``length`` is the mean edge length. ``substitution`` (3V, n) is T, and None where the
+    unknowns are the coordinates of the vertices. ``stated`` (F,) and ``interior`` (I,) choose the
+    facets and the interior vertices whose conditions are stated, where others repeat them.
+    ``whole`` makes the charts and the vertices (V, 3) of the whole sheet of the unknowns.
     """
 
-    columns: int
-    rows: int
+    charts: QuadCharts
     length: float
-    turn: float | None = None
+    places: Ints
+    whole: Callable[[Floats], tuple[QuadCharts, Floats]]
+    substitution: sparse.csr_array | None = None
+    stated: Bools | None = None
+    interior: Bools | None = None
 
-    @property
-    def grid(self) -> QuadGrid:
-        """The grid on which conditions are stated."""
-        return QuadGrid(self.columns, self.rows if self.turn is None else 4)
+    @classmethod
+    def all_of(cls, charts: QuadCharts, length: float) -> Unknowns:
+        """The coordinates of all vertices of ``charts``."""
+        places = charts.lattice.repeat(3, axis=0)
+        return cls(charts, length, places, lambda x: (charts, x.reshape(-1, 3)))
 
-    @property
-    def first_row(self) -> int:
-        """The row of the sheet that is row 0 of ``grid``."""
-        return 0 if self.turn is None else -1
+    @classmethod
+    def ring(cls, piece_of_column: Ints, rows: int, length: float, turn: float) -> Unknowns:
+        """Two rows of a sheet of ``rows`` rows of cells, which repeats by ``turn`` radians about z.
 
-    @cached_property
-    def places(self) -> Ints:
-        """(n, 2) the column and row of the vertex of each unknown; for a period, which is a chain
-        of columns, the row is 0.
+        ``piece_of_column`` (columns,) parts the sheet into bands along columns of vertices.
         """
-        solved = self.rows if self.turn is None else 2
-        vertex = np.arange(self.columns * solved, dtype=np.int64).repeat(3)
-        row = vertex // self.columns
-        return np.stack([vertex % self.columns, row if self.turn is None else 0 * row], axis=1)
+        columns = len(piece_of_column)
+        charts = QuadCharts.of_cells(np.ones((4, columns), dtype=bool), piece_of_column)
+        # the window starts a row before the first row of the sheet
+        charts = QuadCharts(
+            charts.faces_vertices,
+            charts.cells - np.array([0, 1]),
+            charts.pieces,
+            charts.vertices_count,
+        )
+        wide = columns + 1
+        one = sparse.eye_array(wide)
+        back, here, on = (sparse.kron(one, about_z(k * turn)) for k in (-1, 0, 1))
+        blocks = [[None, back], [here, None], [None, here], [on, None], [None, on]]
+        vertex = np.arange(2 * wide, dtype=np.int64).repeat(3) % wide
+        inner = charts.lattice[charts.interior_vertices, 1]
+        sheet = QuadCharts.of_cells(np.ones((rows, columns), dtype=bool), piece_of_column)
 
-    @cached_property
-    def substitution(self) -> sparse.csr_array:
-        """T, (3V, n): the coordinates of ``grid`` are T times the unknowns."""
-        if self.turn is None:
-            return sparse.csr_array(sparse.eye_array(3 * self.columns * self.rows, format="csr"))
-        one = sparse.eye_array(self.columns)
-        blocks = [
-            [None, sparse.kron(one, about_z(-self.turn))],
-            [sparse.kron(one, np.eye(3)), None],
-            [None, sparse.kron(one, np.eye(3))],
-            [sparse.kron(one, about_z(self.turn)), None],
-        ]
-        return sparse.csr_array(sparse.block_array(blocks, format="csr"))
+        def whole(x: Floats) -> tuple[QuadCharts, Floats]:
+            period = x.reshape(2, wide, 3)
+            turned = np.array([about_z(k * turn) for k in range((rows + 2) // 2)])
+            points = np.einsum("kab,rcb->krca", turned, period).reshape(-1, wide, 3)
+            return sheet, points[: rows + 1].reshape(-1, 3)
+
+        return cls(
+            charts,
+            length,
+            np.stack([vertex, 0 * vertex], axis=1),
+            whole,
+            sparse.csr_array(sparse.block_array(blocks, format="csr")),
+            stated=np.isin(charts.cells[:, 1], (0, 1)),
+            interior=np.isin(inner, (0, 1)),
+        )
+
+    @classmethod
+    def gore(cls, columns: int, rows: int, gores: int, length: float, turn: float) -> Unknowns:
+        """One of ``gores`` charts of ``columns`` x ``rows`` cells, each the one before turned by
+        ``turn`` radians about z. They close where ``gores * turn`` is a full turn.
+        """
+        charts = QuadCharts.of_cells(np.ones((rows, columns), dtype=bool))
+        vertices = charts.vertices_count
+        column, row = charts.lattice.T
+        unknown = row * columns + column % columns
+        rotation = np.where((column == columns)[:, None, None], about_z(turn), np.eye(3))
+        count = 3 * columns * (rows + 1)
+        entries = (unknown[:, None, None] * 3 + np.arange(3)) + np.zeros((1, 3, 1), dtype=np.int64)
+        substitution = sparse.csr_array(
+            (rotation.ravel(), entries.ravel(), np.arange(0, 9 * vertices + 1, 3)),
+            shape=(3 * vertices, count),
+        )
+        substitution.eliminate_zeros()
+        closed = bool(abs(gores * turn - 2 * np.pi) < 1e-9)
+        pieces = np.repeat(np.arange(gores), columns)
+        kept = np.ones((rows, gores * columns), dtype=bool)
+        body = QuadCharts.of_cells(kept, pieces, closed)
+        around, up = body.lattice.T
+
+        def whole(x: Floats) -> tuple[QuadCharts, Floats]:
+            grid = x.reshape(rows + 1, columns, 3)
+            turned = np.array([about_z(k * turn) for k in range(gores + 1)])
+            points = grid[up, around % columns]
+            return body, np.einsum("vab,vb->va", turned[around // columns], points)
+
+        vertex = np.arange(columns * (rows + 1), dtype=np.int64).repeat(3)
+        places = np.stack([vertex % columns, vertex // columns], axis=1)
+        return cls(charts, length, places, whole, substitution)
+
+    def vertices(self, x: Floats) -> Floats:
+        """(V, 3) the vertices of ``charts``."""
+        return (x if self.substitution is None else self.substitution @ x).reshape(-1, 3)
+
+    def by_unknowns(self, jacobian: sparse.csr_array) -> sparse.csr_array:
+        """A Jacobian by the vertices of ``charts`` as one by the unknowns."""
+        if self.substitution is None:
+            return jacobian
+        return sparse.csr_array(jacobian @ self.substitution)
 
     def constraints(self, flat_foldable: bool) -> Constraints:
         """The conditions of an origami as a function of x."""
-        on_grid = OrigamiConstraints(self.grid, self.length, flat_foldable)
-        if self.turn is None:
-            return on_grid
-        # the first row of facets repeats the last row
-        return self._of_unknowns(on_grid, np.arange(self.columns - 1, on_grid.count))
+        on_charts = OrigamiConstraints(self.charts, self.length, flat_foldable)
+        if self.stated is None or self.interior is None:
+            return self.of_unknowns(on_charts)
+        inner = [self.interior] * (2 if flat_foldable else 1)
+        return self.of_unknowns(on_charts, np.flatnonzero(np.concatenate([self.stated, *inner])))
 
-    def on_unknowns(self, on_grid: Constraints) -> Constraints:
-        """Conditions on ``grid`` as a function of x."""
-        return on_grid if self.turn is None else self._of_unknowns(on_grid, None)
+    def of_unknowns(self, on_charts: Constraints, chosen: Ints | None = None) -> Constraints:
+        """Conditions on ``charts``, or the ``chosen`` ones of them, as a function of x."""
+        if self.substitution is None and chosen is None:
+            return on_charts
 
-    def _of_unknowns(self, on_grid: Constraints, chosen: Ints | None) -> Constraints:
         def conditions(x: Floats) -> tuple[Floats, sparse.csr_array]:
-            values, jacobian = on_grid(self.substitution @ x)
+            values, jacobian = on_charts(self.vertices(x).ravel())
             if chosen is not None:
                 values, jacobian = values[chosen], jacobian[chosen]
-            return values, jacobian @ self.substitution
+            return values, self.by_unknowns(jacobian)
 
         return conditions
-
-    def sheet(self, x: Floats) -> Tessellation:
-        """The whole sheet."""
-        if self.turn is None:
-            return Tessellation(x.reshape(self.rows, self.columns, 3))
-        period = x.reshape(2, self.columns, 3)
-        turned = np.array([about_z(k * self.turn) for k in range((self.rows + 1) // 2)])
-        points = np.einsum("kab,rcb->krca", turned, period).reshape(-1, self.columns, 3)
-        return Tessellation(points[: self.rows])
 
 
 def about_z(angle: float) -> Floats:

@@ -1,18 +1,15 @@
-"""What is asked of a fit and what it answers, each a frozen value with its own checks."""
+"""What is asked of a fit, with its own checks."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, get_args
+from dataclasses import dataclass, field
+from typing import Any, get_args
 
 from miurafab.display import Shown
-from miurafab.errors import OptionError, PatternError, UnitError
-from miurafab.findings import Finding, findings_json
+from miurafab.errors import OptionError
 from miurafab.options import (
     Choice,
-    Kind,
     Pair,
     Whole,
     Written,
@@ -22,73 +19,18 @@ from miurafab.options import (
     number,
     option,
 )
-from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.fitting.polish import Follow
-from miurafab.origami.fitting.seed import Corrugation
-from miurafab.origami.verify import EXACT, Measurements
+from miurafab.origami.fitting.kinds import CutColumns, FlatFoldability, Pieces
+from miurafab.origami.fitting.objective import Follow
+from miurafab.origami.verify import EXACT
 from miurafab.surfaces.analytic import GeneralizedCylinder
 from miurafab.surfaces.placement import Region
 from miurafab.surfaces.surface import TargetSurface
-from miurafab.units import parse_angle
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 DEFAULT_FACETS = (20, 20)
 DEFAULT_SIZE_MM = 200.0
 """The longest side of a named surface's folded form; a mesh keeps the size of its file."""
 CLOSINGS = ("sector", "open", "seam")
 FACETS = Pair(Whole(2), "COLSxROWS", "20x20", "x")
-
-
-class FlatFoldability(Kind):
-    """``exact`` (0 inside), ``off`` (None) or the largest difference of pi - a1 - a3 from 0.
-
-    The paper gives this limit in radians, every other angle here is in degrees; so a number must
-    carry its unit.
-    """
-
-    @property
-    def metavar(self) -> str:
-        return "exact|off|ANGLE"
-
-    def read(self, value: object) -> float | None:
-        if value == "exact":
-            return 0.0
-        if value == "off":
-            return None
-        try:
-            float(value)  # type: ignore[arg-type]
-        except (TypeError, ValueError):
-            pass
-        else:
-            raise ValueError(
-                f"is {value} without a unit; write {value}rad, as the paper does, or degrees such "
-                "as 0.9deg"
-            )
-        try:
-            inside = parse_angle(value if isinstance(value, str) else repr(value))
-        except UnitError:
-            raise ValueError(
-                f"is {value!r}; it must be exact, off, or an angle such as 0.016rad or 0.9deg"
-            ) from None
-        self.check(inside)
-        return inside
-
-    def check(self, inside: float) -> None:
-        if not 0 <= inside < math.pi:
-            raise ValueError(
-                f"is {math.degrees(inside):g} deg; it must be exact, off, or an angle under 180 deg"
-            )
-
-    def show(self, inside: float) -> str:
-        return f"{inside:g}rad" if inside else "exact"
-
-
-INTERRUPTED = Finding(
-    "interrupted", "The fit was interrupted; this is the best exact sheet up to then."
-)
-"""The advice of a fit that Ctrl-C ended."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -184,17 +126,56 @@ class FitOptions(Shown):
         group="Mesh targets",
         default_text="automatic",
     )
+    pieces: int | None = option(
+        Pieces(),
+        "The number of flat pieces, joined along seams in space; auto takes the fewest that reach "
+        "the quality of a good sheet.",
+        group="Sheet",
+        default_text="auto",
+        page="more",
+    )
+    cut_columns: tuple[int, ...] | None = option(
+        CutColumns(),
+        "Cut the sheet into pieces along these columns of vertices.",
+        group="Sheet",
+        default_text="evenly spaced",
+    )
     polish: str = option(
-        Choice(("auto", "on", "off")),
-        "Bring the sheet as close to the target as it goes: on, off, or auto (where a limit is not "
-        "met or flat-foldability is asked for).",
-        "auto",
+        Choice(("on", "off")),
+        "Minimise the fair objective: on, or off for the projection of the seed alone, which is "
+        "faster and leaves facets that are harder to fold.",
+        "on",
         group="Search",
     )
-    seed: int = option(Whole(), "Random seed of the attempts.", 0, group="Search")
+    timeout: float | None = option(
+        number(0, above=True),
+        "End the search after so many seconds, with the best sheet up to then.",
+        group="Search",
+        default_text="none",
+    )
+    seed: int = option(
+        Whole(),
+        "Random seed: 0 starts from the smooth corrugation, any other number from a shaken one, "
+        "for another sheet.",
+        0,
+        group="Search",
+    )
 
     def __post_init__(self) -> None:
         check_options(self)
+        if self.cut_columns is not None:
+            if self.cut_columns[-1] >= self.columns:
+                raise OptionError(
+                    "cut_columns",
+                    f"reaches column {self.cut_columns[-1]}, and the sheet has {self.columns} "
+                    "columns of facets",
+                )
+            if self.pieces not in (None, len(self.cut_columns) + 1):
+                raise OptionError(
+                    "pieces",
+                    f"is {self.pieces}, and {len(self.cut_columns)} `cut_columns` make "
+                    f"{len(self.cut_columns) + 1} pieces; give only one of the two",
+                )
         low, high = self.angles
         if not low < math.pi / 2 < high:
             raise OptionError(
@@ -253,131 +234,11 @@ class FitRequest(FitOptions):
         super().__post_init__()
         if self.is_tube and self.rows == 2:
             raise OptionError("facets", "has 2 rows; a closed tube has an inside from 4 rows on")
-        if self.is_tube and self.polish == "on":
-            raise OptionError("polish", "is on, which would open the seam of a closed tube")
+        if self.is_tube and (self.pieces or 1) > 1:
+            raise OptionError("pieces", "is over 1, and a closed tube is one piece")
 
     @property
     def is_tube(self) -> bool:
         """Whether the sheet is built as a closed tube, whose first and last row are one."""
         tube = isinstance(self.surface, GeneralizedCylinder) and self.surface.closed
         return tube and self.rows % 2 == 0
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """One attempt: the way (``direct``, ``strip``, ``seed``, ``bent``, ``refined``,
-    ``shaken``), the row
-    direction, the corrugation, the residual it ended with, why it was not enough (empty if it
-    was), and on a mesh where else the sheet was laid.
-    """
-
-    way: str
-    rows_along: str
-    corrugation: Corrugation
-    residual: float
-    iterations: int
-    fault: str
-    place: str = ""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class FitResult(Shown):
-    """The outcome of a fit.
-
-    Parameters
-    ----------
-    status : str
-        ``converged``; ``infeasible``: an exact sheet that misses a limit; ``interrupted``: the best
-        exact sheet when Ctrl-C ended the fit; ``stalled``: no exact sheet was found.
-    advice : str
-        What to change, empty where nothing is to be said.
-    pattern : CreasePattern or None
-        The best sheet, None where none was found.
-    measurements : Measurements or None
-        The residuals and distances of ``pattern``.
-    attempts : tuple of Attempt
-        What was tried, in order.
-    iterations : int
-        Iterations of the solver, in all attempts.
-    seconds : float
-        The time that the fit took.
-    deviation_mm : float, optional
-        How far the part of the sheet that follows the target lies from it at most, mm.
-    polished : bool
-        Whether the sheet was brought closer after it was found.
-    active_bounds : mapping
-        How many inequalities of each kind hold the sheet back.
-    findings : tuple of Finding
-        What a person should know of the target.
-    """
-
-    status: str
-    advice: str
-    pattern: CreasePattern | None
-    measurements: Measurements | None
-    attempts: tuple[Attempt, ...]
-    iterations: int
-    seconds: float
-    deviation_mm: float | None = None
-    polished: bool = False
-    active_bounds: Mapping[str, int] = field(default_factory=dict)
-    findings: tuple[Finding, ...] = ()
-
-    def plot(self, form: str | None = None, ax: Axes | None = None) -> Axes:
-        """Draw the pattern (:meth:`CreasePattern.plot`).
-
-        Raises
-        ------
-        PatternError
-            Where no sheet was found.
-        """
-        if self.pattern is None:
-            raise PatternError(f"There is no sheet to draw: {self.advice}")
-        return self.pattern.plot(form, ax)
-
-    def _summary(self) -> str:
-        if self.pattern is None or self.measurements is None:
-            return f"{self.status}: no sheet in {len(self.attempts)} attempts"
-        far = self.measurements.hausdorff_mm
-        grid = self.pattern.grid
-        return f"{self.status}: {self.measurements.facets} facets" + "".join(
-            [
-                "" if far is None else f", {far:.2g} mm from {self.pattern.name or 'the target'}",
-                "" if grid is None else f", pattern {grid[0]}x{grid[1]}",
-            ]
-        )
-
-    def _picture(self) -> str:
-        return "" if self.pattern is None else self.pattern._picture()
-
-    def _facts(self) -> Mapping[str, object]:
-        report = self.report()
-        return {key: value for key, value in report.items() if not isinstance(value, list | dict)}
-
-    def report(self) -> dict[str, Any]:
-        """The fit report, ready for JSON."""
-        numbers = {f.name: getattr(self.measurements, f.name, None) for f in fields(Measurements)}
-        return {
-            "status": self.status,
-            "advice": self.advice,
-            **numbers,
-            "iterations": self.iterations,
-            "seconds": self.seconds,
-            "deviation_mm": self.deviation_mm,
-            "polished": self.polished,
-            "active_bounds": dict(self.active_bounds),
-            "findings": findings_json(self.findings),
-            "attempts": [
-                {
-                    "way": a.way,
-                    "rows_along": a.rows_along,
-                    "amplitude": a.corrugation.amplitude,
-                    "zigzag": a.corrugation.zigzag,
-                    "residual": a.residual,
-                    "iterations": a.iterations,
-                    "fault": a.fault,
-                    "place": a.place,
-                }
-                for a in self.attempts
-            ],
-        }

@@ -18,25 +18,24 @@ from dataclasses import replace
 from miurafab.findings import Finding
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.fitting.closeness import Closeness
-from miurafab.origami.fitting.request import INTERRUPTED, FitRequest, FitResult
+from miurafab.origami.fitting.request import FitRequest
+from miurafab.origami.fitting.result import INTERRUPTED, FitResult
 
 COARSEST = 4
 """Facets along the longer side of the coarsest sheet tried."""
 FINER = 1.5
 FINEST = 160
 """Facets along the longer side of the finest sheet tried."""
-ATTEMPTS = 4
-"""Attempts at each size."""
 
 
 def coarsest(
     request: FitRequest,
-    fit: Callable[[FitRequest, int], FitResult],
+    fit: Callable[[FitRequest], FitResult],
     on_progress: Callable[[float, str], None] | None = None,
 ) -> FitResult:
     """The sheet with the fewest facets that meets every limit of ``request``, or the nearest sheet.
 
-    ``fit`` fits one size in at most the given number of attempts. ``request.columns`` and ``rows``
+    ``fit`` fits one size. ``request.columns`` and ``rows``
     give only the proportion of the sheet.
     """
     started = time.perf_counter()
@@ -47,7 +46,7 @@ def coarsest(
             columns, rows = _shape(request, longer)
             if on_progress is not None:
                 on_progress(1 - 0.8 ** len(tried), f"{columns}x{rows} facets")
-            tried[longer] = fit(replace(request, facets=(columns, rows)), ATTEMPTS)
+            tried[longer] = fit(replace(request, facets=(columns, rows)))
             if tried[longer].status == "interrupted":
                 raise KeyboardInterrupt
         return tried[longer]

@@ -30,11 +30,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from miurafab.geometry.arrays import Floats
-from miurafab.origami.tessellation import Tessellation
+from miurafab.geometry.arrays import Bools, Floats
+from miurafab.geometry.quads import QuadCharts
 from miurafab.surfaces.surface import TargetSurface, curvature_along_u, tangents, unit
 
-MAX_TAN_PSI = math.tan(math.radians(60))
+STEEPEST = math.radians(60)
+"""The slide is clipped at this angle unless the caller asks for less."""
 
 
 @dataclass(frozen=True)
@@ -61,49 +62,118 @@ class Corrugation:
         return cls(amplitude, math.sqrt((along**2 - 1) * (1 + amplitude**2)) / amplitude)
 
 
+@dataclass(frozen=True, eq=False)
+class Seed:
+    """The corrugation on a target: ``vertices`` (V, 3) of its charts, and ``steepest``, the largest
+    slide psi that it asks for before the clip, radians.
+    """
+
+    vertices: Floats
+    steepest: float
+
+
 def seed(
     surface: TargetSurface,
+    charts: QuadCharts,
     columns: int,
     rows: int,
     corrugation: Corrugation,
+    *,
+    clip: float = STEEPEST,
     level: float = 0.0,
-) -> tuple[Tessellation, float]:
-    """The corrugation on ``surface`` with ``columns`` x ``rows`` vertices, half above and half
-    below it; ``level`` lifts the sheet by that part of its height.
+) -> Seed:
+    """The corrugation on ``surface``, half above and half below it.
 
-    Also returns the largest |tan psi| before the ramp is clipped at tan(60 degrees). A larger value
-    means that the target bends too much along the rows for one sheet.
+    ``charts`` are cells of a lattice of ``columns`` x ``rows`` cells over the domain. Each chart
+    has a ramp of its own; vertices that charts share are the mean of both. ``level`` lifts the
+    sheet by that part of its height. The slide is clipped at the angle ``clip``.
     """
-    domain = surface.domain
-    uv = domain.lattice(columns, rows)
-    du, dv = domain.width / (columns - 1), domain.height / (rows - 1)
-    along, across = tangents(surface, uv)
-    speed_v = np.linalg.norm(across, axis=-1)
-    t = unit(along)
-    spacing_i = np.linalg.norm(along, axis=-1) * du
-    # the distance between rows, not between neighbours: parameter lines may be oblique
-    oblique = np.einsum("...k,...k->...", across, t)
-    spacing_j = np.sqrt(np.maximum(speed_v**2 - oblique**2, 1e-12 * speed_v**2)) * dv
-    fan_i, fan_j = _fans(spacing_i, spacing_j)
-    lambda_i = corrugation.stretch_along * (spacing_i / fan_i).max() * fan_i / spacing_i
-    lambda_j = corrugation.stretch_across * (spacing_j / fan_j).max() * fan_j / spacing_j
-    sigma = np.sqrt(lambda_j**2 - 1)
-    tau = np.sqrt((lambda_i**2 - 1) * (1 + sigma**2)) / sigma
+    lattice = surface.domain.lattice(columns + 1, rows + 1)
+    total = np.zeros((charts.vertices_count, 3))
+    share = np.zeros(charts.vertices_count)
+    whole = len(charts.cells) == columns * rows and not charts.pieces.any()
+    steepest = 0.0
+    for piece in np.unique(charts.pieces).tolist():
+        facets = np.flatnonzero(charts.pieces == piece)
+        cells = charts.cells[facets]
+        first, last = int(cells[:, 0].min()), int(cells[:, 0].max()) + 1
+        corner = cells[:, None, :] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+        right, up = corner[..., 0] - first, corner[..., 1]
+        used = np.zeros((rows + 1, last - first + 1), dtype=bool)
+        used[up, right] = True
+        metric = _Metric.of(
+            surface, lattice[:, first : last + 1], (columns, rows), corrugation, whole
+        )
+        ramp = metric.ramp(surface, used)
+        steepest = max(steepest, float(np.abs(ramp[used]).max()))
+        points = metric.points(
+            surface, np.clip(ramp, -math.tan(clip), math.tan(clip)), first, level
+        )
+        np.add.at(total, charts.faces_vertices[facets], points[up, right])
+        np.add.at(share, charts.faces_vertices[facets], 1.0)
+    return Seed(total / share[:, None], math.atan(steepest))
 
-    rate = curvature_along_u(surface, uv) * lambda_i**2 / (lambda_i**2 - 1) * spacing_i
-    ramp = np.concatenate(
-        [np.zeros((rows, 1)), np.cumsum((rate[:, 1:] + rate[:, :-1]) / 2, axis=1)], axis=1
-    )
-    ramp -= ramp[:, [columns // 2]] / 2 + ramp[:, [(columns - 1) // 2]] / 2
-    steepest = float(np.abs(ramp).max())
-    ramp = np.clip(ramp, -MAX_TAN_PSI, MAX_TAN_PSI)
 
-    i, j = np.arange(columns), np.arange(rows)
-    shifted = uv.copy()
-    shifted[..., 1] += ((i % 2) - 0.5)[None, :] * tau * spacing_i / speed_v
-    lift = ((j % 2) - 0.5 + level)[:, None] * sigma * spacing_j
-    direction = surface.normal(shifted) + t * ramp[..., None]
-    return Tessellation(surface.point(shifted) + lift[..., None] * direction), steepest
+@dataclass(frozen=True, eq=False)
+class _Metric:
+    """The stretches on the vertices ``uv`` (rows, columns, 2) of one chart, and what follows."""
+
+    uv: Floats
+    along: Floats
+    speed_v: Floats
+    spacing_i: Floats
+    spacing_j: Floats
+    lambda_i: Floats
+    lambda_j: Floats
+
+    @classmethod
+    def of(
+        cls,
+        surface: TargetSurface,
+        uv: Floats,
+        cells: tuple[int, int],
+        corrugation: Corrugation,
+        fans: bool,
+    ) -> _Metric:
+        du, dv = surface.domain.width / cells[0], surface.domain.height / cells[1]
+        along, across = tangents(surface, uv)
+        speed_v = np.linalg.norm(across, axis=-1)
+        t = unit(along)
+        spacing_i = np.linalg.norm(along, axis=-1) * du
+        # the distance between rows, not between neighbours: parameter lines may be oblique
+        oblique = np.einsum("...k,...k->...", across, t)
+        spacing_j = np.sqrt(np.maximum(speed_v**2 - oblique**2, 1e-12 * speed_v**2)) * dv
+        lambda_i = np.full_like(spacing_i, corrugation.stretch_along)
+        lambda_j = np.full_like(spacing_j, corrugation.stretch_across)
+        if fans:
+            fan_i, fan_j = _fans(spacing_i, spacing_j)
+            lambda_i *= (spacing_i / fan_i).max() * fan_i / spacing_i
+            lambda_j *= (spacing_j / fan_j).max() * fan_j / spacing_j
+        return cls(uv, t, speed_v, spacing_i, spacing_j, lambda_i, lambda_j)
+
+    def ramp(self, surface: TargetSurface, used: Bools) -> Floats:
+        """(rows, columns) tan psi, zero in the middle of the vertices ``used`` of each row."""
+        rate = curvature_along_u(surface, self.uv) * self.spacing_i
+        rate = rate * self.lambda_i**2 / (self.lambda_i**2 - 1)
+        steps = (rate[:, 1:] + rate[:, :-1]) / 2
+        ramp = np.concatenate([np.zeros((len(rate), 1)), np.cumsum(steps, axis=1)], axis=1)
+        first = used.argmax(axis=1)
+        last = used.shape[1] - 1 - used[:, ::-1].argmax(axis=1)
+        row = np.arange(len(ramp))
+        middle = ramp[row, (first + last) // 2] + ramp[row, (first + last + 1) // 2]
+        return np.asarray(ramp - middle[:, None] / 2)
+
+    def points(self, surface: TargetSurface, ramp: Floats, first: int, level: float) -> Floats:
+        """(rows, columns, 3) the corrugation; ``first`` is the number of the first column."""
+        sigma = np.sqrt(self.lambda_j**2 - 1)
+        tau = np.sqrt((self.lambda_i**2 - 1) * (1 + sigma**2)) / sigma
+        rows, columns = ramp.shape
+        i, j = first + np.arange(columns), np.arange(rows)
+        shifted = self.uv.copy()
+        shifted[..., 1] += ((i % 2) - 0.5)[None, :] * tau * self.spacing_i / self.speed_v
+        lift = ((j % 2) - 0.5 + level)[:, None] * sigma * self.spacing_j
+        direction = surface.normal(shifted) + self.along * ramp[..., None]
+        return np.asarray(surface.point(shifted) + lift[..., None] * direction)
 
 
 def _fans(spacing_i: Floats, spacing_j: Floats) -> tuple[Floats, Floats]:

@@ -1,0 +1,106 @@
+"""The kinds of values that only a fit has: flat-foldability, and the number of pieces."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+from miurafab.errors import UnitError
+from miurafab.options import Kind
+from miurafab.units import parse_angle
+
+
+class FlatFoldability(Kind):
+    """``exact`` (0 inside), ``off`` (None) or the largest difference of pi - a1 - a3 from 0.
+
+    The paper gives this limit in radians, every other angle here is in degrees; so a number must
+    carry its unit.
+    """
+
+    @property
+    def metavar(self) -> str:
+        return "exact|off|ANGLE"
+
+    def read(self, value: object) -> float | None:
+        if value == "exact":
+            return 0.0
+        if value == "off":
+            return None
+        try:
+            float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            pass
+        else:
+            raise ValueError(
+                f"is {value} without a unit; write {value}rad, as the paper does, or degrees such "
+                "as 0.9deg"
+            )
+        try:
+            inside = parse_angle(value if isinstance(value, str) else repr(value))
+        except UnitError:
+            raise ValueError(
+                f"is {value!r}; it must be exact, off, or an angle such as 0.016rad or 0.9deg"
+            ) from None
+        self.check(inside)
+        return inside
+
+    def check(self, inside: float) -> None:
+        if not 0 <= inside < math.pi:
+            raise ValueError(
+                f"is {math.degrees(inside):g} deg; it must be exact, off, or an angle under 180 deg"
+            )
+
+    def show(self, inside: float) -> str:
+        return f"{inside:g}rad" if inside else "exact"
+
+
+class Pieces(Kind):
+    """``auto`` (None inside) or a whole number from 1 on."""
+
+    @property
+    def metavar(self) -> str:
+        return "N|auto"
+
+    def read(self, value: object) -> int | None:
+        if value == "auto":
+            return None
+        text = value if isinstance(value, str) else repr(value)
+        if not text.isdecimal():
+            raise ValueError(f"is {value!r}; it must be auto or a whole number from 1 on")
+        self.check(int(text))
+        return int(text)
+
+    def check(self, inside: int) -> None:
+        if inside < 1:
+            raise ValueError(f"is {inside}; it must be auto or a whole number from 1 on")
+
+    def show(self, inside: int) -> str:
+        return str(inside)
+
+
+class CutColumns(Kind):
+    """Columns of vertices along which a sheet is cut, each under the next."""
+
+    @property
+    def metavar(self) -> str:
+        return "I,J"
+
+    def read(self, value: object) -> tuple[int, ...]:
+        parts = value.split(",") if isinstance(value, str) else value
+        try:
+            columns = tuple(int(str(part)) for part in parts)  # type: ignore[attr-defined] # TypeError
+        except (TypeError, ValueError):
+            raise ValueError(
+                f"is {value!r}; write column numbers with commas between, such as 8,16"
+            ) from None
+        self.check(columns)
+        return columns
+
+    def check(self, inside: tuple[int, ...]) -> None:
+        if not inside or inside[0] < 1 or any(a >= b for a, b in itertools.pairwise(inside)):
+            raise ValueError(
+                f"is {self.show(inside)!r}; write columns from 1 on, each under the next"
+            )
+
+    def show(self, inside: tuple[int, ...]) -> str:
+        return ",".join(map(str, inside))

@@ -1,0 +1,122 @@
+"""Where a sheet belongs on its target: the places of its cells, its rim, and its nearest points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.quads import QuadCharts
+from miurafab.surfaces.surface import TargetSurface, tangents, unit
+
+
+@dataclass(frozen=True, eq=False)
+class Rim:
+    """The border that the facets ``facets`` (k,) are to reach: ``places`` (k, 3), and the unit
+    directions ``outward`` (k, 3) across the border. ``overhang`` weighs a facet beyond its place
+    against one that has retreated: 0 where the sheet is trimmed afterwards.
+    """
+
+    facets: Ints
+    places: Floats
+    outward: Floats
+    overhang: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Nominal:
+    """Where the sheet belongs: ``corners`` (F, 4, 3) and ``centres`` (F, 3) of the cells on the
+    target, and the parameters of the centres (F, 2).
+    """
+
+    corners: Floats
+    centres: Floats
+    parameters: Floats
+
+    @classmethod
+    def of(cls, surface: TargetSurface, charts: QuadCharts, columns: int, rows: int) -> Nominal:
+        """The cells of ``charts`` in a lattice of ``columns`` x ``rows`` cells on ``surface``."""
+        d = surface.domain
+        step = np.array([d.width / columns, d.height / rows])
+        corner = charts.cells[:, None, :] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+        origin = np.array([d.u0, d.v0])
+        centres = origin + (charts.cells + 0.5) * step
+        return cls(surface.point(origin + corner * step), surface.point(centres), centres)
+
+
+SIDES = ((0, -1, (0, 3)), (0, 1, (1, 2)), (1, -1, (0, 1)), (1, 1, (3, 2)))
+"""The axis, the outward sign and the corners of the four sides of a cell."""
+
+
+def rim_of_domain(
+    surface: TargetSurface,
+    charts: QuadCharts,
+    nominal: Nominal,
+    cells: tuple[int, int],
+    axes: tuple[int, ...] = (0, 1),
+) -> Rim:
+    """The rim of the cells at the border of a lattice of ``cells`` columns and rows, across the
+    parameters ``axes``. A side between two facets is no rim.
+    """
+    half = np.array([surface.domain.width / cells[0], surface.domain.height / cells[1]]) / 2
+    facets, outward = [], []
+    for axis, sign, corners in SIDES:
+        if axis not in axes:
+            continue
+        end = 0 if sign < 0 else cells[axis] - 1
+        inside = charts.on_two_facets(charts.faces_vertices[:, corners])
+        chosen = np.flatnonzero((charts.cells[:, axis] == end) & ~inside)
+        step = sign * half * np.eye(2)[axis]
+        uv = nominal.parameters[chosen]
+        facets.append(chosen)
+        outward.append(unit(surface.point(uv + step) - surface.point(uv - step)))
+    together = np.concatenate(facets)
+    return Rim(together, nominal.centres[together], np.concatenate(outward))
+
+
+def chains_of(charts: QuadCharts, corners: Floats) -> tuple[Ints, Floats]:
+    """Three vertices at stride 2 along i or j inside one chart, (n, 3), and the second difference
+    (n, 3) of their places on the target, ``corners`` (F, 4, 3).
+
+    Each chain runs along the lower sides of four facets, and along the upper sides at the border.
+    """
+    chains, places = [], []
+    for direction, (first, last) in enumerate((((0, 3), (1, 2)), ((0, 1), (3, 2)))):
+        step, side = charts.next_facets(direction), charts.next_facets(1 - direction)
+        for near, far, chosen in zip(
+            first, last, (np.ones(len(step), dtype=bool), side < 0), strict=True
+        ):
+            run = [np.flatnonzero(chosen)]
+            for _ in range(3):
+                ahead = step[run[-1]]
+                run = [facets[ahead >= 0] for facets in run] + [ahead[ahead >= 0]]
+            start, _, middle, end = run
+            ends = ((start, near), (middle, near), (end, far))
+            chains.append(np.stack([charts.faces_vertices[f, c] for f, c in ends], axis=1))
+            a, b, c = (corners[f, k] for f, k in ends)
+            places.append(a - 2 * b + c)
+    return np.concatenate(chains), np.concatenate(places)
+
+
+def feet_of(surface: TargetSurface, points: Floats, start: Floats, steps: int = 2) -> Floats:
+    """(n, 2) the parameters near ``start`` whose points are nearest to ``points`` (n, 3).
+
+    Gauss-Newton steps on |S(u, v) - p|^2, each at most a twentieth of the domain.
+    """
+    d = surface.domain
+    cap = np.array([d.width, d.height]) / 20
+    uv = start
+    for _ in range(steps):
+        along, across = tangents(surface, uv)
+        gap = surface.point(uv) - points
+        a, b, c = _dot(along, along), _dot(along, across), _dot(across, across)
+        f, g = _dot(along, gap), _dot(across, gap)
+        det = a * c - b * b
+        step = np.stack([(b * g - c * f) / det, (b * f - a * g) / det], axis=1)
+        uv = uv + np.clip(step, -cap, cap)
+    return uv
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.einsum("nk,nk->n", a, b))

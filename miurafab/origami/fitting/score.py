@@ -1,0 +1,101 @@
+"""The score of an exact sheet: how well it can be folded, and how much of the target it follows.
+
+The score is the largest of these parts, and less is better. At 1 each is as good as asked:
+
+deviation   the largest distance of a follower from the target, over 0.5 % of the diagonal
+rim         how far a border facet lies inside or beyond its place, over 1 % of the diagonal
+sectors     the larger of 45 deg - least and greatest - 135 deg, over 7 degrees
+bad         the share of corners outside 45..135 deg, over 10 %
+folds       the largest fold angle over 178 deg
+area        the 95th over the 5th percentile of the areas of facets, over 20
+edges       0.05 of the mean edge over the shortest edge
+
+Facets that cross, overlap or are not convex are faults and no matter of degree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from miurafab.geometry.angles import angle_between
+from miurafab.geometry.arrays import Floats
+from miurafab.geometry.polygons import edge_lengths, facet_normals
+from miurafab.geometry.quads import QuadCharts
+from miurafab.origami.fitting.nominal import Rim
+
+GOOD = 1.0
+"""A sheet with this score or less is as good as asked, and ends the search."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """The parts of the score, each 1 where the sheet is as good as asked; ``bow_ties`` is the
+    number of facets that are not convex.
+    """
+
+    deviation: float
+    rim: float
+    sectors: float
+    bad: float
+    folds: float
+    area: float
+    edges: float
+    bow_ties: int
+
+    @property
+    def total(self) -> float:
+        """The largest part."""
+        return max(float(getattr(self, f.name)) for f in fields(self) if f.name != "bow_ties")
+
+    def report(self) -> dict[str, float]:
+        """The parts and the total, for the fit report."""
+        return {"total": self.total, **{f.name: getattr(self, f.name) for f in fields(self)}}
+
+
+def score(charts: QuadCharts, points: Floats, rim: Rim, deviation: float) -> Score:
+    """The score of the sheet ``points`` (V, 3) over ``charts``; ``rim`` is the border that it is to
+    reach, and ``deviation`` the largest distance of its followers.
+    """
+    faces = charts.faces_vertices
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    corners = points[faces]
+    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    sectors = np.degrees(angle_between(ahead, behind))
+    outside = np.maximum(45 - sectors, sectors - 135)
+    area = np.linalg.norm(
+        np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1
+    )
+    normals = facet_normals(points, faces)
+    f, g = charts.neighbouring_facets.T
+    folds = np.degrees(angle_between(normals[f], normals[g]))
+    edges = edge_lengths(points, charts.edges_vertices)
+    off = np.zeros(1)
+    if len(rim.facets):
+        gap = rim.places - corners[rim.facets].mean(axis=1)
+        across = np.einsum("nk,nk->n", rim.outward, gap)
+        off = np.where(across > 0, across, -across * (rim.overhang > 0))
+    spread = np.percentile(area, 95) / max(float(np.percentile(area, 5)), 1e-300)
+    return Score(
+        deviation=100 * deviation / diagonal / 0.5,
+        rim=100 * float(off.max()) / diagonal,
+        sectors=float(outside.max()) / 7,
+        bad=100 * float((outside > 0.1).mean()) / 10,
+        folds=float(folds.max(initial=0.0)) / 178,
+        area=float(spread) / 20,
+        edges=0.05 * float(edges.mean()) / max(float(edges.min()), 1e-300),
+        bow_ties=int(bow_ties(corners).sum()),
+    )
+
+
+def bow_ties(corners: Floats) -> Floats:
+    """(F,) which quads ``corners`` (F, 4, 3) are not convex: (u x v) . (v x w) < 0 for a diagonal
+    v and the sides u, w beside it.
+    """
+    crossed = np.zeros(len(corners), dtype=bool)
+    for turn in (0, 1):
+        p = np.roll(corners, -turn, axis=1)
+        u, v, w = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]
+        crossed |= np.einsum("fk,fk->f", np.cross(u, v), np.cross(v, w)) <= 0
+    return crossed
