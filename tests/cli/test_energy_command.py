@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from command_line import sentence
+from piece_problems import two_pieces
 from problems import regular
 
 from miurafab.errors import InputError
@@ -47,6 +48,17 @@ def test_json_tells_the_barrier_and_where_it_is(run, saved, hypar):
     low, high = sorted(abs(state["angle_deg"]) for state in answer["stable_states"])
     assert low == 0 < abs(answer["barrier_angle_deg"]) < high
     assert high == pytest.approx(abs(answer["folded_angle_deg"]))
+
+
+def test_each_of_several_pieces_has_its_own_numbers(run, tmp_path):
+    two_pieces(5, 5, 2).save(tmp_path / "pieces.fold")
+    answer = json.loads(run("energy", tmp_path / "pieces.fold", "--steps", "2", "--json").stdout)
+    assert [piece["piece"] for piece in answer["pieces"]] == [0, 1]
+    assert answer["rigid"] is True
+    done = run("energy", tmp_path / "pieces.fold", "--steps", "2", "-o", tmp_path / "energy.csv")
+    assert done.returncode == 0
+    assert "All pieces fold rigidly" in done.stdout
+    assert (tmp_path / "energy.csv").read_text().count("\n") == 1 + 2 * 3
 
 
 def test_joules_with_a_material(run, saved):
