@@ -12,6 +12,10 @@ taken as one point, form a tree of their own; the path in it between two loops i
 of the cut whose two sides come to lie apart are opened, the others stay. The tree of facets crosses
 the line where the lattice closes only where it must, so that a ring opens there.
 
+The last sides carry the rounding of all angles before them: on a cylinder of 10,000 facets their
+lengths are wrong by 5e-12. Where it is over ``EXACT``, one step of least squares over all sides and
+diagonals spreads it evenly: 3e-14 with 10,000 facets, 1e-13 with 100,000.
+
 Sides are numbered h = 4 * facet + k, from corner k to the next corner of the facet.
 """
 
@@ -20,16 +24,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, eye_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from miurafab.geometry.angles import angle_between
 from miurafab.geometry.arrays import Bools, Floats, Ints, run_starts
 from miurafab.geometry.quads import QuadCharts
+from miurafab.geometry.sparse import SymmetricSolver
 
 CLOSES = 1e-9
 """In mean sides: the two sides of a cut that lie nearer than this when flat are one crease."""
 
+EXACT = 1e-12
+"""In mean sides: differences of lengths up to this are left as they are."""
+ROUNDING = 1e-6
+"""In mean sides: larger differences of lengths are faults of the sheet, and stay where they are."""
+
+_RIDGE = 1e-9
+"""Of the mean stiffness; it holds the three motions of each piece, which no length tells."""
+
+_PAIRS = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 3]])
 _CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 _MIDDLES = np.array([[1, 0], [2, 1], [1, 2], [0, 1]])
 
@@ -69,6 +83,7 @@ def develop(charts: QuadCharts, points: Floats) -> Development:
     if (apart != cut).any():
         corners = _corners(charts, creases[~apart])
         places = _places(corners, headings, lengths, tree)
+    places = _evened(places, corners, points[charts.faces_vertices])
     at = np.empty((len(places), 2), dtype=np.int64)
     at[corners] = charts.cells[:, None, :] + _CORNERS
     piece, vertices = np.empty((2, len(places)), dtype=np.int64)
@@ -146,7 +161,7 @@ def _tree(charts: QuadCharts, creases: Ints) -> _Tree:
     distance, before, _ = dijkstra(
         graph, directed=False, indices=roots, return_predecessors=True, min_only=True
     )
-    child = np.setdiff1d(np.arange(count), roots)
+    child = np.flatnonzero(distance > 0)
     child = child[np.argsort(distance[child], kind="stable")]
     parent = before[child].astype(np.int64)
     key = pairs[:, 0] * count + pairs[:, 1]
@@ -175,19 +190,24 @@ def _cut(charts: QuadCharts, creases: Ints, used: Bools) -> Bools:
     What is off the tree of facets, and ends at a vertex inside, is taken away until nothing does.
     """
     corners = _corners(charts, creases).ravel()
-    border = np.setdiff1d(np.arange(len(corners)), creases)
+    outer = np.ones(len(corners), dtype=bool)
+    outer[creases] = False
+    border = np.flatnonzero(outer)
     loose = corners[border], corners[_after(border)]
     count, node = _components(*loose, int(corners.max()) + 1)
     inside = np.ones(count, dtype=bool)
     inside[node[loose[0]]] = False
     ends = node[np.stack([corners[creases[:, 0]], corners[_after(creases[:, 0])]], axis=1)]
-    cut = ~used
+    left = np.flatnonzero(~used)
     while True:
-        degree = np.bincount(ends[cut].ravel(), minlength=count)
-        dangling = cut & ((degree == 1) & inside)[ends].any(axis=1)
+        degree = np.bincount(ends[left].ravel(), minlength=count)
+        dangling = ((degree == 1) & inside)[ends[left]].any(axis=1)
         if not dangling.any():
-            return cut
-        cut &= ~dangling
+            break
+        left = left[~dangling]
+    cut = np.zeros(len(creases), dtype=bool)
+    cut[left] = True
+    return cut
 
 
 def _headings(corners: Floats, tree: _Tree) -> tuple[Floats, Floats]:
@@ -232,6 +252,32 @@ def _places(corners: Ints, headings: Floats, lengths: Floats, tree: _Tree) -> Fl
             places[new[fresh]] = places[from_[fresh]] + by[fresh]
             known[new] = True
     return places
+
+
+def _evened(places: Floats, corners: Ints, quads: Floats) -> Floats:
+    """``places`` (W, 2) moved until sides and diagonals have their lengths in ``quads`` (F, 4, 3).
+
+    One Gauss-Newton step: with unit vectors u along all pairs and r what they lack in length, the
+    moves d solve J'J d = J'r, where a row of J is u at one end and -u at the other.
+    """
+    ends = corners[:, _PAIRS].reshape(-1, 2)
+    lengths = np.linalg.norm(np.diff(quads[:, _PAIRS], axis=2)[:, :, 0], axis=2).ravel()
+    gap = np.diff(places[ends], axis=1)[:, 0]
+    found = np.linalg.norm(gap, axis=1)
+    lack = lengths - found
+    worst = float(np.abs(lack).max() / lengths.mean())
+    if not EXACT < worst <= ROUNDING or not found.all():
+        return places
+    along = gap / found[:, None]
+    row = np.repeat(np.arange(len(ends)), 4)
+    column = (2 * ends[:, :, None] + [0, 1]).reshape(-1)
+    values = np.stack([-along, along], axis=1).reshape(-1)
+    jacobian = coo_array((values, (row, column)), shape=(len(ends), places.size)).tocsr()
+    normal = jacobian.T @ jacobian + _RIDGE * eye_array(places.size)
+    normal = normal.tocsc()
+    normal.sort_indices()
+    moves = SymmetricSolver().factor(normal).solve(jacobian.T @ lack)
+    return places + moves.reshape(-1, 2)
 
 
 def _gaps(places: Floats, corners: Ints, creases: Ints) -> Floats:
