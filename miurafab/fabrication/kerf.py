@@ -3,9 +3,9 @@
 The beam burns kerf / 2 to each side of its path, so the path is the outline offset outwards by
 kerf / 2, with mitred corners so that corners stay sharp. The mitre of a corner below 60 degrees is
 cut off square, at a distance of kerf from the corner; that is farther than kerf / 2, so the corner
-stays whole. If two parts of an outline are nearer than the kerf, the path may close a ring around
-waste; these rings are paths, too. Holding bridges are gaps in a path that keep a patch in its sheet
-until it is taken out.
+stays whole. The path around a hole lies inside it. If two parts of an outline are nearer than the
+kerf, the path may close a ring around waste; these rings are paths, too. Holding bridges are gaps
+in a path that keep a patch in its sheet until it is taken out.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ def allowance(kerf: float) -> float:
     return math.hypot(MITRE_LIMIT, 1.0) * kerf / 2
 
 
-def cut_lines(outlines: Sequence[Floats], kerf: float) -> list[list[Floats]]:
-    """The closed cut lines (m, 2) in mm of each simple closed outline (n, 2): the outer line first,
-    counter-clockwise. No line repeats its first point.
+def cut_lines(outlines: Sequence[Sequence[Floats]], kerf: float) -> list[list[Floats]]:
+    """The closed cut lines (m, 2) in mm of each outline, whose rings (n, 2) are the outer one and
+    those around holes: the outer line first, counter-clockwise. No line repeats its first point.
     """
     if kerf == 0.0:
-        return [[outline] for outline in outlines]
-    polygons = np.array([shapely.Polygon(outline) for outline in outlines])
+        return [list(rings) for rings in outlines]
+    polygons = np.array([shapely.Polygon(rings[0], rings[1:]) for rings in outlines])
     moved = shapely.buffer(polygons, kerf / 2, join_style="mitre", mitre_limit=MITRE_LIMIT)
     found = []
     for polygon in moved:

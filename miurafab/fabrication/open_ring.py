@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.seams import COINCIDENT, ring_seams
+from miurafab.fabrication.seams import COINCIDENT, border_seams
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.crease_pattern import CreasePattern
@@ -91,7 +91,10 @@ def open_ring(pattern: CreasePattern, axis: int, line: int) -> CreasePattern:
         edges_fold_angle=angles,
         faces_vertices=_faces(pattern, parts, axis, line),
         folded_coords=_spliced(folded, folded, axis, line).reshape(-1, 3),
+        seams=None,
     )
+    if pattern.seams is not None:
+        made = replace(made, seams=border_seams(made).edges)
     measured = with_angles_of_the_folded_form(made)
     letters[joint] = measured.edges_assignment[joint]
     angles[joint] = measured.edges_fold_angle[joint]
@@ -155,7 +158,7 @@ def _closes(pattern: CreasePattern, parts: _Parts, axis: int) -> bool:
     """Whether each edge of the first line is glued to its edge of the last line."""
     lines = parts.on_lines(axis)
     wanted = np.sort(lines[[0, -1]].T, axis=1)
-    glued = np.sort(ring_seams(pattern).edges, axis=1)
+    glued = np.sort(border_seams(pattern).edges, axis=1)
     return set(map(tuple, wanted.tolist())) <= set(map(tuple, glued.tolist()))
 
 

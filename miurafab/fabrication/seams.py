@@ -1,8 +1,9 @@
 """Seams: the pairs of facet sides that are glued together.
 
-Most seams lie within the pattern: an edge between two facets of different patches, one of which
-bears a tab. If the folded form closes upon itself (a ring, a tube), two edges of the border of the
-pattern coincide and are glued, too. Two border edges form such a seam if, in the folded form,
+Some seams lie within a piece of the pattern: an edge between two facets of different patches, one
+of which bears a tab. Others join two edges of the border: two pieces, or a folded form that closes
+upon itself (a ring, a tube). A pattern names these pairs (``CreasePattern.seams``). If it names
+none, as in the files of other programs, two border edges form a seam if, in the folded form,
 
 - their ends coincide, and the edges run in opposite directions as seen from their facets;
 - their lengths in the flat pattern are equal;
@@ -85,26 +86,38 @@ def inner_seams(pattern: CreasePattern, edges: Ints, sides: Ints) -> Seams:
 
 
 def all_seams(pattern: CreasePattern, face_patch: Ints) -> Seams:
-    """The seams of ``face_patch`` (F,): first between patches, then between borders."""
+    """The seams of ``face_patch`` (F,): first within pieces, then between borders."""
     faces = pattern.edges_faces
     patch = np.where(faces >= 0, face_patch[faces], -1)
     seam = (faces >= 0).all(axis=1) & (patch[:, 0] != patch[:, 1])
     edges = np.flatnonzero(seam & (pattern.edges_assignment != "C"))
-    return inner_seams(pattern, edges, np.ones_like(edges)).joined(ring_seams(pattern))
+    return inner_seams(pattern, edges, np.ones_like(edges)).joined(border_seams(pattern))
 
 
-def ring_seams(pattern: CreasePattern) -> Seams:
-    """The pairs of border edges that coincide in the folded form, in the order of the lower edge;
-    none if the folded form is unknown.
+def border_seams(pattern: CreasePattern) -> Seams:
+    """The pairs of border edges that are glued, in the order of the lower edge."""
+    pairs = _coinciding(pattern) if pattern.seams is None else np.sort(pattern.seams, axis=1)
+    pairs = pairs[np.argsort(pairs[:, 0])]
+    faces = pattern.edges_faces[pairs].max(axis=2)
+    if pattern.folded_coords is None:
+        return Seams(pairs, faces, np.full(len(pairs), "U"))
+    ends = _with_facet_on_the_left(pattern, pairs[:, 0])
+    normal = facet_normals(pattern.folded_coords, pattern.faces_vertices[faces.ravel()])
+    left, right = normal.reshape(-1, 2, 3).swapaxes(0, 1)
+    angle = fold_angles(pattern.folded_coords, ends, left, right)
+    fold = np.select([angle > FLAT_ANGLE, angle < -FLAT_ANGLE], ["V", "M"], "F")
+    seams = Seams(pairs, faces, fold)
+    return seams if pattern.seams is not None else seams.take(np.abs(angle) < math.pi - TOGETHER)
+
+
+def _coinciding(pattern: CreasePattern) -> Ints:
+    """(S, 2) the pairs of border edges of one length that coincide in the folded form; none if it
+    is unknown.
     """
-    none = np.empty((0, 2), dtype=np.int64)
     border = np.flatnonzero((pattern.edges_faces >= 0).sum(axis=1) == 1)
     if pattern.folded_coords is None or len(border) < 2:
-        return Seams(none, none, pattern.edges_assignment[:0])
-    # Each border edge runs with its facet on the left.
-    turned = pattern.edges_faces[border, 0] < 0
-    ends = pattern.edges_vertices[border]
-    ends = np.where(turned[:, None], ends[:, ::-1], ends)
+        return np.empty((0, 2), dtype=np.int64)
+    ends = _with_facet_on_the_left(pattern, border)
     folded = pattern.folded_coords[ends]
     near = COINCIDENT * float(np.linalg.norm(np.ptp(pattern.folded_coords, axis=0)))
     middles = scipy.spatial.KDTree(folded.mean(axis=1))
@@ -115,12 +128,11 @@ def ring_seams(pattern: CreasePattern) -> Seams:
     length = edge_lengths(pattern.vertices_coords, ends)
     met &= np.abs(length[pairs[:, 0]] - length[pairs[:, 1]]) <= near
     alone = np.bincount(pairs.ravel(), minlength=len(border)) == 1
-    pairs = pairs[met & alone[pairs].all(axis=1)]
-    pairs = pairs[np.argsort(pairs[:, 0])]
-    faces = pattern.edges_faces[border].max(axis=1)[pairs]
-    normal = facet_normals(pattern.folded_coords, pattern.faces_vertices[faces.ravel()])
-    left, right = normal.reshape(-1, 2, 3).swapaxes(0, 1)
-    angle = fold_angles(pattern.folded_coords, ends[pairs[:, 0]], left, right)
-    fold = np.select([angle > FLAT_ANGLE, angle < -FLAT_ANGLE], ["V", "M"], "F")
-    glued = np.abs(angle) < math.pi - TOGETHER
-    return Seams(border[pairs], faces, fold).take(glued)
+    return np.asarray(border[pairs[met & alone[pairs].all(axis=1)]])
+
+
+def _with_facet_on_the_left(pattern: CreasePattern, border: Ints) -> Ints:
+    """(n, 2) the ends of the border edges ``border`` (n,), as their facet has them on its left."""
+    turned = pattern.edges_faces[border, 0] < 0
+    ends = pattern.edges_vertices[border]
+    return np.where(turned[:, None], ends[:, ::-1], ends)

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.seams import Seams, all_seams, ring_seams
+from miurafab.fabrication.seams import Seams, all_seams, border_seams
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import edge_lengths, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
@@ -279,9 +279,9 @@ def choose_tabs(
     return tabs.take(kept), unusual[kept], seams.edges[~kept, 0]
 
 
-def ring_tabs(pattern: CreasePattern, material: Material, options: LayoutOptions) -> TabRegions:
-    """All tabs that may stand on the border of the pattern, on either side of each seam."""
-    seams = ring_seams(pattern)
+def border_tabs(pattern: CreasePattern, material: Material, options: LayoutOptions) -> TabRegions:
+    """All tabs that may stand on borders of the pattern, on either side of each seam."""
+    seams = border_seams(pattern)
     seams = seams.joined(seams.swapped(np.ones(len(seams), dtype=bool)))
     return tab_regions(pattern, seams, material, full_facet=options.full_facet)
 

@@ -18,7 +18,7 @@ from miurafab.fabrication.sheets import lay_out
 
 def test_a_rectangle_grows_by_half_a_kerf_on_each_side():
     outline = np.array([[0, 0], [40, 0], [40, 20], [0, 20]], dtype=float)
-    (line,) = cut_lines([outline], 0.2)[0]
+    (line,) = cut_lines([[outline]], 0.2)[0]
     expected = shapely.box(-0.1, -0.1, 40.1, 20.1).normalize()
     assert shapely.Polygon(line).normalize().equals_exact(expected, 1e-9)
     assert shapely.Polygon(line).exterior.is_ccw
@@ -26,7 +26,7 @@ def test_a_rectangle_grows_by_half_a_kerf_on_each_side():
 
 def test_no_kerf_leaves_the_outline_as_it_is():
     outline = np.array([[0, 0], [40, 0], [40, 20]], dtype=float)
-    np.testing.assert_array_equal(cut_lines([outline], 0.0)[0][0], outline)
+    np.testing.assert_array_equal(cut_lines([[outline]], 0.0)[0][0], outline)
 
 
 @settings(derandomize=True, max_examples=30, deadline=None)
@@ -34,7 +34,7 @@ def test_no_kerf_leaves_the_outline_as_it_is():
 def test_the_beam_burns_up_to_the_piece_and_never_into_it(sector, kerf):
     pattern = zigzag(12, 12, a=15.0, sector=sector)
     for piece in outline_patches(pattern, 120.0, 90.0, card(kerf=kerf, inset=0.5)).patches:
-        nominal = shapely.Polygon(piece.outline)
+        nominal = shapely.Polygon(piece.rings[0], piece.rings[1:])
         outer, *waste = piece.cut_lines
         path = shapely.LineString(np.concatenate([outer, outer[:1]]))
         assert path.distance(nominal) == pytest.approx(kerf / 2, abs=1e-9)
@@ -51,7 +51,7 @@ def test_waste_enclosed_by_a_narrow_mouth_is_cut_out_too():
         [[0, 0], [30, 0], [30, 20], [15.1, 20], [15.1, 15], [20, 15], [20, 5], [10, 5], [10, 15],
          [15, 15], [15, 20], [0, 20]], dtype=float,
     )  # fmt: skip
-    outer, waste = cut_lines([outline], 0.4)[0]
+    outer, waste = cut_lines([[outline]], 0.4)[0]
     assert shapely.Polygon(outer).contains(shapely.Polygon(waste))
     assert shapely.Polygon(waste).area == pytest.approx(9.6 * 9.6)
 

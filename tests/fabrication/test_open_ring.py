@@ -17,7 +17,7 @@ import miurafab
 from miurafab.errors import LayoutError
 from miurafab.fabrication.open_ring import open_ring, opened
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.seams import ring_seams
+from miurafab.fabrication.seams import border_seams
 from miurafab.fabrication.sheets import lay_out
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.crease_pattern import CreasePattern
@@ -209,14 +209,14 @@ def test_every_invariant_holds_at_the_joint(ring):
 
 def test_seam_and_line_change_places(ring):
     pattern, axis = ring
-    seams, lines = ring_seams(pattern), lines_of(pattern, axis)
+    seams, lines = border_seams(pattern), lines_of(pattern, axis)
     for line in some_lines(pattern, axis):
         there = open_ring(pattern, axis, line)
         joint = lines[count_of(pattern, axis) - line]
         np.testing.assert_array_equal(there.edges_assignment[joint], seams.fold)
-        np.testing.assert_array_equal(ring_seams(there).edges, lines[[0, -1]].T)
+        np.testing.assert_array_equal(border_seams(there).edges, lines[[0, -1]].T)
         letters = pattern.edges_assignment[lines[line]]
-        np.testing.assert_array_equal(ring_seams(there).fold, letters)
+        np.testing.assert_array_equal(border_seams(there).fold, letters)
         assert (there.edges_assignment[lines[[0, -1]]] == "B").all()
         assert (there.edges_fold_angle[lines[[0, -1]]] == 0.0).all()
         # Where the fold of every crease is known, it is what it was.
@@ -232,7 +232,7 @@ def fold_angles_of_the_closed_sheet(pattern, axis, line):
     """
     kept = pattern.edges_assignment != "B"
     kept[lines_of(pattern, axis)[line]] = False
-    seams = ring_seams(pattern)
+    seams = border_seams(pattern)
     corners = pattern.folded_coords[pattern.faces_vertices[seams.faces]]
     one, other = corners[..., 2, :] - corners[..., 0, :], corners[..., 3, :] - corners[..., 1, :]
     normal = np.cross(one, other)
@@ -261,7 +261,7 @@ def test_a_pattern_that_closes_both_ways_is_opened_both_ways():
     np.testing.assert_allclose(both.folded_coords.reshape(rows, columns, 3)[:-1, :-1], moved)
     # A lattice, moved by any even number of its rows, is the same lattice.
     np.testing.assert_allclose(both.vertices_coords, pattern.vertices_coords, atol=1e-12)
-    seams = {tuple(pair) for pair in ring_seams(both).edges.tolist()}
+    seams = {tuple(pair) for pair in border_seams(both).edges.tolist()}
     for axis in (0, 1):
         assert {tuple(pair) for pair in lines_of(both, axis)[[0, -1]].T.tolist()} <= seams
 

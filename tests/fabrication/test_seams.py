@@ -16,7 +16,7 @@ from miurafab.fabrication.labels import place_texts
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_outline import outline_patches
-from miurafab.fabrication.seams import ring_seams
+from miurafab.fabrication.seams import border_seams
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tabs import inset_of
 
@@ -37,7 +37,7 @@ def row_edges(pattern, row):
 
 
 def test_the_first_and_last_row_of_a_ring_are_a_seam(closed):
-    seams = ring_seams(closed)
+    seams = border_seams(closed)
     _, rows = closed.grid
     first, last = row_edges(closed, 0), row_edges(closed, rows - 1)
     np.testing.assert_array_equal(seams.edges, np.column_stack([first, last]))
@@ -45,7 +45,7 @@ def test_the_first_and_last_row_of_a_ring_are_a_seam(closed):
 
 
 def test_the_seam_of_a_ring_folds_as_the_row_a_period_farther(closed):
-    seams = ring_seams(closed)
+    seams = border_seams(closed)
     np.testing.assert_array_equal(seams.fold, closed.edges_assignment[row_edges(closed, 2)])
 
 
@@ -74,7 +74,7 @@ def book():
     ],
 )
 def test_what_is_not_glued_is_no_seam(pattern):
-    assert len(ring_seams(pattern)) == 0
+    assert len(border_seams(pattern)) == 0
 
 
 def carried(points, start, end, to_start, to_end):
@@ -101,7 +101,7 @@ def test_each_ring_tab_is_in_its_mate_and_off_everything_else(closed, size, side
     outlined = outline_patches(pattern, *BEDS[size], material, options)
     tabs, facets = outlined.tabs, facet_polygons(pattern)
     across = tabs.seams.edges[:, 0] != tabs.seams.edges[:, 1]
-    assert across.sum() == len(ring_seams(pattern))
+    assert across.sum() == len(border_seams(pattern))
     assert not len(outlined.untabbed)
     shapes = np.array([shapely.Polygon(tabs.polygon(k)) for k in range(len(tabs))])
     owner = outlined.face_patch[tabs.own_face]
@@ -127,7 +127,7 @@ def test_each_ring_tab_is_in_its_mate_and_off_everything_else(closed, size, side
         same = np.setdiff1d(np.flatnonzero(owner == owner[k]), [k])
         assert (shapely.distance(shapes[k], shapes[same]) > 0).all()
     for number, piece in enumerate(outlined.patches):
-        outline = shapely.Polygon(piece.outline)
+        outline = shapely.Polygon(piece.rings[0], piece.rings[1:])
         assert outline.is_valid
         assert outline.area == pytest.approx(
             shapely.area(facets[piece.faces]).sum() + tabs.areas[owner == number].sum()
@@ -142,7 +142,7 @@ def without_grid_of(pattern):
 def test_the_layout_of_a_ring_tells_its_seam(closed, size):
     layout = lay_out(closed, bed(*BEDS[size]), card())
     document = json.loads(write_layout(layout, "p", "s"))
-    seams = ring_seams(closed)
+    seams = border_seams(closed)
     home = {face: patch["id"] for patch in document["patches"] for face in patch["faces"]}
     told = {
         (tab["edge"], tab["mate_edge"]): (patch["id"], tab["mate_patch"], tab["fold"])

@@ -98,7 +98,7 @@ def test_a_piece_is_its_patch_and_its_tabs(name):
     facets = facet_polygons(pattern)
     seen = []
     for number, piece in enumerate(outlined.patches):
-        outline = shapely.Polygon(piece.outline)
+        outline = shapely.Polygon(piece.rings[0], piece.rings[1:])
         assert outline.is_valid
         assert outline.exterior.is_ccw
         area = shapely.area(facets[piece.faces]).sum() + outlined.tabs.areas[piece.tabs].sum()
@@ -208,7 +208,7 @@ def test_a_pattern_that_overlaps_itself_has_tabs_that_do_not():
     pattern = flat_patterns.fan(60, 3, cell=10.0, radius=60.0)
     outlined = outline_patches(pattern, 1000.0, 1000.0, card())
     for piece in outlined.patches:
-        assert shapely.Polygon(piece.outline).is_valid
+        assert shapely.Polygon(piece.rings[0], piece.rings[1:]).is_valid
     assert len(outlined.tabs) + len(outlined.untabbed) > 0
 
 

@@ -12,7 +12,7 @@ from problems import assert_mountains_and_valleys
 
 from miurafab.errors import InputError
 from miurafab.fabrication.open_ring import open_ring
-from miurafab.fabrication.seams import ring_seams
+from miurafab.fabrication.seams import border_seams
 from miurafab.origami.cylinder import cylinder_on
 from miurafab.origami.fitting.constraints import OrigamiConstraints
 from miurafab.origami.fitting.fit import fit
@@ -119,7 +119,7 @@ def test_a_tube_that_is_fitted_is_closed_wherever_it_is_opened() -> None:
         assert found.findings == ()
         assert found.measurements.max_flat_foldability is not None
         assert found.measurements.max_flat_foldability < 1e-12
-        assert len(ring_seams(pattern)) == 12
+        assert len(border_seams(pattern)) == 12
 
 
 @pytest.mark.parametrize(

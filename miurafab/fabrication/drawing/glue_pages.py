@@ -32,6 +32,9 @@ from miurafab.fabrication.sheets import Layout
 _STEP = (ROOM - 12) / 3
 """The width of one step of gluing."""
 
+_TALL = 52.0
+"""The height of the picture of a step that is shown in space."""
+
 
 @dataclass(frozen=True, eq=False)
 class GluePages:
@@ -44,11 +47,16 @@ class GluePages:
     def layout(self) -> Layout:
         return self.views.layout
 
+    @property
+    def in_space(self) -> bool:
+        """Whether the steps are shown in space: pieces meet there and not in the flat pattern."""
+        return self.views.pattern.pieces_count > 1 and self.views.pattern.folded_coords is not None
+
     def pages(self) -> Iterator[Page]:
         """Functions that draw one page each."""
         steps = assembly_order(self.layout.model, self.views.pattern)
         top, notes = HEIGHT - MARGIN - 19, self.notes()
-        height = 20.0 + min(_STEP * self.views.aspect, 40.0)
+        height = 20.0 + (_TALL if self.in_space else min(_STEP * self.views.aspect, 40.0))
         glue = self.layout.totals.tabs > 0
         copies = self.layout.copies
         each = f", each of the {copies} copies" if copies > 1 else ""
@@ -57,14 +65,13 @@ class GluePages:
         shown = [] if alone else list(enumerate(steps))
         first = 3 * int((top - taken - BOTTOM) // height)
         later = 3 * int((top - BOTTOM) // height)
-        seams = self.seams_by_pair()
 
         def draw(canvas: Canvas, part: list[tuple[int, GlueStep]], y: float) -> None:
             for place, (number, step) in enumerate(part):
                 row, column = divmod(place, 3)
                 box = (MARGIN + column * (_STEP + 6), y - row * height, _STEP, height)
                 before = {earlier.patch for earlier in steps[:number]}
-                self.step(canvas, number, step, before, seams, box)
+                self.step(canvas, number, step, before, box)
 
         def front(canvas: Canvas) -> None:
             words = (
@@ -89,24 +96,12 @@ class GluePages:
         """The findings that matter for the assembly."""
         return [str(finding) for finding in self.layout.findings]
 
-    def seams_by_pair(self) -> dict[tuple[int, int, bool], list[int]]:
-        """The pattern edges of each seam, by its two patches and by whether it closes the sheet."""
-        found: dict[tuple[int, int, bool], list[int]] = {}
-        for patch in self.views.patches:
-            for tab in patch.tabs:
-                closes = tab.edge != tab.mate_edge
-                low, high = sorted((patch.id, tab.mate_patch))
-                edges = [tab.edge, tab.mate_edge] if closes else [tab.edge]
-                found.setdefault((low, high, closes), []).extend(edges)
-        return found
-
     def step(
         self,
         canvas: Canvas,
         number: int,
         step: GlueStep,
         before: set[int],
-        seams: dict[tuple[int, int, bool], list[int]],
         box: Box,
     ) -> None:
         """One step of gluing, from the top of ``box`` down."""
@@ -128,24 +123,27 @@ class GluePages:
         else:
             title = f"Begin with {label}"
         text(canvas, x + 8.5, top - 6.8, title, 9.5, bold=True)
-        glued = [
-            edge
-            for mate in step.onto
-            for edge in seams.get((min(mate, step.patch), max(mate, step.patch), step.closes), [])
-        ]
         words = tabs_called(step.tabs).capitalize() if step.tabs else ""
         if step.onto and not step.tabs:
             words = "No tabs: use tape on the seam"
+        if step.all_round:
+            words += ", all round, from outside"
         lines = wrapped(words, width - 8.5, 8)
         text(canvas, x + 8.5, top - 11, lines[0], 8)
         if len(lines) > 1:
             text(canvas, x + 8.5, top - 14.2, lines[1] + (" ..." if len(lines) > 2 else ""), 8)
             top -= 3.2
-        tall = min(height - 20, width * self.views.aspect)
+        tall = height - 20
+        if self.in_space:
+            room = (x, top - 14 - tall, width, tall)
+            self.views.step(canvas, room, step.patch, before, step.edges)
+            return
+        shown = (step.patch, *(step.onto if step.closes else ()))
+        tall = min(tall, width * self.views.aspect)
         self.views.map(
             canvas,
             (x, top - 14 - tall, width, tall),
-            shown=(step.patch, *(step.onto if step.closes else ())),
+            shown=shown,
             done=before - {step.patch},
-            seams=np.array(glued, dtype=np.int64),
+            seams=np.array(step.edges, dtype=np.int64),
         )

@@ -6,7 +6,7 @@ All views of a guide show a patch in the same colour, and all flat views have th
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from reportlab.lib.colors import Color, white
 from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
+from reportlab.pdfgen.pathobject import PDFPathObject
 
 from miurafab.fabrication.drawing.page import (
     CREASE_COLOURS,
@@ -26,12 +27,12 @@ from miurafab.fabrication.drawing.page import (
     text,
     tint,
 )
+from miurafab.fabrication.partition.boundary import boundaries
 from miurafab.fabrication.partition.patch_frame import Patch
-from miurafab.fabrication.partition.split import boundaries
 from miurafab.fabrication.sheets import DrawnLayout, Layout
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.picture import project
+from miurafab.origami.picture import AZIMUTH, ELEVATION, View, project
 
 _TALL = 1.25
 """A flat pattern with a larger ratio of height to width is turned by a right angle."""
@@ -49,6 +50,14 @@ def edge_letters(layout: Layout, pattern: CreasePattern) -> NDArray[np.str_]:
                 fold = {"mountain": "M", "valley": "V"}.get(tab.fold, "F")
                 letters[[tab.edge, tab.mate_edge]] = fold
     return letters
+
+
+_EVEN_ODD = 0
+"""The fill of reportlab that leaves holes open."""
+
+_ASIDE, _LOWEST, _UPRIGHT = math.radians(25), math.radians(15), 0.05
+"""A step of gluing is seen this far from the side, and at least from this elevation; a direction
+with less extent than the last, over the size of the shell, says nothing about the azimuth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +103,10 @@ class Views:
         return float(height / max(width, 1e-9))
 
     @cached_property
-    def rings(self) -> list[Ints]:
-        """The vertices around each patch."""
-        return [each.vertices for each in boundaries(self.pattern, self.face_patch)]
+    def rings(self) -> list[list[Ints]]:
+        """The vertices around each patch, and around each of its holes."""
+        around = boundaries(self.pattern, self.face_patch)
+        return [[loop.vertices for loop in each.loops] for each in around]
 
     @cached_property
     def letters(self) -> NDArray[np.str_]:
@@ -108,29 +118,77 @@ class Views:
         ``shown`` is given, other patches are pale.
         """
         assert self.pattern.folded_coords is not None
-        faces = self.pattern.faces_vertices
-        view = project(self.pattern.folded_coords, faces)
+        view = project(self.pattern.folded_coords, self.pattern.faces_vertices)
         seen, scale = fitted(view.places, box)
         fills = [
             tint(patch.id) if shown is None or patch.id in shown else PALE for patch in self.patches
         ]
-        outlined = len(faces) <= OUTLINED
+        for face in view.order.tolist():
+            self._facet(canvas, seen, view, face, fills[self.face_patch[face]])
+        return scale
+
+    def step(
+        self, canvas: Canvas, box: Box, patch: int, done: Collection[int], edges: Collection[int]
+    ) -> None:
+        """``patch`` in colour and the patches ``done`` lighter, folded, seen from outside with the
+        pattern edges ``edges`` in front; these are heavy.
+        """
+        points = self.pattern.folded_coords
+        assert points is not None
+        faces = self.pattern.faces_vertices
+        view = project(points, faces, *self._towards(patch, edges))
+        seen, _ = fitted(view.places, box)
+        marked: dict[int, list[int]] = {}
+        for edge in edges:
+            for face in self.pattern.edges_faces[edge].tolist():
+                marked.setdefault(face, []).append(edge)
+        known = {patch, *done}
+        for face in view.order.tolist():
+            own = int(self.face_patch[face])
+            if own not in known:
+                continue
+            self._facet(canvas, seen, view, face, tint(own, 1.0 if own == patch else 0.45))
+            # Nearer facets hide the part of a seam that is not seen.
+            heavy = self.pattern.edges_vertices[marked.get(face, [])]
+            canvas.setStrokeColor(INK)
+            canvas.setLineWidth(0.7 * mm)
+            canvas.setLineCap(1)
+            canvas.lines((seen[heavy] * mm).reshape(-1, 4).tolist())
+        self._name(canvas, seen, patch, _fitting(8.0, len(self.patches)))
+
+    def _towards(self, patch: int, edges: Collection[int]) -> tuple[float, float]:
+        """The azimuth and elevation from which a patch and a seam are seen from outside."""
+        points = self.pattern.folded_coords
+        assert points is not None
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        corners = self.pattern.faces_vertices[self.patches[patch].faces]
+        out = points[corners[corners >= 0]].mean(axis=0) - middle
+        if edges:
+            out += points[self.pattern.edges_vertices[list(edges)]].mean(axis=(0, 1)) - middle
+        across = math.hypot(out[0], out[1])
+        if across < _UPRIGHT * float(np.ptp(points, axis=0).max()):
+            return AZIMUTH, ELEVATION
+        rise = math.atan2(out[2], across)
+        return math.atan2(out[1], out[0]) + _ASIDE, min(max(rise, _LOWEST), math.pi / 3)
+
+    def _facet(self, canvas: Canvas, seen: Floats, view: View, face: int, fill: Color) -> None:
+        """One facet of a ``view``, at its places ``seen`` on the page."""
+        level = min(float(view.shade[face]), 1.0)
+        shaded = Color(fill.red * level, fill.green * level, fill.blue * level)
+        canvas.setFillColor(shaded)
+        canvas.setStrokeColor(Color(shaded.red * 0.75, shaded.green * 0.75, shaded.blue * 0.75))
         canvas.setLineWidth(0.08 * mm)
         canvas.setLineJoin(1)
-        for face in view.order.tolist():
-            base, level = fills[self.face_patch[face]], min(float(view.shade[face]), 1.0)
-            fill = Color(base.red * level, base.green * level, base.blue * level)
-            canvas.setFillColor(fill)
-            canvas.setStrokeColor(Color(fill.red * 0.75, fill.green * 0.75, fill.blue * 0.75))
-            polygon(canvas, seen[[v for v in faces[face].tolist() if v >= 0]], stroke=outlined)
-        return scale
+        faces = self.pattern.faces_vertices
+        corners = faces[face][faces[face] >= 0]
+        polygon(canvas, seen[corners], stroke=len(faces) <= OUTLINED)
 
     def flat_view(self, canvas: Canvas, box: Box) -> float:
         """The flat pattern with its creases and the names of its patches; returns its scale."""
         points, scale = fitted(self.flat, box)
         for patch in self.patches:
             canvas.setFillColor(tint(patch.id, 0.75))
-            polygon(canvas, points[self.rings[patch.id]])
+            self._filled(canvas, points, patch.id)
         ends = (points[self.pattern.edges_vertices] * mm).reshape(-1, 4)
         canvas.setLineCap(1)
         for letter, colour in CREASE_COLOURS.items():
@@ -143,15 +201,16 @@ class Views:
             self._name(canvas, points, patch.id, size)
         return scale
 
+    def _filled(self, canvas: Canvas, points: Floats, patch: int) -> None:
+        """A patch in the current colour; its holes stay open."""
+        path = _closed(canvas, [points[ring] for ring in self.rings[patch]])
+        canvas.drawPath(path, stroke=0, fill=1, fillMode=_EVEN_ODD)
+
     def _around(self, canvas: Canvas, points: Floats, weight: float, colour: Color) -> None:
         canvas.setStrokeColor(colour)
         canvas.setLineWidth(weight * mm)
         canvas.setLineJoin(1)
-        path = canvas.beginPath()
-        for ring in self.rings:
-            for k, (x, y) in enumerate((points[ring] * mm).tolist()):
-                (path.lineTo if k else path.moveTo)(x, y)
-            path.close()
+        path = _closed(canvas, [points[ring] for rings in self.rings for ring in rings])
         canvas.drawPath(path, stroke=1, fill=0)
 
     def _name(self, canvas: Canvas, points: Floats, patch: int, size: float) -> None:
@@ -176,7 +235,7 @@ class Views:
             strength = 1.0 if patch in shown else 0.45
             known = patch in shown or patch in done
             canvas.setFillColor(tint(patch, strength) if known else PALE)
-            polygon(canvas, points[self.rings[patch]])
+            self._filled(canvas, points, patch)
         self._around(canvas, points, 0.2, white)
         if seams is not None and len(seams):
             canvas.setStrokeColor(INK)
@@ -186,6 +245,16 @@ class Views:
         size = _fitting(8.0, len(self.patches))
         for patch in {*shown, *done}:
             self._name(canvas, points, patch, size)
+
+
+def _closed(canvas: Canvas, rings: Iterable[Floats]) -> PDFPathObject:
+    """One path around all ``rings`` (n, 2)."""
+    path = canvas.beginPath()
+    for ring in rings:
+        for k, (x, y) in enumerate((ring * mm).tolist()):
+            (path.lineTo if k else path.moveTo)(x, y)
+        path.close()
+    return path
 
 
 def named(canvas: Canvas, label: str, x: float, y: float, size: float) -> None:

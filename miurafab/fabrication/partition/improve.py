@@ -19,7 +19,7 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.cover import brickwork, excess, nearest, rectangle_around
 from miurafab.fabrication.partition.cover_search import CoverSearch
 from miurafab.fabrication.partition.min_cut import Recut
-from miurafab.fabrication.tabs import TabRegions
+from miurafab.fabrication.partition.pieces import StandingTabs
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import edge_lengths, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
@@ -46,7 +46,7 @@ def improved(
     patch: Ints,
     part: Ints,
     size: tuple[float, float],
-    ring: TabRegions,
+    border: StandingTabs,
     depth: float,
     material: Material,
     options: LayoutOptions,
@@ -56,11 +56,11 @@ def improved(
     """(F,) a split no worse than ``patch`` (F,), ids from 0; of two patches the lower bears tabs.
 
     Each patch lies within one ``part`` (F,) of the pattern, and patches of a lower part have lower
-    numbers. ``size`` is the bed in mm, ``ring`` the tabs on the border of the pattern; no tab
+    numbers. ``size`` is the bed in mm, ``border`` the tabs on the border of the pattern; no tab
     reaches farther than ``depth`` mm from its facet. ``straight`` seams, along the lines of a grid,
     are the easiest to glue: they stay unless a patch is saved.
     """
-    room = _room(pattern, ring)
+    room = _room(pattern, border)
     alternate = options.tab_side == "alternate"
 
     def recut(patch: Ints, rectangles: Floats) -> Ints | None:
@@ -166,20 +166,20 @@ def _deepest(room: Floats, rectangles: Floats, size: tuple[float, float]) -> Int
     return np.asarray(near[np.arange(len(near)), over.argmin(axis=1)])
 
 
-def _room(pattern: CreasePattern, ring: TabRegions) -> Floats:
+def _room(pattern: CreasePattern, tabs: StandingTabs) -> Floats:
     """(F, c, 2) the corners of each facet and of its tabs on the border of the pattern."""
     corners = pattern.faces_vertices
     room = pattern.vertices_coords[np.where(corners >= 0, corners, corners[:, :1])]
-    order = np.argsort(ring.own_face, kind="stable")
-    own = ring.own_face[order]
+    order = np.argsort(tabs.face, kind="stable")
+    own = tabs.face[order]
     place = np.arange(len(own)) - np.searchsorted(own, own)
-    points = np.where(ring.present[..., None], ring.points, ring.points[:, :1])
+    points = np.where(tabs.present[..., None], tabs.points, tabs.points[:, :1])
     for turn in range(int(place.max(initial=-1)) + 1):
         # One tab of each facet at a time; a facet without a tab repeats its first corner.
         tab = order[place == turn]
-        tab = tab[ring.count[tab] > 0]
+        tab = tab[tabs.present[tab].any(axis=1)]
         more = np.repeat(room[:, :1], points.shape[1], axis=1)
-        more[ring.own_face[tab]] = points[tab]
+        more[tabs.face[tab]] = points[tab]
         room = np.concatenate([room, more], axis=1)
     return room
 

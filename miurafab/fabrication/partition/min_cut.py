@@ -277,10 +277,11 @@ class Recut:
 
 
 def _prices(pattern: CreasePattern) -> Floats:
-    """(E,) the price of a mm of each edge as a seam, 1 or a little more."""
-    if pattern.grid is None:
+    """(E,) the price of a mm of each edge as a seam, 1 or a little more where the lattice is known:
+    a seam keeps to one line of it.
+    """
+    if pattern.cells is None:
         return np.ones(len(pattern.edges_vertices))
-    columns = pattern.grid[0]
-    low, high = np.sort(pattern.edges_vertices, axis=1).T
-    line = np.where(high - low == 1, low // columns, low % columns)
+    column, row = pattern.cells[pattern.edges_faces].transpose(2, 0, 1)
+    line = np.where(column[:, 0] != column[:, 1], column.max(axis=1), row.max(axis=1))
     return np.asarray(1.0 + _PRICE * ((line * 0.6180339887498949) % 1.0))

@@ -1,10 +1,10 @@
 """Outlines of patches with their tabs, and their cut lines, in the plane of the pattern.
 
-The outline of a patch is its boundary, with each of its tabs inserted at its seam edge. Tabs lie in
-facets of other patches, so the outline is a simple closed curve. There are two exceptions: the flat
-pattern overlaps itself, or a tab stands on the border of the pattern and meets the patch. Tabs that
-collide there are left out and listed. If a patch exceeds the bed because of tabs on the other side
-of a seam or of higher tabs, it gets standard tabs only.
+The outline of a patch is its boundary, with each of its tabs inserted at its seam edge. A hole has
+a ring as well. Tabs lie in facets of other patches, so the rings are simple closed curves and do
+not meet. There are two exceptions: the flat pattern overlaps itself, or a tab stands on the border
+of a piece and meets the patch. Tabs that collide there are left out and listed. If a patch exceeds
+the bed because of tabs on the other side of a seam or of higher tabs, it gets standard tabs only.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from shapely.geometry.base import BaseGeometry
 
 from miurafab.fabrication.kerf import allowance, cut_lines
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.partition.boundary import Boundary, boundaries
 from miurafab.fabrication.partition.fit_box import Space
-from miurafab.fabrication.partition.split import Boundary, boundaries, split
+from miurafab.fabrication.partition.split import split
 from miurafab.fabrication.tabs import TabRegions, choose_tabs
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.shapes import common_area
@@ -30,14 +31,15 @@ from miurafab.profiles import Material
 class OutlinedPatch:
     """One patch in the plane of the pattern, in mm.
 
-    ``faces`` (n,) int64 are its facets, ``tabs`` (t,) int64 its tabs in order along the outline,
-    ``outline`` (m, 2) is the finished outline, counter-clockwise, and ``cut_lines`` are the paths
-    of the beam: the outer ring first, then rings around enclosed waste.
+    ``faces`` (n,) int64 are its facets, ``tabs`` (t,) int64 its tabs in order along the rings,
+    ``rings`` are the finished outline (m, 2), counter-clockwise, and those around its holes,
+    clockwise. ``cut_lines`` are the paths of the beam: the outer one first, then those around holes
+    and enclosed waste.
     """
 
     faces: Ints
     tabs: Ints
-    outline: Floats
+    rings: list[Floats]
     cut_lines: list[Floats]
 
 
@@ -81,8 +83,8 @@ def outline_patches(
         tabs, unusual, untabbed = choose_tabs(pattern, face_patch, material, options, tight)
         outlines, standing = _outlines(pattern, face_patch, around, tabs)
         outgrown = [
-            bool(unusual[own].any()) and space.turn(outline) is None
-            for outline, own in zip(outlines, standing, strict=True)
+            bool(unusual[own].any()) and space.turn(rings[0]) is None
+            for rings, own in zip(outlines, standing, strict=True)
         ]
         if not any(outgrown):
             break
@@ -103,41 +105,46 @@ def outline_patches(
 
 def _outlines(
     pattern: CreasePattern, face_patch: Ints, around: list[Boundary], tabs: TabRegions
-) -> tuple[list[Floats], list[Ints]]:
-    """The outline of each patch, and its tabs in order along the outline."""
+) -> tuple[list[list[Floats]], list[Ints]]:
+    """The rings of each patch, and its tabs in order along them."""
     tab_of_edge = np.full(len(pattern.edges_vertices), -1)
     tab_of_edge[tabs.edge] = np.arange(len(tabs))
     owner = face_patch[tabs.own_face]
     outlines, standing = [], []
     for patch, boundary in enumerate(around):
-        found = tab_of_edge[boundary.edges]
-        foreign = found >= 0
-        foreign[foreign] = owner[found[foreign]] != patch
-        found[foreign] = -1
-        corners = pattern.vertices_coords[boundary.vertices]
-        parts = []
-        before = 0
-        for at in np.flatnonzero(found >= 0).tolist():
-            # The base is the first side of the tab; the outline goes around the tab instead.
-            parts += [corners[before : at + 1], np.roll(tabs.polygon(found[at]), -1, axis=0)]
-            before = at + 1
-        outlines.append(np.concatenate([*parts, corners[before:]]))
-        standing.append(found[found >= 0])
+        rings, own = [], []
+        for loop in boundary.loops:
+            found = tab_of_edge[loop.edges]
+            foreign = found >= 0
+            foreign[foreign] = owner[found[foreign]] != patch
+            found[foreign] = -1
+            corners = pattern.vertices_coords[loop.vertices]
+            parts = []
+            before = 0
+            for at in np.flatnonzero(found >= 0).tolist():
+                # The base is the first side of the tab; the outline goes around the tab instead.
+                parts += [corners[before : at + 1], np.roll(tabs.polygon(found[at]), -1, axis=0)]
+                before = at + 1
+            rings.append(np.concatenate([*parts, corners[before:]]))
+            own.append(found[found >= 0])
+        outlines.append(rings)
+        standing.append(np.concatenate(own))
     return outlines, standing
 
 
 def _without_collisions(
     pattern: CreasePattern,
     around: list[Boundary],
-    outlines: list[Floats],
+    outlines: list[list[Floats]],
     standing: list[Ints],
     tabs: TabRegions,
 ) -> Bools:
     """(N,) whether each tab is free of collisions."""
     kept = np.ones(len(tabs), dtype=bool)
-    valid = shapely.is_valid(np.array([shapely.Polygon(outline) for outline in outlines]))
-    for patch in np.flatnonzero(~valid).tolist():
-        taken: BaseGeometry = shapely.Polygon(pattern.vertices_coords[around[patch].vertices])
+    shapes = [shapely.Polygon(rings[0], rings[1:]) for rings in outlines]
+    for patch in np.flatnonzero(~shapely.is_valid(np.array(shapes))).tolist():
+        outer, *holes = (pattern.vertices_coords[loop.vertices] for loop in around[patch].loops)
+        taken: BaseGeometry = shapely.Polygon(outer, holes)
         for tab in standing[patch].tolist():
             shape = shapely.Polygon(tabs.polygon(tab))
             if common_area(taken, shape) < 1e-6 and _meets_in_base(taken, shape):

@@ -1,17 +1,17 @@
-"""Split of a pattern into patches: disks of facets that fit the bed with their tabs.
+"""Split of a pattern into patches that fit the bed with their tabs.
 
-A pattern that fits is one patch. Otherwise a grid of facets is cut into bands and runs
-(:mod:`~miurafab.fabrication.partition.grid_dp`), and any other mesh is split by region growing
-(:mod:`~miurafab.fabrication.partition.region_growing`). The split is then improved without regard
-to grid lines (:mod:`~miurafab.fabrication.partition.improve`), unless patches must keep the
-directions of the pattern. A flat pattern may overlap itself, but a patch may not: a patch that does
-is halved until no patch overlaps itself.
+Each piece of the pattern (:mod:`~miurafab.fabrication.partition.pieces`) is split by itself. A
+piece that fits is one patch, with its holes. Otherwise its patches are disks: a grid of facets is
+cut into bands and runs (:mod:`~miurafab.fabrication.partition.grid_dp`), and any other mesh is
+split by region growing (:mod:`~miurafab.fabrication.partition.region_growing`). The split is then
+improved without regard to grid lines (:mod:`~miurafab.fabrication.partition.improve`), unless
+patches must keep the directions of the pattern. A flat pattern may overlap itself, but a patch may
+not: a patch that does is halved until no patch overlaps itself.
 """
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -19,12 +19,21 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.partition.boundary import boundaries, is_pinched, overlapping
 from miurafab.fabrication.partition.fit_box import Space, box_of, support
 from miurafab.fabrication.partition.grid_dp import Block, GridShape, split_grid
 from miurafab.fabrication.partition.improve import improved
-from miurafab.fabrication.partition.region_growing import grow_patches, is_disk
+from miurafab.fabrication.partition.pieces import (
+    Piece,
+    StandingTabs,
+    full_grid,
+    lattice_cells,
+    pieces_of,
+    standing,
+)
+from miurafab.fabrication.partition.region_growing import grow_patches
 from miurafab.fabrication.seams import inner_seams
-from miurafab.fabrication.tabs import TabRegions, choose_tabs, ring_tabs, tab_regions
+from miurafab.fabrication.tabs import TabRegions, border_tabs, choose_tabs, tab_regions
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
@@ -32,16 +41,6 @@ from miurafab.profiles import Material
 
 _MANY = 30_000
 """In grids with more facets only every other angle is tried."""
-
-
-@dataclass(frozen=True, eq=False)
-class Boundary:
-    """The closed boundary of a patch, counter-clockwise: ``vertices`` and ``edges`` (n,) int64 of
-    the pattern; edge i follows vertex i.
-    """
-
-    vertices: Ints
-    edges: Ints
 
 
 def split(
@@ -64,23 +63,55 @@ def split(
     options = options or LayoutOptions()
     space = Space(width, height, turns)
     check_facets(pattern)
-    cells = _cells(pattern)
-    blocks = _blocks(cells, options)
-    faces = len(pattern.faces_vertices)
-    if len(blocks) == 1 and _fits_whole(pattern, space, material, options):
-        return np.zeros(faces, dtype=np.int64)
+    _check_lines(pattern, options)
+    number = np.empty(len(pattern.faces_vertices), dtype=np.int64)
+    pieces = pieces_of(pattern)
+    for place, piece in enumerate(pieces):
+        number[piece.facets] = place
+    border = standing(border_tabs(pattern, material, options))
+    if options.tab_side == "alternate":
+        whole = border
+    else:
+        # The seams between pieces bear their tabs on the same side however the pieces are split.
+        tight = np.ones(len(pieces), dtype=bool)
+        whole = standing(choose_tabs(pattern, number, material, options, tight)[0])
+    found = np.empty_like(number)
+    count = 0
+    for piece in pieces:
+        parts = _parts(piece.pattern, options)
+        if not parts.any() and _fits_whole(piece, whole.of(piece.facets), space):
+            found[piece.facets] = count
+        else:
+            tabs = border.of(piece.facets)
+            found[piece.facets] = count + _split(piece, parts, tabs, space, material, options)
+        count = int(found[piece.facets].max()) + 1
+    return found
+
+
+def _split(
+    piece: Piece,
+    part: Ints,
+    border: StandingTabs,
+    space: Space,
+    material: Material,
+    options: LayoutOptions,
+) -> Ints:
+    """(n,) the patch of each facet of a ``piece`` that is not whole, from 0.
+
+    No patch reaches from one ``part`` (n,) to another. The ``border`` bears tabs.
+    """
+    pattern = piece.pattern
     directions = space.directions
     corners = pattern.faces_vertices
     body = support(pattern.vertices_coords[corners], corners >= 0, directions)
-    ring = ring_tabs(pattern, material, options)
-    body = _with_tabs(body, ring, support(ring.points, ring.present, directions))
+    body = _with_tabs(body, border.face, support(border.points, border.present, directions))
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+    cells = full_grid(pattern)
     turned = options.tab_side == "upper"
-    if turned and cells is not None:
+    if turned:
         # Seen from the opposite corner of the grid, the upper patch is the lower patch.
-        cells = cells[::-1, ::-1]
-        rows, columns = cells.shape
-        blocks = [(rows - r1, rows - r0, columns - c1, columns - c0) for r0, r1, c0, c1 in blocks]
+        part = part.max() - part
+        cells = None if cells is None else cells[::-1, ::-1]
     both = cells is None or options.tab_side == "alternate"
     if cells is None or both:
         # It is not known yet which patch bears a tab, so every possible tab is counted.
@@ -92,20 +123,15 @@ def split(
     seams = inner_seams(pattern, edges, sides)
     tabs = tab_regions(pattern, seams, material, full_facet=options.full_facet)
     tab_values = support(tabs.points, tabs.present, directions)
-    reach = _with_tabs(body, tabs, tab_values)
-    _check_alone(pattern, ~space.holds(reach), tabs, space, options)
+    reach = _with_tabs(body, tabs.own_face, tab_values)
+    _check_alone(piece, ~space.holds(reach), tabs, space, options)
 
     depth = _tab_room(pattern, tabs)
     small = space.smaller(depth) if both else space
-    part = np.zeros(faces, dtype=np.int64)
-    if cells is not None:
-        blocks.sort()
-        for number, (r0, r1, c0, c1) in enumerate(blocks):
-            part[cells[r0:r1, c0:c1]] = number
-    found = np.empty(faces, dtype=np.int64)
+    found = np.empty(len(corners), dtype=np.int64)
     count = 0
     if cells is None or (both and not small.holds(reach).all()):
-        for number in range(len(blocks)):
+        for number in range(int(part.max()) + 1):
             facets = np.flatnonzero(part == number)
             found[facets] = grow_patches(pattern, reach, space, facets)[facets] + count
             count = int(found[facets].max()) + 1
@@ -116,21 +142,21 @@ def split(
             upward = place > own
             tabs, tab_values = tabs.take(upward), tab_values[upward]
         shape = _grid_shape(pattern, cells, body, tabs, tab_values)
-        for r0, r1, c0, c1 in blocks:
+        for r0, r1, c0, c1 in _blocks(part[cells]):
             block = cells[r0:r1, c0:c1]
             here = shape.part(r0, r1, c0, c1)
-            if faces > _MANY and turns is None:
+            if len(corners) > _MANY and space.turns is None:
                 here = here.with_every(2)
             for a0, a1, b0, b1 in split_grid(here, small):
                 found[block[a0:a1, b0:b1]] = count
                 count += 1
-    if turns is None:
+    if space.turns is None:
         found = improved(
             pattern,
             found,
             part,
-            (width, height),
-            ring,
+            (space.width, space.height),
+            border,
             depth,
             material,
             options,
@@ -140,42 +166,61 @@ def split(
     return found.max() - found if turned else found
 
 
-def _blocks(cells: Ints | None, options: LayoutOptions) -> list[Block]:
-    """The blocks of the grid between the seams that ``options`` ask for."""
-    wanted = {"row": options.seam_rows, "column": options.seam_columns}
-    if cells is None:
-        for name, lines in wanted.items():
-            if lines:
-                raise LayoutError(
-                    f"A seam along {name} {lines[0]} was asked for, but the facets of this pattern "
-                    "do not form a grid; leave the seams to the program."
-                )
-        return [(0, 0, 0, 0)]
-    for (name, lines), count in zip(wanted.items(), cells.shape, strict=True):
-        if lines and lines[-1] >= count:
+def _check_lines(pattern: CreasePattern, options: LayoutOptions) -> None:
+    """Raise a LayoutError for seams along lines of the lattice that do not exist."""
+    cells = lattice_cells(pattern)
+    for axis, (name, lines) in enumerate(_lines(options)):
+        if lines and cells is None:
+            raise LayoutError(
+                f"A seam along {name} {lines[0]} was asked for, but the facets of this pattern "
+                "do not form a grid; leave the seams to the program."
+            )
+        if lines and cells is not None and lines[-1] > cells[:, axis].max():
+            count = int(cells[:, axis].max()) + 1
             raise LayoutError(
                 f"A seam along {name} {lines[-1]} was asked for, but a seam must lie between the "
                 f"{count} {name}s of facets, at 1 to {count - 1}."
             )
-    ends = [
-        list(itertools.pairwise([0, *lines, count]))
-        for lines, count in zip(wanted.values(), cells.shape, strict=True)
-    ]
-    return [(r0, r1, c0, c1) for r0, r1 in ends[0] for c0, c1 in ends[1]]
+
+
+def _lines(options: LayoutOptions) -> tuple[tuple[str, tuple[int, ...]], ...]:
+    """The lines of the lattice on which seams are asked for, by column and by row."""
+    return ("column", options.seam_columns), ("row", options.seam_rows)
+
+
+def _parts(piece: CreasePattern, options: LayoutOptions) -> Ints:
+    """(n,) the part of each facet, from 0, between the seams that ``options`` ask for."""
+    cells = piece.cells
+    if cells is None:
+        return np.zeros(len(piece.faces_vertices), dtype=np.int64)
+    column, row = (
+        np.searchsorted(np.array(lines, dtype=np.int64), cells[:, axis], side="right")
+        for axis, (_, lines) in enumerate(_lines(options))
+    )
+    number = row * (len(options.seam_columns) + 1) + column
+    return np.asarray(np.unique(number, return_inverse=True)[1], dtype=np.int64)
+
+
+def _blocks(part: Ints) -> list[Block]:
+    """The blocks of a grid in which ``part`` (R, C) is the same, by part."""
+    rows = [0, *(np.flatnonzero(np.diff(part[:, 0])) + 1).tolist(), part.shape[0]]
+    columns = [0, *(np.flatnonzero(np.diff(part[0])) + 1).tolist(), part.shape[1]]
+    blocks = [(*r, *c) for r in itertools.pairwise(rows) for c in itertools.pairwise(columns)]
+    return sorted(blocks, key=lambda block: int(part[block[0], block[2]]))
 
 
 def _with_tabs(
-    body: NDArray[np.float32], tabs: TabRegions, tab_values: NDArray[np.float32]
+    body: NDArray[np.float32], own_face: Ints, tab_values: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """(F, D) the support values of facets with their tabs."""
+    """(F, D) the support values of facets with their tabs, which stand on ``own_face`` (N,)."""
     reach = body.copy()
-    order = np.argsort(tabs.own_face, kind="stable")
-    own = tabs.own_face[order]
+    order = np.argsort(own_face, kind="stable")
+    own = own_face[order]
     place = np.arange(len(own)) - np.searchsorted(own, own)
     for turn in range(int(place.max(initial=-1)) + 1):
         # One tab of each facet at a time.
         tab = order[place == turn]
-        face = tabs.own_face[tab]
+        face = own_face[tab]
         reach[face] = np.maximum(reach[face], tab_values[tab])
     return reach
 
@@ -188,32 +233,6 @@ def _tab_room(pattern: CreasePattern, tabs: TabRegions) -> float:
     off = tabs.points - base[:, :1]
     depth = np.abs(off[..., 0] * -way[:, None, 1] + off[..., 1] * way[:, None, 0])
     return float(depth.max(initial=0.0, where=tabs.present))
-
-
-def boundaries(pattern: CreasePattern, face_patch: Ints) -> list[Boundary]:
-    """The boundary of each patch of ``face_patch`` (F,), by patch id, from its lowest edge on."""
-    face, corner = np.nonzero(pattern.faces_vertices >= 0)
-    edge = pattern.faces_edges[face, corner]
-    tail = pattern.faces_vertices[face, corner]
-    sides = pattern.edges_faces[edge]
-    other = np.where(sides[:, 0] == face, sides[:, 1], sides[:, 0])
-    patch = face_patch[face]
-    border = np.flatnonzero((other < 0) | (face_patch[other] != patch))
-    border = border[np.lexsort((edge[border], patch[border]))]
-    patch, edge, tail = patch[border], edge[border], tail[border]
-    head = pattern.edges_vertices[edge].sum(axis=1) - tail
-    vertices = len(pattern.vertices_coords)
-    keys = patch * vertices + tail
-    order = np.argsort(keys)
-    following = order[np.searchsorted(keys, patch * vertices + head, sorter=order)].tolist()
-    found = []
-    starts = np.searchsorted(patch, np.arange(int(face_patch.max(initial=-1)) + 1))
-    for start in starts.tolist():
-        steps = [start]
-        while following[steps[-1]] != start:
-            steps.append(following[steps[-1]])
-        found.append(Boundary(tail[steps], edge[steps]))
-    return found
 
 
 def check_facets(pattern: CreasePattern) -> None:
@@ -240,35 +259,14 @@ def check_facets(pattern: CreasePattern) -> None:
             )
 
 
-def _fits_whole(
-    pattern: CreasePattern, space: Space, material: Material, options: LayoutOptions
-) -> bool:
-    faces = np.arange(len(pattern.faces_vertices))
-    used = np.unique(pattern.faces_vertices[pattern.faces_vertices >= 0])
-    tabs, _, _ = choose_tabs(pattern, np.zeros_like(faces), material, options)
-    points = np.concatenate([pattern.vertices_coords[used], tabs.points[tabs.present]])
-    if space.turn(points) is None:
+def _fits_whole(piece: Piece, tabs: StandingTabs, space: Space) -> bool:
+    """Whether a piece with ``tabs`` on its border fits and can be one patch."""
+    pattern = piece.pattern
+    points = np.concatenate([pattern.vertices_coords, tabs.points[tabs.present]])
+    if space.turn(points) is None or is_pinched(pattern):
         return False
-    return is_disk(pattern, faces) and not len(_overlapping(pattern, np.zeros_like(faces)))
-
-
-def _cells(pattern: CreasePattern) -> Ints | None:
-    """(R, C) the facet in each cell of the grid, or None if the facets are not those of a grid."""
-    if pattern.grid is None:
-        return None
-    columns, rows = pattern.grid
-    faces = pattern.faces_vertices
-    if len(faces) != (columns - 1) * (rows - 1) or faces.shape[1] != 4:
-        return None
-    low = faces.min(axis=1)
-    cell = np.column_stack([low, low + 1, low + columns, low + columns + 1])
-    row, column = np.divmod(low, columns)
-    regular = (np.sort(faces, axis=1) == cell).all(axis=1) & (column < columns - 1)
-    if not regular.all() or (row >= rows - 1).any() or len(np.unique(low)) != len(faces):
-        return None
-    cells = np.empty((rows - 1, columns - 1), dtype=np.int64)
-    cells[row, column] = np.arange(len(faces))
-    return cells
+    around = boundaries(pattern, np.zeros(len(piece.facets), dtype=np.int64))
+    return not overlapping(pattern, around)
 
 
 def _places(cells: Ints) -> Ints:
@@ -309,9 +307,10 @@ def _grid_shape(
 
 
 def _check_alone(
-    pattern: CreasePattern, doubtful: Bools, tabs: TabRegions, space: Space, options: LayoutOptions
+    piece: Piece, doubtful: Bools, tabs: TabRegions, space: Space, options: LayoutOptions
 ) -> None:
-    """Raise a LayoutError for the first ``doubtful`` (F,) facet that fits at no angle."""
+    """Raise a LayoutError for the first ``doubtful`` (n,) facet that fits at no angle."""
+    pattern = piece.pattern
     for face in np.flatnonzero(doubtful).tolist():
         corners = pattern.faces_vertices[face]
         facet = pattern.vertices_coords[corners[corners >= 0]]
@@ -331,20 +330,10 @@ def _check_alone(
         if space.turns is not None:
             along, choice = " along the pattern's axes", ", write grain = 'none'"
         raise LayoutError(
-            f"Facet {face} measures {long:.1f} mm x {short:.1f} mm{along}{with_tabs} and does not "
-            f"fit {room}; make the pattern smaller, use more facets{choice}, or {remedy}."
+            f"Facet {piece.facets[face]} measures {long:.1f} mm x {short:.1f} mm{along}{with_tabs} "
+            f"and does not fit {room}; make the pattern smaller, use more facets{choice}, or "
+            f"{remedy}."
         )
-
-
-def _overlapping(pattern: CreasePattern, face_patch: Ints) -> list[int]:
-    """The patches whose boundary crosses or touches itself in the plane.
-
-    Facets are counter-clockwise, so a patch is an immersed disk. It overlaps itself only if its
-    boundary is not a simple closed curve.
-    """
-    rings = [pattern.vertices_coords[b.vertices] for b in boundaries(pattern, face_patch)]
-    valid = shapely.is_valid(np.array([shapely.Polygon(ring) for ring in rings]))
-    return np.flatnonzero(~valid).tolist()
 
 
 def _without_overlaps(
@@ -352,7 +341,7 @@ def _without_overlaps(
 ) -> Ints:
     """The split with every patch that overlaps itself halved until none does, ids from 0."""
     while True:
-        bad = _overlapping(pattern, face_patch)
+        bad = overlapping(pattern, boundaries(pattern, face_patch))
         if not bad:
             return face_patch
         # Ids are spread to make room for the parts, so that the order of patches stays.

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.partition.boundary import boundaries
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.partition.region_growing import is_disk
-from miurafab.fabrication.partition.split import boundaries, split
+from miurafab.fabrication.partition.split import split
 from miurafab.fabrication.tabs import choose_tabs
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -111,11 +112,16 @@ def test_a_pattern_that_fits_is_one_patch_whatever_its_angle():
     assert split(turned, wide - 1.0, high, card()).max() > 0
 
 
-def test_a_ring_that_fits_is_opened_all_the_same():
+def test_a_ring_that_fits_stays_whole_and_its_hole_is_cut_out():
     pattern = triangles(4, 12, 100.0, hole=True)
-    face_patch = split(pattern, 500.0, 500.0, card())
-    assert face_patch.max() >= 1
-    assert_patches_are_sound(pattern, face_patch, 500.0, 500.0)
+    (patch,) = outline_patches(pattern, 500.0, 500.0, card(kerf=0.4)).patches
+    outer, hole = (shapely.Polygon(line) for line in patch.cut_lines)
+    # A valid shape that surrounds exactly the facets, less half a kerf all round.
+    rest = outer.difference(hole).buffer(-0.2, join_style="mitre")
+    facets = shapely.union_all(facet_polygons(pattern))
+    assert len(facets.interiors) == 1
+    assert outer.contains(hole)
+    assert shapely.hausdorff_distance(rest, facets) < 0.01
 
 
 def test_two_separate_pieces_of_paper_are_two_patches():

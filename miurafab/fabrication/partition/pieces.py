@@ -1,0 +1,134 @@
+"""The pieces of a pattern, each as a pattern of its own for the split.
+
+A piece is what hangs together in the flat pattern. Where pieces lie in the flat pattern means
+nothing: they lie apart with air between them, and each is split by itself. Tabs on the seams
+between pieces stand on the border of a piece, so they come along with it.
+
+Facets may have places in the lattice of the tessellation. They tell the lines along which a piece
+is best cut; facets of a piece without gaps form a grid of rows and columns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from miurafab.fabrication.tabs import TabRegions
+from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.origami.crease_pattern import CreasePattern
+
+
+@dataclass(frozen=True, eq=False)
+class StandingTabs:
+    """N tabs on the border of a piece: ``face`` (N,) the facet that bears each, ``points``
+    (N, m, 2) its corners in mm, of which those ``present`` (N, m) are real.
+    """
+
+    face: Ints
+    points: Floats
+    present: Bools
+
+    def of(self, facets: Ints) -> StandingTabs:
+        """The tabs on ``facets`` (n,), which are numbered in this order."""
+        place = np.full(max(int(facets.max()), int(self.face.max(initial=0))) + 1, -1)
+        place[facets] = np.arange(len(facets))
+        own = place[self.face]
+        which = own >= 0
+        return StandingTabs(own[which], self.points[which], self.present[which])
+
+
+def standing(tabs: TabRegions) -> StandingTabs:
+    """All of ``tabs``."""
+    return StandingTabs(tabs.own_face, tabs.points, tabs.present)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One piece: its ``facets`` (n,) in the whole pattern, and the ``pattern`` of these facets
+    alone, in their order. Its ``cells`` are those of the whole pattern.
+    """
+
+    facets: Ints
+    pattern: CreasePattern
+
+
+def pieces_of(pattern: CreasePattern) -> list[Piece]:
+    """The pieces in the order of their numbers, then of their lowest facets."""
+    label = components(pattern)
+    cells = lattice_cells(pattern)
+    if label.max() == 0:
+        return [Piece(np.arange(len(label)), replace(pattern, cells=cells))]
+    numbers = label if pattern.pieces is None else pattern.pieces
+    first = np.unique(label, return_index=True)[1]
+    order = np.lexsort((first, numbers[first]))
+    whole = replace(pattern, cells=cells)
+    return [_piece(whole, np.flatnonzero(label == part)) for part in order.tolist()]
+
+
+def components(pattern: CreasePattern) -> Ints:
+    """(F,) what hangs together in the flat pattern, numbered by its lowest facet."""
+    count = len(pattern.faces_vertices)
+    pairs = pattern.edges_faces[(pattern.edges_faces >= 0).all(axis=1)]
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _piece(pattern: CreasePattern, facets: Ints) -> Piece:
+    faces = pattern.faces_vertices[facets]
+    faces = faces[:, : int((faces >= 0).sum(axis=1).max())]
+    vertices = np.unique(faces[faces >= 0])
+    place = np.full(len(pattern.vertices_coords) + 1, -1)
+    place[vertices] = np.arange(len(vertices))
+    edges = np.unique(pattern.faces_edges[facets])
+    edges = edges[edges >= 0]
+    part = CreasePattern(
+        vertices_coords=pattern.vertices_coords[vertices],
+        edges_vertices=place[pattern.edges_vertices[edges]],
+        edges_assignment=pattern.edges_assignment[edges],
+        edges_fold_angle=pattern.edges_fold_angle[edges],
+        faces_vertices=place[faces],
+        cells=None if pattern.cells is None else pattern.cells[facets],
+    )
+    return Piece(facets, part)
+
+
+def lattice_cells(pattern: CreasePattern) -> Ints | None:
+    """(F, 2) the column and row of each facet, from 0; None if the facets have no such places."""
+    if pattern.cells is not None:
+        return np.asarray(pattern.cells - pattern.cells.min(axis=0))
+    if pattern.grid is None:
+        return None
+    columns, rows = pattern.grid
+    faces = pattern.faces_vertices
+    if len(faces) != (columns - 1) * (rows - 1) or faces.shape[1] != 4:
+        return None
+    low = faces.min(axis=1)
+    cell = np.column_stack([low, low + 1, low + columns, low + columns + 1])
+    row, column = np.divmod(low, columns)
+    regular = (np.sort(faces, axis=1) == cell).all(axis=1) & (column < columns - 1)
+    if not regular.all() or (row >= rows - 1).any() or len(np.unique(low)) != len(faces):
+        return None
+    return np.column_stack([column, row])
+
+
+def full_grid(pattern: CreasePattern) -> Ints | None:
+    """(R, C) the facet in each cell of a piece whose cells fill a rectangle, each joined to the
+    next in its row and column; None for other pieces.
+    """
+    if pattern.cells is None:
+        return None
+    place = pattern.cells - pattern.cells.min(axis=0)
+    columns, rows = (place.max(axis=0) + 1).tolist()
+    number = place[:, 1] * columns + place[:, 0]
+    if len(number) != columns * rows or len(np.unique(number)) != len(number):
+        return None
+    pairs = pattern.edges_faces[(pattern.edges_faces >= 0).all(axis=1)]
+    step = np.abs(np.diff(place[pairs], axis=1)[:, 0]).sum(axis=1)
+    if (step != 1).any() or len(pairs) != rows * (columns - 1) + (rows - 1) * columns:
+        return None
+    cells = np.empty(columns * rows, dtype=np.int64)
+    cells[number] = np.arange(len(number))
+    return cells.reshape(rows, columns)
