@@ -54,6 +54,10 @@ Block = tuple[Floats, Ints, Floats]
 Follow = Literal["middle", "top", "bottom"]
 """What lies on the target: the means of the facets, or the vertices of the odd or even rows."""
 
+INACTIVE = 1e-30
+"""The weight of an inactive hinge: nothing, but not zero, so that the products of the Jacobian keep
+their pattern of entries and the order of elimination is found once."""
+
 LEAST_AREA = 0.15
 """A of a facet in the convexity term is at least this part of the median."""
 
@@ -200,7 +204,7 @@ class FairObjective:
         rows = np.stack([-(to_a + to_b), to_a, to_b], axis=1)
         w = self.weights
         low, high = w.least_sector - alpha, alpha - w.greatest_sector
-        sign = np.where(high > 0, w.sectors, np.where(low > 0, -w.sectors, 0.0))
+        sign = np.where(high > 0, w.sectors, np.where(low > 0, -w.sectors, INACTIVE))
         return sign * np.where(high > 0, high, -low), corners, sign[:, None, None] * rows
 
     def _folds(self, points: Floats) -> Block:
@@ -223,7 +227,7 @@ class FairObjective:
             parts.append(np.stack([-by_a, -by_b, by_a, by_b], axis=1))
         weights = self.weights
         flat, tight = c - np.cos(weights.least_fold), np.cos(weights.greatest_fold) - c
-        sign = np.where(flat > 0, weights.folds, np.where(tight > 0, -weights.folds, 0.0))
+        sign = np.where(flat > 0, weights.folds, np.where(tight > 0, -weights.folds, INACTIVE))
         value = sign * np.where(flat > 0, flat, -tight)
         vertices = np.concatenate([faces[f], faces[g]], axis=1)
         return value, vertices, sign[:, None, None] * np.concatenate(parts, axis=1)
@@ -290,7 +294,7 @@ class FairObjective:
 
 def _hinge(weight: float, over: Floats, vertices: Ints, gradient: Floats) -> Block:
     """max(0, ``over``) times ``weight``; ``gradient`` is that of ``over``."""
-    active = np.where(over > 0, weight, 0.0)
+    active = np.where(over > 0, weight, INACTIVE)
     return active * over, vertices, active[:, None, None] * gradient
 
 
