@@ -142,7 +142,6 @@ def measure(pattern: CreasePattern, surface: TargetSurface | None = None) -> Mea
         return Measurements(facets, vertices, float(flat_edges.min()), covered)
     ring = invariants.corner_ring(pattern, folded)
     inner = invariants.interior_vertices(pattern)
-    distances = {} if surface is None else _distances(pattern, surface)
     shortest = min(flat_edges.min(), edge_lengths(folded, pattern.edges_vertices).min())
     measured = Measurements(
         facets,
@@ -157,27 +156,32 @@ def measure(pattern: CreasePattern, surface: TargetSurface | None = None) -> Mea
         max_isometry=float(invariants.isometry(pattern).max()),
         self_intersections=len(self_intersections(pattern)),
     )
-    return replace(measured, **distances)
+    return measured if surface is None else with_distances(measured, pattern, surface)
 
 
 def _largest(values: Floats) -> float:
     return float(np.abs(values).max())
 
 
-def _distances(pattern: CreasePattern, surface: TargetSurface) -> dict[str, Any]:
-    """Distances sheet to target both ways, in mm, and the area ratio."""
+def with_distances(
+    measured: Measurements, pattern: CreasePattern, surface: TargetSurface
+) -> Measurements:
+    """``measured`` with the distances both ways between ``pattern`` and ``surface``, in mm, and the
+    area ratio.
+    """
     assert pattern.folded_coords is not None
     found = nearness(pattern, surface)
     a, b, c = pattern.folded_coords[triangulate(pattern.faces_vertices)[0]].transpose(1, 0, 2)
     paper = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
-    return {
-        "sheet_to_target_mm": found.sheet_to_target,
-        "target_to_sheet_mm": found.target_to_sheet,
-        "hausdorff_mm": found.hausdorff,
-        "hausdorff_relative": found.hausdorff / found.diagonal,
-        "hausdorff_midsurface_mm": found.means_to_target,
-        "area_ratio": paper / (surface_area(surface) * pattern.scale**2),
-    }
+    return replace(
+        measured,
+        sheet_to_target_mm=found.sheet_to_target,
+        target_to_sheet_mm=found.target_to_sheet,
+        hausdorff_mm=found.hausdorff,
+        hausdorff_relative=found.hausdorff / found.diagonal,
+        hausdorff_midsurface_mm=found.means_to_target,
+        area_ratio=paper / (surface_area(surface) * pattern.scale**2),
+    )
 
 
 def surface_area(surface: TargetSurface, samples: int = 200) -> float:

@@ -22,7 +22,7 @@ from miurafab.origami.fitting.result import Attempt
 from miurafab.origami.fitting.score import GOOD, Score, score
 from miurafab.origami.fitting.starts import Start
 from miurafab.origami.unfold import unfold_charts
-from miurafab.origami.verify import DEGENERATE, EXACT, Measurements, measure
+from miurafab.origami.verify import DEGENERATE, EXACT, Measurements, measure, with_distances
 from miurafab.surfaces.surface import Swapped, TargetSurface
 
 LIMIT_FAULTS = ("min-edge", "max-deviation", "max-distance", "facet-shape", "flat-foldable")
@@ -31,9 +31,10 @@ LIMIT_FAULTS = ("min-edge", "max-deviation", "max-distance", "facet-shape", "fla
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An exact sheet. ``active_bounds`` counts the limits that hold it back."""
+    """An exact sheet on ``surface``. ``active_bounds`` counts the limits that hold it back."""
 
     attempt: Attempt
+    surface: TargetSurface
     pattern: CreasePattern
     measurements: Measurements
     score: Score
@@ -41,6 +42,12 @@ class Candidate:
     deviation_mm: float
     polished: bool = False
     active_bounds: Mapping[str, int] = field(default_factory=dict)
+
+    def with_distances(self) -> Measurements:
+        """The measurements with the distances to the target."""
+        if self.measurements.hausdorff_mm is not None:
+            return self.measurements
+        return with_distances(self.measurements, self.pattern, self.surface)
 
     @property
     def rank(self) -> tuple[int, int, float]:
@@ -63,7 +70,9 @@ def candidate(
     scale = 1.0 if request.size_mm is None else request.size_mm / extent
     target = request.target | start.layout
     pattern = unfold_charts(charts, points * scale, scale=scale, target=target)
-    measured = measure(pattern, unturned(start.surface))
+    # the distances take long; while the search goes on only a limit on them needs them
+    limited = request.max_distance_mm is not None
+    measured = measure(pattern, unturned(start.surface) if limited else None)
     deviation = deviation_of(start, request.follow, charts, points)
     points_of_rim = start.unknowns.vertices(x)
     marks = score(start.unknowns.charts, points_of_rim, start.rim, deviation)
@@ -81,7 +90,10 @@ def candidate(
         start.steepest,
         marks.total,
     )
-    return Candidate(attempt, pattern, measured, marks, faults, deviation * scale, polished)
+    surface = unturned(start.surface)
+    return Candidate(
+        attempt, surface, pattern, measured, marks, faults, deviation * scale, polished
+    )
 
 
 def unturned(surface: TargetSurface) -> TargetSurface:

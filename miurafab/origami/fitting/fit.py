@@ -96,11 +96,8 @@ class _FitSearch:
         """Everything that is tried, in order."""
         request = self.request
         if isinstance(request.surface, GeneralizedCylinder):
-            for start in direct(request):
-                yield plain(request, start)
-                if self._settled():
-                    return
-            if request.is_tube:
+            yield from self._direct()
+            if request.is_tube or (self.best is not None and not self.best.faults):
                 return
         for pieces in self._pieces():
             starts = starts_for(request, pieces)
@@ -112,6 +109,19 @@ class _FitSearch:
             fewest = self._pieces()[0]
             others = [s for s in starts_for(request, fewest) if s.steepest >= STEEP or s.place]
             yield from self._tried(others)
+
+    def _direct(self) -> Iterator[Candidate | Attempt]:
+        """The closed forms on a cylinder; the best of them is polished if it is not good."""
+        best: tuple[tuple[int, int, float], Start] | None = None
+        for start in direct(self.request):
+            made = plain(self.request, start)
+            yield made
+            if isinstance(made, Candidate):
+                if made.good:
+                    return
+                best = min(best or (made.rank, start), (made.rank, start), key=lambda pair: pair[0])
+        if best is not None and not self.request.is_tube and self.request.polish == "on":
+            yield from polished(self.request, best[1], self._check_time)
 
     def _pieces(self) -> tuple[int, ...]:
         request = self.request
@@ -190,7 +200,7 @@ class _FitSearch:
             status,
             " ".join(finding.sentence for finding in findings),
             best.pattern,
-            best.measurements,
+            best.with_distances(),
             made,
             iterations,
             seconds,
