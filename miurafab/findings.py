@@ -37,7 +37,10 @@ def _check(meaning: str) -> Rule:
 RULES = {
     # A target
     "mesh-unit": Rule("warning", "a mesh whose size suggests a unit that is not the millimetre"),
-    "filled-holes": Rule("note", "small holes of a mesh that were filled"),
+    "filled-holes": Rule("note", "holes of a mesh that were filled"),
+    "welded": Rule("note", "borders of a mesh that were joined over small gaps"),
+    "pieces-left-out": Rule("warning", "separate pieces of a mesh that are left out"),
+    "plate": Rule("note", "a thin plate whose skin or middle is the target"),
     "sampling": Rule("warning", "a function that turns faster than its samples show"),
     "smoothed": Rule("note", "a height map or a body that was smoothed"),
     "polar-holes": Rule("note", "holes that the sheet leaves at the poles of a closed body"),

@@ -24,6 +24,7 @@ from miurafab.errors import OptionError, PatternError
 from miurafab.files import AnyPath
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.options import Choice, read_value
+from miurafab.surfaces.frame import origin_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,7 +61,7 @@ class CreasePattern(Shown):
     cells : (F, 2) int64, optional
         The column and row of each facet in the lattice of the tessellation.
     scale : float
-        The folded form lies on ``scale`` times the target.
+        The folded form lies on ``scale`` times the target, relative to :attr:`origin`.
     target : dict
         The surface and its parameters (:mod:`miurafab.surfaces.description`).
 
@@ -108,6 +109,14 @@ class CreasePattern(Shown):
             _check_pieces(self.pieces, self.faces_vertices, vertices)
         if self.seams is not None:
             _check_seams(self.seams, self.edges_assignment)
+
+    @property
+    def origin(self) -> Floats:
+        """(3,) where the origin of ``folded_coords`` lies in the frame of ``scale`` times the
+        target, mm: zeros but for a target that lies far from its own origin
+        (:mod:`miurafab.surfaces.frame`).
+        """
+        return np.asarray(self.scale * origin_in(self.target))
 
     @property
     def pieces_count(self) -> int:

@@ -40,7 +40,7 @@ from miurafab.studio.messages import HttpRequest, Response, answer, made_file, o
 from miurafab.studio.orders import read_fit, read_layout, read_source
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
-from miurafab.surfaces.mesh import MESH_SUFFIXES
+from miurafab.surfaces.mesh_files import MESH_SUFFIXES
 from miurafab.workflow.design import can_close
 
 PAGE = "studio.html"

@@ -30,7 +30,7 @@ from miurafab.studio.messages import HttpRequest, Response, refusal
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.worker import Process
 from miurafab.surfaces.catalogue import make_surface, parse_target
-from miurafab.surfaces.mesh import MESH_SUFFIXES
+from miurafab.surfaces.mesh_files import MESH_SUFFIXES
 from miurafab.workflow.design import design
 
 _IDLE_S = 60.0

@@ -22,7 +22,7 @@ from miurafab.studio.orders import FitOrder, LayoutOrder
 from miurafab.studio.report_text import headline, layout_lines, pattern_lines
 from miurafab.studio.work import Order
 from miurafab.studio.worker import News, Running
-from miurafab.surfaces.mesh import MESH_SUFFIXES
+from miurafab.surfaces.mesh_files import MESH_SUFFIXES
 
 PATTERN_SUFFIX, DESIGN_SUFFIX = ".fold", ".toml"
 _KEPT = 8

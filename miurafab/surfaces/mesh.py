@@ -1,6 +1,6 @@
 """Mesh targets: a scanned or modelled surface as a smooth map from a rectangle.
 
-The mesh is repaired to one disk (:mod:`~miurafab.surfaces.mesh_repair`) and laid flat. A rectangle
+The mesh is repaired to one disk (:mod:`~miurafab.surfaces.preparation`) and laid flat. A rectangle
 in the layout is the parameter domain, and a smooth spline through the vertices over the rectangle
 gives points and normals. A rough mesh (a scan) is smoothed by the spline and laid flat again.
 Distances are measured to the triangles, not to the spline.
@@ -9,33 +9,21 @@ Distances are measured to the triangles, not to the spline.
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 from scipy.interpolate import NdBSpline
 
 from miurafab.errors import TargetError
-from miurafab.files import read_bytes
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
-from miurafab.surfaces.mesh_repair import (
-    clean,
-    doubled_areas,
-    edges_of,
-    even_triangles,
-    fill_holes,
-    oriented_sheet,
-    side_lengths,
-    size_findings,
-)
+from miurafab.surfaces.mesh_files import read_mesh
+from miurafab.surfaces.mesh_repair import doubled_areas, even_triangles, fill_holes, side_lengths
 from miurafab.surfaces.parameterise import flatten
 from miurafab.surfaces.placement import (
     GridPlacement,
@@ -45,15 +33,9 @@ from miurafab.surfaces.placement import (
     placements,
     turned,
 )
+from miurafab.surfaces.preparation import MeshReading, prepare, refuse_other_than_a_disk
 from miurafab.surfaces.smoothing import Smoothed, continued, smooth
 from miurafab.surfaces.surface import Domain, tangents, unit
-
-MESH_SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb")
-
-FROM_POINTS = (
-    "make a triangle mesh of it (MeshLab, CloudCompare and Open3D do) or a height map on a regular "
-    "grid, and fit that."
-)
 
 ROUGH = 0.03
 """A mesh is rough if it is this part of its median edge away from the smooth spline."""
@@ -77,6 +59,7 @@ class MeshChart:
 
     The first ``real`` of ``faces`` (F, 3) and the first ``known`` of ``vertices`` (V, 3) belong to
     the mesh, the others fill holes. ``flat`` (V, 2) is the layout; ``rough`` marks a noisy scan.
+    ``reading`` is what a description keeps of how the mesh was read, such as its ``origin``.
     """
 
     vertices: Floats
@@ -86,6 +69,7 @@ class MeshChart:
     flat: Floats
     rough: bool
     name: str
+    reading: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def triangles(self) -> Floats:
@@ -184,6 +168,7 @@ class MeshSurface:
             "rotate": round(math.degrees(self.placement.angle), 12),
             "rectangle": [d.u0, d.u1, d.v0, d.v1],
             "stiffness": self.stiffness,
+            **self.layout.reading,
         }
 
     def alternatives(self) -> Iterator[tuple[str, MeshSurface]]:
@@ -222,49 +207,24 @@ def load_mesh(
     *,
     region: Region | None = None,
     rotate: float | None = None,
-    place: dict[str, Any] | None = None,
+    reading: MeshReading | None = None,
+    place: Mapping[str, Any] | None = None,
 ) -> tuple[MeshSurface, str]:
     """The mesh file as a target, and the SHA-256 of the file.
 
     ``rotate`` turns the grid against the longer axis of the layout (radians), ``region`` is laid in
-    the turned layout; without both the rectangle is chosen. ``place`` is a
-    :attr:`MeshSurface.description` to be laid out again.
+    the turned layout; without both the rectangle is chosen. ``reading`` says how the mesh is read.
+    ``place`` is a :attr:`MeshSurface.description` to be laid out again.
 
     Raises :class:`~miurafab.errors.TargetError` with one sentence for a file that is missing,
-    unreadable, empty, holds numbers that are not finite, several pieces, a closed or non-manifold
-    surface, large holes, or no such region.
+    unreadable, empty, holds numbers that are not finite, a closed or non-manifold surface, large
+    holes, or no such region.
     """
-    if path.suffix.lower() not in MESH_SUFFIXES:
-        raise TargetError(f"{path} is not a mesh file; known are {', '.join(MESH_SUFFIXES)}.")
-    content = read_bytes(path, TargetError)
-    kind = path.suffix[1:].lower()
-    try:
-        mesh: object = trimesh.load_mesh(io.BytesIO(content), file_type=kind, process=False)
-        if not len(getattr(mesh, "faces", ())):  # load_mesh drops the points of a point cloud
-            mesh = trimesh.load(io.BytesIO(content), file_type=kind, process=False)
-    except Exception as fault:  # noqa: BLE001 - trimesh's readers raise whatever their parser does
-        reason = " ".join(str(fault).split()) or type(fault).__name__
-        raise TargetError(f"{path} cannot be read as a mesh: {reason.rstrip('.')}.") from None
-    vertices, faces = arrays_of(mesh, str(path))
-    surface = mesh_surface(vertices, faces, path.name, region=region, rotate=rotate, place=place)
-    return surface, hashlib.sha256(content).hexdigest()
-
-
-def is_mesh(value: object) -> bool:
-    """Whether ``value`` comes from trimesh: a mesh, a scene or a point cloud."""
-    return isinstance(value, trimesh.parent.Geometry)
-
-
-def arrays_of(mesh: object, name: str) -> tuple[Floats, Ints]:
-    """The vertices (V, 3) and triangles (F, 3) of a mesh of trimesh, called ``name`` in messages.
-
-    Raises :class:`~miurafab.errors.TargetError` for a point cloud and for a scene.
-    """
-    if isinstance(mesh, trimesh.PointCloud):
-        raise TargetError(f"{name} is a point cloud and not a surface; {FROM_POINTS}")
-    if not isinstance(mesh, trimesh.Trimesh):
-        raise TargetError(f"{name} holds no triangle mesh.")
-    return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+    vertices, faces, sha256 = read_mesh(path)
+    surface = mesh_surface(
+        vertices, faces, path.name, region=region, rotate=rotate, reading=reading, place=place
+    )
+    return surface, sha256
 
 
 def mesh_surface(
@@ -274,14 +234,15 @@ def mesh_surface(
     *,
     region: Region | None = None,
     rotate: float | None = None,
-    place: dict[str, Any] | None = None,
+    reading: MeshReading | None = None,
+    place: Mapping[str, Any] | None = None,
 ) -> MeshSurface:
     """A target from the arrays of a triangle mesh, ``vertices`` (V, 3) and ``faces`` (F, 3).
 
     The other arguments are those of :func:`load_mesh`. Raises
     :class:`~miurafab.errors.TargetError` if the mesh is not one disk.
     """
-    layout, findings = lay_out(vertices, faces, name)
+    layout, findings = lay_out(vertices, faces, name, reading, place)
     if place is not None:
         placement, stiffness = _placed_before(place, name)
         surface = layout.surface(placement, stiffness)
@@ -306,7 +267,7 @@ def _placement(layout: MeshChart, region: Region | None, rotate: float | None) -
     return candidates[0][1]
 
 
-def _placed_before(place: dict[str, Any], name: str) -> tuple[GridPlacement, float]:
+def _placed_before(place: Mapping[str, Any], name: str) -> tuple[GridPlacement, float]:
     try:
         u0, u1, v0, v1 = (float(value) for value in place["rectangle"])
         angle, stiffness = math.radians(place["rotate"]), float(place["stiffness"])
@@ -317,18 +278,23 @@ def _placed_before(place: dict[str, Any], name: str) -> tuple[GridPlacement, flo
     return GridPlacement(angle, Domain(u0, u1, v0, v1)), stiffness
 
 
-def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[MeshChart, tuple[Finding, ...]]:
+def lay_out(
+    vertices: Floats,
+    faces: Ints,
+    name: str,
+    reading: MeshReading | None = None,
+    place: Mapping[str, Any] | None = None,
+) -> tuple[MeshChart, tuple[Finding, ...]]:
     """The mesh laid flat, and findings on it. Raises ``TargetError`` if it is not one disk."""
-    vertices, faces = clean(vertices, faces, name)
-    findings = size_findings(vertices, name)
-    faces = oriented_sheet(vertices, faces, name)
+    if place is not None:
+        reading = MeshReading.before(place)
+    mesh = prepare(vertices, faces, name, reading, place)
+    refuse_other_than_a_disk(mesh)
+    vertices, faces = mesh.vertices, mesh.faces
     known, real = len(vertices), len(faces)
-    vertices, faces, filled = fill_holes(vertices, faces, name)
-    if filled:
-        sentence = f"{name}: {filled} small hole{'s were' if filled > 1 else ' was'} filled."
-        findings += (Finding("filled-holes", sentence, name),)
-    if len(vertices) - len(edges_of(faces)[0]) + len(faces) != 1:
-        raise TargetError(f"{name} has a handle; it cannot be laid flat. Cut it open.")
+    holes = "small" if reading is None else reading.holes
+    vertices, faces, filled = fill_holes(vertices, faces, mesh.topology, name, holes)
+    findings = mesh.findings + filled
     flat = flatten(vertices, faces)
     smoothed = _smoothed(vertices[:known], flat[:known], faces)
     edge = float(np.median(side_lengths(vertices, faces[:real])))
@@ -337,7 +303,7 @@ def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[MeshChart, tuple[
         even = np.asarray(smoothed.spline(flat), dtype=np.float64)
         if doubled_areas(even, faces).min() > 1e-6 * np.median(doubled_areas(even, faces)):
             flat = flatten(even, faces)
-    return MeshChart(vertices, faces, real, known, flat, rough, name), findings
+    return MeshChart(vertices, faces, real, known, flat, rough, name, mesh.reading), findings
 
 
 def _smoothed(points: Floats, flat: Floats, faces: Ints) -> Smoothed:

@@ -8,6 +8,7 @@ is wrong and what to do.
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 import trimesh
@@ -15,10 +16,16 @@ import trimesh
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.surfaces.parameterise import border_loops
+from miurafab.surfaces.topology import Topology, one_sheet, pieces_of, used_alone
+from miurafab.surfaces.welding import weld
 
 SMALL_HOLE = 0.15
 """A hole is filled if its border is at most this part of the outer border."""
+
+LEAST_PIECE = 1 / 3
+"""A largest piece with less than this part of the area is no answer to what the user gave."""
+
+Holes = Literal["small", "all"]
 
 
 def clean(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
@@ -43,7 +50,11 @@ def clean(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
     low = vertices[faces].reshape(-1, 3).min(axis=0)
     keys = np.round(np.clip((vertices - low) / (1e-9 * size), -1e12, 1e12)).astype(np.int64)
     _, first, merged = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    vertices, faces = vertices[first], merged.reshape(-1)[faces]
+    # in the order of the file, which neither a turn nor a shift of the mesh changes
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    vertices, faces = vertices[first[order]], rank[merged.reshape(-1)][faces]
     distinct = (np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)
     faces = faces[distinct & (doubled_areas(vertices, faces) > 1e-14 * size**2)]
     if not len(faces):
@@ -67,88 +78,103 @@ def size_findings(vertices: Floats, name: str) -> tuple[Finding, ...]:
     )
 
 
-def oriented_sheet(vertices: Floats, faces: Ints, name: str) -> Ints:
-    """The triangles with one orientation; refuses a mesh that is not one sheet with a border."""
-    edges, uses = edges_of(faces)
-    if (uses > 2).any():
-        raise TargetError(
-            f"{name} is not a surface: {int((uses > 2).sum())} edges have more than two triangles; "
-            "remove the inner walls or duplicate triangles."
+def mended(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints, tuple[Finding, ...]]:
+    """One oriented piece of the mesh, welded and without doubled triangles, and what was done.
+
+    Of several pieces the one of most area is kept. Raises
+    :class:`~miurafab.errors.TargetError` where that is not a surface with two sides.
+    """
+    vertices, faces, welded, widest = weld(vertices, _each_once(faces))
+    findings: tuple[Finding, ...] = ()
+    if welded:
+        findings += (
+            Finding(
+                "welded",
+                f"{name}: borders were welded at {welded} vertices, over gaps of up to "
+                f"{widest:.1e} mm.",
+                name,
+            ),
         )
-    pieces = trimesh.graph.connected_components(edges, nodes=np.arange(len(vertices)))
-    if len(pieces) > 1:
-        sizes = sorted((len(piece) for piece in pieces), reverse=True)
-        raise TargetError(
-            f"{name} holds {len(pieces)} separate pieces (the largest of {sizes[0]} and "
-            f"{sizes[1]} vertices); keep one and try again."
-        )
-    border = edges[uses == 1]
-    if not len(border):
-        raise TargetError(f"{name} is closed; cut it open so that it is a sheet with one border.")
-    touching = np.flatnonzero(np.bincount(border.ravel()) > 2)
-    if len(touching):
-        x, y, z = vertices[touching[0]]
-        raise TargetError(
-            f"{name}: its border touches itself at ({x:.4g}, {y:.4g}, {z:.4g}); widen it there or "
-            "cut it apart."
-        )
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    if not mesh.is_winding_consistent:
-        trimesh.repair.fix_winding(mesh)
-        if not mesh.is_winding_consistent:
-            raise TargetError(
-                f"{name} has one side only, like a Moebius strip; cut it open across."
-            )
-    fan = np.asarray(mesh.faces, dtype=np.int64)
-    pinched = _pinched(fan, len(vertices))
-    if pinched is not None:
-        x, y, z = vertices[pinched]
-        raise TargetError(
-            f"{name} is pinched: parts that share no edge meet at ({x:.4g}, {y:.4g}, {z:.4g}); "
-            "separate them there."
-        )
-    return fan
+        faces = _each_once(faces)
+    vertices, faces, left_out = _largest_piece(vertices, faces, name)
+    vertices, faces = one_sheet(vertices, faces, name)
+    return vertices, faces, findings + left_out
 
 
-def _pinched(faces: Ints, count: int) -> int | None:
-    """A vertex around which the triangles form more than one fan, if there is any."""
-    corners = faces.ravel()
-    # corners of neighbouring triangles at a vertex are joined across the common side
-    following, previous = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, 1, axis=1).ravel()
-    out, back = corners * count + following, corners * count + previous
-    order = np.argsort(back)
-    place = np.searchsorted(back, out, sorter=order).clip(max=len(back) - 1)
-    match = order[place]
-    joined = np.flatnonzero(back[match] == out)
-    fans = trimesh.graph.connected_component_labels(
-        np.stack([joined, match[joined]], axis=1), node_count=len(corners)
+def _each_once(faces: Ints) -> Ints:
+    """The triangles, of those with the same corners the first."""
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    return faces[np.sort(first)]
+
+
+def _largest_piece(
+    vertices: Floats, faces: Ints, name: str
+) -> tuple[Floats, Ints, tuple[Finding, ...]]:
+    piece = pieces_of(faces)
+    area = np.bincount(piece, doubled_areas(vertices, faces)) / 2
+    if len(area) == 1:
+        return vertices, faces, ()
+    largest = int(np.argmax(area))
+    share = float(area[largest] / area.sum())
+    if share < LEAST_PIECE:
+        raise TargetError(
+            f"{name} holds {len(area)} separate pieces, and the largest has only "
+            f"{100 * share:.2g} % of the area; join them in your mesh program, or keep the one "
+            "that is meant."
+        )
+    kept, triangles = used_alone(vertices, faces[piece == largest])
+    rest = len(area) - 1
+    sentence = (
+        f"{name} holds {len(area)} separate pieces: the largest is the target, and "
+        f"{rest} other{'s' if rest > 1 else ''} with {100 * (1 - share):.2g} % of the area "
+        f"{'are' if rest > 1 else 'is'} left out."
     )
-    pairs = np.unique(np.stack([corners, fans], axis=1), axis=0)
-    several = np.flatnonzero(np.bincount(pairs[:, 0], minlength=count) > 1)
-    return int(several[0]) if len(several) else None
+    return kept, triangles, (Finding("pieces-left-out", sentence, name),)
 
 
-def fill_holes(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints, int]:
-    """The mesh with each small hole closed by a fan around its middle, and the number of holes."""
-    loops = border_loops(faces)
-    lengths = [
-        float(np.linalg.norm(vertices[np.roll(loop, -1)] - vertices[loop], axis=1).sum())
-        for loop in loops
-    ]
-    order = sorted(range(len(loops)), key=lambda n: -lengths[n])
-    for n in order[1:]:
-        if lengths[n] > SMALL_HOLE * lengths[order[0]]:
-            raise TargetError(
-                f"{name} has a hole {lengths[n] / math.pi:.3g} mm across, too large to be filled "
-                f"here (it has {len(loops) - 1} in all); fill it in your mesh program, or cut the "
-                "mesh to a part without."
-            )
-        loop = loops[n]
-        middle = np.full(len(loop), len(vertices))
-        vertices = np.concatenate([vertices, vertices[loop].mean(axis=0, keepdims=True)])
-        # a border runs in the direction of its triangles, so the fan runs against it
-        faces = np.concatenate([faces, np.stack([np.roll(loop, -1), loop, middle], axis=1)])
-    return vertices, faces, len(loops) - 1
+def fill_holes(
+    vertices: Floats, faces: Ints, topology: Topology, name: str, holes: Holes = "small"
+) -> tuple[Floats, Ints, tuple[Finding, ...]]:
+    """The mesh with its small holes closed, or ``all``, each by a fan around its middle.
+
+    Raises :class:`~miurafab.errors.TargetError` for a hole that is too large to be filled unasked.
+    """
+    outer, *rest = topology.lengths
+    if rest and rest[0] > SMALL_HOLE * outer and holes == "small":
+        raise TargetError(
+            f"{name} has a hole {rest[0] / math.pi:.3g} mm across, too large to be filled unasked "
+            f"(it has {len(rest)} in all); `holes` all fills it, or cut the mesh to a part without."
+        )
+    for loop in topology.loops[1:]:
+        vertices, faces = _filled(vertices, faces, loop)
+    if not rest:
+        return vertices, faces, ()
+    kind = "small hole" if rest[0] <= SMALL_HOLE * outer else "hole"
+    done = f"{len(rest)} {kind}{'s were' if len(rest) > 1 else ' was'} filled"
+    return vertices, faces, (Finding("filled-holes", f"{name}: {done}.", name),)
+
+
+def _filled(vertices: Floats, faces: Ints, loop: Ints) -> tuple[Floats, Ints]:
+    """The mesh with rings of new vertices between the border ``loop`` and its middle.
+
+    The rings lie an edge apart, so that the triangles are no needles.
+    """
+    border = vertices[loop]
+    middle = border.mean(axis=0)
+    edge = np.linalg.norm(np.roll(border, -1, axis=0) - border, axis=1).mean()
+    across = np.linalg.norm(border - middle, axis=1).mean()
+    rings = min(max(round(float(across / edge)), 1), 40)
+    at = loop
+    for k in range(1, rings):
+        new = len(vertices) + np.arange(len(loop))
+        vertices = np.concatenate([vertices, border + (middle - border) * (k / rings)])
+        # a border runs in the direction of its triangles, so the filling runs against it
+        a, b, c, d = at, np.roll(at, -1), np.roll(new, -1), new
+        faces = np.concatenate([faces, np.stack([b, a, d], 1), np.stack([b, d, c], 1)])
+        at = new
+    last = np.full(len(loop), len(vertices))
+    vertices = np.concatenate([vertices, middle[None]])
+    return vertices, np.concatenate([faces, np.stack([np.roll(at, -1), at, last], axis=1)])
 
 
 def even_triangles(vertices: Floats, faces: Ints) -> Floats:
@@ -161,13 +187,6 @@ def even_triangles(vertices: Floats, faces: Ints) -> Floats:
         return corners
     points, split = trimesh.remesh.subdivide_to_size(vertices, faces, limit, max_iter=24)
     return np.asarray(np.asarray(points, dtype=np.float64)[np.asarray(split)])
-
-
-def edges_of(faces: Ints) -> tuple[Ints, Ints]:
-    """(E, 2) the edges of a triangle mesh, and (E,) the number of triangles at each."""
-    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    edges, uses = np.unique(sides, axis=0, return_counts=True)
-    return edges, uses
 
 
 def side_lengths(points: Floats, faces: Ints) -> Floats:

@@ -49,7 +49,9 @@ def _upright(z: Complexes) -> Floats:
     """
     plane = np.stack([z.real, z.imag], axis=1)
     hull = z[ConvexHull(plane).vertices]
-    frames = np.exp(-1j * np.unique(np.round(np.angle(np.roll(hull, -1) - hull), 9)))
+    angles = np.angle(np.roll(hull, -1) - hull) % (np.pi / 2)  # a right angle gives the same box
+    angles = np.where(np.pi / 2 - angles < 1e-6, 0.0, angles)
+    frames = np.exp(-1j * np.unique(np.round(angles, 9)))
     boxes = hull[None, :] * frames[:, None]
     width, height = np.ptp(boxes.real, axis=1), np.ptp(boxes.imag, axis=1)
     least = int(np.flatnonzero(width * height <= 1.0001 * (width * height).min())[0])
@@ -106,9 +108,14 @@ def conformal(vertices: Floats, faces: Ints) -> Complexes:
 
 
 def _far_apart(vertices: Floats) -> Ints:
-    start = int(np.argmax(np.linalg.norm(vertices - vertices.mean(axis=0), axis=1)))
-    end = int(np.argmax(np.linalg.norm(vertices - vertices[start], axis=1)))
+    start = _first_of_the_largest(np.linalg.norm(vertices - vertices.mean(axis=0), axis=1))
+    end = _first_of_the_largest(np.linalg.norm(vertices - vertices[start], axis=1))
     return np.array([start, end])
+
+
+def _first_of_the_largest(values: Floats) -> int:
+    """The first index of a value equal to the largest, up to rounding: symmetry makes equals."""
+    return int(np.flatnonzero(values >= (1 - 1e-6) * values.max())[0])
 
 
 def tutte(vertices: Floats, faces: Ints) -> Complexes:

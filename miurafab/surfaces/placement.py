@@ -100,9 +100,12 @@ def placements(vertices: Floats, flat: Floats, faces: Ints) -> list[tuple[float,
         if domain is not None:
             score = domain.width * domain.height * evenness(vertices, frame, faces, domain) ** 0.5
             scored.append((score, GridPlacement(angle, domain)))
-    # of scores equal to 2 %, the angle nearest to the axes of the layout comes first
+    # of scores equal to 2 %, the angle nearest to the axes of the layout comes first; the best and
+    # its equals by symmetry are of one class whatever the rounding
     best = max((score for score, _ in scored), default=0.0)
-    return sorted(scored, key=lambda pair: (-math.floor(50 * pair[0] / best), abs(pair[1].angle)))
+    return sorted(
+        scored, key=lambda pair: (-math.floor(50 * pair[0] / best + 1e-6), abs(pair[1].angle))
+    )
 
 
 def covered(frame: Floats, faces: Ints, domain: Domain, count: int = 41) -> bool:

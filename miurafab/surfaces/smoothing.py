@@ -77,6 +77,9 @@ def smooth(
     gram = (basis.T @ basis).tocsc() / len(points)
     penalty = (gather.T @ _bending(knots[0], knots[1]) @ gather).tocsc()
     unit = (0.05 * max(domain.width, domain.height)) ** 4 / (domain.width * domain.height)
+    # relative to the middle: the matrix is nearly singular where there are no points
+    middle = points.mean(axis=0)
+    points = points - middle
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (len(points), _PROBES))
     right = basis.T @ np.concatenate([points, signs], axis=1) / len(points)
     tried = np.unique(np.maximum(10.0**_STEPS, stiffness))
@@ -95,7 +98,7 @@ def smooth(
         elif score > _RISEN * best[0]:
             break
     assert best is not None
-    coefficients = best[2][own].reshape(*shape, 3)
+    coefficients = (best[2] + middle)[own].reshape(*shape, 3)
     spline = NdBSpline((knots[0], knots[1]), coefficients, _DEGREE, extrapolate=True)
     return Smoothed(spline, best[1], float(np.sqrt(best[3] / len(points))))
 

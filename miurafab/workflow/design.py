@@ -29,15 +29,15 @@ from miurafab.surfaces.catalogue import CATALOGUE, make_surface, parse_target
 from miurafab.surfaces.description import described_surface
 from miurafab.surfaces.function import SampledSurface, from_function, from_points, rounded
 from miurafab.surfaces.height_field import IMAGE_SUFFIXES, from_heights, read_image
-from miurafab.surfaces.mesh import (
+from miurafab.surfaces.mesh import MeshSurface, load_mesh, mesh_surface
+from miurafab.surfaces.mesh_files import (
     FROM_POINTS,
     MESH_SUFFIXES,
-    MeshSurface,
     arrays_of,
     is_mesh,
-    load_mesh,
-    mesh_surface,
+    mesh_suffix,
 )
+from miurafab.surfaces.preparation import MeshReading
 from miurafab.surfaces.surface import TargetSurface
 
 Values = Mapping[str, Any]
@@ -112,7 +112,13 @@ def design(target: object, /, **options: Any) -> Design:
         vertices, faces = arrays_of(target, "The mesh")
         vertices = rounded(vertices)
         asked, _ = _asked(given, (), "a mesh")
-        surface = mesh_surface(vertices, faces, region=asked.region, rotate=asked.rotate)
+        surface = mesh_surface(
+            vertices,
+            faces,
+            region=asked.region,
+            rotate=asked.rotate,
+            reading=MeshReading(asked.side, asked.holes),
+        )
         arrays = {"vertices": vertices.tolist(), "faces": faces.tolist()}
         return _on_mesh(surface, arrays | {"name": "mesh"}, asked, "mesh")
     if isinstance(target, np.ndarray | list | tuple):
@@ -168,7 +174,7 @@ def _from_description(target: Values, given: Values) -> Design:
 
 def _changed(design: Design, given: Values) -> Design:
     """``design`` with other options; its surface stays."""
-    for name in ("close", "region", "rotate"):
+    for name in ("close", "region", "rotate", "side", "holes"):
         if name in given:
             raise OptionError(name, "shapes the target; give it to `design`, not to what it made")
     asked, _ = _asked(given, (), "a design")
@@ -183,9 +189,9 @@ def _named(target: str, given: Values) -> Design:
     suffix = path.suffix.lower()
     if suffix == ".toml":
         return _from_file(find_file("patterns", target, error=TargetError), given)
-    if suffix in MESH_SUFFIXES:
+    if mesh_suffix(path):
         asked, _ = _asked(given, (), f"the mesh {path.name}")
-        return _from_mesh(path, asked, path.stem)
+        return _from_mesh(path, asked, path.name.partition(".")[0])
     if suffix in IMAGE_SUFFIXES:
         asked, values = _asked(given, ("height", "spacing"), f"the image {path.name}")
         height = values.get("height")
@@ -257,7 +263,8 @@ def read_layout_table(
 
 
 def _from_mesh(path: Path, asked: FitOptions, title: str) -> Design:
-    surface, sha256 = load_mesh(path, region=asked.region, rotate=asked.rotate)
+    reading = MeshReading(asked.side, asked.holes)
+    surface, sha256 = load_mesh(path, region=asked.region, rotate=asked.rotate, reading=reading)
     return _on_mesh(surface, {"mesh": str(path.resolve()), "sha256": sha256}, asked, title)
 
 

@@ -23,7 +23,9 @@ from miurafab.origami.fitting.kinds import CutColumns, FlatFoldability, Pieces
 from miurafab.origami.fitting.objective import Follow
 from miurafab.origami.verify import EXACT
 from miurafab.surfaces.analytic import GeneralizedCylinder
+from miurafab.surfaces.mesh_repair import Holes
 from miurafab.surfaces.placement import Region
+from miurafab.surfaces.plates import Side
 from miurafab.surfaces.surface import TargetSurface
 
 DEFAULT_FACETS = (20, 20)
@@ -139,6 +141,19 @@ class FitOptions(Shown):
         "Cut the sheet into pieces along these columns of vertices.",
         group="Sheet",
         default_text="evenly spaced",
+    )
+    side: Side = option(
+        Choice(get_args(Side)),
+        "Of a closed solid that is a thin plate: the outer skin (the larger), the inner skin, or "
+        "the middle between them.",
+        "outer",
+        group="Mesh targets",
+    )
+    holes: Holes = option(
+        Choice(get_args(Holes)),
+        "The holes of the mesh to fill: small (up to 15 % of the border's length) or all.",
+        "small",
+        group="Mesh targets",
     )
     polish: str = option(
         Choice(("on", "off")),

@@ -39,7 +39,15 @@ from miurafab.geometry.polygons import (
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.formats.planar_graph import faces_of_plane_graph
+from miurafab.origami.formats.target_frame import (
+    exact_frames,
+    in_own_frame,
+    relative,
+    scale_in,
+    target_in,
+)
 from miurafab.origami.unfold import with_angles_of_the_folded_form
+from miurafab.surfaces.frame import origin_in
 from miurafab.version import __version__
 
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "um": 1e-3}
@@ -100,7 +108,7 @@ def fold_text(pattern: CreasePattern, title: str = "", motion: FoldingMotion | N
         f"{json.dumps(key)}: {json.dumps(value, separators=(',', ':'), allow_nan=False)}"
         for key, value in keys.items()
     )
-    return "{\n" + ",\n".join(lines) + "\n}\n"
+    return in_own_frame("{\n" + ",\n".join(lines) + "\n}\n", pattern)
 
 
 def _folded_frame(points: Floats) -> dict[str, Any]:
@@ -151,7 +159,7 @@ def read_fold(path: Path) -> CreasePattern:
     except RecursionError:
         raise PatternError(f"{path} is not a FOLD file: it is nested too deeply.") from None
     try:
-        pattern = parse_fold(document)
+        pattern = parse_fold(exact_frames(document, text) if type(document) is dict else document)
     except PatternError as fault:
         raise PatternError(f"{path}: {fault}") from None
     mesh = pattern.target.get("mesh")
@@ -179,13 +187,13 @@ def parse_fold(document: Any) -> CreasePattern:
         edges_assignment=assignment,
         edges_fold_angle=_fold_angles(key, assignment),
         faces_vertices=faces,
-        folded_coords=_folded(others, len(flat), factor),
+        folded_coords=_folded(others, len(flat), factor, _origin(document)),
         grid=_grid(document, len(flat)),
         pieces=_pieces(document, faces),
         seams=_numbers(document, "miurafab:seams", 2),
         cells=_numbers(document, "miurafab:cells", 2),
-        scale=_scale(document),
-        target=_target(document),
+        scale=scale_in(document),
+        target=target_in(document),
     )
     pattern = replace(pattern, faces_vertices=_counter_clockwise(flat, faces))
     if pattern.folded_coords is not None and key.get("edges_foldAngle") is None:
@@ -317,12 +325,20 @@ def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> F
     return np.radians(np.where(np.isnan(angles), flat_folded, angles))
 
 
-def _folded(frames: list[Mapping[str, Any]], vertices: int, factor: float) -> Floats | None:
-    """The folded form (V, 3), mm, from the first of ``frames`` of class foldedForm."""
+def _folded(
+    frames: list[Mapping[str, Any]], vertices: int, factor: float, origin: Floats
+) -> Floats | None:
+    """The folded form (V, 3), mm, from the first of ``frames`` of class foldedForm, relative to
+    ``origin``.
+    """
     for frame in frames:
         if "foldedForm" in _classes(frame):
             points = _coordinates(frame, "vertices_coords")
-            points = points * _unit(frame, factor)
+            factor = _unit(frame, factor)
+            if origin.any() and points.shape[1] == 3 and np.isfinite(points).all():
+                points = relative(frame["vertices_coords"], factor, origin)
+            else:
+                points = points * factor
             if points.shape[1] == 2:
                 points = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
             if len(points) != vertices:
@@ -372,15 +388,6 @@ def _numbers(document: Mapping[str, Any], key: str, width: int | None) -> Ints |
     return numbers.astype(np.int64)
 
 
-def _scale(document: Mapping[str, Any]) -> float:
-    scale = document.get("miurafab:scale", 1.0)
-    if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0 < scale < math.inf:
-        raise PatternError(f"'miurafab:scale' is {scale!r}, not a positive number.")
-    return float(scale)
-
-
-def _target(document: Mapping[str, Any]) -> dict[str, Any]:
-    target = document.get("miurafab:target", {})
-    if not isinstance(target, dict):
-        raise PatternError("'miurafab:target' is not an object.")
-    return target
+def _origin(document: Mapping[str, Any]) -> Floats:
+    """(3,) where the folded form of the pattern starts in the frame of the file, mm."""
+    return np.asarray(scale_in(document) * origin_in(target_in(document)))

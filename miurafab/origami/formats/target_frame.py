@@ -1,0 +1,78 @@
+"""The target in a FOLD file: ``miurafab:target``, ``miurafab:scale``, and its frame.
+
+In the file the folded form lies in the frame of the target. Where the target has an ``origin``
+(:mod:`miurafab.surfaces.frame`), the folded form of a pattern is relative to it. A 64-bit number
+has too few digits for the sum of both. So their decimals are added, and taken apart again when the
+file is read: the same numbers come back, bit for bit.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from decimal import Decimal, localcontext
+from typing import Any
+
+import numpy as np
+
+from miurafab.errors import PatternError
+from miurafab.geometry.arrays import Floats
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.surfaces.frame import origin_in
+
+_DIGITS = 700
+"""As many as the sum of any two 64-bit numbers has."""
+
+
+def scale_in(document: Mapping[str, Any]) -> float:
+    """``miurafab:scale``, 1 if it is missing. Raises ``PatternError``."""
+    scale = document.get("miurafab:scale", 1.0)
+    if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0 < scale < math.inf:
+        raise PatternError(f"'miurafab:scale' is {scale!r}, not a positive number.")
+    return float(scale)
+
+
+def target_in(document: Mapping[str, Any]) -> dict[str, Any]:
+    """``miurafab:target``, empty if it is missing. Raises ``PatternError``."""
+    target = document.get("miurafab:target", {})
+    if not isinstance(target, dict):
+        raise PatternError("'miurafab:target' is not an object.")
+    try:
+        origin_in(target)
+    except (TypeError, ValueError) as fault:
+        raise PatternError(f"'miurafab:target' is damaged: {fault}.") from None
+    return target
+
+
+def in_own_frame(text: str, pattern: CreasePattern) -> str:
+    """The ``text`` of a FOLD file of ``pattern`` with the folded form in the target's frame."""
+    folded, origin = pattern.folded_coords, [Decimal(repr(o)) for o in pattern.origin.tolist()]
+    if folded is None or not any(origin):
+        return text
+    with localcontext(prec=_DIGITS):
+        shifted = [
+            [f"{Decimal(repr(x)) + o:f}" for x, o in zip(point, origin, strict=True)]
+            for point in folded.tolist()
+        ]
+    near, far = (json.dumps(form, separators=(",", ":")) for form in (folded.tolist(), shifted))
+    return text.replace(near, far.replace('"', ""), 1)
+
+
+def exact_frames(document: dict[str, Any], text: str) -> dict[str, Any]:
+    """The ``document`` of ``text``, with decimals in its frames if its target has an origin."""
+    if "origin" not in target_in(document) or "file_frames" not in document:
+        return document
+    return {**document, "file_frames": json.loads(text, parse_float=Decimal)["file_frames"]}
+
+
+def relative(points: list[Any], factor: float, origin: Floats) -> Floats:
+    """(V, 3) the points of the file times ``factor``, relative to ``origin`` (3,), mm."""
+    unit, start = Decimal(repr(factor)), [Decimal(repr(o)) for o in origin.tolist()]
+    with localcontext(prec=_DIGITS):
+        return np.array(
+            [
+                [float(Decimal(x) * unit - o) for x, o in zip(point, start, strict=True)]
+                for point in points
+            ]
+        )

@@ -1,0 +1,411 @@
+"""What makers bring: formats, dirt, plates, holes, coordinates far from the origin."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import struct
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from mesh_shapes import SHAPES, disk, mesh, noise, of_kind, plate, polar, sheet
+from scipy.spatial import cKDTree
+
+import miurafab as mf
+from miurafab.errors import TargetError
+from miurafab.geometry.rays import first_hits
+from miurafab.surfaces.mesh import mesh_surface
+from miurafab.surfaces.mesh_files import read_mesh
+from miurafab.surfaces.plates import judge_plate
+from miurafab.surfaces.preparation import MeshReading, prepare
+from miurafab.surfaces.topology import classify, one_sheet
+
+TURN = trimesh.transformations.rotation_matrix(0.7, [1, 2, 0.5])[:3, :3]
+
+
+def off_text(vertices: np.ndarray, faces: np.ndarray) -> str:
+    lines = [f"OFF\n{len(vertices)} {len(faces)} 0"]
+    lines += [f"{x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    lines += [f"{len(face)} {' '.join(map(str, face))}" for face in faces.tolist()]
+    return "\n".join(lines) + "\n"
+
+
+# --- kinds --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_mesh_is_prepared_as_one_piece_of_its_kind_or_refused(name: str) -> None:
+    """Every vertex lies in one fan, and Euler's number is that of the kind."""
+    kind = SHAPES[name].kind
+    if name == "moebius":
+        with pytest.raises(TargetError, match="one side only"):
+            prepare(*mesh(name), name)
+        return
+    prepared = prepare(*mesh(name), name)
+    wanted = {"dirty": "disk", "plate": "disk", "hole": "tube", "refused": "sphere"}.get(kind, kind)
+    wanted = {"plate-pipe": "tube", "torus": "handles", "pinholes": "holes"}.get(name, wanted)
+    assert prepared.topology.kind == wanted
+    solid = trimesh.Trimesh(prepared.vertices, prepared.faces, process=False)
+    assert solid.is_winding_consistent
+    borders = {"disk": 1, "tube": 2, "holes": 4, "sphere": 0, "handles": 0}[wanted]
+    assert solid.euler_number == 2 - borders - 2 * prepared.topology.handles
+    again, _ = one_sheet(prepared.vertices, prepared.faces, name)
+    assert len(again) == len(prepared.vertices)
+
+
+def test_a_border_that_touches_itself_is_parted_there() -> None:
+    """Two fans of two triangles share their middle."""
+    angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)
+    rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    vertices = np.concatenate([[[0, 0, 0]], rim])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 5, 6], [0, 6, 7]])
+    points, parted = one_sheet(vertices, faces, "mesh")
+    assert len(points) == 6 + 2  # six of the rim, and the middle twice
+    assert np.allclose(points[parted], vertices[faces])
+
+
+def test_welds_close_gaps_and_leave_wider_ones() -> None:
+    vertices, faces = mesh("gaps")
+    prepared = prepare(vertices, faces, "gaps.stl")
+    whole = prepare(*sheet(_saddle, 33, 33), "whole")
+    assert len(prepared.faces) == len(whole.faces) == 2048
+    assert cKDTree(whole.vertices).query(prepared.vertices)[0].max() < 2e-4
+    assert "were welded at 207 vertices, over gaps of up to 2.8e-04 mm" in str(prepared.findings)
+    apart = vertices + 0.5 * (np.arange(len(vertices)) // 81 % 2)[:, None]
+    with pytest.raises(TargetError, match="separate pieces, and the largest has only"):
+        prepare(apart, faces, "apart")
+
+
+def _saddle(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return 100 * np.stack([u, v, 0.3 * (u**2 - v**2)], axis=-1)
+
+
+def test_a_coarse_border_is_split_where_a_finer_one_meets_it() -> None:
+    prepared = prepare(*mesh("t-junctions"), "mesh")
+    assert prepared.topology.kind == "disk"
+    area = trimesh.Trimesh(prepared.vertices, prepared.faces, process=False).area
+    assert area == pytest.approx(trimesh.Trimesh(*mesh("t-junctions"), process=False).area)
+
+
+# --- plates -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rays_meet_what_a_search_through_all_triangles_meets(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    triangles = random.normal(size=(60, 1, 3)) + 0.4 * random.normal(size=(60, 3, 3))
+    starts = random.normal(size=(200, 3))
+    along = random.normal(size=(200, 3))
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    distance, hit = first_hits(starts, along, triangles)
+    for n in range(200):
+        best = (np.inf, -1)
+        for k, (a, b, c) in enumerate(triangles):
+            matrix = np.stack([b - a, c - a, -along[n]], axis=1)
+            s, t, way = np.linalg.solve(matrix, starts[n] - a)
+            if min(s, t, way, 1 - s - t) >= 0:
+                best = min(best, (way, k))
+        assert hit[n] == best[1]
+        assert distance[n] == pytest.approx(best[0])
+
+
+PLATES = [name for name in of_kind("plate") if name != "plate-pipe"]
+
+
+@pytest.mark.parametrize("name", PLATES)
+def test_the_skins_of_a_plate_are_its_two_sides_and_the_middle_lies_between(name: str) -> None:
+    skins = {
+        side: prepare(*mesh(name), name, MeshReading(side)) for side in ("outer", "inner", "middle")
+    }
+    assert {skin.topology.kind for skin in skins.values()} == {"disk"}
+    outer, inner, middle = (skins[side].vertices for side in ("outer", "inner", "middle"))
+    across = cKDTree(inner).query(outer)[0]
+    for side in (outer, inner):
+        half = cKDTree(side).query(middle)[0]
+        assert np.median(half) == pytest.approx(np.median(across) / 2, rel=0.1)
+    assert "plate" in {finding.code for finding in skins["outer"].findings}
+
+
+def test_the_middle_of_a_plate_is_the_surface_it_was_made_from() -> None:
+    prepared = prepare(*mesh("plate-dome"), "dome", MeshReading("middle"))
+    assert cKDTree(mesh("cap-40")[0]).query(prepared.vertices)[0].max() < 0.05
+    inner = prepare(*mesh("plate-dome"), "dome", MeshReading("inner"))
+    outer = prepare(*mesh("plate-dome"), "dome")
+    assert inner.topology.lengths[0] < outer.topology.lengths[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("ball", "two skins hold 100 and 0 %"), ("block", "two skins hold 25 and 25 %")],
+)
+def test_a_body_is_no_plate_and_the_figure_says_why(name: str, words: str) -> None:
+    with pytest.raises(TargetError, match=f"closed and no thin plate: its {words}"):
+        mesh_surface(*mesh(name), name)
+
+
+@pytest.mark.parametrize("part", [0.02, 0.1])
+def test_thin_is_accepted_and_thick_refused(part: float) -> None:
+    made = disk(polar(lambda a: 0.9 + 0 * a, lambda x, y: -0.2 * (x**2 + y**2)), 14)
+    assert judge_plate(*plate(made, 200 * part)).why_not == ""
+    assert "%" in judge_plate(*plate(made, 90.0, rim=6)).why_not
+
+
+def test_of_many_triangles_some_send_rays(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = judge_plate(*mesh("plate-wave"))
+    monkeypatch.setattr("miurafab.surfaces.plates.RAYS", 1500)
+    some = judge_plate(*mesh("plate-wave"))
+    assert some.why_not == ""
+    assert some.thickness == pytest.approx(whole.thickness, rel=0.02)
+    assert set(some.outer.tolist()) == set(whole.outer.tolist())
+
+
+def test_a_plate_is_fitted_on_its_skin_and_checked_from_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "plate.off"
+    path.write_text(off_text(*mesh("plate-saddle")))
+    made = mf.fit(path, facets=(8, 8), side="inner")
+    assert made.status == "converged"
+    assert made.pattern.target["side"] == "inner"
+    made.pattern.save(tmp_path / "plate.fold")
+    checked = mf.check(tmp_path / "plate.fold").measurements
+    assert checked.hausdorff_midsurface_mm == pytest.approx(
+        made.measurements.hausdorff_midsurface_mm, rel=1e-9
+    )
+
+
+# --- holes --------------------------------------------------------------------------------------
+
+
+def test_a_large_hole_is_filled_if_asked() -> None:
+    with pytest.raises(TargetError, match=r"hole 80 mm across, .* 'holes' all fills it"):
+        mesh_surface(*mesh("court"), "court")
+    surface = mesh_surface(*mesh("court"), "court", reading=MeshReading(holes="all"))
+    chart = surface.layout
+    assert classify(chart.vertices, chart.faces).kind == "disk"
+    filling = trimesh.Trimesh(chart.vertices, chart.faces[chart.real :], process=False)
+    assert filling.area == pytest.approx(np.pi * 40**2, rel=0.01)
+    # an edge is no longer than a few times the border's
+    assert filling.edges_unique_length.max() < 3 * 2 * np.pi * 40 / 72
+    assert "1 hole was filled" in surface.findings[0].sentence
+    assert surface.description["holes"] == "all"
+
+
+# --- formats ------------------------------------------------------------------------------------
+
+
+def test_polygons_over_several_lines_and_colours_behind_faces(tmp_path: Path) -> None:
+    """A cube of five squares: the same whether a face has one line, three, or a colour."""
+    corners = ["0 0 0", "1 0 0", "1 1 0", "0 1 0", "0 0 1", "1 0 1", "1 1 1", "0 1 1"]
+    faces = ["0 3 2 1", "0 1 5 4", "1 2 6 5", "2 3 7 6", "3 0 4 7"]
+    texts = {
+        "plain": "OFF\n8 5 0\n" + "\n".join(corners) + "\n" + "\n".join(f"4 {f}" for f in faces),
+        "lines": "OFF 8 5 0 # a cube\n\n"
+        + "\n".join(corners)
+        + "\n"
+        + "\n".join("4\n" + f.replace(" ", "\n") for f in faces),
+        "colours": "OFF\n8 5 12\n"
+        + "\n".join(corners)
+        + "\n"
+        + "\n".join(f"4 {f} 255 0 {n}" for n, f in enumerate(faces)),
+        "vertex-colours": "COFF\n8 5 0\n"
+        + "\n".join(f"{c} 0.1 0.2 0.3 1" for c in corners)
+        + "\n"
+        + "\n".join(f"4 {f}" for f in faces),
+    }
+    read = {}
+    for name, text in texts.items():
+        (tmp_path / f"{name}.off").write_text(text + "\n")
+        vertices, triangles, _ = read_mesh(tmp_path / f"{name}.off")
+        read[name] = trimesh.Trimesh(vertices, triangles, process=False)
+        assert len(triangles) == 10
+        assert read[name].area == pytest.approx(5)
+        assert len(trimesh.graph.connected_components(read[name].face_adjacency)) == 1
+
+
+def strip_ply(kind: str) -> tuple[bytes, np.ndarray]:
+    """A lattice of 7 x 5 vertices, each row of it a strip, in one list as Cyberware writes it."""
+    x, y = np.meshgrid(np.arange(7.0), np.arange(5.0))
+    points = np.stack([x, y, 0.1 * x * y], axis=-1).reshape(-1, 3)
+    strip = []
+    for row in range(4):
+        for column in range(7):
+            strip += [(row + 1) * 7 + column, row * 7 + column]
+        strip.append(-1)
+    header = (
+        f"ply\nformat {kind} 1.0\nelement vertex 35\nproperty float x\nproperty float y\n"
+        "property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+    ).encode()
+    if kind == "ascii":
+        rows = [" ".join(map(str, p)) for p in points.tolist()]
+        body = "\n".join([*rows, " ".join(map(str, [len(strip), *strip]))]).encode() + b"\n"
+        return header + body, points
+    order = "<" if "little" in kind else ">"
+    body = points.astype(order + "f4").tobytes()
+    return header + body + struct.pack(f"{order}{1 + len(strip)}i", len(strip), *strip), points
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_strips_of_a_ply_are_triangles_of_one_orientation(tmp_path: Path, kind: str) -> None:
+    content, points = strip_ply(kind)
+    (tmp_path / "scan.ply").write_bytes(content)
+    vertices, faces, _ = read_mesh(tmp_path / "scan.ply")
+    assert np.allclose(vertices, points, atol=1e-6)
+    assert len(faces) == 2 * 6 * 4
+    normal = np.cross(
+        vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]
+    )
+    assert (normal[:, 2] > 0).all()
+    assert classify(vertices, faces).kind == "disk"
+
+
+def package(unit: str, models: dict[str, str]) -> bytes:
+    """A 3MF package whose model files have the given resources and build."""
+    space = (
+        'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" '
+        'xmlns:p="http://schemas.microsoft.com/3dmanufacturing/production/2015/06"'
+    )
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path, inside in models.items():
+            archive.writestr(path, f'<model unit="{unit}" {space}>{inside}</model>')
+    return content.getvalue()
+
+
+def object_of(number: int, vertices: np.ndarray, faces: np.ndarray) -> str:
+    points = "".join(f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in vertices.tolist())
+    corners = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in faces.tolist())
+    return (
+        f'<object id="{number}" type="model"><mesh><vertices>{points}</vertices>'
+        f"<triangles>{corners}</triangles></mesh></object>"
+    )
+
+
+def test_a_3mf_package_is_read_in_its_unit_with_components_and_transforms(tmp_path: Path) -> None:
+    vertices, faces = mesh("triangles-8")
+    inner = object_of(1, vertices / 10, faces)
+    turn = "0 1 0 -1 0 0 0 0 1 5 0 0"
+    outer = (
+        f'<resources><object id="7"><components><component objectid="1" p:path="/3D/part.model" '
+        f'transform="{turn}"/></components></object></resources>'
+        '<build><item objectid="7" transform="1 0 0 0 1 0 0 0 1 0 0 2"/></build>'
+    )
+    (tmp_path / "sheet.3mf").write_bytes(
+        package(
+            "centimeter",
+            {"3D/3dmodel.model": outer, "3D/part.model": f"<resources>{inner}</resources>"},
+        )
+    )
+    read, triangles, _ = read_mesh(tmp_path / "sheet.3mf")
+    x, y, z = vertices.T
+    assert np.allclose(read, np.stack([50 - y, x, z + 20], axis=1))
+    assert (triangles == faces).all()
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "off", "glb", "3mf"])
+def test_a_compressed_file_holds_the_same_mesh(tmp_path: Path, suffix: str) -> None:
+    vertices, faces = mesh("triangles-8")
+    plain = tmp_path / f"sheet.{suffix}"
+    if suffix == "3mf":
+        model = f"<resources>{object_of(1, vertices, faces)}</resources>"
+        build = '<build><item objectid="1"/></build>'
+        plain.write_bytes(package("millimeter", {"3D/3dmodel.model": model + build}))
+    else:
+        trimesh.Trimesh(vertices, faces, process=False).export(plain)
+    packed = tmp_path / f"sheet.{suffix}.gz"
+    packed.write_bytes(gzip.compress(plain.read_bytes()))
+    for a, b in zip(read_mesh(plain)[:2], read_mesh(packed)[:2], strict=True):
+        assert np.array_equal(a, b)
+    assert mf.design(packed).title == "sheet"
+
+
+# --- places and turns -----------------------------------------------------------------------------
+
+PLACES = ([650.0, -300.0, 100.0], [2e4, 2e4, 0.0], [4.5e5, 5.2e6, 300.0], [2e9, -1e9, 5e8])
+"""Up to 1e7 times the size of the meshes."""
+
+
+def moved(name: str, place: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    vertices, faces = mesh(name)
+    return vertices @ TURN.T + np.array(place), faces
+
+
+@pytest.mark.parametrize("name", ["cap-40", "saddle-l", "plate-saddle"])
+def test_a_mesh_gives_the_same_surface_wherever_it_lies(name: str) -> None:
+    """Symmetric meshes too, where rounding decides between equals."""
+    here = mesh_surface(*moved(name, [0.0, 0.0, 0.0]), name)
+    uv = here.domain.lattice(15, 15)
+    for place in PLACES[::3]:
+        there = mesh_surface(*moved(name, place), name)
+        origin = np.array(there.layout.reading.get("origin", (0.0, 0.0, 0.0)))
+        assert origin.any() == (place is not PLACES[0])
+        # single digits of the coordinates, and what a layout makes of them
+        digits = 1e-8 + 3e2 * np.abs(place).max() * np.finfo(float).eps
+        points = there.point(there.domain.lattice(15, 15)) - (np.array(place) - origin)
+        assert np.abs(points - here.point(uv)).max() < digits
+
+
+def test_a_sheet_is_the_same_wherever_its_target_lies(tmp_path: Path) -> None:
+    """To 1e-6 of its size, in the file and in memory, and exact everywhere."""
+    path = tmp_path / "fan.off"
+    sheets = []
+    for place in ([0.0, 0.0, 0.0], *PLACES[2:]):
+        path.write_text(off_text(*moved("fan", place)))
+        made = mf.fit(path, facets=(8, 6), size=300)
+        assert made.status == "converged"
+        assert made.measurements.max_planarity < 1e-12
+        assert made.measurements.max_isometry < 1e-12
+        made.pattern.save(tmp_path / "fan.fold")
+        read = mf.load(tmp_path / "fan.fold")
+        assert np.array_equal(read.folded_coords, made.pattern.folded_coords)
+        checked = mf.check(tmp_path / "fan.fold")
+        assert checked.valid
+        assert checked.measurements.hausdorff_mm == pytest.approx(
+            made.measurements.hausdorff_mm, rel=1e-9
+        )
+        # any reader finds the folded form on `scale` times the target as it stands in its file
+        document = json.loads((tmp_path / "fan.fold").read_text())
+        own = np.array(document["file_frames"][0]["vertices_coords"])
+        own = own / document["miurafab:scale"] - np.array(place)
+        sheets.append((own, np.array(document["vertices_coords"])))
+    size = np.ptp(sheets[0][0], axis=0).max()
+    for own, flat in sheets[1:]:
+        assert np.abs(own - sheets[0][0]).max() < 1e-6 * size
+        assert np.abs(flat - sheets[0][1]).max() < 1e-6 * 300
+
+
+@pytest.mark.parametrize("name", ["petal", "saddle-l"])
+def test_a_turned_mesh_gives_the_turned_surface(name: str) -> None:
+    vertices, faces = mesh(name)
+    here, there = mesh_surface(vertices, faces), mesh_surface(*moved(name, [0.0, 0.0, 0.0]))
+    points = there.point(there.domain.lattice(15, 15))
+    assert np.abs(points - here.point(here.domain.lattice(15, 15)) @ TURN.T).max() < 1e-6
+
+
+@pytest.mark.parametrize("factor", [1e-5, 1e5])
+def test_the_size_of_a_mesh_scales_its_surface_and_nothing_else(factor: float) -> None:
+    vertices, faces = moved("petal", [0.0, 0.0, 0.0])
+    small, large = mesh_surface(vertices, faces), mesh_surface(factor * vertices, faces)
+    points = large.point(large.domain.lattice(9, 9)) / factor
+    assert np.abs(points - small.point(small.domain.lattice(9, 9))).max() < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_alternative_ends_the_search(seed: int) -> None:
+    """Ragged disks with noise: every alternative is a surface, and none raises."""
+    random = np.random.default_rng(seed)
+    waves = random.uniform(0.02, 0.12, 3)
+    phase = random.uniform(0, 2 * np.pi, 3)
+
+    def rim(a: np.ndarray) -> np.ndarray:
+        return 0.8 + sum(
+            w * np.sin(k * a + p) for w, k, p in zip(waves, (3, 7, 13), phase, strict=True)
+        )
+
+    made = disk(polar(rim, lambda x, y: 0.5 * np.sin(2 * x) * np.cos(2.5 * y)), 18)
+    surface = mesh_surface(*noise(made, random.uniform(0, 0.005), seed), "ragged")
+    for place, other in surface.alternatives():
+        assert place
+        assert np.isfinite(other.point(other.domain.lattice(5, 5))).all()
