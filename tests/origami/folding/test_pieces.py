@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from piece_problems import gores, inside_circle, trimmed, two_pieces, two_trimmed_pieces
-from problems import CELL, fitted
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from piece_problems import cut_to, gores, inside_circle, trimmed, two_pieces, two_trimmed_pieces
+from problems import CELL, fitted, regular
 from scipy.spatial.distance import pdist
 
 from miurafab.errors import InputError, PatternError
@@ -18,12 +21,15 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import sheet_model
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.energy.pieces import energies_of_pieces
+from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.kinematics import FoldingMotion, rigid_motion, states_between
 from miurafab.origami.folding.thick_panels import thick_panels
+from miurafab.origami.formats.fold import fold_text, parse_fold
 from miurafab.origami.miura import regular_miura
 from miurafab.origami.piece import pieces_of
 from miurafab.origami.unfold import unfold, unfold_charts
+from miurafab.origami.verify import audit
 from miurafab.workflow.fold import fold
 
 
@@ -61,6 +67,28 @@ def test_a_trimmed_sheet_moves_as_its_part_of_the_whole_sheet() -> None:
     assert motions[1].mismatch.max() < 1e-11
     last = np.abs(motions[1].fold_angles[-1])[part.edges_assignment != "B"]
     assert last == pytest.approx(np.pi)
+
+
+@settings(max_examples=25)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    corners=st.integers(3, 7),
+)
+def test_any_part_of_a_sheet_is_valid_and_folds_rigidly(seed: int, corners: int) -> None:
+    """The part inside a star-shaped outline, in a file and back."""
+    whole = regular(9, 9)
+    random = np.random.default_rng(seed)
+    seen = whole.folded_coords[:, :2] - whole.folded_coords[:, :2].mean(axis=0)
+    size = np.ptp(seen, axis=0).max()
+    wave = 0.12 * np.cos(corners * np.arctan2(seen[:, 1], seen[:, 0]) + random.uniform(0, 6))
+    level = random.uniform(0.3, 0.45) + wave - np.linalg.norm(seen, axis=1) / size
+    part = cut_to(whole, level)
+    assert audit(part).findings == ()
+    again = parse_fold(json.loads(fold_text(part)))
+    assert np.array_equal(again.faces_vertices, part.faces_vertices)
+    motion = rigid_motion(again, states_between(again, 4))
+    assert motion.mismatch.max() < 1e-10
+    assert contacts(motion) == ()
 
 
 @pytest.mark.parametrize("make", [gores, two_pieces, two_trimmed_pieces])
