@@ -95,6 +95,7 @@ if TYPE_CHECKING:
 
 def _homes() -> dict[str, str]:
     """The module of each public name, from the lines ``from MODULE import NAME as NAME`` above."""
+    # A package that is imported has a spec, and its loader has the source.
     source = __spec__.loader.get_source(__name__)  # type: ignore[union-attr]
     lines = (line.split() for line in source.splitlines() if line.startswith("    from miurafab"))
     return {words[3]: words[1] for words in lines}

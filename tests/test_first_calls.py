@@ -1,4 +1,4 @@
-"""29 calls that a newcomer writes first: each works, or answers in one sentence."""
+"""34 calls that a newcomer writes first: each works, or answers in one sentence."""
 
 from __future__ import annotations
 
@@ -64,6 +64,20 @@ ANSWERS = {
         "which is not a path",
     ),
     "29 no port": (lambda: mf.cut("job"), "'port' is missing; name the machine's, or 'virtual'"),
+    "30 a misspelt port": (lambda: mf.cut("job", prt="x"), "'prt' is not an option; did you mean"),
+    "31 a misspelt option of a verb": (
+        lambda: mf.fold("hypar.fold", stepss=3),
+        "'stepss' is not an option; did you mean 'steps'",
+    ),
+    "32 a value too many": (
+        lambda: mf.fold("hypar.fold", 3, 4),
+        "takes pattern and steps without a name, and the rest by name: too many",
+    ),
+    "33 half a pair": (lambda: mf.fit("hypar", facets="8x"), "is '8x'; write COLSxROWS such as"),
+    "34 a tolerance for a pattern": (
+        lambda: mf.convert("hypar.fold", "b.svg", tolerance=1),
+        "'tolerance' goes with a drawing of lines",
+    ),
 }
 
 

@@ -71,6 +71,25 @@ def test_a_library_has_one_home(library: str) -> None:
     assert [user for user in users if not user.startswith(HOMES[library])] == []
 
 
+def test_an_exception_from_the_types_has_its_reason_beside_it() -> None:
+    """Behind it on the line, or on the line before."""
+    bare = []
+    for module in MODULES:
+        lines = module.read_text(encoding="utf-8").splitlines()
+        for before, line in zip(["", *lines], lines, strict=False):
+            words = line.partition("# type: ignore[")[2]
+            if words and "#" not in words and not before.strip().startswith(("#", "@")):
+                bare.append(f"{name(module)}: {line.strip()}")
+    assert bare == []
+
+
+def test_the_usual_baud_rate_stands_once() -> None:
+    users = [
+        name(module) for module in MODULES if re.search("115_?200\\b(?! baud)", module.read_text())
+    ]
+    assert users == ["miurafab/profiles/machine.py"]
+
+
 def test_only_the_command_line_names_its_flags() -> None:
     named = [
         f"{name(module)}:{number}: {line.strip()}"

@@ -33,6 +33,7 @@ def completion(
 
     PowerShell: add 'miurafab completion powershell | Out-String | Invoke-Expression' to $PROFILE.
     """
+    # The command line takes one of SHELLS only, which a str does not say.
     script = program.generate_completion(shell=shell)  # type: ignore[arg-type]
     console.answer({"shell": shell, "script": script}, lambda: print(script, file=sys.stdout))
     return DONE

@@ -135,6 +135,7 @@ class _Command:
         ]
         return own.replace(parameters=parameters)
 
+    # cyclopts reads the annotations of an object; of this one they are made when asked for.
     @property
     def __annotations__(self) -> dict[str, Any]:  # type: ignore[override]
         return {name: each.annotation for name, each in self.__signature__.parameters.items()}

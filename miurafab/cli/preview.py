@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, argument, option
-from miurafab.errors import DONE
+from miurafab.errors import DONE, NO
 from miurafab.options import File
 
 if TYPE_CHECKING:
@@ -46,7 +46,8 @@ def preview(
 ) -> int:
     """Show what a job would do, without opening a port.
 
-    Prints times, lengths and warnings, and writes pictures and a page.
+    Prints times, lengths and warnings, and writes pictures and a page. The exit code is 1 if a cut
+    would be refused.
     """
     with console.progress("dry run") as progress:
         seen = miurafab.preview(job, machine=machine, settings=settings, on_progress=progress)
@@ -68,7 +69,7 @@ def preview(
         console.line(f"Open {files[-1]} in a browser; pictures are beside it.")
 
     console.answer(answer, show)
-    return DONE
+    return NO if answer["status"] == "refused" else DONE
 
 
 def _row(sheet: SheetPreview) -> tuple[str | int, ...]:

@@ -34,7 +34,7 @@ import shapely
 from miurafab.errors import InputError, LayoutError
 from miurafab.fabrication.nesting.problem import Ring, SheetKind, Stock
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.options import Choice, Whole, length
+from miurafab.options import Choice, Text, Whole, length
 from miurafab.profiles import GRAINS, Table, read_toml
 from miurafab.profiles.machine import Bed
 
@@ -90,7 +90,7 @@ def read_stock(path: Path) -> tuple[StockSheet, ...]:
 
 def _sheet(table: Table, name: str) -> StockSheet:
     sheet = StockSheet(
-        name=table.text("name", name),
+        name=table.value("name", Text(), name),
         width_mm=table.value("width", length(1, 1e5)),
         height_mm=table.value("height", length(1, 1e5)),
         quantity=table.value("quantity", Whole(1, 10_000), None),

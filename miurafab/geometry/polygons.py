@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Iterator
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -116,3 +117,23 @@ def principal_axes(points: Floats) -> Floats:
     centred = points - points.mean(axis=0)
     _, axes = np.linalg.eigh(centred.T @ centred)
     return np.asarray(axes * np.sign(axes[np.abs(axes).argmax(axis=0), [0, 1]]))
+
+
+def smallest_box(points: Floats) -> tuple[float, Floats]:
+    """The angle of the smallest box around ``points`` (n, 2), 0 to pi/2, and its extents (2,) along
+    that angle and across it.
+
+    A smallest box has a side along a side of the convex hull (Freeman and Shapira, Comm. ACM 18,
+    1975). Of boxes within 0.01 % the one with the least angle is taken, so that rounding decides
+    nothing.
+    """
+    hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(points)))
+    sides = np.diff(hull[::-1], axis=0) if len(hull) > 1 else np.array([[1.0, 0.0]])
+    angles = np.arctan2(sides[:, 1], sides[:, 0]) % (np.pi / 2)  # a right angle gives the same box
+    angles = np.unique(np.round(np.where(np.pi / 2 - angles < 1e-6, 0.0, angles), 9))
+    along = np.column_stack([np.cos(angles), np.sin(angles)])
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    sizes = np.column_stack([np.ptp(hull @ along.T, axis=0), np.ptp(hull @ across.T, axis=0)])
+    areas = sizes.prod(axis=1)
+    least = int(np.flatnonzero(areas <= 1.0001 * areas.min())[0])
+    return float(angles[least]), sizes[least]

@@ -20,13 +20,12 @@ import serial
 import serial.tools.list_ports
 
 from miurafab.errors import PortError
+from miurafab.profiles.machine import BAUD
 from miurafab.simulate.beam import BeamSegment
 from miurafab.simulate.grbl.controller import VirtualGrbl
 
 VIRTUAL = "virtual"
 """The port name of the controller in memory."""
-BAUD = 115_200
-"""The baud rate of nearly every GRBL board."""
 
 # What pyserial lets through when a port goes away: a TypeError for a descriptor that is None by
 # now, a termios.error (no OSError) for a request to a line that has hung up.

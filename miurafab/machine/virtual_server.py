@@ -30,8 +30,9 @@ from miurafab.machine.actions import read_dump
 from miurafab.machine.dialects import virtual_machine
 from miurafab.machine.faulty import FaultyDevice
 from miurafab.machine.signals import StopSignals
-from miurafab.machine.transport import BAUD, Device
+from miurafab.machine.transport import Device
 from miurafab.profiles import load_machine
+from miurafab.profiles.machine import BAUD
 from miurafab.simulate.faults import Fault
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.simulate.grbl.dialect import DIALECTS

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from miurafab.errors import ProfileError
 from miurafab.profiles import MachineProfile
+from miurafab.profiles.machine import BAUD
 
 _NEEDED = (1, 11, 12, 30, 31, 32, 100, 101, 102, 110, 111, 112, 120, 121, 122)
 _COUNT_AND_CHECKSUM = len("N12345 *123")
@@ -93,7 +94,7 @@ class Link:
     time); ``line_overhead``, the bytes that the dialect adds to each line.
     """
 
-    baud: int = 115_200
+    baud: int = BAUD
     latency: float = 1e-3
     rx_bytes: int = 128
     line_overhead: int = 0

@@ -203,7 +203,7 @@ def read_options(
     for name in (*given, *over):
         if name not in known:
             noun = "a known key" if place(name) else "an option"
-            complaint = f"'{name}' is not {noun}; {_nearest(name, [*known, *besides])}"
+            complaint = f"'{name}' is not {noun}; {nearest(name, [*known, *besides])}"
             raise OptionError(None, complaint, place(name))
     inside: dict[str, Any] = {}
     for name, value in {**given, **over}.items():
@@ -226,6 +226,7 @@ def _made(cls: type[T], inside: Mapping[str, Any], base: T | None = None) -> T:
     """A value of ``cls`` of the values ``inside``, by the names outside, and of ``base``."""
     hints = get_type_hints(cls)
     values: dict[str, Any] = {}
+    # No bound of T says that it is a dataclass.
     for entry in fields(cls):  # type: ignore[arg-type]
         if _KEY in entry.metadata:
             name = outside(entry.name)
@@ -262,6 +263,7 @@ def check_options(value: Any) -> None:
                 raise OptionError(outside(entry.name), str(fault)) from None
 
 
-def _nearest(name: str, known: Sequence[str]) -> str:
+def nearest(name: str, known: Sequence[str]) -> str:
+    """The hint for ``name`` that is not ``known``: the near miss, or all there are."""
     near = difflib.get_close_matches(name, known, n=1)
     return f"did you mean '{near[0]}'" if near else f"there are {', '.join(sorted(known))}"

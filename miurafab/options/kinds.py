@@ -229,7 +229,7 @@ class File(Kind):
 
     def read(self, value: object) -> Path:
         try:
-            path = Path(value)  # type: ignore[arg-type]
+            path = Path(value)  # type: ignore[arg-type]  # the TypeError is the answer
         except TypeError:
             raise ValueError(f"is {value!r}, not a path") from None
         if value == "":
@@ -254,6 +254,7 @@ class Pair(Kind):
         parts: Any = value
         if isinstance(value, str):
             parts = value.lower().replace("×", "x").split(self.separator)
+            parts = [part for part in parts if part.strip()]
         try:
             first, second = parts
         except (TypeError, ValueError):

@@ -15,6 +15,7 @@ from miurafab.options import (
     Choice,
     Flag,
     Several,
+    Text,
     Whole,
     angle,
     feed,
@@ -27,6 +28,8 @@ from miurafab.profiles.shipped import find_profile
 from miurafab.profiles.table import Table, read_toml
 
 DIALECTS = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc", "marlin", "hpgl")
+BAUD = 115_200
+"""The baud rate of nearly every GRBL board."""
 TOOLS = ("laser", "pen", "knife")
 STREAMING = ("character-counting", "send-response")
 FLOW_CONTROL = ("none", "xon-xoff", "rts-cts")
@@ -118,7 +121,7 @@ class Tool:
 class Controller:
     """How to talk to the controller."""
 
-    baud: int = option(Whole(300, 4_000_000), "Speed of the serial port in baud.", 115_200)
+    baud: int = option(Whole(300, 4_000_000), "Speed of the serial port in baud.", BAUD)
     streaming: str = option(
         Choice(STREAMING), "How the sender keeps the receive buffer full.", STREAMING[0]
     )
@@ -208,7 +211,7 @@ def load_machine(name: AnyPath) -> MachineProfile:
     table = Table(read_toml(path), path.name)
     profile = MachineProfile(
         name=path.stem,
-        title=table.text("title"),
+        title=table.value("title", Text()),
         dialect=table.value("dialect", Choice(DIALECTS)),
         bed=table.table("bed").options(Bed),
         motion=table.table("motion").options(MotionLimits),

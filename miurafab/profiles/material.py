@@ -14,6 +14,7 @@ from miurafab.files import AnyPath
 from miurafab.options import (
     REQUIRED,
     Choice,
+    Text,
     Whole,
     angle,
     feed,
@@ -193,7 +194,7 @@ def load_material(name: AnyPath) -> Material:
     creases, relief_hole = _creases(table.table("creases", {}), perforation, kerf)
     material = Material(
         name=path.stem,
-        title=table.text("title"),
+        title=table.value("title", Text()),
         thickness_mm=table.value("thickness", length(0.01, 20)),
         kerf_mm=kerf,
         max_power=max_power,

@@ -64,13 +64,6 @@ class Table:
         """Whether the file gives ``key``."""
         return key in self._values
 
-    def text(self, key: str, default: str = _REQUIRED) -> str:
-        """A string."""
-        value = self._take(key, default)
-        if not isinstance(value, str):
-            raise self.fault(key, f"must be a text in quotes, not {value!r}")
-        return value
-
     def value(self, key: str, kind: Kind, default: Any = _REQUIRED) -> Any:
         """A value of ``kind``."""
         value = self._take(key, default)

@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial import ConvexHull
 
 from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs
+from miurafab.geometry.polygons import smallest_box
 from miurafab.geometry.sparse import factor_symmetric
 
 Complexes = NDArray[np.complex128]
@@ -43,19 +43,9 @@ def flatten(vertices: Floats, faces: Ints) -> Floats:
 
 
 def _upright(z: Complexes) -> Floats:
-    """(V, 2) the layout turned so that its bounding box is the smallest, the longer side along x.
-
-    The smallest box has a side along a side of the convex hull.
-    """
-    plane = np.stack([z.real, z.imag], axis=1)
-    hull = z[ConvexHull(plane).vertices]
-    angles = np.angle(np.roll(hull, -1) - hull) % (np.pi / 2)  # a right angle gives the same box
-    angles = np.where(np.pi / 2 - angles < 1e-6, 0.0, angles)
-    frames = np.exp(-1j * np.unique(np.round(angles, 9)))
-    boxes = hull[None, :] * frames[:, None]
-    width, height = np.ptp(boxes.real, axis=1), np.ptp(boxes.imag, axis=1)
-    least = int(np.flatnonzero(width * height <= 1.0001 * (width * height).min())[0])
-    z = z * frames[least] * (1 if width[least] >= 0.9999 * height[least] else -1j)
+    """(V, 2) the layout turned so that its box is the smallest, the longer side along x."""
+    angle, (along, across) = smallest_box(np.stack([z.real, z.imag], axis=1))
+    z = z * np.exp(-1j * angle) * (1 if along >= 0.9999 * across else -1j)
     z = z - z.mean()
     return np.stack([z.real, z.imag], axis=1)
 

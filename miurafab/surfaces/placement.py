@@ -55,6 +55,7 @@ class Region:
         """
         example = "write u0,u1,v0,v1 such as 0.1,0.9,0.2,0.8 or 10mm,90mm,2cm,8cm"
         try:
+            # What is no list raises the TypeError that is the answer.
             parts = value.split(",") if isinstance(value, str) else list(value)  # type: ignore[call-overload]
             words = [str(part).strip() for part in parts]
             u0, u1, v0, v1 = values = [parse_length(word) for word in words]

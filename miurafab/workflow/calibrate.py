@@ -29,6 +29,7 @@ from miurafab.fabrication.perforation import MIN_STROKE_MM
 from miurafab.fabrication.sheets import Layout, Sheet, Totals
 from miurafab.files import AnyPath, as_path
 from miurafab.options import read_value
+from miurafab.options.verbs import verb
 from miurafab.origami.formats.fold import fold_text
 from miurafab.posting.sections import post_sections
 from miurafab.profiles import (
@@ -70,6 +71,7 @@ class Calibration(Shown):
         return f"{self.job.path}: {len(self.sheet.cells)} flaps, {len(self.sheet.squares)} squares"
 
 
+@verb
 def calibrate(
     directory: AnyPath,
     machine: AnyPath | None = None,
@@ -154,6 +156,7 @@ def calibrate(
     return Calibration(made, sheet)
 
 
+@verb
 def add_material(
     name: AnyPath,
     directory: AnyPath,

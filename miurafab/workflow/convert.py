@@ -14,6 +14,7 @@ import numpy as np
 from miurafab.display import Shown
 from miurafab.files import AnyPath, as_path, new_file
 from miurafab.findings import Finding, findings_json
+from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.formats.files import SOLIDS, WITHOUT_ANGLES, WRITTEN, load, write_pattern
 
@@ -58,6 +59,7 @@ class Conversion(Shown):
         }
 
 
+@verb
 def convert(
     source: AnyPath,
     target: AnyPath,

@@ -6,6 +6,7 @@ each go beside it, and by its journal a sheet that was interrupted goes on.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -38,6 +39,7 @@ from miurafab.options import (
     read_value,
 )
 from miurafab.options.documented import described
+from miurafab.options.verbs import verb
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.cut import Prepared, prepare
 from miurafab.workflow.timeline import SheetProgress, placed
@@ -118,6 +120,7 @@ class CutOptions(Shown):
 DEFAULT_OPTIONS = CutOptions()
 
 
+@verb
 def cut(
     job: object,
     port: str | None = None,
@@ -191,6 +194,8 @@ def cut(
     own = {name: options.pop(name) for name in declared(CutOptions) if name in options}
     asked = read_options(CutOptions, own)
     if port is None:
+        for name in difflib.get_close_matches("port", options, n=1):
+            raise OptionError(None, f"'{name}' is not an option; did you mean 'port'")
         raise OptionError("port", "is missing; name the machine's, or 'virtual', which needs none")
     port = read_value("port", Text(), port)
     chosen = None if sheets is None else read_value("sheets", Several(Whole(1)), sheets)
@@ -238,12 +243,8 @@ def cut_prepared(
         if plan.resumption is not None and on_resume is not None:
             on_resume(plan.resumption.finding)
         if options.frame:
-            frame(
-                prepared,
-                number,
-                port=port,
-                options=replace(options, send=replace(options.send, at=at)),
-            )
+            head = replace(options.send, at=at)
+            frame(prepared, number, port=port, options=replace(options, send=head))
             if after_frame is not None:
                 after_frame(number)
         send = partial(_stream(port), keys=keys, virtual_speed=options.virtual_speed)

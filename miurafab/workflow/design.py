@@ -21,7 +21,7 @@ from miurafab.display import Shown
 from miurafab.errors import OptionError, TargetError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.findings import Finding
-from miurafab.options import declared, length, number, read_options, read_value
+from miurafab.options import Text, declared, length, number, read_options, read_value
 from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitOptions, FitRequest
 from miurafab.profiles import Table, find_file, read_toml
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
@@ -216,11 +216,11 @@ def _parameters(name: str) -> tuple[str, ...]:
 
 def _from_file(path: Path, given: Values) -> Design:
     table = Table(read_toml(path, TargetError), path.name, TargetError)
-    title = table.text("title", path.stem)
+    title = table.value("title", Text(), path.stem)
     target = table.table("target")
     sheets, machine, material = read_layout_table(table.table("layout", {}), path.parent)
-    mesh = path.parent / target.text("mesh") if target.has("mesh") else None
-    name = "" if mesh is not None else target.text("surface")
+    mesh = path.parent / target.value("mesh", Text()) if target.has("mesh") else None
+    name = "" if mesh is not None else target.value("surface", Text())
     known = () if mesh is not None else _parameters(name)
     chosen, changed = _split(given, known, f"the target of {path.name}")
     asked = read_options(
@@ -249,7 +249,7 @@ def read_layout_table(
     and the names of the machine and the material.
     """
     machine, material = (
-        layout.text(key) if layout.has(key) else None for key in ("machine", "material")
+        layout.value(key, Text()) if layout.has(key) else None for key in ("machine", "material")
     )
     options = read_options(
         LayoutOptions,

@@ -9,6 +9,7 @@ from miurafab.errors import InputError
 from miurafab.files import AnyPath
 from miurafab.options import Whole, number, option, read_options
 from miurafab.options.documented import described
+from miurafab.options.verbs import verb
 from miurafab.origami.energy.bar_hinge import Paper, sheet_model
 from miurafab.origami.energy.curve import EnergyCurve, energy_curve
 from miurafab.origami.energy.path import Progress
@@ -32,6 +33,7 @@ class EnergyOptions:
     )
 
 
+@verb
 def energy(
     pattern: PatternLike,
     steps: int | None = None,

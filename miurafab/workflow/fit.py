@@ -7,12 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 from miurafab.options.documented import described
+from miurafab.options.verbs import verb
 from miurafab.origami.fitting.fit import fit as fit_request
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.origami.fitting.result import FitResult
 from miurafab.workflow.design import design
 
 
+@verb
 def fit(
     target: object, /, *, on_progress: Callable[[float, str], None] | None = None, **options: Any
 ) -> FitResult:

@@ -20,6 +20,7 @@ from miurafab.files import AnyPath, new_file
 from miurafab.geometry.arrays import Floats
 from miurafab.options import Choice, Whole, declared, length, option, read_options, read_value
 from miurafab.options.documented import described
+from miurafab.options.verbs import verb
 from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.contact import triangulate
@@ -185,6 +186,7 @@ class Folding(Shown):
 described(Folding.save, FoldOptions, without=("steps", "thickness"))
 
 
+@verb
 def fold(
     pattern: PatternLike, steps: int | None = None, *, on_progress: Progress | None = None
 ) -> Folding:
@@ -264,6 +266,7 @@ def _names(motion: FoldingMotion) -> tuple[str, ...]:
     return tuple(names)
 
 
+@verb
 def thick_panels(
     pattern: PatternLike, thickness: float, *, on_progress: Progress | None = None
 ) -> ThickPanels:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from miurafab.errors import InputError, PatternError
 from miurafab.files import AnyPath
+from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.formats.files import load
@@ -37,6 +38,7 @@ def as_pattern(pattern: object) -> CreasePattern:
     )
 
 
+@verb
 def check(pattern: PatternLike) -> Audit:
     """Recompute every invariant of a pattern, and its distance from its target.
 

@@ -18,6 +18,7 @@ from miurafab.files import AnyPath, as_path
 from miurafab.findings import Finding, findings_json
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import parse_dump
+from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import DEFAULT_MACHINE, MachineProfile, load_machine, read_machine
 from miurafab.workflow.dry_run import (
@@ -124,6 +125,7 @@ class Preview(Shown):
         }
 
 
+@verb
 def preview(
     job: SheetJob | JobDirectory | AnyPath,
     *,

@@ -21,6 +21,7 @@ from miurafab.files import AnyPath, as_path
 from miurafab.gcode.job import Job
 from miurafab.options import read_options
 from miurafab.options.documented import described
+from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.fold import write_fold
 from miurafab.posting import post
@@ -191,6 +192,7 @@ class SheetJob(Shown):
         }
 
 
+@verb
 def sheets(
     pattern: PatternLike,
     machine: MachineProfile | AnyPath | None = None,

@@ -22,6 +22,7 @@ from typing import Any
 from miurafab.errors import InputError, OptionError
 from miurafab.options import Text, Whole, Written, declared, option, read_options
 from miurafab.options.documented import described
+from miurafab.options.verbs import verb
 from miurafab.origami.fitting.fit import fit
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.origami.tradeoff import WEIGHTS, Sample, Tradeoff, summarise
@@ -35,7 +36,7 @@ Progress = Callable[[float, str], None]
 def _read_sides(value: object) -> tuple[int, ...]:
     words = value.split(",") if isinstance(value, str) else value
     try:
-        return tuple(Whole(2).read(word) for word in words)  # type: ignore[attr-defined]
+        return tuple(Whole(2).read(word) for word in words)  # type: ignore[attr-defined]  # TypeError below
     except (TypeError, ValueError):
         raise ValueError(f"is {value!r}; write whole numbers from 2, such as 8,16,32") from None
 
@@ -43,7 +44,7 @@ def _read_sides(value: object) -> tuple[int, ...]:
 def _read_weights(value: object) -> tuple[float, ...]:
     words = value.split(",") if isinstance(value, str) else value
     try:
-        weights = tuple(float(word) for word in words)  # type: ignore[attr-defined]
+        weights = tuple(float(word) for word in words)  # type: ignore[attr-defined]  # TypeError below
     except (TypeError, ValueError):
         weights = ()
     if not weights or not all(0 < weight < 1 for weight in weights):
@@ -85,6 +86,7 @@ class TradeoffOptions:
             )
 
 
+@verb
 def tradeoff(
     target: object,
     sides: Sequence[int] | str | None = None,

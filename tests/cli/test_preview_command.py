@@ -50,7 +50,7 @@ def test_a_file_in_figures_and_pictures(run, file, tmp_path):
 def test_people_get_a_table_and_every_warning(run, file, tmp_path):
     (tmp_path / file).write_text(GCODE.replace("X110", "X410").replace("M4", "M3"))
     done = run("preview", file, "-o", "seen")
-    assert done.returncode == 0
+    assert done.returncode == 1
     assert "400 mm" in done.stdout
     assert "refusal (bounds): plate.nc, line 7 moves to X410 Y10, off the bed" in done.stdout
     assert "refusal (m3): plate.nc, line 5 arms the laser with M3" in done.stdout
@@ -63,7 +63,7 @@ def test_people_get_a_table_and_every_warning(run, file, tmp_path):
 def test_a_preview_and_a_dry_run_judge_in_the_same_words(run, name, codes):
     where = (str(DATA / name), "--machine", "grbl-laser-400")
     done = run("preview", *where, "-o", "seen", "--json")
-    assert done.returncode == 0
+    assert done.returncode == 1
     preview = json.loads(done.stdout)
     seen = preview["sheets"][0]
     told = run("cut", *where, "--dry-run", "--json")

@@ -20,6 +20,7 @@ from miurafab.geometry.polygons import (
     reversed_faces,
     sides_and_diagonals,
     signed_areas,
+    smallest_box,
 )
 from miurafab.geometry.shapes import common_area
 
@@ -86,3 +87,25 @@ def test_principal_axes_point_in_the_positive_direction(angle, seed):
     assert abs(axes[:, 1] @ [c, s]) > 0.9
     assert axes.T @ axes == pytest.approx(np.eye(2))
     assert (axes[np.abs(axes).argmax(axis=0), [0, 1]] > 0).all()
+
+
+@pytest.mark.parametrize("angle", [-1.4, -0.3, 0.3, 1.2])
+def test_the_smallest_box_of_a_turned_rectangle_is_the_rectangle(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    rectangle = np.array([[0, 0], [40, 0], [40, 25], [0, 25], [13, 7]]) @ [[c, s], [-s, c]]
+    found, sizes = smallest_box(rectangle)
+    assert sorted(sizes) == pytest.approx([25.0, 40.0])
+    assert np.sin(2 * (found - angle)) == pytest.approx(0.0, abs=1e-8)
+
+
+def test_no_turn_gives_a_smaller_box():
+    points = np.random.default_rng(3).normal(size=(30, 2))
+    angle, sizes = smallest_box(points)
+    angles = np.append(np.linspace(0, np.pi / 2, 2001), angle)
+    along = points @ np.stack([np.cos(angles), np.sin(angles)])
+    across = points @ np.stack([-np.sin(angles), np.cos(angles)])
+    areas = np.ptp(along, axis=0) * np.ptp(across, axis=0)
+    assert areas[-1] == pytest.approx(sizes.prod())
+    assert areas[-1] <= 1.0001 * areas.min()
+    line = np.outer(np.arange(4.0), [3.0, 4.0])
+    assert smallest_box(line)[1] == pytest.approx([15.0, 0.0], abs=1e-7)

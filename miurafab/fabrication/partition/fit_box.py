@@ -120,13 +120,6 @@ def fits(values: NDArray[np.float32], width: float, height: float) -> Bools:
     )
 
 
-def box_of(points: Floats) -> tuple[float, float]:
-    """The longer and the shorter side in mm of the smallest box around ``points`` (n, 2)."""
-    _, sizes = boxes_at(points, 0.0, 0.0)
-    best = int(np.argmin(sizes.prod(axis=1)))
-    return float(sizes[best].max()), float(sizes[best].min())
-
-
 def best_turn(points: Floats, width: float, height: float) -> float | None:
     """The angle θ in radians, -π/2 < θ <= π/2, whose turn by -θ fits ``points`` (n, 2) into the
     rectangle with the smallest box, or None if no angle fits. Exact up to :data:`TOLERANCE`.

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.boundary import boundaries, is_pinched, overlapping
-from miurafab.fabrication.partition.fit_box import Space, box_of, support
+from miurafab.fabrication.partition.fit_box import Space, support
 from miurafab.fabrication.partition.grid_dp import Block, GridShape, split_grid
 from miurafab.fabrication.partition.improve import improved
 from miurafab.fabrication.partition.pieces import (
@@ -35,7 +35,7 @@ from miurafab.fabrication.partition.region_growing import grow_patches
 from miurafab.fabrication.seams import inner_seams
 from miurafab.fabrication.tabs import TabRegions, border_tabs, choose_tabs, tab_regions
 from miurafab.geometry.arrays import Bools, Floats, Ints
-from miurafab.geometry.polygons import signed_areas
+from miurafab.geometry.polygons import signed_areas, smallest_box
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -320,7 +320,10 @@ def _check_alone(
             continue
         with_tabs = "" if space.turn(facet) is None else " with its tabs"
         shape = points if with_tabs else facet
-        long, short = box_of(shape) if space.turns is None else np.ptp(shape, axis=0).tolist()
+        if space.turns is None:
+            short, long = np.sort(smallest_box(shape)[1]).tolist()
+        else:
+            long, short = np.ptp(shape, axis=0).tolist()
         along, choice = "", ""
         room = f"the usable bed of {space.width:.1f} mm x {space.height:.1f} mm"
         remedy = "take a larger bed"

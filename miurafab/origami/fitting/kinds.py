@@ -27,7 +27,7 @@ class FlatFoldability(Kind):
         if value == "off":
             return None
         try:
-            float(value)  # type: ignore[arg-type]
+            float(value)  # type: ignore[arg-type]  # TypeError below
         except (TypeError, ValueError):
             pass
         else:

@@ -23,6 +23,7 @@ import numpy as np
 
 from miurafab.errors import InputError, OptionError, PatternError
 from miurafab.files import AnyPath, as_path, new_file, read_bytes
+from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.formats.fold import read_fold, write_fold
@@ -51,6 +52,7 @@ READ = (".fold", *DRAWINGS, ".obj")
 WRITTEN = (*READ, ".stl", ".glb")
 
 
+@verb
 def load(
     path: AnyPath, *, folded: AnyPath | None = None, tolerance: float | None = None
 ) -> CreasePattern:
@@ -75,7 +77,7 @@ def load(
     PatternError
         For a file that is missing or holds no pattern.
     InputError
-        For another ending.
+        For another ending, and for options that do not go with it.
 
     Examples
     --------
@@ -88,6 +90,8 @@ def load(
     ending = path.suffix.lower()
     if folded is not None and ending != ".obj":
         raise OptionError("folded", f"goes with a flat .obj file, and {path} is none")
+    if tolerance is not None and ending not in DRAWINGS:
+        raise OptionError("tolerance", f"goes with a drawing of lines, and {path} is none")
     if ending == ".fold":
         return read_fold(path)
     if ending == ".obj":

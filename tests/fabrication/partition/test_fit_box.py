@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miurafab.fabrication.partition.fit_box import best_turn, box_of, fan, fits, support
+from miurafab.fabrication.partition.fit_box import best_turn, fan, fits, support
 
 clouds = st.tuples(st.integers(3, 12), st.integers(0, 10_000)).map(
     lambda t: np.random.default_rng(t[1]).normal(size=(t[0], 2)) * [80.0, 30.0]
@@ -42,12 +41,6 @@ def test_a_strip_that_fits_only_askew_is_found():
     # Turned by 45 degrees it is 101 / sqrt 2 = 71.418 mm both ways.
     assert best_turn(strip, 71.419, 71.419) is not None
     assert best_turn(strip, 71.417, 71.417) is None
-
-
-def test_box_of_a_turned_rectangle_is_its_sides():
-    c, s = np.cos(0.3), np.sin(0.3)
-    corners = np.array([[0, 0], [40, 0], [40, 25], [0, 25]]) @ np.array([[c, s], [-s, c]])
-    assert box_of(corners) == pytest.approx((40.0, 25.0))
 
 
 @settings(derandomize=True, max_examples=100, deadline=None)
