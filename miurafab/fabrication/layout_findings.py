@@ -9,8 +9,10 @@ from miurafab.fabrication.nesting import Nesting
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_frame import FramedPatches
 from miurafab.fabrication.strokes import Drawn
+from miurafab.fabrication.tabs import MIN_BASE_MM
 from miurafab.fabrication.wording import count
 from miurafab.findings import Finding
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -68,7 +70,10 @@ def layout_findings(
     untabbed = framed.outlined.untabbed.tolist()
     if untabbed:
         edges = count(len(untabbed), "seam edge bears", "seam edges bear")
-        sentence = f"{edges} no tab, since there is no room: use tape there."
+        ends = pattern.edges_vertices[framed.outlined.untabbed]
+        short = int((edge_lengths(pattern.vertices_coords, ends) < MIN_BASE_MM).sum())
+        which = f", {short} of them shorter than {MIN_BASE_MM:g} mm" if short else ""
+        sentence = f"{edges} no tab{which}, since there is no room: use tape there."
         findings.append(Finding("untabbed", sentence, tuple(untabbed)))
     if lettering.left_out:
         names = count(lettering.left_out, "name or number", "names and numbers")

@@ -33,8 +33,11 @@ from miurafab.geometry.polygons import edge_lengths, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
+MIN_BASE_MM = 2.0
+"""A tab with a shorter base tears at its root (judged)."""
+
 MIN_SIDE_MM = 1.0
-"""A tab with a shorter base or a smaller mean height cannot be handled (judged)."""
+"""A tab with a smaller mean height cannot be handled (judged)."""
 
 MIN_AREA_MM2 = 2.0
 """A tab with a smaller glue area does not hold (judged)."""
@@ -122,7 +125,7 @@ class TabRegions:
         """(N,) whether each tab is long and large enough to hold."""
         base = np.linalg.norm(self.points[:, 1] - self.points[:, 0], axis=1)
         area = self.areas
-        large = (base >= MIN_SIDE_MM) & (area >= MIN_SIDE_MM * base) & (area >= MIN_AREA_MM2)
+        large = (base >= MIN_BASE_MM) & (area >= MIN_SIDE_MM * base) & (area >= MIN_AREA_MM2)
         return np.asarray(large & (self.count >= 3))
 
     @property

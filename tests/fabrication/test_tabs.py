@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miurafab.fabrication.partition.patch_outline import outline_patches
-from miurafab.fabrication.tabs import MIN_AREA_MM2, MIN_SIDE_MM, choose_tabs, inset_of
+from miurafab.fabrication.tabs import MIN_AREA_MM2, MIN_BASE_MM, choose_tabs, inset_of
 from miurafab.origami.crease_pattern import CreasePattern
 
 CASES = {
@@ -57,7 +57,7 @@ def assert_tabs_are_sound(pattern, outlined, material):
         # Along its seam edge, and no higher than asked.
         base = shapely.LineString(shapely.get_coordinates(shape)[:2])
         assert seam.buffer(1e-9).contains(base)
-        assert base.length >= MIN_SIDE_MM - 1e-9
+        assert base.length >= MIN_BASE_MM - 1e-9
         line = shapely.get_coordinates(seam)
         way = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
         off = (tabs.polygon(i) - line[0]) @ np.array([-way[1], way[0]])

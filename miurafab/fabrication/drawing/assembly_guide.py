@@ -79,11 +79,13 @@ class _Overview:
     def page(self, canvas: Canvas) -> None:
         layout, pattern = self.views.layout, self.views.pattern
         facets = len(pattern.faces_vertices)
+        several = pattern.pieces_count > 1
+        pieces = f"{count(pattern.pieces_count, 'piece', 'pieces')}, " if several else ""
         copies = f", {layout.copies} copies," if layout.copies > 1 else ""
         top = heading(
             canvas,
             self.title,
-            f"{count(facets, 'facet', 'facets')} in "
+            f"{count(facets, 'facet', 'facets')} in {pieces}"
             f"{count(len(self.views.patches), 'patch', 'patches')}{copies} on "
             f"{count(len(layout.sheets), 'sheet', 'sheets')}",
         )

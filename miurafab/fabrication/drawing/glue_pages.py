@@ -11,7 +11,11 @@ from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.assembly import GlueStep, assembly_order
-from miurafab.fabrication.drawing.instructions import draw_instructions, height_of_instructions
+from miurafab.fabrication.drawing.instructions import (
+    draw_instructions,
+    glueing,
+    height_of_instructions,
+)
 from miurafab.fabrication.drawing.page import (
     BOTTOM,
     HEIGHT,
@@ -57,10 +61,10 @@ class GluePages:
         steps = assembly_order(self.layout.model, self.views.pattern)
         top, notes = HEIGHT - MARGIN - 19, self.notes()
         height = 20.0 + (_TALL if self.in_space else min(_STEP * self.views.aspect, 40.0))
-        glue = self.layout.totals.tabs > 0
+        glue = glueing(self.layout.totals.tabs, self.views.pattern.pieces_count)
         copies = self.layout.copies
         each = f", each of the {copies} copies" if copies > 1 else ""
-        taken = height_of_instructions(notes, glue=glue)
+        taken = height_of_instructions(notes, glue)
         alone = len(self.views.patches) == 1 and not any(step.closes for step in steps)
         shown = [] if alone else list(enumerate(steps))
         first = 3 * int((top - taken - BOTTOM) // height)
@@ -78,7 +82,7 @@ class GluePages:
                 ("folding and glueing", f"Fold first, then glue{each}") if glue else ("folding", "")
             )
             heading(canvas, f"{self.title}: {words[0]}", words[1])
-            draw_instructions(canvas, top, notes, glue=glue)
+            draw_instructions(canvas, top, notes, glue)
             draw(canvas, shown[:first], top - taken)
 
         yield front
@@ -127,7 +131,9 @@ class GluePages:
         if step.onto and not step.tabs:
             words = "No tabs: use tape on the seam"
         if step.all_round:
-            words += ", all round, from outside"
+            words += ", all round"
+        if self.in_space and (step.closes or step.all_round):
+            words += ", from outside"
         lines = wrapped(words, width - 8.5, 8)
         text(canvas, x + 8.5, top - 11, lines[0], 8)
         if len(lines) > 1:

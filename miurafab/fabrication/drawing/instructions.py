@@ -37,6 +37,11 @@ _GLUEING = (
     "Patches are glued best half way unfolded, while the seam is nearly flat. Press until it "
     "holds, then take the next tab.",
 )
+_GLUEING_PIECES = (
+    *_GLUEING[:2],
+    "Pieces meet as they are folded: give each its shape first, then glue the seam from one end to "
+    "the other. The last seams are closed from outside, as on a paper globe.",
+)
 
 
 _COLUMN = (ROOM - 10) / 2
@@ -44,22 +49,31 @@ _STEP = 8.5 * 0.47
 """The line spacing of a paragraph."""
 
 
-def height_of_instructions(notes: Sequence[str], *, glue: bool) -> float:
+def glueing(tabs: int, pieces: int) -> Sequence[str]:
+    """How to glue ``pieces`` with so many ``tabs``; nothing without tabs."""
+    if not tabs:
+        return ()
+    return _GLUEING_PIECES if pieces > 1 else _GLUEING
+
+
+def height_of_instructions(notes: Sequence[str], glue: Sequence[str]) -> float:
     """The height of :func:`draw_instructions` in mm."""
     columns = (
         sum(len(wrapped(line, _COLUMN - 5, 8.5)) * _STEP + 1.4 for line in lines)
-        for lines in ((_FOLDING, _GLUEING) if glue else (_FOLDING,))
+        for lines in (_FOLDING, glue)
     )
     below = sum(len(wrapped(note, ROOM, 8.5)) for note in notes) * _STEP
     return 48.0 + max(columns) + below + 6.0
 
 
-def draw_instructions(canvas: Canvas, top: float, notes: Sequence[str], *, glue: bool) -> None:
-    """How to fold, how to ``glue`` if there are tabs, and ``notes``, from ``top`` down."""
+def draw_instructions(
+    canvas: Canvas, top: float, notes: Sequence[str], glue: Sequence[str]
+) -> None:
+    """How to fold, how to ``glue`` (:func:`glueing`), and ``notes``, from ``top`` down."""
     columns: list[tuple[float, str, Sequence[str]]] = [(MARGIN, "Fold", _FOLDING)]
     _draw_folds(canvas, MARGIN, top - 34)
     if glue:
-        columns.append((MARGIN + _COLUMN + 10, "Glue", _GLUEING))
+        columns.append((MARGIN + _COLUMN + 10, "Glue", glue))
         _draw_tab(canvas, MARGIN + _COLUMN + 10, top - 34)
     lowest = top
     for x, title, lines in columns:

@@ -55,9 +55,11 @@ def edge_letters(layout: Layout, pattern: CreasePattern) -> NDArray[np.str_]:
 _EVEN_ODD = 0
 """The fill of reportlab that leaves holes open."""
 
-_ASIDE, _LOWEST, _UPRIGHT = math.radians(25), math.radians(15), 0.05
-"""A step of gluing is seen this far from the side, and at least from this elevation; a direction
-with less extent than the last, over the size of the shell, says nothing about the azimuth."""
+_ASIDE, _ABOVE, _OVER = math.radians(25), math.radians(15), math.radians(40)
+"""A step of gluing is seen this far from the side and from above; a shell that is less than half as
+high as wide is seen at the last elevation."""
+_UPRIGHT = 0.05
+"""A direction with less extent, over the size of the shell, says nothing about the azimuth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,11 +167,14 @@ class Views:
         out = points[corners[corners >= 0]].mean(axis=0) - middle
         if edges:
             out += points[self.pattern.edges_vertices[list(edges)]].mean(axis=(0, 1)) - middle
-        across = math.hypot(out[0], out[1])
-        if across < _UPRIGHT * float(np.ptp(points, axis=0).max()):
+        across, size = math.hypot(out[0], out[1]), np.ptp(points, axis=0)
+        if across < _UPRIGHT * size.max():
             return AZIMUTH, ELEVATION
-        rise = math.atan2(out[2], across)
-        return math.atan2(out[1], out[0]) + _ASIDE, min(max(rise, _LOWEST), math.pi / 3)
+        azimuth = math.atan2(out[1], out[0]) + _ASIDE
+        if size[2] < size[:2].max() / 2:
+            return azimuth, _OVER  # an open shell
+        rise = math.atan2(out[2], across) + _ABOVE
+        return azimuth, min(max(rise, -math.pi / 6), math.pi / 3)
 
     def _facet(self, canvas: Canvas, seen: Floats, view: View, face: int, fill: Color) -> None:
         """One facet of a ``view``, at its places ``seen`` on the page."""
