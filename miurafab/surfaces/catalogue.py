@@ -8,11 +8,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from miurafab.errors import TargetError
 from miurafab.options import Quantity, angle, number
 from miurafab.surfaces import analytic, curves
+from miurafab.surfaces.profile_files import read_profile
 from miurafab.surfaces.surface import TargetSurface
 
 
@@ -248,9 +250,9 @@ def make_surface(name: str, given: Mapping[str, Any]) -> tuple[TargetSurface, di
     """The named surface and its complete parameters as written, angles in degrees.
 
     ``given`` maps parameter names to numbers or texts with a unit, a bare angle in degrees;
-    ``profile`` is a list of points. What is left out has its default.
-    Raises :class:`~miurafab.errors.TargetError` naming the surface or parameter and what is
-    accepted.
+    ``profile`` is a list of points, or the path of a file of them. What is left out has its
+    default. Raises :class:`~miurafab.errors.TargetError` naming the surface or parameter and what
+    is accepted.
     """
     entry = CATALOGUE.get(name)
     if entry is None:
@@ -260,7 +262,7 @@ def make_surface(name: str, given: Mapping[str, Any]) -> tuple[TargetSurface, di
     written: dict[str, Any] = {key: p.default for key, p in entry.parameters.items()}
     for key, text in given.items():
         if key == "profile" and entry.profile_axes is not None:
-            written["profile"] = text
+            written["profile"] = read_profile(Path(text)) if isinstance(text, str) else text
             continue
         if key not in entry.parameters:
             known = ", ".join(entry.parameters)

@@ -198,7 +198,7 @@ def _named(target: str, given: Values) -> Design:
         if height is not None:
             height = read_value("height", number(), height)
         return _on_heights(read_image(path, height), values, asked, path.stem)
-    if suffix and os.sep in target:
+    if suffix and os.sep in target and target.partition(":")[0] not in CATALOGUE:
         files = ", ".join((".toml", *MESH_SUFFIXES, *IMAGE_SUFFIXES))
         raise TargetError(f"'{target}' cannot be a target: known files are {files}.")
     name, parameters = parse_target(target)
@@ -235,7 +235,10 @@ def _from_file(path: Path, given: Values) -> Design:
             design = _from_mesh(mesh, asked, title)
             target.finish()
         else:
-            design = _on_surface(name, target.rest() | changed, asked, title)
+            values = target.rest()
+            if isinstance(values.get("profile"), str):
+                values["profile"] = str(path.parent / values["profile"])
+            design = _on_surface(name, values | changed, asked, title)
     except OptionError as fault:
         where = "" if fault.option in given else path.name
         raise OptionError(fault.option, fault.complaint, where) from None

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -11,6 +14,7 @@ from scipy.spatial import cKDTree
 from miurafab.errors import TargetError
 from miurafab.geometry.distances import closest_on_mesh
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface, parse_target
+from miurafab.surfaces.profile_files import read_profile
 from miurafab.surfaces.surface import (
     CHORD,
     Domain,
@@ -19,6 +23,7 @@ from miurafab.surfaces.surface import (
     tangents,
     unit,
 )
+from miurafab.workflow.design import design
 
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
@@ -156,3 +161,51 @@ def test_all_round_a_revolution_there_is_no_border_along_the_profile() -> None:
     foot = surface.point(uv)
     off = foot + 0.1 * surface.normal(uv)
     assert np.abs(surface.nearest(off) - foot).max() < 1e-9
+
+
+def test_a_profile_is_read_from_a_list_and_from_a_drawing(tmp_path: Path) -> None:
+    """The drawing has a shorter line beside the profile."""
+    points = [[40.0, 0.0], [60.0, 40.0], [50.0, 90.0], [65.0, 130.0]]
+    (tmp_path / "goblet.csv").write_text("r, z\n40, 0\n60;40\n50 90 # the neck\n\n65,\t130\n")
+    drawing = ezdxf.new()
+    drawing.modelspace().add_line((0, 0), (0, 20))
+    drawing.modelspace().add_lwpolyline(points)
+    drawing.saveas(tmp_path / "goblet.dxf")
+    given = make_surface("revolution", {"profile": points})[0]
+    for name in ("goblet.csv", "goblet.dxf"):
+        request = design(f"revolution:profile={tmp_path / name}").request
+        assert request.target["parameters"]["profile"] == points
+        uv = given.domain.lattice(5, 5)
+        assert np.array_equal(request.surface.point(uv), given.point(uv))
+    (tmp_path / "goblet.toml").write_text(
+        '[target]\nsurface = "revolution"\nprofile = "goblet.csv"\n'
+    )
+    assert design(tmp_path / "goblet.toml").request.target["parameters"]["profile"] == points
+
+
+def test_an_arc_of_a_drawing_is_flattened_to_a_thousandth_of_its_size(tmp_path: Path) -> None:
+    drawing = ezdxf.new()
+    drawing.modelspace().add_arc((50, 0), 30, 90, 270)
+    drawing.saveas(tmp_path / "arc.dxf")
+    points = np.array(read_profile(tmp_path / "arc.dxf"))
+    middle = (points[1:] + points[:-1]) / 2
+    assert np.abs(np.hypot(points[:, 0] - 50, points[:, 1]) - 30).max() < 0.02
+    assert np.abs(np.hypot(middle[:, 0] - 50, middle[:, 1]) - 30).max() < 2e-3 * 60
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("p.csv", "1,2\n3,x\n", "line 2 is '3,x'; a profile has two numbers a line"),
+        ("p.csv", "1,2,3\n", "line 1 is '1,2,3'"),
+        ("p.csv", "", "two or more"),
+        ("p.dxf", "Dear Sir or Madam", "cannot be read as a DXF drawing"),
+        ("p.png", "", "not a file of points; known are .csv, .txt, .dxf"),
+    ],
+)
+def test_a_file_without_a_profile_is_refused(
+    tmp_path: Path, name: str, content: str, words: str
+) -> None:
+    (tmp_path / name).write_text(content)
+    with pytest.raises(TargetError, match=re.escape(words)):
+        make_surface("revolution", {"profile": str(tmp_path / name)})

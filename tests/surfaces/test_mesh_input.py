@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import importlib.util
 import io
 import json
 import struct
@@ -409,3 +410,72 @@ def test_no_alternative_ends_the_search(seed: int) -> None:
     for place, other in surface.alternatives():
         assert place
         assert np.isfinite(other.point(other.domain.lattice(5, 5))).all()
+
+
+# --- STEP ---------------------------------------------------------------------------------------
+
+
+def step_text(size: float, unit: str) -> str:
+    """z = x y / (2 size) over a square: a B-spline face of degree one with straight edges."""
+    corners = [(0, 0, 0), (size, 0, 0), (size, size, size / 2), (0, size, 0)]
+    axes = (
+        "#1=CARTESIAN_POINT('',(0.,0.,0.));#2=DIRECTION('',(0.,0.,1.));#3=DIRECTION('',(1.,0.,0.));"
+    )
+    lines = [
+        axes + "#4=AXIS2_PLACEMENT_3D('',#1,#2,#3);",
+        f"#5=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT({unit},.METRE.));",
+        "#6=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));",
+        "#7=(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT());",
+        "#8=UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-07),#5,'accuracy','');",
+        "#9=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#8))"
+        "GLOBAL_UNIT_ASSIGNED_CONTEXT((#5,#6,#7))REPRESENTATION_CONTEXT('',''));",
+        "#10=APPLICATION_CONTEXT('design');#11=PRODUCT_CONTEXT('',#10,'mechanical');",
+        "#12=PRODUCT('sheet','sheet','',(#11));#13=PRODUCT_DEFINITION_FORMATION('','',#12);",
+        "#14=PRODUCT_DEFINITION_CONTEXT('part definition',#10,'design');",
+        "#15=PRODUCT_DEFINITION('design','',#13,#14);#16=PRODUCT_DEFINITION_SHAPE('','',#15);",
+    ]
+    for k in range(4):
+        a, b = np.array(corners[k], float), np.array(corners[(k + 1) % 4], float)
+        x, y, z = a
+        u, v, w = (b - a) / np.linalg.norm(b - a)
+        lines += [
+            f"#{20 + k}=CARTESIAN_POINT('',({x:.6f},{y:.6f},{z:.6f}));",
+            f"#{30 + k}=VERTEX_POINT('',#{20 + k});",
+            f"#{40 + k}=DIRECTION('',({u:.15f},{v:.15f},{w:.15f}));",
+            f"#{50 + k}=VECTOR('',#{40 + k},1.);#{60 + k}=LINE('',#{20 + k},#{50 + k});",
+            f"#{70 + k}=EDGE_CURVE('',#{30 + k},#{30 + (k + 1) % 4},#{60 + k},.T.);",
+            f"#{80 + k}=ORIENTED_EDGE('',*,*,#{70 + k},.T.);",
+        ]
+    lines += [
+        "#90=EDGE_LOOP('',(#80,#81,#82,#83));#91=FACE_OUTER_BOUND('',#90,.T.);",
+        "#92=B_SPLINE_SURFACE_WITH_KNOTS('',1,1,((#20,#23),(#21,#22)),.UNSPECIFIED.,.F.,.F.,.F.,"
+        "(2,2),(2,2),(0.,1.),(0.,1.),.UNSPECIFIED.);",
+        "#93=ADVANCED_FACE('',(#91),#92,.T.);#94=OPEN_SHELL('',(#93));",
+        "#95=SHELL_BASED_SURFACE_MODEL('',(#94));",
+        "#96=MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#4,#95),#9);",
+        "#97=SHAPE_DEFINITION_REPRESENTATION(#16,#96);",
+    ]
+    return (
+        "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\n"
+        "FILE_NAME('sheet','2026-01-01T00:00:00',(''),(''),'','','');\n"
+        "FILE_SCHEMA(('AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }'));\nENDSEC;\nDATA;\n"
+        + "\n".join(lines)
+        + "\nENDSEC;\nEND-ISO-10303-21;\n"
+    )
+
+
+@pytest.mark.parametrize(("unit", "factor"), [(".MILLI.", 1.0), ("$", 1000.0)])
+def test_a_step_file_is_meshed_in_millimetres_or_names_what_it_needs(
+    tmp_path: Path, unit: str, factor: float
+) -> None:
+    path = tmp_path / "sheet.step"
+    path.write_text(step_text(100.0, unit))
+    if importlib.util.find_spec("cascadio") is None:
+        with pytest.raises(TargetError, match=r"pip install miurafab\[step\]"):
+            read_mesh(path)
+        return
+    vertices, faces, _ = read_mesh(path)
+    assert len(faces) > 100
+    x, y, z = vertices.T / factor
+    assert np.ptp(x) == pytest.approx(100, abs=1e-3)
+    assert np.abs(z - x * y / 200).max() < 0.05
