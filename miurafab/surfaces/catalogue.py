@@ -76,8 +76,11 @@ def _log_spiral(start: float, growth: float, turns: float, length: float) -> Tar
 
 
 def _turned(name: str, profile: curves.ProfileCurve, angle: float) -> TargetSurface:
-    if profile.evenly(400, -0.05, 1.05)[:, 0].min() <= 0:
-        raise TargetError(f"The profile of '{name}' must keep off its axis (r > 0).")
+    least = float(profile.evenly(400)[:, 0].min())
+    if least <= 0:
+        raise TargetError(
+            f"The profile of '{name}' reaches r = {least:.3g}; it must keep off its axis (r > 0)."
+        )
     return analytic.revolution(profile, angle)
 
 

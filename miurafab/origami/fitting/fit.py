@@ -34,6 +34,8 @@ PIECES_ROUND = (1, 2, 6, 8, 12)
 """The numbers of pieces that ``auto`` tries, on a sheet and all round an axis."""
 PATIENCE = 25.0
 """Seconds of processor time for 400 facets, after which no new start is begun."""
+FINE = 1.25
+"""With a clean sheet of this score or less, more pieces are not tried."""
 FAR = 4.0
 """The plain search goes on while the deviation is over this many times that of a good sheet."""
 
@@ -103,7 +105,7 @@ class _FitSearch:
             starts = starts_for(request, pieces)
             likely = [s for s in starts if s.steepest < STEEP and not s.place]
             yield from self._tried(likely)
-            if self._settled():
+            if self._settled() or (self.best is not None and self.best.fine(FINE)):
                 return
         if self.best is None or self.best.rank[0]:
             fewest = self._pieces()[0]

@@ -68,7 +68,7 @@ class Weights:
 
     distance: float = 3.0
     place: float = 0.05
-    rim: float = 1.0
+    rim: float = 3.0
     sectors: float = 4.0
     folds: float = 3.0
     edges: float = 8.0

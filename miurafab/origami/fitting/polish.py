@@ -15,11 +15,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.fitting.candidate import Candidate, candidate, turned_follow
-from miurafab.origami.fitting.fair import fairest
+from miurafab.origami.fitting.fair import PENALTY, fairest
 from miurafab.origami.fitting.inequalities import Bounds, limits
 from miurafab.origami.fitting.objective import FairObjective, Weights
 from miurafab.origami.fitting.request import FitRequest
@@ -29,13 +27,17 @@ from miurafab.origami.fitting.starts import Start
 
 STEP_CAP = 0.25
 """The largest move of a coordinate in one step of the projection, in mean edge lengths."""
-EASING = (1e3,)
-"""The penalties before the full one."""
-EASING_STEPS = 8
-LEGS = (8, 14)
+EASING = ((1e3, 8),)
+"""The penalties before the full one, with their steps."""
+LEGS = ((PENALTY, 8), (PENALTY, 14))
 """Steps with the full penalty, in legs; after each the sheet is projected and judged."""
+FEW = 2000
+"""A sheet of fewer unknowns takes ``MORE`` steps in its last leg, which cost little."""
+MORE = 40
 SCALINGS = 4
-"""The most rounds, each at the scale that the last round left."""
+"""The most rounds within limits, each at the scale that the last round left."""
+SHAPE_FAULTS = ("min-edge", "facet-shape", "flat-foldable")
+"""The faults of a sheet that misses a limit on edges, corners or Kawasaki's condition."""
 BOUND_MARGIN = 2e-3
 """The limits are tightened by this part, since the scale of the sheet still changes."""
 
@@ -53,51 +55,53 @@ def polished(
 ) -> Iterator[Candidate | Attempt]:
     """The fair sheets of ``start``, each better than the one before unless it crosses itself.
 
-    ``on_step`` is called before each step, and may end the search by an exception.
+    The first round leaves the limits on edges, corners and Kawasaki's condition out. Where it
+    misses one of them, the next rounds go on from there within the limits, at the scale that the
+    last round left. ``on_step`` is called before each step, and may end the search by an exception.
     """
-    scale = 1.0
-    if request.size_mm is not None:
-        extent = np.ptp(start.unknowns.whole(start.x)[1], axis=0).max()
-        scale = request.size_mm / float(extent)
-    x, eased = start.x, False
-    iterations = 0
-    for _ in range(SCALINGS):
-        bounds = limits(request, start.unknowns, scale, BOUND_MARGIN)
-        objective = _objective(request, start, x, bounds)
-        constraints = start.unknowns.constraints(request.exactly_flat_foldable)
-        tick = _ticking(on_step)
-        if not eased:
-            for penalty in EASING:
-                sheet = fairest(
-                    objective,
-                    start.unknowns,
-                    constraints,
-                    x,
-                    steps=EASING_STEPS,
-                    penalty=penalty,
-                    on_step=tick,
-                )
-                x, objective = sheet.x, replace(objective, feet=sheet.feet)
-                iterations += sheet.steps
-            eased = True
-        best: Candidate | None = None
-        for steps in LEGS:
-            sheet = fairest(objective, start.unknowns, constraints, x, steps=steps, on_step=tick)
+    unknowns = start.unknowns
+    unlimited = replace(
+        request,
+        min_edge_mm=None,
+        min_angle=None,
+        max_angle=None,
+        max_aspect=None,
+        flat_foldable=0.0 if request.exactly_flat_foldable else None,
+    )
+    constraints = unknowns.constraints(request.exactly_flat_foldable)
+    tick = _ticking(on_step)
+    x, iterations, scale = start.x, 0, 1.0
+    for number in range(1 + SCALINGS):
+        asked = request if number else unlimited
+        bounds = limits(asked, unknowns, scale, BOUND_MARGIN)
+        objective = _objective(asked, start, x, bounds)
+        last: Candidate | None = None
+        for penalty, steps in LEGS if number else (*EASING, *LEGS):
+            if (penalty, steps) == LEGS[-1] and len(x) < FEW:
+                steps = MORE
+            sheet = fairest(
+                objective, unknowns, constraints, x, steps=steps, penalty=penalty, on_step=tick
+            )
             x, objective = sheet.x, replace(objective, feet=sheet.feet)
             iterations += sheet.steps
+            if penalty < PENALTY:
+                continue
             solution = _projected(request, start, x, bounds if bounds.any else None)
             if not solution.converged:
                 yield _failed(start, solution)
                 continue
-            best = candidate(request, start, solution.x, iterations + solution.iterations, True)
+            last = candidate(request, start, solution.x, iterations + solution.iterations, True)
             if bounds.any:
-                best = replace(best, active_bounds=bounds.count(solution.active))
-            yield best
+                last = replace(last, active_bounds=bounds.count(solution.active))
+            yield last
             if sheet.steps < steps:
                 break
-        if best is None or not bounds.any or not best.faults:
+        limited = limits(request, unknowns, scale).any
+        if last is None or not limited or (number and not last.faults):
             return
-        scale = best.pattern.scale
+        if number == 0 and not any(fault.code in SHAPE_FAULTS for fault in last.faults):
+            return
+        scale = last.pattern.scale
 
 
 def _ticking(on_step: Callable[[], None] | None) -> Callable[[int, float], None] | None:
@@ -108,14 +112,14 @@ def _objective(request: FitRequest, start: Start, x: Floats, bounds: Bounds) -> 
     """The fair objective with the limits ``bounds`` as hinges."""
     weights = Weights()
     if bounds.min_edge is not None:
-        shortest = max(weights.shortest_edge, 1.02 * bounds.min_edge / start.unknowns.length)
+        shortest = max(weights.shortest_edge, bounds.min_edge / start.unknowns.length)
         weights = replace(weights, shortest_edge=shortest)
     if bounds.angles is not None:
         low, high = bounds.angles
         weights = replace(
             weights,
-            least_sector=max(weights.least_sector, low + 0.01),
-            greatest_sector=min(weights.greatest_sector, high - 0.01),
+            least_sector=max(weights.least_sector, low),
+            greatest_sector=min(weights.greatest_sector, high),
         )
     return FairObjective.of(
         start.surface,
@@ -125,8 +129,8 @@ def _objective(request: FitRequest, start: Start, x: Floats, bounds: Bounds) -> 
         follow=turned_follow(request.follow, start.rows_along),
         rim=start.rim,
         weights=weights,
-        aspect=None if bounds.aspect is None else 0.98 * bounds.aspect,
-        kawasaki=None if bounds.kawasaki is None else 0.95 * bounds.kawasaki,
+        aspect=bounds.aspect,
+        kawasaki=bounds.kawasaki,
     )
 
 

@@ -19,7 +19,7 @@ from miurafab.findings import Finding
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.request import FitRequest
-from miurafab.origami.fitting.result import INTERRUPTED, FitResult
+from miurafab.origami.fitting.result import INTERRUPTED, TIME_RAN_OUT, FitResult
 
 COARSEST = 4
 """Facets along the longer side of the coarsest sheet tried."""
@@ -46,7 +46,11 @@ def coarsest(
             columns, rows = _shape(request, longer)
             if on_progress is not None:
                 on_progress(1 - 0.8 ** len(tried), f"{columns}x{rows} facets")
-            tried[longer] = fit(replace(request, facets=(columns, rows)))
+            limit = request.timeout
+            left = None if limit is None else limit - (time.perf_counter() - started)
+            if left is not None and left <= 0:
+                raise TimeoutError
+            tried[longer] = fit(replace(request, facets=(columns, rows), timeout=left))
             if tried[longer].status == "interrupted":
                 raise KeyboardInterrupt
         return tried[longer]
@@ -54,7 +58,9 @@ def coarsest(
     try:
         best = _search(request, trial, tried)
     except KeyboardInterrupt:
-        best = _best_so_far(request, tried)
+        best = _best_so_far(request, tried, "interrupted", INTERRUPTED)
+    except TimeoutError:
+        best = _best_so_far(request, tried, "infeasible", TIME_RAN_OUT)
     if on_progress is not None:
         on_progress(1.0, "done")
     return replace(
@@ -81,17 +87,21 @@ def _search(
     return replace(best, advice=why.sentence, findings=(why,))
 
 
-def _best_so_far(request: FitRequest, tried: Mapping[int, FitResult]) -> FitResult:
-    """The result to hand back after Ctrl-C. Raises ``KeyboardInterrupt`` where no size has one."""
+def _best_so_far(
+    request: FitRequest, tried: Mapping[int, FitResult], status: str, why: Finding
+) -> FitResult:
+    """The result to hand back after Ctrl-C or at the time limit, with ``why`` as its advice. Raises
+    ``KeyboardInterrupt`` where no size has a sheet.
+    """
     miss = _miss(request)
     sheets = [tried[n] for n in sorted(tried) if tried[n].pattern is not None]
     if not sheets:
         raise KeyboardInterrupt
     return replace(
         min(sheets, key=miss),
-        status="interrupted",
-        advice=INTERRUPTED.sentence,
-        findings=(INTERRUPTED,),
+        status=status,
+        advice=why.sentence,
+        findings=(why,),
     )
 
 
