@@ -53,7 +53,9 @@ def test_svg(layout):
 
 
 def test_pdf(layout):
-    sheets = read_pdf(sheets_pdf(layout.toolpaths, "test"))
+    written = sheets_pdf(layout.toolpaths, "test")
+    assert b"ASCII85Decode" not in written, "text takes a quarter more room"
+    sheets = read_pdf(written)
     assert len(sheets) == len(layout.toolpaths)
     for (size, found), toolpath in zip(sheets, layout.toolpaths, strict=True):
         assert size == pytest.approx((toolpath.width_mm, toolpath.height_mm), abs=1e-3)

@@ -46,7 +46,7 @@ def standing(tabs: TabRegions) -> StandingTabs:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class SplitPiece:
     """One piece: its ``facets`` (n,) in the whole pattern, and the ``pattern`` of these facets
     alone, in their order. Its ``cells`` are those of the whole pattern.
     """
@@ -55,12 +55,12 @@ class Piece:
     pattern: CreasePattern
 
 
-def pieces_of(pattern: CreasePattern) -> list[Piece]:
+def pieces_of(pattern: CreasePattern) -> list[SplitPiece]:
     """The pieces in the order of their numbers, then of their lowest facets."""
     label = components(pattern)
     cells = lattice_cells(pattern)
     if label.max() == 0:
-        return [Piece(np.arange(len(label)), replace(pattern, cells=cells))]
+        return [SplitPiece(np.arange(len(label)), replace(pattern, cells=cells))]
     numbers = label if pattern.pieces is None else pattern.pieces
     first = np.unique(label, return_index=True)[1]
     order = np.lexsort((first, numbers[first]))
@@ -76,7 +76,7 @@ def components(pattern: CreasePattern) -> Ints:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _piece(pattern: CreasePattern, facets: Ints) -> Piece:
+def _piece(pattern: CreasePattern, facets: Ints) -> SplitPiece:
     faces = pattern.faces_vertices[facets]
     faces = faces[:, : int((faces >= 0).sum(axis=1).max())]
     vertices = np.unique(faces[faces >= 0])
@@ -92,7 +92,7 @@ def _piece(pattern: CreasePattern, facets: Ints) -> Piece:
         faces_vertices=place[faces],
         cells=None if pattern.cells is None else pattern.cells[facets],
     )
-    return Piece(facets, part)
+    return SplitPiece(facets, part)
 
 
 def lattice_cells(pattern: CreasePattern) -> Ints | None:

@@ -24,7 +24,7 @@ from miurafab.fabrication.partition.fit_box import Space, support
 from miurafab.fabrication.partition.grid_dp import Block, GridShape, split_grid
 from miurafab.fabrication.partition.improve import improved
 from miurafab.fabrication.partition.pieces import (
-    Piece,
+    SplitPiece,
     StandingTabs,
     full_grid,
     lattice_cells,
@@ -89,7 +89,7 @@ def split(
 
 
 def _split(
-    piece: Piece,
+    piece: SplitPiece,
     part: Ints,
     border: StandingTabs,
     space: Space,
@@ -259,7 +259,7 @@ def check_facets(pattern: CreasePattern) -> None:
             )
 
 
-def _fits_whole(piece: Piece, tabs: StandingTabs, space: Space) -> bool:
+def _fits_whole(piece: SplitPiece, tabs: StandingTabs, space: Space) -> bool:
     """Whether a piece with ``tabs`` on its border fits and can be one patch."""
     pattern = piece.pattern
     points = np.concatenate([pattern.vertices_coords, tabs.points[tabs.present]])
@@ -307,7 +307,7 @@ def _grid_shape(
 
 
 def _check_alone(
-    piece: Piece, doubtful: Bools, tabs: TabRegions, space: Space, options: LayoutOptions
+    piece: SplitPiece, doubtful: Bools, tabs: TabRegions, space: Space, options: LayoutOptions
 ) -> None:
     """Raise a LayoutError for the first ``doubtful`` (n,) facet that fits at no angle."""
     pattern = piece.pattern
