@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import reprlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +21,7 @@ from scipy.interpolate import NdBSpline, make_interp_spline
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats
+from miurafab.surfaces.frame import described, origin_for, origin_in
 from miurafab.surfaces.smoothing import continued
 from miurafab.surfaces.surface import (
     Domain,
@@ -56,11 +57,14 @@ class SampledSurface:
         The parameters of the samples.
     domain : Domain
         The parameters of the target. It lies inside ``span``.
+    origin : (3,) float64
+        What the samples are relative to (:mod:`miurafab.surfaces.frame`).
     """
 
     points: Floats
     span: Domain
     domain: Domain
+    origin: Floats = field(default_factory=lambda: np.zeros(3))
 
     def __repr__(self) -> str:
         rows, columns = self.points.shape[:2]
@@ -103,6 +107,7 @@ class SampledSurface:
             "samples": self.points.tolist(),
             "span": [span.u0, span.u1, span.v0, span.v1],
             "domain": [domain.u0, domain.u1, domain.v0, domain.v1],
+            **described(self.origin),
         }
 
 
@@ -111,11 +116,12 @@ def sampled_before(description: Mapping[str, Any]) -> SampledSurface:
     try:
         points = np.array(description["samples"], dtype=np.float64)
         span, domain = (read_domain(description[key]) for key in ("span", "domain"))
+        origin = origin_in(description)
     except (KeyError, TypeError, ValueError):
         raise TargetError("The samples of the target are damaged.") from None
     if points.ndim != 3 or points.shape[2] != 3 or min(points.shape[:2]) < 4:
         raise TargetError("The samples of the target are damaged.")
-    return SampledSurface(points, span, domain)
+    return SampledSurface(points, span, domain, origin)
 
 
 def through(points: Floats, span: Domain, domain: Domain | None = None) -> SampledSurface:
@@ -131,8 +137,8 @@ def through(points: Floats, span: Domain, domain: Domain | None = None) -> Sampl
     if not np.isfinite(points).all():
         row, column = np.argwhere(~np.isfinite(points).all(axis=2))[0].tolist()
         raise TargetError(f"The point in row {row}, column {column} of the grid is not finite.")
-    points = rounded(points)
-    surface = SampledSurface(points, span, domain or span)
+    origin = origin_for(points.reshape(-1, 3))
+    surface = SampledSurface(rounded(points - origin), span, domain or span, origin)
     lattice = surface.domain.lattice(33, 33)
     along, across = tangents(surface, lattice)
     area = np.linalg.norm(np.cross(along, across), axis=-1)
@@ -216,7 +222,7 @@ def sample(
     for count in SAMPLES:
         surface = through(evaluate(span.lattice(count, count)), span, domain)
         between = _midpoints(domain, count)
-        gap = np.linalg.norm(surface.point(between) - evaluate(between), axis=-1)
+        gap = np.linalg.norm(surface.point(between) + surface.origin - evaluate(between), axis=-1)
         miss = float(gap.max()) / _diagonal(surface.points)
         if miss <= TOLERANCE:
             break

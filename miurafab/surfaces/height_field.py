@@ -79,7 +79,8 @@ def from_heights(
     surface, _ = sample(
         lambda uv: np.concatenate([uv, spline(uv)[..., 2:]], axis=-1), domain, domain
     )
-    miss = float(np.abs(surface.point(places)[:, 2] - points[:, 2]).max())
+    heights_there = surface.point(places)[:, 2] + surface.origin[2]
+    miss = float(np.abs(heights_there - points[:, 2]).max())
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     if miss <= _TOLD * size:
         return surface, ()

@@ -167,3 +167,25 @@ def test_a_point_cloud_is_refused_with_a_way_out(tmp_path: Path):
 def test_a_damaged_description_is_refused(target):
     with pytest.raises(PatternError, match="damaged"):
         described_surface(target)
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0, 3e6), (4e5, 5e6, 300.0)])
+def test_points_and_heights_far_from_the_origin_give_the_same_surface(place):
+    x, y = np.meshgrid(np.linspace(-1, 1, 20), np.linspace(-1, 1, 16))
+    points = np.stack([x, y, bump(x, y)], axis=-1)
+    here, there = from_points(points), from_points(points + place)
+    if place[0]:
+        there_by_heights, here_by_heights = there, here
+    else:
+        here_by_heights, _ = from_heights(points[..., 2], 0.1)
+        there_by_heights, findings = from_heights(points[..., 2] + place[2], 0.1)
+        assert findings == ()
+    uv = here.domain.lattice(11, 13)
+    assert np.abs(there.point(uv) + there.origin - place - here.point(uv)).max() < 5e-8
+    uv = here_by_heights.domain.lattice(11, 13)
+    shifted = there_by_heights.point(uv) + there_by_heights.origin - place
+    assert np.abs(shifted - here_by_heights.point(uv)).max() < 1e-6
+    again, _ = described_surface(json.loads(json.dumps(there.description)))
+    assert np.array_equal(again.point(uv), there.point(uv))
+    assert np.array_equal(again.origin, there.origin)
+    assert np.abs(again.point(uv)).max() < 10
