@@ -85,7 +85,7 @@ def scaled(name: str, facets: int, worst: float) -> CreasePattern:
         c[-inner:] -= kept
         return c, jacobian
 
-    solution = project(constraints, x, conditions.places, cap=0.25 * conditions.length)
+    solution = project(constraints, x, cap=0.25 * conditions.length)
     assert solution.converged, solution.reason
     return _pattern(pattern, solution.x)
 

@@ -139,7 +139,6 @@ def _projected(request: FitRequest, start: Start, x: Floats, bounds: Bounds | No
     return project(
         unknowns.constraints(request.exactly_flat_foldable),
         x,
-        unknowns.places,
         inequalities=None if bounds is None else unknowns.of_unknowns(bounds),
         cap=STEP_CAP * unknowns.length,
     )

@@ -32,16 +32,14 @@ from miurafab.origami.fitting.solver import Constraints
 class Unknowns:
     """The unknowns x (n,) of a sheet; ``charts`` is where the conditions are stated.
 
-    ``places`` (n, 2) are whole-number places of the unknowns in the plane, for the elimination
-    order. ``length`` is the mean edge length. ``substitution`` (3V, n) is T, and None where the
-    unknowns are the coordinates of the vertices. ``stated`` (F,) and ``interior`` (I,) choose the
-    facets and the interior vertices whose conditions are stated, where others repeat them.
-    ``whole`` makes the charts and the vertices (V, 3) of the whole sheet of the unknowns.
+    ``length`` is the mean edge length. ``whole`` makes the charts and the vertices (V, 3) of the
+    whole sheet of the unknowns. ``substitution`` (3V, n) is T, and None where the unknowns are the
+    coordinates of the vertices. ``stated`` (F,) and ``interior`` (I,) choose the facets and the
+    interior vertices whose conditions are stated, where others repeat them.
     """
 
     charts: QuadCharts
     length: float
-    places: Ints
     whole: Callable[[Floats], tuple[QuadCharts, Floats]]
     substitution: sparse.csr_array | None = None
     stated: Bools | None = None
@@ -50,8 +48,7 @@ class Unknowns:
     @classmethod
     def all_of(cls, charts: QuadCharts, length: float) -> Unknowns:
         """The coordinates of all vertices of ``charts``."""
-        places = charts.lattice.repeat(3, axis=0)
-        return cls(charts, length, places, lambda x: (charts, x.reshape(-1, 3)))
+        return cls(charts, length, lambda x: (charts, x.reshape(-1, 3)))
 
     @classmethod
     def ring(cls, piece_of_column: Ints, rows: int, length: float, turn: float) -> Unknowns:
@@ -72,7 +69,6 @@ class Unknowns:
         one = sparse.eye_array(wide)
         back, here, on = (sparse.kron(one, about_z(k * turn)) for k in (-1, 0, 1))
         blocks = [[None, back], [here, None], [None, here], [on, None], [None, on]]
-        vertex = np.arange(2 * wide, dtype=np.int64).repeat(3) % wide
         inner = charts.lattice[charts.interior_vertices, 1]
         sheet = QuadCharts.of_cells(np.ones((rows, columns), dtype=bool), piece_of_column)
 
@@ -85,7 +81,6 @@ class Unknowns:
         return cls(
             charts,
             length,
-            np.stack([vertex, 0 * vertex], axis=1),
             whole,
             sparse.csr_array(sparse.block_array(blocks, format="csr")),
             stated=np.isin(charts.cells[:, 1], (0, 1)),
@@ -121,9 +116,7 @@ class Unknowns:
             points = grid[up, around % columns]
             return body, np.einsum("vab,vb->va", turned[around // columns], points)
 
-        vertex = np.arange(columns * (rows + 1), dtype=np.int64).repeat(3)
-        places = np.stack([vertex % columns, vertex // columns], axis=1)
-        return cls(charts, length, places, whole, substitution)
+        return cls(charts, length, whole, substitution)
 
     def vertices(self, x: Floats) -> Floats:
         """(V, 3) the vertices of ``charts``."""

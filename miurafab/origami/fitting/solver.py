@@ -10,8 +10,7 @@ to redundant constraints (which eps is for), and a fifth of the size of the KKT 
 Inequalities g(x) >= 0 join by an active set: a violated row is held at zero until its multiplier
 shows that the other rows keep it satisfied.
 
-The rows are eliminated in nested dissection order, computed once for each sparsity pattern. Near
-the end J hardly changes, so conjugate gradients on the last factor replace a new factor.
+Near the end J hardly changes, so conjugate gradients on the last factor replace a new factor.
 This module knows nothing of origami.
 """
 
@@ -24,9 +23,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg
 
-from miurafab.geometry.arrays import Bools, Floats, Ints
-from miurafab.geometry.sparse import Factor, factor_symmetric
-from miurafab.origami.fitting.nested_dissection import boxes_of_rows, nested_dissection
+from miurafab.geometry.arrays import Bools, Floats
+from miurafab.geometry.sparse import Factor, SymmetricSolver
 
 Constraints = Callable[[Floats], tuple[Floats, sparse.csr_array]]
 
@@ -52,30 +50,29 @@ class Projection:
     active: Bools
 
 
-@dataclass(frozen=True, eq=False)
 class GramFactor:
-    """A factor of J J^T, whose rows are eliminated in the ``order`` (m,)."""
+    """The last factor of J J^T; the order of elimination is kept from one J to the next."""
 
-    order: Ints
-    factor: Factor
+    def __init__(self) -> None:
+        self._solver = SymmetricSolver()
+        self._factor: Factor | None = None
+        self.rows = 0
 
-    @classmethod
-    def of(cls, jacobian: sparse.csr_array, order: Ints) -> GramFactor | None:
-        """The factor, or None where the matrix is singular to the last digit."""
-        ordered = jacobian[order]
-        gram = (ordered @ ordered.T.tocsr()).tocsc()
+    def renew(self, jacobian: sparse.csr_array) -> bool:
+        """Factor J J^T; False where the matrix is singular to the last digit."""
+        gram = (jacobian @ jacobian.T.tocsr()).tocsc()
         gram.setdiag(gram.diagonal() * (1 + REGULARISATION) + 1e-300)
+        gram.sort_indices()
         try:
-            factor = factor_symmetric(gram, reorder=False)
+            self._factor, self.rows = self._solver.factor(gram), gram.shape[0]
         except RuntimeError:
-            return None
-        return cls(order, factor)
+            self._factor, self.rows = None, 0
+        return self._factor is not None
 
     def solve(self, right: Floats) -> Floats:
         """The solution (m,) of J J^T mu = ``right`` (m,)."""
-        solution = np.empty_like(right)
-        solution[self.order] = self.factor.solve(right[self.order])
-        return solution
+        assert self._factor is not None
+        return self._factor.solve(right)
 
     def refine(self, jacobian: sparse.csr_array, right: Floats) -> Floats | None:
         """The solution for a slightly different ``jacobian``; None if that takes too long."""
@@ -87,15 +84,9 @@ class GramFactor:
         return None if left else np.asarray(solution, dtype=np.float64)
 
 
-def elimination_order(jacobian: sparse.csr_array, places: Ints) -> Ints:
-    """(m,) the nested dissection order of the rows; the columns have the ``places`` (n, 2)."""
-    return nested_dissection(*boxes_of_rows(jacobian, places))
-
-
 def project(
     constraints: Constraints,
     x: Floats,
-    places: Ints,
     *,
     inequalities: Constraints | None = None,
     tolerance: float = 1e-13,
@@ -104,13 +95,11 @@ def project(
 ) -> Projection:
     """Move ``x`` onto c(x) = 0, g(x) >= 0 until max|c| and max(-g) are at most ``tolerance``.
 
-    ``places`` (n, 2) are whole-number places of the unknowns in the plane, for the ordering. No
-    coordinate moves by more than ``cap`` in a step. Failure is a result: ``reason`` says why.
+    No coordinate moves by more than ``cap`` in a step. Failure is a result: ``reason`` says why.
     """
     state = _Rows.at(constraints, inequalities, x, None)
     residual, best, since_best = state.residual, state.residual, 0
-    factor: GramFactor | None = None
-    order, ordered_for = np.zeros(0, dtype=np.int64), None
+    factor, factored_for = GramFactor(), None
     last_step = np.inf
 
     def ended(iterations: int, converged: bool, reason: str) -> Projection:
@@ -119,22 +108,20 @@ def project(
     for iteration in range(max_iterations):
         values, jacobian = state.values, state.jacobian
         if residual <= tolerance:
-            if factor is not None and len(factor.order) == len(values):
+            if factor.rows and factor.rows == len(values):
                 # one more step with the last factor lowers the residual to rounding
                 trial = x - jacobian.T @ factor.solve(values)
                 following = _Rows.at(constraints, inequalities, trial, state.held)
                 if following.residual < residual:
                     x, state, residual = trial, following, following.residual
             return ended(iteration, True, "converged")
-        same_rows = ordered_for is not None and np.array_equal(ordered_for, state.held)
+        same_rows = factored_for is not None and np.array_equal(factored_for, state.held)
         mu = None
-        if factor is not None and same_rows and last_step < SMALL_STEP * cap:
+        if same_rows and last_step < SMALL_STEP * cap:
             mu = factor.refine(jacobian, values)
-        if mu is None:
-            if not same_rows:
-                order, ordered_for = elimination_order(jacobian, places), state.held
-            factor = GramFactor.of(jacobian, order)
-            mu = None if factor is None else factor.solve(values)
+        if mu is None and factor.renew(jacobian):
+            factored_for = state.held
+            mu = factor.solve(values)
         step = None if mu is None else -(jacobian.T @ mu)
         if mu is None or step is None or not np.isfinite(step).all():
             return ended(iteration, False, "the linear system became singular")

@@ -60,7 +60,7 @@ def test_projection_from_it_takes_few_steps(name: str) -> None:
     made, charts = seeded(make_surface(name, {})[0], 16, 16, Corrugation.from_stretches(1.3, 1.3))
     unknowns = Unknowns.all_of(charts, mean_edge(made, charts))
     constraints, cap = unknowns.constraints(False), 0.25 * unknowns.length
-    found = project(constraints, made.vertices.ravel(), unknowns.places, cap=cap)
+    found = project(constraints, made.vertices.ravel(), cap=cap)
     assert found.converged
     assert found.iterations <= 9
 
