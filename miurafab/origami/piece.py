@@ -37,11 +37,12 @@ def pieces_of(pattern: CreasePattern) -> tuple[Piece, ...]:
     if pattern.pieces is None:
         counts = (pattern.vertices_coords, pattern.edges_vertices, pattern.faces_vertices)
         return (Piece(pattern, *(np.arange(len(array)) for array in counts)),)
-    return tuple(_piece(pattern, number) for number in range(pattern.pieces_count))
+    numbers = range(pattern.pieces_count)
+    return tuple(piece_of(pattern, np.flatnonzero(pattern.pieces == n)) for n in numbers)
 
 
-def _piece(pattern: CreasePattern, number: int) -> Piece:
-    facets = np.flatnonzero(pattern.pieces == number)
+def piece_of(pattern: CreasePattern, facets: Ints) -> Piece:
+    """The ``facets`` (n,) of ``pattern`` alone, in their order."""
     faces = pattern.faces_vertices[facets]
     vertices = np.unique(faces[faces >= 0])
     edges = np.unique(pattern.faces_edges[facets][faces >= 0])

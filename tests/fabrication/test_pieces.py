@@ -15,7 +15,7 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.assembly import assembly_order
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_outline import outline_patches
-from miurafab.fabrication.partition.pieces import full_grid, pieces_of
+from miurafab.fabrication.partition.pieces import full_grid, hanging_together
 from miurafab.fabrication.partition.split import split
 from miurafab.fabrication.seams import border_seams
 from miurafab.fabrication.sheets import lay_out
@@ -66,7 +66,7 @@ def test_pieces_that_fit_stay_whole_wherever_they_lie(name):
         pattern, vertices_coords=pattern.vertices_coords + 5000.0 * owner[:, None] * [1.0, 0.3]
     )
     for placed in (pattern, far):
-        found = split(placed, 300.0, 300.0, card())
+        found = split(placed, 360.0, 260.0, card())
         np.testing.assert_array_equal(found, pattern.pieces)
 
 
@@ -164,12 +164,12 @@ def test_cells_give_the_lines_for_seams_where_there_is_no_whole_grid():
 
 
 def test_a_whole_piece_is_a_grid_and_a_trimmed_one_is_not():
-    for piece in pieces_of(two_pieces()):
+    for piece in hanging_together(two_pieces()):
         grid = full_grid(piece.pattern)
         assert grid.shape == (8, 4)
         row, column = np.indices(grid.shape)
         cells = piece.pattern.cells[grid]
         np.testing.assert_array_equal(cells[..., 0] - cells[0, 0, 0], column)
         np.testing.assert_array_equal(cells[..., 1], row)
-    for piece in pieces_of(two_trimmed_pieces()):
+    for piece in hanging_together(two_trimmed_pieces()):
         assert full_grid(piece.pattern) is None

@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from miurafab.fabrication.tabs import TabRegions
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.piece import Piece, piece_of, pieces_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,27 +46,18 @@ def standing(tabs: TabRegions) -> StandingTabs:
     return StandingTabs(tabs.own_face, tabs.points, tabs.present)
 
 
-@dataclass(frozen=True, eq=False)
-class SplitPiece:
-    """One piece: its ``facets`` (n,) in the whole pattern, and the ``pattern`` of these facets
-    alone, in their order. Its ``cells`` are those of the whole pattern.
+def hanging_together(pattern: CreasePattern) -> list[Piece]:
+    """The pieces in the order of their numbers, then of their lowest facets. Their cells are those
+    of the lattice of the whole pattern.
     """
-
-    facets: Ints
-    pattern: CreasePattern
-
-
-def pieces_of(pattern: CreasePattern) -> list[SplitPiece]:
-    """The pieces in the order of their numbers, then of their lowest facets."""
     label = components(pattern)
-    cells = lattice_cells(pattern)
-    if label.max() == 0:
-        return [SplitPiece(np.arange(len(label)), replace(pattern, cells=cells))]
     numbers = label if pattern.pieces is None else pattern.pieces
     first = np.unique(label, return_index=True)[1]
-    order = np.lexsort((first, numbers[first]))
-    whole = replace(pattern, cells=cells)
-    return [_piece(whole, np.flatnonzero(label == part)) for part in order.tolist()]
+    order = first[np.lexsort((first, numbers[first]))]
+    whole = replace(pattern, cells=lattice_cells(pattern))
+    if len(order) == 1:
+        return list(pieces_of(replace(whole, pieces=None)))
+    return [piece_of(whole, np.flatnonzero(label == label[facet])) for facet in order.tolist()]
 
 
 def components(pattern: CreasePattern) -> Ints:
@@ -74,25 +66,6 @@ def components(pattern: CreasePattern) -> Ints:
     pairs = pattern.edges_faces[(pattern.edges_faces >= 0).all(axis=1)]
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)
-
-
-def _piece(pattern: CreasePattern, facets: Ints) -> SplitPiece:
-    faces = pattern.faces_vertices[facets]
-    faces = faces[:, : int((faces >= 0).sum(axis=1).max())]
-    vertices = np.unique(faces[faces >= 0])
-    place = np.full(len(pattern.vertices_coords) + 1, -1)
-    place[vertices] = np.arange(len(vertices))
-    edges = np.unique(pattern.faces_edges[facets])
-    edges = edges[edges >= 0]
-    part = CreasePattern(
-        vertices_coords=pattern.vertices_coords[vertices],
-        edges_vertices=place[pattern.edges_vertices[edges]],
-        edges_assignment=pattern.edges_assignment[edges],
-        edges_fold_angle=pattern.edges_fold_angle[edges],
-        faces_vertices=place[faces],
-        cells=None if pattern.cells is None else pattern.cells[facets],
-    )
-    return SplitPiece(facets, part)
 
 
 def lattice_cells(pattern: CreasePattern) -> Ints | None:

@@ -24,11 +24,10 @@ from miurafab.fabrication.partition.fit_box import Space, support
 from miurafab.fabrication.partition.grid_dp import Block, GridShape, split_grid
 from miurafab.fabrication.partition.improve import improved
 from miurafab.fabrication.partition.pieces import (
-    SplitPiece,
     StandingTabs,
     full_grid,
+    hanging_together,
     lattice_cells,
-    pieces_of,
     standing,
 )
 from miurafab.fabrication.partition.region_growing import grow_patches
@@ -37,6 +36,7 @@ from miurafab.fabrication.tabs import TabRegions, border_tabs, choose_tabs, tab_
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import signed_areas, smallest_box
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.piece import Piece
 from miurafab.profiles import Material
 
 _MANY = 30_000
@@ -65,7 +65,7 @@ def split(
     check_facets(pattern)
     _check_lines(pattern, options)
     number = np.empty(len(pattern.faces_vertices), dtype=np.int64)
-    pieces = pieces_of(pattern)
+    pieces = hanging_together(pattern)
     for place, piece in enumerate(pieces):
         number[piece.facets] = place
     border = standing(border_tabs(pattern, material, options))
@@ -89,7 +89,7 @@ def split(
 
 
 def _split(
-    piece: SplitPiece,
+    piece: Piece,
     part: Ints,
     border: StandingTabs,
     space: Space,
@@ -259,7 +259,7 @@ def check_facets(pattern: CreasePattern) -> None:
             )
 
 
-def _fits_whole(piece: SplitPiece, tabs: StandingTabs, space: Space) -> bool:
+def _fits_whole(piece: Piece, tabs: StandingTabs, space: Space) -> bool:
     """Whether a piece with ``tabs`` on its border fits and can be one patch."""
     pattern = piece.pattern
     points = np.concatenate([pattern.vertices_coords, tabs.points[tabs.present]])
@@ -307,7 +307,7 @@ def _grid_shape(
 
 
 def _check_alone(
-    piece: SplitPiece, doubtful: Bools, tabs: TabRegions, space: Space, options: LayoutOptions
+    piece: Piece, doubtful: Bools, tabs: TabRegions, space: Space, options: LayoutOptions
 ) -> None:
     """Raise a LayoutError for the first ``doubtful`` (n,) facet that fits at no angle."""
     pattern = piece.pattern
