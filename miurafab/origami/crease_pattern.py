@@ -11,7 +11,7 @@ folded form. The vertices of a seam are doubled: each piece has its own.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -130,6 +130,16 @@ class CreasePattern(Shown):
         if "mesh" in target:
             return Path(str(target["mesh"])).stem
         return str(target.get("surface", target.get("name", "")))
+
+    def scaled(self, factor: float) -> CreasePattern:
+        """The same pattern, ``factor`` times as large flat and folded."""
+        folded = self.folded_coords
+        return replace(
+            self,
+            vertices_coords=factor * self.vertices_coords,
+            folded_coords=None if folded is None else factor * folded,
+            scale=factor * self.scale,
+        )
 
     def chosen_form(self, form: str | None) -> str:
         """``flat`` or ``folded``; None is folded where there is a folded form.

@@ -12,8 +12,9 @@ import contextlib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.interpolate import NdBSpline
@@ -36,6 +37,9 @@ from miurafab.surfaces.placement import (
 from miurafab.surfaces.preparation import MeshReading, prepare, refuse_other_than_a_disk
 from miurafab.surfaces.smoothing import Smoothed, continued, smooth
 from miurafab.surfaces.surface import Domain, tangents, unit
+
+if TYPE_CHECKING:
+    from miurafab.surfaces.outline import WholeMesh
 
 ROUGH = 0.03
 """A mesh is rough if it is this part of its median edge away from the smooth spline."""
@@ -170,6 +174,15 @@ class MeshSurface:
             "stiffness": self.stiffness,
             **self.layout.reading,
         }
+
+    @cached_property
+    def whole(self) -> WholeMesh | None:
+        """All of the mesh inside its outline, None where the layout lies over itself."""
+        from miurafab.surfaces.outline import whole_mesh
+
+        with contextlib.suppress(TargetError):
+            return whole_mesh(self.layout)
+        return None
 
     def alternatives(self) -> Iterator[tuple[str, MeshSurface]]:
         """Other targets on the same mesh, each with its description.

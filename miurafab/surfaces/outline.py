@@ -21,7 +21,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import NdBSpline
@@ -117,11 +116,6 @@ class WholeMesh:
 
     def __repr__(self) -> str:
         return f"<WholeMesh {self.layout.name}: {len(self.triangles)} triangles>"
-
-    @property
-    def description(self) -> dict[str, Any]:
-        """What :func:`whole_mesh` needs to lay the mesh out again; ``rotate`` in degrees."""
-        return {"rotate": round(math.degrees(self.angle), 12), "stiffness": self.stiffness}
 
     def lines(self, columns: int, rows: int) -> tuple[Floats, Floats]:
         """The lines between ``columns`` x ``rows`` cells, along u and along v."""

@@ -17,12 +17,14 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.inequalities import limits
 from miurafab.origami.fitting.objective import Follow
+from miurafab.origami.fitting.outlined import with_border
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.result import Attempt
 from miurafab.origami.fitting.score import GOOD, Score, score
 from miurafab.origami.fitting.starts import Start
 from miurafab.origami.unfold import unfold_charts
 from miurafab.origami.verify import DEGENERATE, EXACT, Measurements, measure, with_distances
+from miurafab.surfaces.outline import WholeMesh
 from miurafab.surfaces.surface import Swapped, TargetSurface
 
 LIMIT_FAULTS = ("min-edge", "max-deviation", "max-distance", "facet-shape", "flat-foldable")
@@ -70,10 +72,13 @@ def candidate(
 ) -> Candidate:
     """The sheet of the unknowns ``x``, measured against what ``request`` asks."""
     charts, points = start.unknowns.whole(x)
-    extent = float(np.ptp(points, axis=0).max())
+    pattern = unfold_charts(charts, points, target=request.target | start.layout)
+    if isinstance(start.surface, WholeMesh):
+        pattern = with_border(pattern, start.surface, request)
+    assert pattern.folded_coords is not None
+    extent = float(np.ptp(pattern.folded_coords, axis=0).max())
     scale = 1.0 if request.size_mm is None else request.size_mm / extent
-    target = request.target | start.layout
-    pattern = unfold_charts(charts, points * scale, scale=scale, target=target)
+    pattern = pattern.scaled(scale)
     # the distances take long; while the search goes on only a limit on them needs them
     limited = request.max_distance_mm is not None
     measured = measure(pattern, unturned(start.surface) if limited else None)

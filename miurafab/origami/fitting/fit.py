@@ -22,7 +22,7 @@ from miurafab.origami.fitting.polish import plain, polished
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.result import INTERRUPTED, TIME_RAN_OUT, Attempt, FitResult
 from miurafab.origami.fitting.search import coarsest
-from miurafab.origami.fitting.starts import STEEP, Start, direct, starts_for
+from miurafab.origami.fitting.starts import STEEP, Start, direct, starts_elsewhere, starts_for
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
 
 TRIED = 3
@@ -103,14 +103,14 @@ class _FitSearch:
                 return
         for pieces in self._pieces():
             starts = starts_for(request, pieces)
-            likely = [s for s in starts if s.steepest < STEEP and not s.place]
+            likely = [s for s in starts if s.steepest < STEEP]
             yield from self._tried(likely)
             if self._settled() or (self.best is not None and self.best.fine(FINE)):
                 return
         if self.best is None or self.best.rank[0]:
             fewest = self._pieces()[0]
-            others = [s for s in starts_for(request, fewest) if s.steepest >= STEEP or s.place]
-            yield from self._tried(others)
+            steep = [s for s in starts_for(request, fewest) if s.steepest >= STEEP]
+            yield from self._tried(steep + starts_elsewhere(request, fewest))
 
     def _direct(self) -> Iterator[Candidate | Attempt]:
         """The closed forms on a cylinder; the best of them is polished if it is not good."""
@@ -193,7 +193,7 @@ class _FitSearch:
             status = "interrupted"
         findings = [*([ended] if ended is not None else []), *best.faults]
         if place := best.attempt.place:
-            sentence = f"On the whole rectangle no clean sheet was found; this one has {place}."
+            sentence = f"On the whole target no clean sheet was found; this one has {place}."
             findings.append(Finding("smaller-part", sentence))
         if best.score.deviation > FAR:
             sentence = "The mid-surface lies far from the target; ask for more `facets`."

@@ -155,6 +155,14 @@ class FitOptions(Shown):
         "small",
         group="Mesh targets",
     )
+    edge: str = option(
+        Choice(("trim", "whole", "rectangle")),
+        "The border of the sheet: cut along the mesh's own outline (trim), whole facets inside it "
+        "(whole), or a rectangle of the mesh (rectangle; so with `region`).",
+        "trim",
+        group="Mesh targets",
+        page="more",
+    )
     polish: str = option(
         Choice(("on", "off")),
         "Minimise the fair objective: on, or off for the projection of the seed alone, which is "

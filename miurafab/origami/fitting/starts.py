@@ -16,6 +16,7 @@ ring, or one gore.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -29,6 +30,7 @@ from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.cylinder import cylinder_on
 from miurafab.origami.fitting.nominal import Nominal, Rim, rim_of_domain
 from miurafab.origami.fitting.objective import Follow
+from miurafab.origami.fitting.outlined import OutlinedLattice, angles_of
 from miurafab.origami.fitting.reduction import Unknowns, about_z
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.seed import STEEPEST, Corrugation, seed
@@ -95,7 +97,7 @@ class Start:
 
 
 def starts_for(request: FitRequest, pieces: int) -> list[Start]:
-    """The starts of ``request`` with so many pieces, the likeliest first."""
+    """The starts of ``request`` on its whole target with so many pieces, the likeliest first."""
     surface = request.surface
     level = LEVELS[request.follow]
     corrugations = corrugations_of(request)
@@ -106,14 +108,72 @@ def starts_for(request: FitRequest, pieces: int) -> list[Start]:
             made = [gores(surface, request, c, pieces, -level) for c in corrugations]
         if surface.closed:
             return sorted(made, key=lambda start: start.order)
-    for place, laid, layout in _places(surface):
-        for turned, name in _oriented(laid):
-            some = corrugations if not place else corrugations[:ELSEWHERE]
-            shift = level if name == "u" else -level
-            for corrugation in some:
-                start = sheet(turned, name, request, corrugation, pieces, shift)
-                made.append(replace(start, place=place, layout=layout))
+    made += outlines(request, corrugations, pieces, level) or _rectangles(request, surface, pieces)
     return sorted(made, key=lambda start: start.order)
+
+
+def starts_elsewhere(request: FitRequest, pieces: int) -> list[Start]:
+    """The starts on parts of a mesh, where the whole of it gives no clean sheet."""
+    surface = request.surface
+    if not isinstance(surface, MeshSurface):
+        return []
+    made = []
+    if trims(request):
+        place = "a rectangle of the mesh"
+        made = [replace(start, place=place) for start in _rectangles(request, surface, pieces)]
+    for place, laid in surface.alternatives():
+        made += [
+            replace(start, place=place, layout=laid.description)
+            for start in _rectangles(request, laid, pieces, ELSEWHERE)
+        ]
+    return sorted(made, key=lambda start: start.order)
+
+
+def _rectangles(
+    request: FitRequest, surface: TargetSurface, pieces: int, most: int | None = None
+) -> list[Start]:
+    """Sheets over all of the domain, with the rows in both directions."""
+    level = LEVELS[request.follow]
+    return [
+        sheet(turned, name, request, corrugation, pieces, level if name == "u" else -level)
+        for turned, name in _oriented(surface)
+        for corrugation in corrugations_of(request)[:most]
+    ]
+
+
+def trims(request: FitRequest) -> bool:
+    """Whether the sheet takes the outline of a mesh for its border."""
+    mesh = isinstance(request.surface, MeshSurface)
+    return mesh and request.edge != "rectangle" and request.region is None
+
+
+def outlines(
+    request: FitRequest, corrugations: list[Corrugation], pieces: int, level: float
+) -> list[Start]:
+    """All of a mesh inside its outline at several angles, those of most and squarest cells first;
+    none where that is not asked for, and where the outline crosses itself when the mesh lies flat.
+    """
+    surface = request.surface
+    if not trims(request) or not isinstance(surface, MeshSurface) or surface.whole is None:
+        return []
+    cells = request.columns, request.rows
+    clip = STEEPEST if pieces == 1 else CLIP_OF_PIECES
+    made = []
+    for angle, c in itertools.product(angles_of(request.rotate), corrugations):
+        parts = piece_of_column(request, pieces)
+        lattice = OutlinedLattice.of(surface.whole, angle, cells, c.zigzag, parts)
+        charts, target, rim = lattice.charts, lattice.target, lattice.rim
+        if len(np.unique(charts.pieces)) < pieces:
+            continue
+        grown = seed(target, charts, *cells, c, clip=clip, level=level)
+        unknowns = Unknowns.all_of(charts, _mean_edge(charts, grown.vertices))
+        x, steepest = grown.vertices.ravel(), grown.steepest
+        layout = {"edge": request.edge}
+        start = Start(
+            "outline", target, "u", c, cells, unknowns, x, steepest, rim, pieces, layout=layout
+        )
+        made.append((lattice.cost, start))
+    return [start for _, start in sorted(made, key=lambda pair: pair[0])]
 
 
 LEVELS: dict[Follow, float] = {"middle": 0.0, "top": -0.5, "bottom": 0.5}
@@ -223,14 +283,6 @@ def corrugations_of(request: FitRequest) -> list[Corrugation]:
             stretch = float(np.hypot(1.0, amplitude))
             corrugations.append(Corrugation.from_stretches(along, stretch))
     return list(dict.fromkeys(corrugations))
-
-
-def _places(surface: TargetSurface) -> Iterator[tuple[str, TargetSurface, dict[str, Any]]]:
-    """The target, and on a mesh the other places on it, each with its description."""
-    yield "", surface, {}
-    if isinstance(surface, MeshSurface):
-        for place, laid in surface.alternatives():
-            yield place, laid, laid.description
 
 
 def _oriented(surface: TargetSurface) -> list[tuple[TargetSurface, str]]:
