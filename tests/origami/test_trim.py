@@ -38,7 +38,8 @@ def bowl() -> tuple[CreasePattern, WholeMesh]:
     vertices = np.stack([x, y, 0.0015 * (x * x + y * y)], axis=1)
     surface = mesh_surface(vertices, np.concatenate([lower, upper]), "bowl")
     assert isinstance(surface, MeshSurface)
-    pattern = fit(FitRequest(facets=(COUNT, COUNT), surface=surface)).pattern
+    request = FitRequest(facets=(COUNT, COUNT), surface=surface, edge="rectangle", polish="off")
+    pattern = fit(request).pattern
     assert pattern is not None
     return pattern, whole_mesh(surface.layout).laid(surface.placement.angle)
 
