@@ -22,6 +22,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
@@ -29,6 +31,7 @@ from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.triangles import split_facets
+from miurafab.origami.invariants import interior_vertices
 
 POISSON_RATIO = 0.3
 """For a material that gives only its modulus; D changes by 4 % between 0.25 and 0.35."""
@@ -46,6 +49,8 @@ class BarHingeModel:
     ``compliance`` (B,); ``hinges`` (H, 4) of vertices u, v, a, b have ``stiffness`` (H,) and
     ``rest`` angles (H,). ``creases`` (C, 4) are the hinges, with stiffness or without, on the
     pattern's edges ``creases_edges`` (C,) that have a facet on both sides and are not assigned F.
+    Creases of different ``mechanisms`` (C,) fold independently of each other, since no stiffness
+    and no chain of interior vertices joins them.
     ``unit_joule`` is None without a material.
     """
 
@@ -58,6 +63,7 @@ class BarHingeModel:
     rest: Floats
     creases: Ints = field(default_factory=lambda: np.empty((0, 4), dtype=np.int64))
     creases_edges: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    mechanisms: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     unit_mm: float = 1.0
     unit_joule: float | None = None
 
@@ -147,6 +153,11 @@ def sheet_model(
         rest=rest,
         creases=creases,
         creases_edges=inner[~flat],
+        mechanisms=(
+            np.zeros(len(creases), dtype=np.int64)
+            if crease_ratio > 0
+            else _mechanisms(pattern, creases)
+        ),
         unit_mm=unit,
         unit_joule=unit_joule,
     )
@@ -177,3 +188,15 @@ def _hinges(triangles: Ints, edges: Ints) -> Ints:
     for u, v in (edges.T, edges[:, ::-1].T):
         sides.append(thirds[order[np.searchsorted(key, u * count + v, sorter=order)]])
     return np.concatenate([edges, np.stack(sides, axis=1)], axis=1)
+
+
+def _mechanisms(pattern: CreasePattern, creases: Ints) -> Ints:
+    """(C,) the mechanism of each crease: creases with a common interior vertex fold together."""
+    inside = np.zeros(len(pattern.vertices_coords), dtype=bool)
+    inside[interior_vertices(pattern)] = True
+    crease, end = np.nonzero(inside[creases[:, :2]])
+    count = len(creases) + len(inside)
+    pairs = (crease, len(creases) + creases[crease, end])
+    graph = coo_array((np.ones(len(crease)), pairs), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    return np.unique(label[: len(creases)], return_inverse=True)[1].astype(np.int64)

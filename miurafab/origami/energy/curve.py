@@ -248,21 +248,22 @@ def _stationary(traced: Traced, path: Path) -> tuple[list[StableState], list[Sta
 def _zero_load(driven: Driven, known: list[Known], before: int) -> StableState:
     """The state without load between two neighbours in ``known``, by regula falsi (Illinois)."""
     left, right = known[before], known[before + 1]
-    a, b = (left.drive, left.state.mu), (right.drive, right.state.mu)
+    a, b = ((known.drive, driven.load(known.state, known.drive)) for known in (left, right))
     scale = max(abs(a[1]), abs(b[1]))
     best = left if abs(a[1]) < abs(b[1]) else right
+    load = min(a[1], b[1], key=abs)
     factored: Factored | None = None
     for _ in range(MAX_FALSI):
-        if abs(best.state.mu) <= ZERO_LOAD * scale:
+        if abs(load) <= ZERO_LOAD * scale:
             break
         drive = (a[0] * b[1] - b[0] * a[1]) / (b[1] - a[1])
         solution = solve(driven, extrapolate(known, drive), drive, factored)
         if not solution.converged:
             break
-        factored, mu = solution.factored, solution.state.mu
+        factored, load = solution.factored, driven.load(solution.state, drive)
         best = Known(drive, solution.state)
-        a = (a[0], a[1] / 2) if (mu < 0) == (b[1] < 0) else b
-        b = (drive, mu)
+        a = (a[0], a[1] / 2) if (load < 0) == (b[1] < 0) else b
+        b = (drive, load)
     return StableState(best.drive, driven.model.energy(best.state.points))
 
 
@@ -271,6 +272,7 @@ def _stiffness(traced: Traced) -> float:
     driven, _, drives, states = traced
     loads = []
     for turn in (-SMALL_TURN, SMALL_TURN):
-        solution = solve(driven, states[0], float(drives[0]) + turn)
-        loads.append(-solution.state.mu if solution.converged else math.nan)
+        drive = float(drives[0]) + turn
+        solution = solve(driven, states[0], drive)
+        loads.append(driven.load(solution.state, drive) if solution.converged else math.nan)
     return (loads[1] - loads[0]) / (2 * SMALL_TURN)

@@ -17,12 +17,18 @@ third of the saddle system in size, with no zeros on its diagonal. So one fill-r
 the vertices serves every factorisation, and no pivoting is needed. F is exact, so the solution
 depends neither on eps nor on the age of K, and K is factored again only when convergence slows.
 
+Parts of a sheet that hang on one crease, or on one facet, fold independently of the driven one. A
+guide moves each of them: a stiff hinge at one of its creases, whose rest angle r follows the driven
+angle s by the law of rigid folding, tan(r / 2) / tan(s / 2) constant. It holds without energy what
+nothing else holds.
+
 Six coordinates of one triangle are held, in axes along it, to exclude rigid motions.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -38,6 +44,8 @@ from miurafab.origami.energy.hinges import hinge_angles, hinge_derivatives, hing
 TOLERANCE = 1e-11
 """Limit of every component of F (forces over the stiffest hinge, if that is over 1). Convergence is
 judged by F and not by the length of a step."""
+GUIDE = 100.0
+"""The stiffness of a guide; sheets of hundreds of facets turn their guides by less than 1e-3."""
 EPS = 1e-10
 """The compliance of inextensible bars in K. Larger values slow the iteration down under large bar
 forces, smaller values by rounding."""
@@ -98,10 +106,13 @@ class Solution(NamedTuple):
 class Driven:
     """A model with one driven quantity: the fold angle of the hinge ``stencil`` (4,), or the
     distance between the two vertices of ``stencil`` (2,).
+
+    ``guided`` (m, 4) are hinges that go with the driven fold angle.
     """
 
     model: BarHingeModel
     stencil: Ints
+    guided: Ints = field(default_factory=lambda: np.empty((0, 4), dtype=np.int64))
 
     @property
     def rest(self) -> EquilibriumState:
@@ -126,11 +137,39 @@ class Driven:
             return float(hinge_angles(points, self.stencil[None])[0])
         return float(np.linalg.norm(points[self.stencil[1]] - points[self.stencil[0]]))
 
+    def load(self, state: EquilibriumState, target: float) -> float:
+        """dE / d target: what drives the driven quantity, and the guides with it."""
+        turned = hinge_angles(state.points, self.guided) - self._guides(target)
+        step = 1e-6
+        rate = (self._guides(target + step) - self._guides(target - step)) / (2 * step)
+        return -state.mu - GUIDE * float(turned @ rate)
+
+    def _guides(self, target: float) -> Floats:
+        """(m,) the rest angles of the guided hinges, with the driven angle at ``target``."""
+        if not len(self.guided):
+            return np.empty(0)
+        return np.asarray(2 * np.arctan(self._ratios * math.tan(target / 2)))
+
+    @cached_property
+    def _ratios(self) -> Floats:
+        """(m,) tan(r / 2) / tan(s / 2) in the folded form."""
+        half = np.tan(hinge_angles(self.model.points, self.guided) / 2)
+        return np.asarray(half / math.tan(self.value(self.model.points) / 2))
+
+    @cached_property
+    def _hinges(self) -> Ints:
+        return np.concatenate([self.model.hinges, self.guided])
+
+    @cached_property
+    def _stiffness(self) -> Floats:
+        return np.concatenate([self.model.stiffness, np.full(len(self.guided), GUIDE)])
+
     def residual(self, state: EquilibriumState, target: float) -> Residual:
         """F at ``state``, with ``target`` for the driven quantity."""
         model, points = self.model, state.points
-        angle, gradient = hinge_gradients(points, model.hinges)
-        bend = (model.stiffness * (angle - model.rest))[:, None, None] * gradient
+        angle, gradient = hinge_gradients(points, self._hinges)
+        rest = np.concatenate([model.rest, self._guides(target)])
+        bend = (self._stiffness * (angle - rest))[:, None, None] * gradient
         d = points[model.bars[:, 1]] - points[model.bars[:, 0]]
         pull = (state.forces / model.lengths)[:, None] * d
         value, drive = self._drive_gradient(points)
@@ -147,10 +186,12 @@ class Driven:
     def factor(self, state: EquilibriumState) -> Factored:
         """K at ``state``. Raises ``RuntimeError`` where it is singular."""
         model, points = self.model, state.points
-        angle, gradient, hessian = hinge_derivatives(points, model.hinges)
-        k = model.stiffness[:, None, None, None, None]
+        angle, gradient, hessian = hinge_derivatives(points, self._hinges)
+        k = self._stiffness[:, None, None, None, None]
         bend = k * (gradient[:, :, :, None, None] * gradient[:, None, None, :, :])
-        bend += (model.stiffness * (angle - model.rest))[:, None, None, None, None] * hessian
+        count = len(model.hinges)  # guides are near their rest
+        turned = model.stiffness * (angle[:count] - model.rest)
+        bend[:count] += turned[:, None, None, None, None] * hessian[:count]
         bars = (points[model.bars[:, 1]] - points[model.bars[:, 0]]) / model.lengths[:, None]
         weights = 1.0 / (model.compliance + EPS)
         block = weights[:, None, None] * bars[:, :, None] * bars[:, None, :]
@@ -169,7 +210,7 @@ class Driven:
         """The Newton step (dx, dn) for ``residual`` with K as ``factored``."""
         bars, weights, drive = factored.bars, factored.weights, factored.drive
         pull = (weights * residual.strain)[:, None] * bars
-        no_bend = np.zeros((len(self.model.hinges), 4, 3))
+        no_bend = np.zeros((len(self._hinges), 4, 3))
         right = residual.force + self._gather(no_bend, pull, residual.miss / EPS * drive)
         coordinates = np.zeros(self.model.points.size)
         coordinates[self._free] = -factored.k.solve(right)
@@ -211,11 +252,11 @@ class Driven:
 
     @cached_property
     def _stiffest(self) -> float:
-        return float(self.model.stiffness.max(initial=1.0))
+        return float(self._stiffness.max(initial=1.0))
 
     @cached_property
     def _ends(self) -> Ints:
-        hinges, bars = self.model.hinges, self.model.bars
+        hinges, bars = self._hinges, self.model.bars
         return np.concatenate([hinges.ravel(), bars[:, 0], bars[:, 1], self.stencil])
 
     @cached_property
@@ -238,7 +279,7 @@ class Driven:
     def _pairs(self) -> tuple[Ints, Ints]:
         """The vertex pairs of all 3x3 blocks of K, in the order of computation."""
         rows, columns = [], []
-        for stencils in (self.model.hinges, self.model.bars, self.stencil[None]):
+        for stencils in (self._hinges, self.model.bars, self.stencil[None]):
             size = stencils.shape[1]
             rows.append(np.repeat(stencils, size, axis=1).ravel())
             columns.append(np.tile(stencils, size).ravel())

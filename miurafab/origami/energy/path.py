@@ -16,7 +16,7 @@ import numpy as np
 
 from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError
-from miurafab.geometry.arrays import Floats
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
 from miurafab.origami.energy.continuation import follow
@@ -118,7 +118,7 @@ def trace(
     :func:`folding_path` raises.
     """
     place = main_crease(model) if edge is None else _place_of(model, edge)
-    driven = Driven(model, model.creases[place])
+    driven = Driven(model, model.creases[place], model.creases[_guided(model, place)])
     angle = driven.value(driven.rest.points)
     if abs(angle) <= NEARLY_FLAT:
         raise InputError(
@@ -136,14 +136,30 @@ def trace(
 
 
 def main_crease(model: BarHingeModel) -> int:
-    """The index in ``model.creases`` of the default driven crease.
+    """The index in ``model.creases`` of the default driven crease, in the largest mechanism.
 
     Of the creases folded by the median fold angle or more, it is the nearest to the middle.
     """
-    angles = np.abs(hinge_angles(model.points, model.creases))
-    middle = model.points[model.creases[:, :2]].mean(axis=1) - model.points.mean(axis=0)
+    largest = np.bincount(model.mechanisms).argmax()
+    return _main_of(model, np.flatnonzero(model.mechanisms == largest))
+
+
+def _main_of(model: BarHingeModel, creases: Ints) -> int:
+    angles = np.abs(hinge_angles(model.points, model.creases[creases]))
+    middle = model.points[model.creases[creases, :2]].mean(axis=1) - model.points.mean(axis=0)
     away = np.linalg.norm(middle, axis=1)
-    return int(np.argmin(np.where(angles >= np.median(angles), away, np.inf)))
+    return int(creases[np.argmin(np.where(angles >= np.median(angles), away, np.inf))])
+
+
+def _guided(model: BarHingeModel, place: int) -> list[int]:
+    """The main crease of each mechanism but that of the crease at ``place``."""
+    own = model.mechanisms[place]
+    numbers = np.unique(model.mechanisms).tolist()
+    return [
+        _main_of(model, np.flatnonzero(model.mechanisms == number))
+        for number in numbers
+        if number != own
+    ]
 
 
 def _place_of(model: BarHingeModel, edge: int) -> int:
@@ -162,7 +178,7 @@ def path_of(traced: Traced) -> Path:
         coords=turned @ driven.axes.T * model.unit_mm,
         drives=drives[: len(states)],
         energies=np.array([model.energy(points) for points in turned]),
-        loads=np.array([-state.mu for state in states]),
+        loads=np.array([driven.load(*pair) for pair in zip(states, drives, strict=False)]),
         converged=len(states) == len(drives),
         model=model,
     )

@@ -22,7 +22,7 @@ SURFACES = {
     "bump": {},
     "sphere": {"width": "1rad", "height": "1rad"},
 }
-"""Doubly curved targets whose fits are flat-foldable to 2e-2 ... 3e-1 radians."""
+"""Doubly curved targets whose fits are flat-foldable to 8e-3 ... 3e-1 radians."""
 
 
 @cache

@@ -20,6 +20,8 @@ from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import sheet_model
 from miurafab.origami.energy.curve import energy_curve
+from miurafab.origami.energy.hinges import hinge_angles
+from miurafab.origami.energy.path import folding_path
 from miurafab.origami.energy.pieces import energies_of_pieces
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
@@ -141,6 +143,43 @@ def test_a_trimmed_sheet_that_does_not_fold_rigidly_bends() -> None:
     for points in motion.frames:
         assert edge_lengths(points, pattern.edges_vertices) == pytest.approx(flat, rel=1e-9)
     assert motion.frames[-1] == pytest.approx(pattern.folded_coords, abs=1e-6)
+
+
+def with_flaps() -> CreasePattern:
+    """A fitted hypar with three facets that hang on one crease each."""
+    kept = np.ones((6, 6), dtype=bool)
+    kept[0, :] = kept[:, 0] = False
+    kept[0, 3] = kept[2, 0] = True
+    kept[1:3, 4:] = kept[3, 4] = False
+    charts = QuadCharts.of_cells(np.ones((6, 6), dtype=bool))
+    shown = QuadCharts.of_cells(kept)
+    used = np.unique(charts.faces_vertices[kept.ravel()])
+    return unfold_charts(shown, fitted("hypar", 6, 6).pattern.folded_coords[used])
+
+
+def test_parts_that_hang_on_one_crease_go_with_the_sheet() -> None:
+    """Nothing but the driven crease tells them where to be: their creases keep its ratio."""
+    pattern = with_flaps()
+    model = sheet_model(pattern)
+    counts = np.bincount(model.mechanisms)
+    assert sorted(counts.tolist()) == [1, 1, 1, 28]
+    curve = energy_curve(pattern, 8)
+    assert curve.converged
+    path = curve.path
+    hanging = np.flatnonzero(counts[model.mechanisms] == 1)
+    angles = np.array(
+        [hinge_angles(points / model.unit_mm, model.creases) for points in path.coords]
+    )
+    half = np.tan(angles[:, hanging] / 2)
+    driven = np.tan(path.drives / 2)
+    assert half / half[0] == pytest.approx((driven / driven[0])[:, None].repeat(3, 1), rel=1e-6)
+
+
+def test_the_load_is_the_slope_of_the_energy_where_guides_hold_parts() -> None:
+    path = folding_path(inside_circle(fitted("hypar", 8, 8).pattern, 0.46), 60)
+    slope = np.gradient(path.energies, path.drives)
+    middle = slice(5, -5)
+    assert path.loads[middle] == pytest.approx(slope[middle], abs=0.02 * np.abs(slope).max())
 
 
 def test_a_trimmed_miura_stores_no_energy() -> None:
