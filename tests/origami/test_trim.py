@@ -13,6 +13,7 @@ from miurafab.geometry.polygons import edge_lengths, facet_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.fit import fit
 from miurafab.origami.fitting.request import FitRequest
+from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.nearness import nearness
 from miurafab.origami.trim import CREASE, SLIVER, inner_facets, trimmed
@@ -234,3 +235,17 @@ def in_two(pattern: CreasePattern) -> CreasePattern:
         seams=seams,
         cells=np.stack([column, np.arange(len(faces)) // (columns - 1)], axis=1),
     )
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_trimmed_sheet_moves_from_nearly_flat_to_its_folded_form(
+    bowl: tuple[CreasePattern, WholeMesh], shape: str
+) -> None:
+    pattern, _ = cut(bowl, shape)
+    motion = bending_motion(pattern, 6)
+    assert len(motion.frames) == 7
+    flat = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
+    for points in motion.frames:
+        assert edge_lengths(points, pattern.edges_vertices) == pytest.approx(flat, rel=1e-8)
+    assert motion.frames[-1] == pytest.approx(pattern.folded_coords, abs=1e-6)
+    assert np.abs(motion.fold_angles[0]).max() < 0.2

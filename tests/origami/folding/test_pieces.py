@@ -175,6 +175,23 @@ def test_parts_that_hang_on_one_crease_go_with_the_sheet() -> None:
     assert half / half[0] == pytest.approx((driven / driven[0])[:, None].repeat(3, 1), rel=1e-6)
 
 
+def test_two_parts_that_share_one_facet_fold_together() -> None:
+    kept = np.zeros((7, 7), dtype=bool)
+    kept[:4, :4] = kept[3:, 3:] = True
+    whole = QuadCharts.of_cells(np.ones((7, 7), dtype=bool))
+    used = np.unique(whole.faces_vertices[kept.ravel()])
+    points = fitted("hypar", 7, 7).pattern.folded_coords[used]
+    pattern = unfold_charts(QuadCharts.of_cells(kept), points)
+    model = sheet_model(pattern)
+    assert np.bincount(model.mechanisms).tolist() == [24, 24]
+    path = folding_path(pattern, 40)
+    assert path.converged
+    slope = np.gradient(path.energies, path.drives)[3:-3]
+    assert path.loads[3:-3] == pytest.approx(slope, abs=0.03 * np.abs(slope).max())
+    angles = np.abs(hinge_angles(path.coords[-1] / model.unit_mm, model.creases))
+    assert angles.max() < 0.2
+
+
 def test_the_load_is_the_slope_of_the_energy_where_guides_hold_parts() -> None:
     path = folding_path(inside_circle(fitted("hypar", 8, 8).pattern, 0.46), 60)
     slope = np.gradient(path.energies, path.drives)
