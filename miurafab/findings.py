@@ -47,7 +47,6 @@ RULES = {
     # A fit (miurafab.origami.fitting)
     "interrupted": Rule("refusal", "a fit that was interrupted; the sheet is the best so far"),
     "timeout": Rule("note", "the `timeout` ended the search with the best sheet up to then"),
-    "bow-tie": Rule("refusal", "a facet is folded over itself"),
     "no-sheet": Rule("refusal", "no exact sheet was found"),
     "no-sheet-in-limits": Rule("refusal", "no sheet meets all limits at any number of facets"),
     "residual": Rule("refusal", "facets that are not exactly planar, developable or isometric"),
@@ -69,6 +68,12 @@ RULES = {
     ),
     "isometry": Rule("refusal", "a facet whose edges differ between flat and folded form"),
     "self-intersection": Rule("refusal", "facets that meet in the folded form"),
+    "bow-tie": Rule("refusal", "a facet whose own sides cross"),
+    "dented": Rule("warning", "a quad facet that is not convex"),
+    "steep-folds": Rule("warning", "creases that fold by more than 165 degrees"),
+    "much-paper": Rule("warning", "a sheet of more than four times the area of the target"),
+    "coverage": Rule("warning", "a sheet that covers less than 95 % of the target"),
+    "overhang": Rule("note", "a sheet of which more than 1 % is beyond the target"),
     # A pattern, converted (miurafab.workflow.convert)
     "no-creases": Rule("note", "a format that holds a shape and no creases"),
     "no-folded-form": Rule("note", "a format that does not hold the folded form"),

@@ -65,6 +65,9 @@ def fit(
     hidden = ("attempts", "findings")
     shown = {key: value for key, value in answer.items() if key not in hidden and value != ""}
     console.answer(answer, lambda: console.facts(shown))
+    for finding in result.findings:
+        if finding not in asked.findings and finding.sentence not in result.advice:
+            console.note(finding.sentence)
     if result.status == "interrupted":
         console.note(f"Interrupted: {out} is the best sheet up to then.")
         return INTERRUPTED

@@ -21,8 +21,58 @@ from miurafab.geometry.polygons import (
 )
 from miurafab.origami.crease_pattern import CreasePattern
 
+EXACT = 1e-10
+"""The residual up to which planarity, developability and isometry count as exact."""
+
 DEGENERATE = 1e-6
 """An edge shorter than this part of the mean edge cannot be creased."""
+
+
+ROUNDINGS = 64
+"""A residual may be as many roundings of a coordinate, as a part of the mean edge."""
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """The residuals of a folded pattern: of its facets (F,), of its ``interior`` vertices (I,), of
+    its seams (S,), and the largest residual that counts as exact.
+    """
+
+    ring: CornerRing
+    interior: Ints
+    planarity: Floats
+    developability: Floats
+    flat_foldability: Floats
+    isometry: Floats
+    exact: float
+
+
+def residuals(pattern: CreasePattern) -> Residuals:
+    """All residuals of the folded ``pattern``."""
+    assert pattern.folded_coords is not None
+    ring, inner = corner_ring(pattern, pattern.folded_coords), interior_vertices(pattern)
+    none = np.empty(0)
+    return Residuals(
+        ring,
+        inner,
+        facet_planarity(pattern, pattern.folded_coords),
+        np.abs(angle_defect(ring, inner)) if len(inner) else none,
+        np.abs(kawasaki_residual(ring, inner)) if len(inner) else none,
+        isometry(pattern),
+        exactness(pattern),
+    )
+
+
+def exactness(pattern: CreasePattern) -> float:
+    """The largest residual that counts as exact.
+
+    It is ``EXACT``, and more where the sheet lies so far from the origin that its coordinates have
+    no digits left for that: at a distance D, a coordinate is rounded by D times 1.1e-16.
+    """
+    assert pattern.folded_coords is not None
+    mean = float(edge_lengths(pattern.folded_coords, pattern.edges_vertices).mean())
+    rounding = float(np.spacing(np.abs(pattern.folded_coords).max()))
+    return EXACT + ROUNDINGS * rounding / mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,3 +206,47 @@ def seam_gaps(pattern: CreasePattern) -> Floats:
         gaps = np.maximum(gaps, np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1))
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
     return np.asarray(gaps / mean)
+
+
+def crossed_facets(pattern: CreasePattern) -> Ints:
+    """The facets of the flat pattern of which two sides cross: bow-ties.
+
+    Their sector angles, taken without sign, may add up as those of a developable vertex, so that
+    only their shape tells that they do not unfold.
+    """
+    faces, points = pattern.faces_vertices, pattern.vertices_coords
+    sizes, k = (faces >= 0).sum(axis=1), faces.shape[1]
+    after = next_corners(faces)
+    heads = np.take_along_axis(faces, after, axis=1)
+    crossed = np.zeros(len(faces), dtype=bool)
+    for one in range(k):
+        for other in range(one + 2, k):
+            apart = np.flatnonzero((other < sizes) & (after[:, other] != one))
+            a, b = points[faces[apart, one]], points[heads[apart, one]]
+            c, d = points[faces[apart, other]], points[heads[apart, other]]
+            across = _turn(a, b, c) * _turn(a, b, d) < 0
+            crossed[apart] |= across & (_turn(c, d, a) * _turn(c, d, b) < 0)
+    return np.flatnonzero(crossed)
+
+
+def dented_facets(pattern: CreasePattern) -> Ints:
+    """The quads of the flat pattern that are not convex, bow-ties left out.
+
+    None in a trimmed pattern, where the cut may leave a facet of any shape.
+    """
+    faces = pattern.faces_vertices
+    if faces.shape[1] != 4 or (faces < 0).any():
+        return np.empty(0, dtype=np.int64)
+    p = pattern.vertices_coords[faces]
+    turns = np.stack([_turn(p[:, k - 1], p[:, k], p[:, (k + 1) % 4]) for k in range(4)], axis=1)
+    sides = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
+    whole = np.sign(turns.sum(axis=1))[:, None]
+    dented = (turns * whole < -DEGENERATE * sides[:, None] ** 2).any(axis=1)
+    dented[crossed_facets(pattern)] = False
+    return np.flatnonzero(dented)
+
+
+def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
+    """(n,) twice the signed areas of the triangles a, b, c (n, 2)."""
+    u, v = b - a, c - a
+    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from miurafab.geometry.arrays import Bools
+from miurafab.geometry.arrays import Bools, Floats
 from miurafab.geometry.hausdorff import farthest_from_map, farthest_from_mesh
 from miurafab.geometry.polygons import facet_means
 from miurafab.origami.crease_pattern import CreasePattern
@@ -39,8 +39,8 @@ class Nearness:
         return max(self.sheet_to_target, self.target_to_sheet)
 
 
-def nearness(pattern: CreasePattern, surface: TargetSurface) -> Nearness:
-    """The distances of the folded ``pattern`` from ``surface``, which is in its own frame."""
+def nearness(pattern: CreasePattern, surface: TargetSurface, tiles: Floats) -> Nearness:
+    """The distances of the folded ``pattern`` from ``surface`` and its ``tiles``, in its frame."""
     assert pattern.folded_coords is not None
     scale, folded = pattern.scale, pattern.folded_coords / pattern.scale
     triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
@@ -50,7 +50,7 @@ def nearness(pattern: CreasePattern, surface: TargetSurface) -> Nearness:
     diagonal = np.linalg.norm(np.ptp(pattern.folded_coords, axis=0))
     return Nearness(
         scale * farthest_from_map(sheet, surface.nearest),
-        scale * farthest_from_mesh(surface.tiles(), sheet),
+        scale * farthest_from_mesh(tiles, sheet),
         scale * float(off),
         float(diagonal),
     )

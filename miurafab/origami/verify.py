@@ -15,18 +15,17 @@ import numpy as np
 
 from miurafab.display import Shown
 from miurafab.findings import Finding, findings_json, refusals
-from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami import invariants
+from miurafab.origami.coverage import coverage
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.folding.contact import overlaps, self_intersections, triangulate
+from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.judge_pattern import Evidence, gather, judge, judge_quality
 from miurafab.origami.nearness import nearness
-from miurafab.surfaces.surface import TargetSurface, tangents
+from miurafab.origami.quality import Quality, quality
+from miurafab.surfaces.surface import TargetSurface
 
-EXACT = 1e-10
-"""The residual up to which planarity, developability and isometry count as exact."""
-
-DEGENERATE = invariants.DEGENERATE
+EXACT, DEGENERATE = invariants.EXACT, invariants.DEGENERATE
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,8 +54,18 @@ class Measurements(Shown):
         The same distance over the diagonal of the box around the folded form.
     hausdorff_midsurface_mm : float or None
         The largest distance of a facet mean from the target, mm.
+    coverage : float or None
+        The share of the target's area that the sheet covers (:mod:`miurafab.origami.coverage`).
+    overhang : float or None
+        The share of the sheet that reaches beyond the border of the target.
     area_ratio : float or None
-        The area of the paper over the area of the target.
+        The area of the paper over the area of the target that lies under it.
+    pieces : int
+        The number of flat pieces.
+    seam_mm : float
+        The length of all seams between pieces.
+    quality : Quality or None
+        Fold angles, sector angles, edges and proportions of the facets.
     """
 
     facets: int
@@ -73,7 +82,21 @@ class Measurements(Shown):
     hausdorff_mm: float | None = None
     hausdorff_relative: float | None = None
     hausdorff_midsurface_mm: float | None = None
+    coverage: float | None = None
+    overhang: float | None = None
     area_ratio: float | None = None
+    pieces: int = 1
+    seam_mm: float = 0.0
+    quality: Quality | None = None
+
+    @classmethod
+    def report(cls, measured: Measurements | None) -> dict[str, Any]:
+        """The fields under the names of the fit report, each None where nothing was measured."""
+        numbers = {f.name: getattr(measured, f.name, None) for f in fields(cls)}
+        shape = None if measured is None else measured.quality
+        if shape is not None and measured is not None:
+            numbers["quality"] = shape.as_json(measured.area_ratio)
+        return numbers
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,11 +133,10 @@ class Audit(Shown):
 
     def report(self) -> dict[str, Any]:
         """The report of ``miurafab check``, under the names of the fit report."""
-        numbers = {f.name: getattr(self.measurements, f.name) for f in fields(self.measurements)}
         return {
             "status": "converged" if self.valid else "invalid",
             "advice": " ".join(finding.sentence for finding in refusals(self.findings)),
-            **numbers,
+            **Measurements.report(self.measurements),
             "iterations": None,
             "seconds": self.seconds,
             "findings": findings_json(self.findings),
@@ -127,50 +149,56 @@ def audit(pattern: CreasePattern, surface: TargetSurface | None = None) -> Audit
     ``surface`` is the target in its own frame; the pattern's ``scale`` is applied to it.
     """
     started = time.perf_counter()
-    measured = measure(pattern, surface)
-    findings = tuple(_findings(pattern, measured))
+    evidence = gather(pattern)
+    measured = _measured(pattern, surface, evidence)
+    findings = (*judge(pattern, evidence), *judge_quality(measured))
     return Audit(measured, findings, time.perf_counter() - started)
 
 
 def measure(pattern: CreasePattern, surface: TargetSurface | None = None) -> Measurements:
     """The numbers alone."""
-    facets, vertices = len(pattern.faces_vertices), len(pattern.vertices_coords)
-    folded = pattern.folded_coords
+    return _measured(pattern, surface, gather(pattern))
+
+
+def _measured(
+    pattern: CreasePattern, surface: TargetSurface | None, evidence: Evidence
+) -> Measurements:
     flat_edges = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
-    covered = len(overlaps(pattern))
-    if folded is None:
-        return Measurements(facets, vertices, float(flat_edges.min()), covered)
-    ring = invariants.corner_ring(pattern, folded)
-    inner = invariants.interior_vertices(pattern)
-    shortest = min(flat_edges.min(), edge_lengths(folded, pattern.edges_vertices).min())
+    seams = pattern.seams
     measured = Measurements(
-        facets,
-        vertices,
-        float(shortest),
-        covered,
-        max_planarity=float(invariants.facet_planarity(pattern, folded).max()),
-        max_developability=_largest(invariants.angle_defect(ring, inner)) if len(inner) else 0.0,
-        max_flat_foldability=(
-            _largest(invariants.kawasaki_residual(ring, inner)) if len(inner) else 0.0
-        ),
-        max_isometry=float(invariants.isometry(pattern).max()),
-        self_intersections=len(self_intersections(pattern)),
+        len(pattern.faces_vertices),
+        len(pattern.vertices_coords),
+        float(flat_edges.min()),
+        len(evidence.overlaps),
+        pieces=pattern.pieces_count,
+        seam_mm=0.0 if seams is None else float(flat_edges[seams[:, 0]].sum()),
+    )
+    found, folded = evidence.residuals, pattern.folded_coords
+    if found is None or folded is None:
+        return measured
+    shortest = min(flat_edges.min(), edge_lengths(folded, pattern.edges_vertices).min())
+    measured = replace(
+        measured,
+        min_edge_mm=float(shortest),
+        max_planarity=float(found.planarity.max()),
+        max_developability=float(found.developability.max(initial=0.0)),
+        max_flat_foldability=float(found.flat_foldability.max(initial=0.0)),
+        max_isometry=float(found.isometry.max()),
+        self_intersections=len(evidence.crossings),
+        quality=quality(pattern, found.ring),
     )
     return measured if surface is None else with_distances(measured, pattern, surface)
-
-
-def _largest(values: Floats) -> float:
-    return float(np.abs(values).max())
 
 
 def with_distances(
     measured: Measurements, pattern: CreasePattern, surface: TargetSurface
 ) -> Measurements:
-    """``measured`` with the distances both ways between ``pattern`` and ``surface``, in mm, and the
-    area ratio.
+    """``measured`` with the distances both ways between ``pattern`` and ``surface``, in mm, the
+    shares of both that lie on each other, and the area ratio.
     """
     assert pattern.folded_coords is not None
-    found = nearness(pattern, surface)
+    tiles = surface.tiles()
+    found, cover = nearness(pattern, surface, tiles), coverage(pattern, tiles)
     a, b, c = pattern.folded_coords[triangulate(pattern.faces_vertices)[0]].transpose(1, 0, 2)
     paper = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
     return replace(
@@ -180,113 +208,7 @@ def with_distances(
         hausdorff_mm=found.hausdorff,
         hausdorff_relative=found.hausdorff / found.diagonal,
         hausdorff_midsurface_mm=found.means_to_target,
-        area_ratio=paper / (surface_area(surface) * pattern.scale**2),
+        coverage=cover.covered,
+        overhang=cover.overhang,
+        area_ratio=paper / (cover.area * pattern.scale**2),
     )
-
-
-def surface_area(surface: TargetSurface, samples: int = 200) -> float:
-    """The area of the target over its domain by the midpoint rule, in its own unit squared."""
-    d = surface.domain
-    u = d.u0 + (np.arange(samples) + 0.5) * d.width / samples
-    v = d.v0 + (np.arange(samples) + 0.5) * d.height / samples
-    along, across = tangents(surface, np.stack(np.meshgrid(u, v), axis=-1))
-    density = np.linalg.norm(np.cross(along, across), axis=-1)
-    return float(density.mean() * d.width * d.height)
-
-
-def _findings(pattern: CreasePattern, measured: Measurements) -> list[Finding]:
-    found = []
-    edges = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
-    short = np.flatnonzero(edges < DEGENERATE * edges.mean())
-    if len(short):
-        found.append(
-            Finding(
-                "degenerate-edge",
-                f"{_these(short, 'edge')} shorter than a millionth of the mean edge (down to "
-                f"{edges[short].min():.1e} mm): they cannot be creased or cut, so the sheet cannot "
-                "be made. Fit again with `min_edge`.",
-                tuple(short.tolist()),
-            )
-        )
-    if measured.overlaps:
-        found.append(_overlap(pattern))
-    gaps = invariants.seam_gaps(pattern)
-    open_seams = np.flatnonzero(~(gaps <= EXACT))
-    if len(open_seams):
-        found.append(
-            Finding(
-                "seam",
-                f"{_these(open_seams, 'seam')} not closed: the two edges differ by up to "
-                f"{gaps[open_seams].max():.1e} mean edges in length or in place.",
-                tuple(open_seams.tolist()),
-            )
-        )
-    if pattern.folded_coords is None:
-        return found
-    found += _inexact(pattern, pattern.folded_coords)
-    if measured.self_intersections:
-        pairs = self_intersections(pattern)
-        found.append(
-            Finding(
-                "self-intersection",
-                f"{len(pairs)} pairs of facets pass through or lie on each other in the folded "
-                f"form, the first being facets {pairs[0][0]} and {pairs[0][1]}.",
-                tuple(np.unique(pairs).tolist()),
-            )
-        )
-    return found
-
-
-def _overlap(pattern: CreasePattern) -> Finding:
-    pairs = overlaps(pattern)
-    within = pairs
-    if pattern.pieces is not None:
-        within = pairs[pattern.pieces[pairs[:, 0]] == pattern.pieces[pairs[:, 1]]]
-    (one, other), *_ = pairs if not len(within) else within
-    if len(within):
-        sentence = (
-            f"{len(within)} pairs of facets overlap in the flat pattern, the first being facets "
-            f"{one} and {other}: it cannot be cut from one piece."
-        )
-    else:
-        sentence = (
-            f"Pieces lie on each other in the flat pattern ({len(pairs)} pairs of facets, the "
-            f"first being {one} and {other}): they have to lie apart."
-        )
-    return Finding("overlap", sentence, tuple(np.unique(pairs).tolist()))
-
-
-def _inexact(pattern: CreasePattern, folded: Floats) -> list[Finding]:
-    """Where planarity, developability and isometry are over ``EXACT``."""
-    inner = invariants.interior_vertices(pattern)
-    facets = np.arange(len(pattern.faces_vertices))
-    ring = invariants.corner_ring(pattern, folded)
-    defect = invariants.angle_defect(ring, inner) if len(inner) else np.empty(0)
-    checks = (
-        ("planarity", "planar", "facet", facets, invariants.facet_planarity(pattern, folded)),
-        ("developability", "developable", "vertex", inner, np.abs(defect)),
-        ("isometry", "the same flat and folded", "facet", facets, invariants.isometry(pattern)),
-    )
-    found = []
-    for code, virtue, noun, names, values in checks:
-        over = ~(values <= EXACT)
-        if over.any():
-            where = names[over]
-            found.append(
-                Finding(
-                    code,
-                    f"{_these(where, noun)} not {virtue}: up to {values.max():.1e}, over "
-                    f"{EXACT:.0e}.",
-                    tuple(where.tolist()),
-                )
-            )
-    return found
-
-
-def _these(numbers: Ints, noun: str) -> str:
-    """``Edge 7 is`` or ``12 edges (3, 4, 5, 6, 7, ...) are``."""
-    if len(numbers) == 1:
-        return f"{noun.capitalize()} {numbers[0]} is"
-    shown = ", ".join(str(n) for n in numbers[:5]) + (", ..." if len(numbers) > 5 else "")
-    several = "vertices" if noun == "vertex" else noun + "s"
-    return f"{len(numbers)} {several} ({shown}) are"

@@ -11,6 +11,7 @@ from miurafab.options.verbs import verb
 from miurafab.origami.fitting.fit import fit as fit_request
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.origami.fitting.result import FitResult
+from miurafab.origami.judge_pattern import judge_quality
 from miurafab.workflow.design import design
 
 
@@ -70,7 +71,8 @@ def fit(
     """
     asked = design(target, **options)
     result = fit_request(asked.request, on_progress)
-    return replace(result, findings=(*asked.findings, *result.findings))
+    shape = () if result.measurements is None else judge_quality(result.measurements)
+    return replace(result, findings=(*asked.findings, *result.findings, *shape))
 
 
 described(fit, FitOptions)

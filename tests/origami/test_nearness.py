@@ -10,7 +10,7 @@ from problems import fitted
 from scipy.spatial import cKDTree
 
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.nearness import nearness
+from miurafab.origami.nearness import Nearness, nearness
 from miurafab.surfaces.catalogue import make_surface
 
 BARYCENTRIC = np.array(
@@ -32,10 +32,15 @@ def dense_target(name: str, count: int = 700) -> np.ndarray:
     return surface.point(np.stack([u, v], axis=-1)).reshape(-1, 3)
 
 
+def measured(pattern: CreasePattern, name: str) -> Nearness:
+    surface = make_surface(name, {})[0]
+    return nearness(pattern, surface, surface.tiles())
+
+
 @pytest.mark.parametrize("name", ["hypar", "vase", "sphere", "cylinder"])
 def test_both_distances_are_those_of_dense_samples(name):
     pattern = fitted(name, 12, 12).pattern
-    found = nearness(pattern, make_surface(name, {})[0])
+    found = measured(pattern, name)
     sheet, target = dense_sheet(pattern), dense_target(name) * pattern.scale
     there = cKDTree(target).query(sheet)[0].max()
     back = cKDTree(sheet).query(target)[0].max()
@@ -53,7 +58,7 @@ def test_over_a_rectangle_the_farthest_point_is_a_vertex(shift):
     half = np.array([surface.domain.u1, surface.domain.v1]) * pattern.scale
     outside = np.maximum(np.abs(points[:, :2]) - half, 0.0)
     far = np.linalg.norm(np.append(outside, points[:, 2:], axis=1), axis=1).max()
-    found = nearness(replace(pattern, folded_coords=points), surface)
+    found = measured(replace(pattern, folded_coords=points), "plane")
     assert found.sheet_to_target == pytest.approx(far, rel=1e-9)
     assert found.target_to_sheet > shift
 
@@ -68,7 +73,7 @@ def test_half_a_sheet_leaves_half_of_the_target_far_away():
         grid=None,
     )
     surface = make_surface("hypar", {})[0]
-    before, after = nearness(whole, surface), nearness(half, surface)
+    before, after = measured(whole, "hypar"), measured(half, "hypar")
     assert after.sheet_to_target == pytest.approx(before.sheet_to_target, rel=0.2)
     width = surface.domain.width * whole.scale
     assert after.target_to_sheet > 0.45 * width

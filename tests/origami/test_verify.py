@@ -22,7 +22,8 @@ PROMISED = {
     "status", "advice", "facets", "vertices", "max_planarity", "max_developability",
     "max_flat_foldability", "min_edge_mm", "max_isometry", "hausdorff_mm", "hausdorff_relative",
     "hausdorff_midsurface_mm", "self_intersections", "overlaps", "area_ratio", "iterations",
-    "seconds",
+    "seconds", "sheet_to_target_mm", "target_to_sheet_mm", "coverage", "overhang", "pieces",
+    "seam_mm", "quality", "findings",
 }  # fmt: skip
 
 
@@ -180,6 +181,58 @@ def test_a_coordinate_that_is_no_number_never_gets_as_far(key):
     points[3, 0] = math.nan
     with pytest.raises(PatternError, match="not"):
         replace(regular(), **{key: points})
+
+
+def test_bow_ties_pass_every_residual_and_are_found():
+    """A strip of three squares of which the middle one is crossed: flat and folded are one."""
+    flat = np.array([[0, 0], [1, 0], [2, 0], [3, 0], [0, 1], [1, 1], [2, 1], [3, 1]], dtype=float)
+    faces = np.array([[0, 1, 5, 4], [1, 2, 5, 6], [2, 3, 7, 6]])
+    sides = {
+        tuple(sorted(pair)) for f in faces.tolist() for pair in zip(f, f[1:] + f[:1], strict=True)
+    }
+    edges = np.array(sorted(sides))
+    uses = [sum(set(e) <= set(f) for f in faces.tolist()) for e in edges.tolist()]
+    pattern = CreasePattern(
+        vertices_coords=10 * flat,
+        edges_vertices=edges,
+        edges_assignment=np.where(np.array(uses) == 2, "F", "B"),
+        edges_fold_angle=np.zeros(len(edges)),
+        faces_vertices=faces,
+        folded_coords=np.pad(10 * flat, ((0, 0), (0, 1))),
+    )
+    found = codes(pattern)
+    assert found["bow-tie"] == (1,)
+    assert not {"isometry", "planarity", "developability"} & set(found)
+    assert not audit(pattern).valid
+
+
+def test_a_quad_that_is_not_convex_is_told():
+    pattern = regular()
+    flat, folded = pattern.vertices_coords.copy(), pattern.folded_coords.copy()
+    for points in (flat, folded):  # the corner goes over the diagonal of its facet
+        points[0] = points[0] + 0.7 * (points[10] - points[0])
+    found = codes(replace(pattern, vertices_coords=flat, folded_coords=folded))
+    assert found == {"dented": (0,)}
+
+
+def test_a_sheet_far_from_the_origin_is_as_exact_as_its_digits():
+    pattern = regular()
+    far = replace(pattern, folded_coords=pattern.folded_coords + np.array([3e7, -2e7, 1e7]))
+    assert codes(far) == {}
+    bent = moved(pattern.folded_coords, 3 * 9 + 4, 0.0, 0.0, 1e-3)
+    far = replace(pattern, folded_coords=bent + np.array([3e7, -2e7, 1e7]))
+    assert {"planarity", "isometry"} <= set(codes(far))
+
+
+def test_the_quality_is_that_of_the_regular_miura_ori():
+    """Sector angles of 65 and 115 degrees, sides of 12 and 10 mm, fold angles of two values."""
+    pattern = regular()
+    shape = audit(pattern).measurements.quality
+    assert np.degrees(shape.sector_angles) == pytest.approx([65, 115])
+    assert shape.edge_mm[0] == pytest.approx(10.0)
+    assert shape.facet_aspect == pytest.approx(1.2)
+    stated = np.abs(pattern.edges_fold_angle[pattern.edges_assignment != "B"])
+    assert shape.fold_angles == pytest.approx(np.quantile(stated, (0.5, 0.95, 1.0)))
 
 
 def test_the_report_names_what_the_fit_report_names():

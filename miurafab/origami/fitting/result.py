@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from miurafab.display import Shown
@@ -126,11 +126,10 @@ class FitResult(Shown):
 
     def report(self) -> dict[str, Any]:
         """The fit report, ready for JSON."""
-        numbers = {f.name: getattr(self.measurements, f.name, None) for f in fields(Measurements)}
         return {
             "status": self.status,
             "advice": self.advice,
-            **numbers,
+            **Measurements.report(self.measurements),
             "iterations": self.iterations,
             "seconds": self.seconds,
             "deviation_mm": self.deviation_mm,

@@ -1,0 +1,184 @@
+"""What is wrong with a pattern, and what is hard to fold in it: the findings of the audit.
+
+:func:`gather` recomputes what the judgement needs, once: residuals and facets that meet.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from miurafab.findings import Finding
+from miurafab.geometry.arrays import Ints
+from miurafab.geometry.polygons import edge_lengths
+from miurafab.origami import invariants
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.contact import overlaps, self_intersections
+from miurafab.origami.invariants import DEGENERATE, EXACT, Residuals
+
+if TYPE_CHECKING:
+    from miurafab.origami.verify import Measurements
+
+STEEP_FOLD = math.radians(165)
+"""A crease beyond this angle nearly lies on its neighbour."""
+
+MUCH_PAPER = 4.0
+"""From this area ratio on, the paper lies in more than four layers on average."""
+
+LITTLE_COVERED, MUCH_OVERHANG = 0.95, 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """The pairs of facets (n, 2) that overlap when flat and cross when folded, and the residuals,
+    which are None without a folded form.
+    """
+
+    overlaps: Ints
+    crossings: Ints
+    residuals: Residuals | None
+
+
+def gather(pattern: CreasePattern) -> Evidence:
+    """Everything that :func:`judge` needs of ``pattern``."""
+    if pattern.folded_coords is None:
+        return Evidence(overlaps(pattern), np.empty((0, 2), dtype=np.int64), None)
+    found = invariants.residuals(pattern)
+    return Evidence(overlaps(pattern), self_intersections(pattern), found)
+
+
+def judge_quality(measured: Measurements) -> Iterator[Finding]:
+    """What makes a sheet hard to fold or leaves target out; all of it is left to the maker."""
+    shape = measured.quality
+    if shape is not None and shape.fold_angles[2] > STEEP_FOLD:
+        yield Finding(
+            "steep-folds",
+            f"Creases fold by up to {math.degrees(shape.fold_angles[2]):.0f} degrees, and facets "
+            "nearly lie on each other there; ask for other `facets`, or a lower `amplitude` or "
+            "`zigzag`.",
+        )
+    if measured.area_ratio is not None and measured.area_ratio > MUCH_PAPER:
+        yield Finding(
+            "much-paper",
+            f"The sheet takes {measured.area_ratio:.1f} times the area of the target under it, so "
+            "it is thick and steep; lower `zigzag` or `amplitude`.",
+        )
+    if measured.coverage is not None and measured.coverage < LITTLE_COVERED:
+        yield Finding(
+            "coverage",
+            f"The sheet covers {100 * measured.coverage:.1f} % of the target's area.",
+        )
+    if measured.overhang is not None and measured.overhang > MUCH_OVERHANG:
+        yield Finding(
+            "overhang",
+            f"{100 * measured.overhang:.1f} % of the sheet reaches beyond the border of the target "
+            "or lies over its holes.",
+        )
+
+
+def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
+    """The faults of ``pattern``."""
+    edges = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
+    short = np.flatnonzero(edges < DEGENERATE * edges.mean())
+    if len(short):
+        yield Finding(
+            "degenerate-edge",
+            f"{_these(short, 'edge')} shorter than a millionth of the mean edge (down to "
+            f"{edges[short].min():.1e} mm): they cannot be creased or cut, so the sheet cannot "
+            "be made. Fit again with `min_edge`.",
+            tuple(short.tolist()),
+        )
+    yield from _shapes(pattern)
+    if len(evidence.overlaps):
+        yield _overlap(pattern, evidence.overlaps)
+    found = evidence.residuals
+    exact = EXACT if found is None else found.exact
+    gaps = invariants.seam_gaps(pattern)
+    open_seams = np.flatnonzero(~(gaps <= exact))
+    if len(open_seams):
+        yield Finding(
+            "seam",
+            f"{_these(open_seams, 'seam')} not closed: the two edges differ by up to "
+            f"{gaps[open_seams].max():.1e} mean edges in length or in place.",
+            tuple(open_seams.tolist()),
+        )
+    if found is not None:
+        yield from _inexact(found)
+    pairs = evidence.crossings
+    if len(pairs):
+        yield Finding(
+            "self-intersection",
+            f"{len(pairs)} pairs of facets pass through or lie on each other in the folded "
+            f"form, the first being facets {pairs[0][0]} and {pairs[0][1]}.",
+            tuple(np.unique(pairs).tolist()),
+        )
+
+
+def _shapes(pattern: CreasePattern) -> Iterator[Finding]:
+    """Facets of a shape that does not unfold, and of one that is hard to fold."""
+    crossed = invariants.crossed_facets(pattern)
+    if len(crossed):
+        yield Finding(
+            "bow-tie",
+            f"{_these(crossed, 'facet')} a bow-tie, whose own sides cross: no piece of paper has "
+            "that shape.",
+            tuple(crossed.tolist()),
+        )
+    dented = invariants.dented_facets(pattern)
+    if len(dented):
+        yield Finding(
+            "dented",
+            f"{_these(dented, 'facet')} not convex, and folds badly.",
+            tuple(dented.tolist()),
+        )
+
+
+def _overlap(pattern: CreasePattern, pairs: Ints) -> Finding:
+    within = pairs
+    if pattern.pieces is not None:
+        within = pairs[pattern.pieces[pairs[:, 0]] == pattern.pieces[pairs[:, 1]]]
+    (one, other), *_ = pairs if not len(within) else within
+    if len(within):
+        sentence = (
+            f"{len(within)} pairs of facets overlap in the flat pattern, the first being facets "
+            f"{one} and {other}: it cannot be cut from one piece."
+        )
+    else:
+        sentence = (
+            f"Pieces lie on each other in the flat pattern ({len(pairs)} pairs of facets, the "
+            f"first being {one} and {other}): they have to lie apart."
+        )
+    return Finding("overlap", sentence, tuple(np.unique(pairs).tolist()))
+
+
+def _inexact(found: Residuals) -> Iterator[Finding]:
+    """Where planarity, developability and isometry are not exact."""
+    facets = np.arange(len(found.planarity))
+    checks = (
+        ("planarity", "planar", "facet", facets, found.planarity),
+        ("developability", "developable", "vertex", found.interior, found.developability),
+        ("isometry", "the same flat and folded", "facet", facets, found.isometry),
+    )
+    for code, virtue, noun, names, values in checks:
+        over = ~(values <= found.exact)
+        if over.any():
+            where = names[over]
+            yield Finding(
+                code,
+                f"{_these(where, noun)} not {virtue}: up to {values.max():.1e}, over "
+                f"{found.exact:.0e}.",
+                tuple(where.tolist()),
+            )
+
+
+def _these(numbers: Ints, noun: str) -> str:
+    """``Edge 7 is`` or ``12 edges (3, 4, 5, 6, 7, ...) are``."""
+    if len(numbers) == 1:
+        return f"{noun.capitalize()} {numbers[0]} is"
+    shown = ", ".join(str(n) for n in numbers[:5]) + (", ..." if len(numbers) > 5 else "")
+    several = "vertices" if noun == "vertex" else noun + "s"
+    return f"{len(numbers)} {several} ({shown}) are"
