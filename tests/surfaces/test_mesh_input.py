@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from mesh_shapes import SHAPES, disk, mesh, noise, of_kind, plate, polar, sheet
+from mesh_shapes import SHAPES, disk, mesh, noise, plate, polar, sheet
 from scipy.spatial import cKDTree
 
 import miurafab as mf
@@ -38,7 +38,14 @@ def off_text(vertices: np.ndarray, faces: np.ndarray) -> str:
 # --- kinds --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SHAPES)
+SOLIDS = ("plate-saddle", "plate-pipe", "ball", "banana", "block", "torus")
+"""Of the closed meshes these; each of their triangles sends a ray."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name for name in SHAPES if name in SOLIDS or SHAPES[name].kind not in ("plate", "sphere")],
+)
 def test_a_mesh_is_prepared_as_one_piece_of_its_kind_or_refused(name: str) -> None:
     """Every vertex lies in one fan, and Euler's number is that of the kind."""
     kind = SHAPES[name].kind
@@ -114,7 +121,7 @@ def test_rays_meet_what_a_search_through_all_triangles_meets(seed: int) -> None:
         assert distance[n] == pytest.approx(best[0])
 
 
-PLATES = [name for name in of_kind("plate") if name != "plate-pipe"]
+PLATES = ("plate-dome", "plate-wedge", "plate-rounded", "plate-noisy")
 
 
 @pytest.mark.parametrize("name", PLATES)
@@ -167,7 +174,7 @@ def test_of_many_triangles_some_send_rays(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_plate_is_fitted_on_its_skin_and_checked_from_its_file(tmp_path: Path) -> None:
     path = tmp_path / "plate.off"
     path.write_text(off_text(*mesh("plate-saddle")))
-    made = mf.fit(path, facets=(8, 8), side="inner")
+    made = mf.fit(path, facets=(4, 4), side="inner", polish="off")
     assert made.status == "converged"
     assert made.pattern.target["side"] == "inner"
     made.pattern.save(tmp_path / "plate.fold")
@@ -333,7 +340,7 @@ def moved(name: str, place: list[float]) -> tuple[np.ndarray, np.ndarray]:
     return vertices @ TURN.T + np.array(place), faces
 
 
-@pytest.mark.parametrize("name", ["cap-40", "saddle-l", "plate-saddle"])
+@pytest.mark.parametrize("name", ["cap-40", "saddle-l"])
 def test_a_mesh_gives_the_same_surface_wherever_it_lies(name: str) -> None:
     """Symmetric meshes too, where rounding decides between equals."""
     here = mesh_surface(*moved(name, [0.0, 0.0, 0.0]), name)
@@ -350,24 +357,24 @@ def test_a_mesh_gives_the_same_surface_wherever_it_lies(name: str) -> None:
 
 def test_a_sheet_is_the_same_wherever_its_target_lies(tmp_path: Path) -> None:
     """To 1e-6 of its size, in the file and in memory, and exact everywhere."""
-    path = tmp_path / "fan.off"
+    path = tmp_path / "sheet.off"
     sheets = []
     for place in ([0.0, 0.0, 0.0], *PLACES[2:]):
-        path.write_text(off_text(*moved("fan", place)))
-        made = mf.fit(path, facets=(8, 6), size=300)
+        path.write_text(off_text(*moved("turned", place)))
+        made = mf.fit(path, facets=(6, 6), size=300, polish="off")
         assert made.status == "converged"
         assert made.measurements.max_planarity < 1e-12
         assert made.measurements.max_isometry < 1e-12
-        made.pattern.save(tmp_path / "fan.fold")
-        read = mf.load(tmp_path / "fan.fold")
+        made.pattern.save(tmp_path / "sheet.fold")
+        read = mf.load(tmp_path / "sheet.fold")
         assert np.array_equal(read.folded_coords, made.pattern.folded_coords)
-        checked = mf.check(tmp_path / "fan.fold")
+        checked = mf.check(tmp_path / "sheet.fold")
         assert checked.valid
         assert checked.measurements.hausdorff_mm == pytest.approx(
             made.measurements.hausdorff_mm, rel=1e-9
         )
         # any reader finds the folded form on `scale` times the target as it stands in its file
-        document = json.loads((tmp_path / "fan.fold").read_text())
+        document = json.loads((tmp_path / "sheet.fold").read_text())
         own = np.array(document["file_frames"][0]["vertices_coords"])
         own = own / document["miurafab:scale"] - np.array(place)
         sheets.append((own, np.array(document["vertices_coords"])))
@@ -393,7 +400,7 @@ def test_the_size_of_a_mesh_scales_its_surface_and_nothing_else(factor: float) -
     assert np.abs(points - small.point(small.domain.lattice(9, 9))).max() < 1e-6
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_no_alternative_ends_the_search(seed: int) -> None:
     """Ragged disks with noise: every alternative is a surface, and none raises."""
     random = np.random.default_rng(seed)
