@@ -69,7 +69,13 @@ def tradeoff(
             f"distance = {100 * found.coefficient:.3g} % of the diagonal / n (n facets a side), to "
             f"{100 * found.law_error:.0f} %; left free, the power of n is {found.exponent:.3f}"
         )
-        console.line(f"A/A0 tends to {found.area_limit:.4f}")
+        console.line(
+            f"A/A0 tends to {found.area_limit:.4f} as 1 / n; left free, to "
+            f"{found.area_free_limit:.4f} with the power {found.area_power:.2f} of n"
+        )
+        if found.midsurface_exponent is not None:
+            power = f"{found.midsurface_exponent:.2f}"
+            console.line(f"the distance of the mid-surface falls with the power {power} of n")
         table = [(c.weight, c.best_facets, round(c.optimal_facets)) for c in found.curves]
         console.rows(("weight of effort", "cheapest sheet", "cheapest by the law"), table)
 

@@ -6,12 +6,16 @@ target. A corrugation whose height is proportional to the size of its facets giv
 
     d(n) = c / n,        A / A0 = a + b / n,
 
-where a > 1 is paper that no refinement saves. With a weight w in (0, 1) on effort,
+where a > 1 is paper that no refinement saves. Each power is also left free, A / A0 = a + b n^p, and
+reported beside the law's; so is the power of the distance of the mid-surface, which falls faster
+than that of the whole, since the height of the corrugation falls as 1 / n.
+With a weight w in (0, 1) on effort,
 
     C_w(n) = (1 - w) d(n) / 1% + w n^2 / 1000,    least at  n = ((1 - w) 1000 c / (2 w 1%))^(1/3).
 
 (Dudte, Vouga, Tachi and Mahadevan, Nature Materials 15, 2016, last figure, ask the same of a
-hyperboloid; the units of the cost, 1 % and 1000 facets, are this project's.)
+hyperboloid, and let the area fall as 1 over the number of facets, which is p = -2. The units of the
+cost, 1 % and 1000 facets, are this project's.)
 """
 
 from __future__ import annotations
@@ -86,6 +90,10 @@ class Tradeoff(Shown):
         The largest relative distance of a sample from c / n.
     area_limit, area_slope : float or None
         a and b of the law of the area of the paper.
+    area_power, area_free_limit : float or None
+        p and a of the law of the area with a free power, the best fit with p from -4 to -0.25.
+    midsurface_exponent : float or None
+        The power of n by which the distance of the mid-surface falls.
     curves : tuple of CostCurve
         The cost of each sheet, for each weight on effort.
     """
@@ -97,6 +105,9 @@ class Tradeoff(Shown):
     area_limit: float | None
     area_slope: float | None
     curves: tuple[CostCurve, ...]
+    area_power: float | None = None
+    area_free_limit: float | None = None
+    midsurface_exponent: float | None = None
 
     @property
     def found(self) -> tuple[Sample, ...]:
@@ -164,6 +175,9 @@ class Tradeoff(Shown):
             },
             "area_ratio_limit": self.area_limit,
             "area_ratio_slope": self.area_slope,
+            "area_ratio_power": self.area_power,
+            "area_ratio_free_limit": self.area_free_limit,
+            "midsurface_exponent": self.midsurface_exponent,
             "costs": [asdict(curve) for curve in self.curves],
         }
 
@@ -201,7 +215,28 @@ def summarise(samples: list[Sample], weights: tuple[float, ...] = WEIGHTS) -> Tr
         float(limit),
         float(slope),
         tuple(curves),
+        *_free_area_law(n, area),
+        _power(n, np.array([s.hausdorff_midsurface_mm for s in fitted], dtype=np.float64)),
     )
+
+
+def _free_area_law(n: Floats, area: Floats) -> tuple[float, float]:
+    """p and a of the law a + b n^p that is nearest to ``area`` (k,), weighted by n."""
+    powers = np.linspace(-4, -0.25, 376)
+    fits = [np.polyfit(n**power, area, 1, w=n) for power in powers.tolist()]
+    misses = [
+        float(np.linalg.norm(n * (np.polyval(fit, n**power) - area)))
+        for fit, power in zip(fits, powers.tolist(), strict=True)
+    ]
+    best = int(np.argmin(misses))
+    return float(powers[best]), float(fits[best][1])
+
+
+def _power(n: Floats, distance: Floats) -> float | None:
+    """The power of n by which ``distance`` falls; None where it is 0 or nearly so somewhere."""
+    if not distance.min() > 1e-9:
+        return None
+    return float(np.polyfit(np.log(n), np.log(distance), 1)[0])
 
 
 def cost(weight: float, n: Floats, d: Floats) -> Floats:

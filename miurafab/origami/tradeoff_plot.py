@@ -72,7 +72,10 @@ def draw_tradeoff(found: Tradeoff, axes: Sequence[Axes], title: str = "") -> Non
         label=f"{found.area_limit:.3f} {found.area_slope:+.2g} / n",
     )  # fmt: skip
     area.axhline(found.area_limit, color=LAW, lw=0.8, ls=":")
-    area.semilogx(facets, [s.area_ratio for s in found.found], "o", color=SHEETS, label="sheets")
+    area.semilogx(
+        facets, [s.area_ratio for s in found.found], "o", color=SHEETS,
+        label=f"sheets (free power: n$^{{{found.area_power:.2f}}}$)",
+    )  # fmt: skip
     area.set_ylabel("area of the paper over that of the target")
     shades = colormaps["viridis"](np.linspace(0.0, 0.85, len(found.curves)))
     for curve, shade in zip(found.curves, shades, strict=True):

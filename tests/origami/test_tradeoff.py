@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,6 +42,19 @@ def test_the_laws_are_recovered(sides, c, a, b):
     assert found.law_error == pytest.approx(0, abs=1e-9)
     assert found.area_limit == pytest.approx(a, rel=1e-6)
     assert found.area_slope == pytest.approx(b, abs=1e-4)
+
+
+@pytest.mark.parametrize("power", [-0.5, -1.0, -2.0, -3.0])
+def test_the_powers_that_are_left_free_are_recovered(power):
+    sides = (6, 8, 12, 16, 24)
+    samples = [
+        replace(s, area_ratio=1.7 + 0.8 * n**power, hausdorff_midsurface_mm=3.0 * n ** (power - 1))
+        for s, n in zip(made(sides), sides, strict=True)
+    ]
+    found = summarise(samples)
+    assert found.area_power == pytest.approx(power, abs=0.011)
+    assert found.area_free_limit == pytest.approx(1.7, abs=2e-3)
+    assert found.midsurface_exponent == pytest.approx(power - 1, abs=1e-9)
 
 
 @given(st.floats(0.01, 0.99), st.floats(0.01, 2))
