@@ -23,6 +23,7 @@ from miurafab.errors import TargetError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
+from miurafab.surfaces.decimation import decimated
 from miurafab.surfaces.mesh_files import read_mesh
 from miurafab.surfaces.mesh_repair import doubled_areas, even_triangles, fill_holes, side_lengths
 from miurafab.surfaces.parameterise import flatten
@@ -37,6 +38,7 @@ from miurafab.surfaces.placement import (
 from miurafab.surfaces.preparation import MeshReading, prepare, refuse_other_than_a_disk
 from miurafab.surfaces.smoothing import Smoothed, continued, smooth
 from miurafab.surfaces.surface import Domain, tangents, unit
+from miurafab.surfaces.topology import classify
 
 if TYPE_CHECKING:
     from miurafab.surfaces.outline import WholeMesh
@@ -46,6 +48,12 @@ ROUGH = 0.03
 
 MARGIN = 0.12
 """The spline also follows the mesh up to this part of the rectangle's size beyond it."""
+
+LARGE = 80_000
+"""A mesh of more triangles is simplified before it is laid flat, to about ``LAID_FLAT``: the spline
+has at most 40 x 40 spans."""
+
+LAID_FLAT = 40_000
 
 FEWEST = 4
 """A rectangle with fewer vertices of the mesh is refused."""
@@ -61,14 +69,16 @@ _ROUGH_SPANS = 24
 class MeshChart:
     """A mesh laid flat.
 
-    The first ``real`` of ``faces`` (F, 3) and the first ``known`` of ``vertices`` (V, 3) belong to
-    the mesh, the others fill holes. ``flat`` (V, 2) is the layout; ``rough`` marks a noisy scan.
+    ``vertices`` (V, 3) and ``faces`` (F, 3) are the mesh, simplified if it is large, with its holes
+    filled; the first ``known`` of the vertices are the mesh's own. ``flat`` (V, 2) is the layout;
+    ``rough`` marks a noisy scan. ``whole`` are the vertices and triangles of the mesh as it is, for
+    distances.
     ``reading`` is what a description keeps of how the mesh was read, such as its ``origin``.
     """
 
     vertices: Floats
     faces: Ints
-    real: int
+    whole: tuple[Floats, Ints]
     known: int
     flat: Floats
     rough: bool
@@ -78,7 +88,8 @@ class MeshChart:
     @property
     def triangles(self) -> Floats:
         """(T, 3, 3) the triangles of the mesh, without those that fill holes."""
-        return self.vertices[self.faces[: self.real]]
+        vertices, faces = self.whole
+        return vertices[faces]
 
     def surface(self, placement: GridPlacement, stiffness: float = 0.0) -> MeshSurface:
         """The target over ``placement``; the spline is as stiff as the data ask, or ``stiffness``.
@@ -104,7 +115,7 @@ class MeshChart:
                 f"sheet, and {FEWEST} are needed; subdivide the triangles of the mesh."
             )
         smoothed = smooth(places, points, wide, spans(wide, edge, _SPANS), stiffness)
-        triangles = even_triangles(self.vertices, self.faces[: self.real])
+        triangles = even_triangles(*self.whole)
         return MeshSurface(smoothed.spline, domain, triangles, placement, stiffness, self)
 
     def _not_covered(self, frame: Floats) -> str:
@@ -303,10 +314,14 @@ def lay_out(
         reading = MeshReading.before(place)
     mesh = prepare(vertices, faces, name, reading, place)
     refuse_other_than_a_disk(mesh)
-    vertices, faces = mesh.vertices, mesh.faces
+    whole = mesh.vertices, mesh.faces
+    topology = mesh.topology
+    vertices, faces = decimated(*whole, LAID_FLAT) if len(mesh.faces) > LARGE else whole
+    if len(faces) < len(mesh.faces):
+        topology = classify(vertices, faces)
     known, real = len(vertices), len(faces)
     holes = "small" if reading is None else reading.holes
-    vertices, faces, filled = fill_holes(vertices, faces, mesh.topology, name, holes)
+    vertices, faces, filled = fill_holes(vertices, faces, topology, name, holes)
     findings = mesh.findings + filled
     flat = flatten(vertices, faces)
     smoothed = _smoothed(vertices[:known], flat[:known], faces)
@@ -316,7 +331,7 @@ def lay_out(
         even = np.asarray(smoothed.spline(flat), dtype=np.float64)
         if doubled_areas(even, faces).min() > 1e-6 * np.median(doubled_areas(even, faces)):
             flat = flatten(even, faces)
-    return MeshChart(vertices, faces, real, known, flat, rough, name, mesh.reading), findings
+    return MeshChart(vertices, faces, whole, known, flat, rough, name, mesh.reading), findings
 
 
 def _smoothed(points: Floats, flat: Floats, faces: Ints) -> Smoothed:

@@ -49,7 +49,7 @@ def clean(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
     vertices = np.where(np.isfinite(vertices), vertices, 0.0)
     low = vertices[faces].reshape(-1, 3).min(axis=0)
     keys = np.round(np.clip((vertices - low) / (1e-9 * size), -1e12, 1e12)).astype(np.int64)
-    _, first, merged = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    first, merged = _equal_rows(keys)
     # in the order of the file, which neither a turn nor a shift of the mesh changes
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -61,6 +61,15 @@ def clean(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
         raise TargetError(f"{name}: all triangles are degenerate (have no area).")
     used, faces = np.unique(faces, return_inverse=True)
     return vertices[used], faces.reshape(-1, 3)
+
+
+def _equal_rows(keys: Ints) -> tuple[Ints, Ints]:
+    """The index of the first of each class of equal rows of ``keys`` (n, 3), and the class (n,)."""
+    order = np.lexsort(keys.T)
+    new = np.concatenate([[True], (np.diff(keys[order], axis=0) != 0).any(axis=1)])
+    merged = np.empty(len(keys), dtype=np.int64)
+    merged[order] = np.cumsum(new) - 1
+    return order[new], merged
 
 
 def size_findings(vertices: Floats, name: str) -> tuple[Finding, ...]:

@@ -200,7 +200,7 @@ def whole_mesh(layout: MeshChart, stiffness: float = 0.0) -> WholeMesh:
     size = high - low
     wide = Domain(*np.stack([low - REACH * size, high + REACH * size], axis=1).ravel().tolist())
     domain = Domain(*np.stack([low, high], axis=1).ravel().tolist())
-    triangles = even_triangles(layout.vertices, layout.faces[: layout.real])
+    triangles = even_triangles(*layout.whole)
     places, points = layout.flat[: layout.known], layout.vertices[: layout.known]
     count = spans(wide, median_edge(layout.flat, layout.faces), _SPANS)
     for stiff in [stiffness, *(s for s in STIFFER if s > stiffness)]:

@@ -134,8 +134,11 @@ def border_loops(faces: Ints) -> list[Ints]:
     """The border of an oriented mesh as loops of vertices, the loop of most vertices first."""
     sides = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     count = int(faces.max()) + 1
-    keys = sides[:, 0] * count + sides[:, 1]
-    open_sides = sides[~np.isin(keys, sides[:, 1] * count + sides[:, 0])]
+    keys = sides.min(axis=1) * count + sides.max(axis=1)
+    order = np.argsort(keys, kind="stable")
+    first = np.flatnonzero(np.diff(keys[order], prepend=-1))
+    alone = np.diff(first, append=len(keys)) == 1
+    open_sides = sides[np.sort(order[first[alone]])]
     following = dict(open_sides.tolist())
     loops = []
     while following:
