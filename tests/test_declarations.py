@@ -29,7 +29,7 @@ from miurafab.options import (
     declared,
     read_options,
 )
-from miurafab.origami.fitting.kinds import CutColumns, FlatFoldability, Pieces
+from miurafab.origami.fitting.kinds import CutColumns, FlatFoldability, Pieces, Poles
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.studio.form import FIT, LAYOUT, filled
 from miurafab.workflow.cut_sheets import CutOptions
@@ -75,6 +75,7 @@ def example(kind: Kind) -> str:
         FlatFoldability: lambda: "0.9deg",
         Pieces: lambda: "3",
         CutColumns: lambda: "1,2",
+        Poles: lambda: "0,0,-1,0,0,1",
     }.get(type(kind), lambda: "0.1,0.9,0.2,0.8")()
 
 

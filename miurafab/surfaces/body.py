@@ -18,9 +18,11 @@ import numpy as np
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.surfaces.mesh_repair import doubled_areas, even_triangles
+from miurafab.surfaces.frame import origin_in
+from miurafab.surfaces.mesh_repair import SMALL_HOLE, Holes, doubled_areas, even_triangles
 from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.poles import HOLE, HeatDistance, open_at, pole_candidates
+from miurafab.surfaces.preparation import PreparedMesh
 from miurafab.surfaces.refine import refine
 from miurafab.surfaces.tube import TubeChart, TubeSurface, tube_chart
 from miurafab.surfaces.tube_figures import LIMITS, TubeFigures
@@ -28,11 +30,26 @@ from miurafab.surfaces.tube_figures import LIMITS, TubeFigures
 STIFFNESSES = (0.0, 1e-2, 1e-1)
 """What is tried, the least first."""
 
+ROOM = 0.01
+"""A tube encloses at least this part of its area to the power 3/2: one of the length of 100 radii
+does. A sheet with a hole does not."""
+
 FEW = 8
 """The first pair of poles that serves in this many gores or fewer is taken."""
 
 EDGE = 0.03
 """No edge is longer than this part of the root of the area before the mesh is laid flat."""
+
+
+@dataclass(frozen=True)
+class BodyChoice:
+    """What a user chooses of a body: the coordinates of two ``poles`` one after the other, the
+    radius ``hole`` round each, and the number of ``pieces``. None is automatic.
+    """
+
+    poles: tuple[float, ...] | None = None
+    hole: float | None = None
+    pieces: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +82,38 @@ class Opening:
     poles: Floats
     hole: float
     lost: float
+
+
+def goes_round(mesh: PreparedMesh, holes: Holes) -> bool:
+    """Whether a mesh is a body for gores: closed and no plate, or a tube whose smaller border is no
+    hole to be filled, and which with a lid on both borders encloses a room.
+    """
+    if mesh.topology.kind == "sphere":
+        return True
+    if mesh.topology.kind != "tube" or holes == "all":
+        return False
+    if mesh.topology.lengths[1] <= SMALL_HOLE * mesh.topology.lengths[0]:
+        return False
+    area = Body(mesh.vertices, mesh.faces, mesh.name).area
+    return abs(_volume(mesh.vertices, mesh.faces)) > ROOM * math.sqrt(area) ** 3
+
+
+def round_target(
+    mesh: PreparedMesh, choice: BodyChoice, place: Mapping[str, Any] | None
+) -> TubeSurface:
+    """The target on a mesh that goes round, as ``choice`` or the description ``place`` says."""
+    body = Body(mesh.vertices, mesh.faces, mesh.name)
+    if place is not None:
+        surface = described(body, place)
+    else:
+        origin = origin_in(mesh.reading)
+        poles = None if choice.poles is None else np.reshape(choice.poles, (2, 3)) - origin
+        surface = body_surface(body, poles=poles, hole=choice.hole, pieces=choice.pieces)
+    return replace(
+        surface,
+        findings=mesh.findings + surface.findings,
+        description={**mesh.reading, **surface.description},
+    )
 
 
 def body_surface(
@@ -233,8 +282,13 @@ def _refusal(name: str, told: TubeFigures, closed: bool) -> str:
 
 
 def _outwards(vertices: Floats, faces: Ints) -> Ints:
-    """The triangles turned so that they face outwards: with a lid on each border, the volume that
-    they enclose is positive."""
+    """The triangles turned so that they face outwards."""
+    return faces[:, ::-1] if _volume(vertices, faces) < 0 else faces
+
+
+def _volume(vertices: Floats, faces: Ints) -> float:
+    """The volume that the triangles enclose with a lid on each border, positive where they face
+    outwards."""
     corners = vertices[faces]
     if _has_border(faces):
         lids = []
@@ -245,8 +299,7 @@ def _outwards(vertices: Floats, faces: Ints) -> Ints:
             lids.append(np.stack([np.roll(rim, -1, axis=0), rim, middle], axis=1))
         corners = np.concatenate([corners, *lids])
     corners = corners - vertices.mean(axis=0)
-    volume = np.einsum("fk,fk->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-    return faces[:, ::-1] if volume < 0 else faces
+    return float(np.einsum("fk,fk->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6
 
 
 def _has_border(faces: Ints) -> bool:

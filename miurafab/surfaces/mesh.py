@@ -23,9 +23,16 @@ from miurafab.errors import TargetError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
+from miurafab.surfaces.body import BodyChoice, goes_round, round_target
 from miurafab.surfaces.decimation import decimated
 from miurafab.surfaces.mesh_files import read_mesh
-from miurafab.surfaces.mesh_repair import doubled_areas, even_triangles, fill_holes, side_lengths
+from miurafab.surfaces.mesh_repair import (
+    Holes,
+    doubled_areas,
+    even_triangles,
+    fill_holes,
+    side_lengths,
+)
 from miurafab.surfaces.parameterise import flatten
 from miurafab.surfaces.placement import (
     GridPlacement,
@@ -35,10 +42,16 @@ from miurafab.surfaces.placement import (
     placements,
     turned,
 )
-from miurafab.surfaces.preparation import MeshReading, prepare, refuse_other_than_a_disk
+from miurafab.surfaces.preparation import (
+    MeshReading,
+    PreparedMesh,
+    prepare,
+    refuse_other_than_a_disk,
+)
 from miurafab.surfaces.smoothing import Smoothed, continued, smooth
 from miurafab.surfaces.surface import Domain, tangents, unit
 from miurafab.surfaces.topology import classify
+from miurafab.surfaces.tube import TubeSurface
 
 if TYPE_CHECKING:
     from miurafab.surfaces.outline import WholeMesh
@@ -233,7 +246,8 @@ def load_mesh(
     rotate: float | None = None,
     reading: MeshReading | None = None,
     place: Mapping[str, Any] | None = None,
-) -> tuple[MeshSurface, str]:
+    choice: BodyChoice | None = None,
+) -> tuple[MeshSurface | TubeSurface, str]:
     """The mesh file as a target, and the SHA-256 of the file.
 
     ``rotate`` turns the grid against the longer axis of the layout (radians), ``region`` is laid in
@@ -246,7 +260,14 @@ def load_mesh(
     """
     vertices, faces, sha256 = read_mesh(path)
     surface = mesh_surface(
-        vertices, faces, path.name, region=region, rotate=rotate, reading=reading, place=place
+        vertices,
+        faces,
+        path.name,
+        region=region,
+        rotate=rotate,
+        reading=reading,
+        place=place,
+        choice=choice,
     )
     return surface, sha256
 
@@ -260,13 +281,20 @@ def mesh_surface(
     rotate: float | None = None,
     reading: MeshReading | None = None,
     place: Mapping[str, Any] | None = None,
-) -> MeshSurface:
+    choice: BodyChoice | None = None,
+) -> MeshSurface | TubeSurface:
     """A target from the arrays of a triangle mesh, ``vertices`` (V, 3) and ``faces`` (F, 3).
 
     The other arguments are those of :func:`load_mesh`. Raises
-    :class:`~miurafab.errors.TargetError` if the mesh is not one disk.
+    :class:`~miurafab.errors.TargetError` for a mesh that neither lies flat nor goes round.
     """
-    layout, findings = lay_out(vertices, faces, name, reading, place)
+    if place is not None:
+        reading = MeshReading.before(place)
+    mesh = prepare(vertices, faces, name, reading, place)
+    holes = "small" if reading is None else reading.holes
+    if region is None and rotate is None and goes_round(mesh, holes):
+        return round_target(mesh, choice or BodyChoice(), place)
+    layout, findings = _laid(mesh, holes)
     if place is not None:
         placement, stiffness = _placed_before(place, name)
         surface = layout.surface(placement, stiffness)
@@ -302,25 +330,21 @@ def _placed_before(place: Mapping[str, Any], name: str) -> tuple[GridPlacement, 
     return GridPlacement(angle, Domain(u0, u1, v0, v1)), stiffness
 
 
-def lay_out(
-    vertices: Floats,
-    faces: Ints,
-    name: str,
-    reading: MeshReading | None = None,
-    place: Mapping[str, Any] | None = None,
-) -> tuple[MeshChart, tuple[Finding, ...]]:
+def lay_out(vertices: Floats, faces: Ints, name: str) -> tuple[MeshChart, tuple[Finding, ...]]:
     """The mesh laid flat, and findings on it. Raises ``TargetError`` if it is not one disk."""
-    if place is not None:
-        reading = MeshReading.before(place)
-    mesh = prepare(vertices, faces, name, reading, place)
+    return _laid(prepare(vertices, faces, name), "small")
+
+
+def _laid(mesh: PreparedMesh, holes: Holes) -> tuple[MeshChart, tuple[Finding, ...]]:
+    """The chart of a mesh, and findings on it."""
     refuse_other_than_a_disk(mesh)
+    name = mesh.name
     whole = mesh.vertices, mesh.faces
     topology = mesh.topology
     vertices, faces = decimated(*whole, LAID_FLAT) if len(mesh.faces) > LARGE else whole
     if len(faces) < len(mesh.faces):
         topology = classify(vertices, faces)
     known, real = len(vertices), len(faces)
-    holes = "small" if reading is None else reading.holes
     vertices, faces, filled = fill_holes(vertices, faces, topology, name, holes)
     findings = mesh.findings + filled
     flat = flatten(vertices, faces)

@@ -1,13 +1,15 @@
 """Tubes as targets: a mesh with two borders as a smooth map that closes on itself in u.
 
-The harmonic coordinates of the mesh (:mod:`~miurafab.surfaces.harmonic`) are turned into lengths: v
-becomes the mean length along the meridians,
+The harmonic coordinates of the mesh (:mod:`~miurafab.surfaces.harmonic`) are turned into lengths.
+The mean length s along the meridians obeys
 
     ds/dv = mean over one turn of 1 / |grad v|,
 
-and u is stretched to the mean girth, which is the area over the mean length. A spline that is
-periodic in u goes through the vertices at these places. Rows of a sheet run round the tube along u,
-columns run along v, and u, v and the outward normal are right-handed.
+which is also proportional to the girth at that level, since the map keeps angles. Along the new v,
+s grows like the root of the girth, so that rows are closer where the tube is narrow; its range is
+the mean length of the meridians. u is stretched to the mean girth, the area over that length. A
+spline that is periodic in u goes through the vertices at these places. Rows of a sheet run round
+the tube along u, columns run along v, and u, v and the outward normal are right-handed.
 """
 
 from __future__ import annotations
@@ -27,6 +29,11 @@ from miurafab.surfaces.harmonic import CylinderMap, cylinder_map
 from miurafab.surfaces.smoothing import continued, smooth
 from miurafab.surfaces.surface import Domain, ParametricSurface, tangents, unit
 from miurafab.surfaces.tube_figures import TubeFigures, figures
+
+NARROWING = 0.5
+"""The row spacing grows like the girth to this power. Gores of a pin, 8 x (4 x 36), lie 0.46 % of
+the diagonal from it with 0, at the last row before the pole, 0.21 % with 0.5 and 0.13 % with 1,
+where the areas of facets differ 24-fold."""
 
 _LEVELS = 80
 _SPANS = 40
@@ -123,15 +130,14 @@ def tube_chart(vertices: Floats, faces: Ints, low: Ints, high: Ints) -> TubeChar
     ``low``.
     """
     mapped = cylinder_map(vertices, faces, low, high)
-    lengths = _lengths(vertices, faces, mapped)
-    along = lengths(mapped.height)
-    length = float(lengths(1.0))
+    places, length = _places(vertices, faces, mapped)
     corners = vertices[faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(cross, axis=1)
     girth = float(doubled.sum()) / 2 / length
     turns = _from_fullest(mapped, faces, doubled)
-    flat = np.stack([girth * turns, np.clip(along, 0.0, length)], axis=1)
+    along = np.clip(places(mapped.height), 0.0, length)
+    flat = np.stack([girth * np.where(turns < 1, turns, 0.0), along], axis=1)
     return TubeChart(vertices, faces, flat, girth, length, mapped.turned_over(faces))
 
 
@@ -143,8 +149,8 @@ def _from_fullest(mapped: CylinderMap, faces: Ints, doubled: Floats) -> Floats:
     return np.asarray((mapped.turns - np.angle(moment) / (2 * np.pi)) % 1.0)
 
 
-def _lengths(vertices: Floats, faces: Ints, mapped: CylinderMap) -> PchipInterpolator:
-    """The mean length s along the meridians as a function of v.
+def _places(vertices: Floats, faces: Ints, mapped: CylinderMap) -> tuple[PchipInterpolator, float]:
+    """The new v as a function of the old, and the mean length of the meridians.
 
     The mean of 1 / |grad v| over one turn is summed at levels of v that part the area evenly. In a
     triangle the level is a line, and its share of the turn is the part of u along it.
@@ -167,8 +173,10 @@ def _lengths(vertices: Floats, faces: Ints, mapped: CylinderMap) -> PchipInterpo
     logs = np.log(np.concatenate([rates[:1], rates, rates[-1:]]))
     fine = np.interp(np.arange(8 * len(ends) - 7) / 8, np.arange(len(ends)), ends)
     rate = np.exp(PchipInterpolator(ends, logs)(fine))
+    length = float(np.diff(fine) @ (rate[1:] + rate[:-1])) / 2
+    rate = rate ** (1 - NARROWING)
     sums = np.concatenate([[0.0], np.cumsum(np.diff(fine) * (rate[1:] + rate[:-1]) / 2)])
-    return PchipInterpolator(fine, sums)
+    return PchipInterpolator(fine, length / sums[-1] * sums), length
 
 
 def _mean_over_turn(u: Floats, v: Floats, values: Floats, level: float) -> float:

@@ -25,6 +25,7 @@ from miurafab.options import Text, declared, length, number, read_options, read_
 from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitOptions, FitRequest
 from miurafab.profiles import Table, find_file, read_toml
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
+from miurafab.surfaces.body import BodyChoice
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface, parse_target
 from miurafab.surfaces.description import described_surface
 from miurafab.surfaces.function import SampledSurface, from_function, from_points, rounded
@@ -39,6 +40,7 @@ from miurafab.surfaces.mesh_files import (
 )
 from miurafab.surfaces.preparation import MeshReading
 from miurafab.surfaces.surface import TargetSurface
+from miurafab.surfaces.tube import TubeSurface
 
 Values = Mapping[str, Any]
 
@@ -118,6 +120,7 @@ def design(target: object, /, **options: Any) -> Design:
             region=asked.region,
             rotate=asked.rotate,
             reading=MeshReading(asked.side, asked.holes),
+            choice=_choice(asked),
         )
         arrays = {"vertices": vertices.tolist(), "faces": faces.tolist()}
         return _on_mesh(surface, arrays | {"name": "mesh"}, asked, "mesh")
@@ -174,7 +177,7 @@ def _from_description(target: Values, given: Values) -> Design:
 
 def _changed(design: Design, given: Values) -> Design:
     """``design`` with other options; its surface stays."""
-    for name in ("close", "region", "rotate", "side", "holes"):
+    for name in ("close", "region", "rotate", "poles", "polar_hole", "side", "holes"):
         if name in given:
             raise OptionError(name, "shapes the target; give it to `design`, not to what it made")
     asked, _ = _asked(given, (), "a design")
@@ -267,12 +270,18 @@ def read_layout_table(
 
 def _from_mesh(path: Path, asked: FitOptions, title: str) -> Design:
     reading = MeshReading(asked.side, asked.holes)
-    surface, sha256 = load_mesh(path, region=asked.region, rotate=asked.rotate, reading=reading)
+    surface, sha256 = load_mesh(
+        path, region=asked.region, rotate=asked.rotate, reading=reading, choice=_choice(asked)
+    )
     return _on_mesh(surface, {"mesh": str(path.resolve()), "sha256": sha256}, asked, title)
 
 
+def _choice(asked: FitOptions) -> BodyChoice:
+    return BodyChoice(asked.poles, asked.polar_hole_mm, asked.pieces)
+
+
 def _on_mesh(
-    surface: MeshSurface, description: dict[str, Any], asked: FitOptions, title: str
+    surface: MeshSurface | TubeSurface, description: dict[str, Any], asked: FitOptions, title: str
 ) -> Design:
     request = FitRequest(
         **vars(asked), surface=surface, target={**description, **surface.description}
@@ -327,8 +336,14 @@ def _request(surface: TargetSurface, target: dict[str, Any], asked: FitOptions) 
 
 
 def _not_for(name: str, asked: FitOptions) -> None:
-    for option in ("region", "rotate"):
-        if getattr(asked, option) is not None:
+    given = {
+        "region": asked.region,
+        "rotate": asked.rotate,
+        "poles": asked.poles,
+        "polar_hole": asked.polar_hole_mm,
+    }
+    for option, value in given.items():
+        if value is not None:
             raise OptionError(option, f"is for mesh targets, and '{name}' is none")
 
 

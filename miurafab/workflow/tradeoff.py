@@ -161,7 +161,7 @@ def _as_text(
         name: entry.kind.show(getattr(request, entry.field))
         for name, entry in declared(FitOptions).items()
         if getattr(request, entry.field) not in (None, entry.default)
-        and name not in ("facets", "close", "region", "rotate")
+        and name not in ("facets", "close", "region", "rotate", "poles", "polar_hole")
     }
     return request.target, written
 

@@ -6,13 +6,17 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 from mesh_shapes import ball, mesh, ring
 
-from miurafab.errors import TargetError
+from miurafab.errors import OptionError, TargetError
+from miurafab.origami.fitting.fit import fit
 from miurafab.surfaces.body import Body, body_surface, described
+from miurafab.surfaces.description import described_surface
 from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.poles import HeatDistance, open_at, pole_candidates
 from miurafab.surfaces.surface import tangents
+from miurafab.workflow.design import design
 
 
 def rotation():
@@ -198,3 +202,43 @@ def test_the_poles_and_the_holes_are_the_users():
     assert surface.domain.height == pytest.approx(50 * (math.pi - 0.8), rel=0.01)
     axis = surface.point(surface.domain.lattice(13, 5)[:, :-1]).mean(axis=1)
     assert np.abs(axis[:, :2]).max() < 0.5
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    """Six gores of a bent pipe."""
+    vertices, faces = mesh("bent-pipe")
+    return fit(design(trimesh.Trimesh(vertices, faces, process=False), facets=(24, 12)).request)
+
+
+def test_gores_of_a_bent_pipe_close_and_fold(sheet):
+    measured = sheet.measurements
+    assert sheet.status == "converged"
+    assert sheet.score.bow_ties == measured.self_intersections == measured.overlaps == 0
+    assert max(measured.max_planarity, measured.max_developability) < 1e-12
+    assert measured.max_isometry < 1e-12
+    assert 100 * sheet.deviation_mm < np.linalg.norm(np.ptp(mesh("bent-pipe")[0], axis=0))
+    # closed all round: as many seams as gores, each as long as the pipe
+    pattern = sheet.pattern
+    gores = len(np.unique(pattern.pieces))
+    assert len(pattern.seams) == 12 * gores
+    ends = pattern.folded_coords[pattern.edges_vertices[pattern.seams]]
+    same = np.abs(ends[:, 0] - ends[:, 1]).max(axis=(1, 2))
+    turned = np.abs(ends[:, 0] - ends[:, 1, ::-1]).max(axis=(1, 2))
+    assert np.minimum(same, turned).max() < 1e-9
+
+
+def test_a_pattern_of_gores_finds_its_target_again(sheet):
+    target = sheet.pattern.target
+    surface, findings = described_surface(target)
+    assert not findings
+    assert surface.gores == target["gores"]
+    middle = sheet.pattern.folded_coords.mean(axis=0)
+    assert np.isfinite(surface.nearest(middle[None])).all()
+
+
+def test_a_tube_takes_no_pole_of_a_named_surface():
+    with pytest.raises(OptionError, match="mesh targets"):
+        design("hypar", poles="0,0,-1,0,0,1")
+    with pytest.raises(OptionError, match="six numbers"):
+        design("hypar", poles="0,0,1")

@@ -63,11 +63,6 @@ def confetti(v, f):
     return p.reshape(-1, 3), np.arange(3 * len(f)).reshape(-1, 3)
 
 
-def closed(v, f):
-    box = trimesh.creation.icosphere(2)
-    return box.vertices, box.faces
-
-
 def fin(v, f):
     """A third triangle on an inner edge."""
     return np.concatenate([v, [[50, 50, 30]]]), np.concatenate([f, [[f[40, 0], f[40, 1], len(v)]]])
@@ -119,7 +114,6 @@ REFUSED = {
     nan: "vertex .* not a finite number",
     infinite: "vertex .* not a finite number",
     confetti: "450 separate pieces, and the largest has only",
-    closed: "is closed and no thin plate: .* cut it open",
     flat_triangles: "all triangles are degenerate",
     one_point: "all triangles lie in one point",
     large_hole: "has a hole .* mm across, too large",

@@ -24,6 +24,7 @@ from miurafab.origami.fitting.result import INTERRUPTED, TIME_RAN_OUT, Attempt, 
 from miurafab.origami.fitting.search import coarsest
 from miurafab.origami.fitting.starts import STEEP, Start, direct, starts_elsewhere, starts_for
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
+from miurafab.surfaces.tube import TubeSurface
 
 TRIED = 3
 """The starts that are brought to fair sheets, for each number of pieces."""
@@ -32,6 +33,8 @@ LARGE = 900
 PIECES = (1, 2, 3, 4)
 PIECES_ROUND = (1, 2, 6, 8, 12)
 """The numbers of pieces that ``auto`` tries, on a sheet and all round an axis."""
+MORE_GORES = (0, 2, 4)
+"""What ``auto`` adds to the number of gores that the map of a body asks for."""
 PATIENCE = 25.0
 """Seconds of processor time for 400 facets, after which no new start is begun."""
 FINE = 1.25
@@ -131,6 +134,8 @@ class _FitSearch:
             return (len(request.cut_columns) + 1,)
         if request.pieces is not None:
             return (request.pieces,)
+        if isinstance(request.surface, TubeSurface):
+            return tuple(request.surface.gores + more for more in MORE_GORES)
         closed = isinstance(request.surface, Revolution) and request.surface.closed
         if request.polish == "off":
             return (1,)

@@ -78,6 +78,34 @@ class Pieces(Kind):
         return str(inside)
 
 
+class Poles(Kind):
+    """Two points of space, the coordinates of the one after those of the other."""
+
+    @property
+    def metavar(self) -> str:
+        return "X,Y,Z,X,Y,Z"
+
+    def read(self, value: object) -> tuple[float, ...]:
+        parts = value.split(",") if isinstance(value, str) else value
+        try:
+            numbers = tuple(float(part) for part in parts)  # type: ignore[attr-defined] # TypeError
+        except (TypeError, ValueError):
+            raise ValueError(
+                f"is {value!r}; write six numbers with commas between, such as 0,0,-50,0,0,50"
+            ) from None
+        self.check(numbers)
+        return numbers
+
+    def check(self, inside: tuple[float, ...]) -> None:
+        if len(inside) != 6 or not all(map(math.isfinite, inside)):
+            raise ValueError(f"is {self.show(inside)!r}; it must be six numbers, two points")
+        if inside[:3] == inside[3:]:
+            raise ValueError(f"is {self.show(inside)!r}; the two points must differ")
+
+    def show(self, inside: tuple[float, ...]) -> str:
+        return ",".join(map("{:g}".format, inside))
+
+
 class CutColumns(Kind):
     """Columns of vertices along which a sheet is cut, each under the next."""
 

@@ -19,7 +19,7 @@ from miurafab.options import (
     number,
     option,
 )
-from miurafab.origami.fitting.kinds import CutColumns, FlatFoldability, Pieces
+from miurafab.origami.fitting.kinds import CutColumns, FlatFoldability, Pieces, Poles
 from miurafab.origami.fitting.objective import Follow
 from miurafab.origami.verify import EXACT
 from miurafab.surfaces.analytic import GeneralizedCylinder
@@ -141,6 +141,22 @@ class FitOptions(Shown):
         "Cut the sheet into pieces along these columns of vertices.",
         group="Sheet",
         default_text="evenly spaced",
+    )
+    poles: tuple[float, ...] | None = option(
+        Poles(),
+        "Points near the two poles of a closed mesh, in its own coordinates; gores run from one to "
+        "the other.",
+        group="Mesh targets",
+        default_text="automatic",
+        page="more",
+    )
+    polar_hole_mm: float | None = option(
+        length(above=True),
+        "Radius of the hole that the sheet leaves round each pole of a closed mesh, in the mesh's "
+        "own unit.",
+        group="Mesh targets",
+        default_text="6 % of the root of the area",
+        page="more",
     )
     side: Side = option(
         Choice(get_args(Side)),

@@ -11,7 +11,7 @@ they are tried:
 4. the stretches in their order.
 
 A surface of revolution repeats itself, and only the part that repeats is solved: two rows of a
-ring, or one gore.
+ring, or one gore. Any other body that goes round is solved as a whole, in gores.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ from miurafab.origami.fitting.seed import STEEPEST, Corrugation, seed
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution, revolution
 from miurafab.surfaces.mesh import MeshSurface
 from miurafab.surfaces.surface import Swapped, TargetSurface
+from miurafab.surfaces.tube import TubeSurface
 
 STRETCHES = ((1.3, 1.3), (1.6, 1.3), (1.15, 1.6), (1.3, 1.6), (2.0, 1.3))
 """The stretches along and across the rows. Strong curvature along the rows needs more stretch along
@@ -49,6 +50,8 @@ few."""
 CLIP_OF_PIECES = math.radians(45)
 """The clip of the slide for several pieces: columns that two pieces share are means, and a steep
 slide makes bow-ties of the facets beside them."""
+LEAST_COLUMNS = 4
+"""The least columns of facets in a gore of a body."""
 ELSEWHERE = 2
 """How many of the stretches are tried at each other place of a mesh."""
 SHAKE = 0.03
@@ -102,6 +105,9 @@ def starts_for(request: FitRequest, pieces: int) -> list[Start]:
     level = LEVELS[request.follow]
     corrugations = corrugations_of(request)
     made: list[Start] = []
+    if isinstance(surface, TubeSurface):
+        made = [round_body(surface, request, c, pieces, level) for c in corrugations]
+        return sorted(made, key=lambda start: start.order)
     if isinstance(surface, Revolution):
         made += [ring(surface, request, c, pieces, level) for c in corrugations]
         if pieces > 2:
@@ -260,6 +266,27 @@ def gores(
     rim = rim_of_domain(swapped, unknowns.charts, nominal, cells, axes=(1,))
     x = grid[:, :around].ravel()
     return Start("gores", swapped, "v", corrugation, cells, unknowns, x, made.steepest, rim, count)
+
+
+def round_body(
+    surface: TubeSurface, request: FitRequest, corrugation: Corrugation, count: int, level: float
+) -> Start:
+    """Rows round a tube or a closed body, and gores that meet along columns. The columns of the
+    request run round it, at least four to a gore.
+    """
+    columns = count * max(LEAST_COLUMNS, 2 * round(request.columns / count / 2))
+    cells = columns, request.rows
+    charts = QuadCharts.of_cells(
+        np.ones((request.rows, columns), dtype=bool),
+        np.arange(columns, dtype=np.int64) * count // columns,
+        closed=True,
+    )
+    made = seed(surface, charts, *cells, corrugation, clip=CLIP_OF_PIECES, level=level)
+    unknowns = Unknowns.all_of(charts, _mean_edge(charts, made.vertices))
+    nominal = Nominal.of(surface, charts, *cells)
+    rim = rim_of_domain(surface, charts, nominal, cells, axes=(1,))
+    x = made.vertices.ravel()
+    return Start("gores", surface, "u", corrugation, cells, unknowns, x, made.steepest, rim, count)
 
 
 def piece_of_column(request: FitRequest, pieces: int) -> Ints:
