@@ -75,7 +75,7 @@ def score(charts: QuadCharts, points: Floats, rim: Rim, deviation: float) -> Sco
     if len(rim.facets):
         gap = rim.places - corners[rim.facets].mean(axis=1)
         across = np.einsum("nk,nk->n", rim.outward, gap)
-        off = np.where(across > 0, across, -across * (rim.overhang > 0))
+        off = np.where(across > 0, across, -across * rim.overhang)
     spread = np.percentile(area, 95) / max(float(np.percentile(area, 5)), 1e-300)
     return Score(
         deviation=100 * deviation / diagonal / 0.5,
