@@ -60,11 +60,7 @@ class Candidate:
     @property
     def good(self) -> bool:
         """Whether the sheet meets everything asked and is as good as asked."""
-        return self.fine(GOOD)
-
-    def fine(self, limit: float) -> bool:
-        """Whether the sheet meets everything asked with a score of ``limit`` or less."""
-        return not self.faults and self.score.total <= limit
+        return not self.faults and self.score.total <= GOOD
 
 
 def candidate(

@@ -37,8 +37,6 @@ MORE_GORES = (0, 2, 4)
 """What ``auto`` adds to the number of gores that the map of a body asks for."""
 PATIENCE = 25.0
 """Seconds of processor time for 400 facets, after which no new start is begun."""
-FINE = 1.25
-"""With a clean sheet of this score or less, more pieces are not tried."""
 FAR = 4.0
 """The plain search goes on while the deviation is over this many times that of a good sheet."""
 
@@ -108,7 +106,7 @@ class _FitSearch:
             starts = starts_for(request, pieces)
             likely = [s for s in starts if s.steepest < STEEP]
             yield from self._tried(likely)
-            if self._settled() or (self.best is not None and self.best.fine(FINE)):
+            if self._settled():
                 return
         if self.best is None or self.best.rank[0]:
             fewest = self._pieces()[0]

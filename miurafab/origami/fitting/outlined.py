@@ -66,7 +66,8 @@ class OutlinedLattice:
         target = whole.laid(angle, (column / 2, max(row, zigzag * column) / 2))
         kept = _in_one_piece(target.kept(columns, rows, zigzag * column))
         charts = QuadCharts.of_cells(kept, piece_of_column)
-        rim = Rim(*target.rim(columns, rows, charts.cells, zigzag * column))
+        # what hangs over is cut off
+        rim = Rim(*target.rim(columns, rows, charts.cells, zigzag * column), overhang=0.0)
         ratio = target.domain.width / columns * rows / target.domain.height
         cost = abs(math.log(ratio)) + math.log(kept.size / kept.sum())
         return cls(target, charts, rim, cost)
