@@ -141,7 +141,7 @@ def test_the_examples_name_commands_and_options_that_exist():
         (("cut", "job", "--pointer", "3", "--port", "virtual"), "ask for the --frame as well"),
         (("cut", "job.nc", "--facets", "8x8", "--port", "virtual"), "--facets is for a target"),
         (("completion", "tcsh"), "SHELL is 'tcsh'; it must be one of bash, zsh"),
-        (("fit", "hypar", "-o", "x.fold", "--polish", "maybe"), "on or off."),
+        (("fit", "hypar", "-o", "x.fold", "--polish", "maybe"), "one of on, off."),
         (("fit", "hypar", "-o", "x.fold", "--close", "seem"), "--close is 'seem'; did you mean"),
     ],
 )

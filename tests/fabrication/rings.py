@@ -20,5 +20,7 @@ def tube(sides: int = 12, columns: int = 7, size: float = 30.0) -> CreasePattern
 
 
 def revolved(facets: str, size: str, close: str = "seam") -> CreasePattern:
-    """A hyperboloid turned all round, with a seam to glue or a gap."""
-    return fit(design("hyperboloid", facets=facets, size=size, close=close).request).pattern
+    """A hyperboloid turned all round in one piece, with a seam to glue or a gap."""
+    return fit(
+        design("hyperboloid", facets=facets, size=size, close=close, pieces=1).request
+    ).pattern

@@ -164,8 +164,8 @@ def test_cut_facets_do_not_count_as_the_middle_of_a_sheet(
 ) -> None:
     pattern, target = cut(bowl, "circle")
     as_cut = replace(pattern, target=pattern.target | {"edge": "trim"})
-    all_means, uncut = nearness(pattern, target), nearness(as_cut, target)
-    before = nearness(bowl[0], target)
+    all_means, uncut = (nearness(each, target, target.tiles()) for each in (pattern, as_cut))
+    before = nearness(bowl[0], target, target.tiles())
     assert uncut.means_to_target <= before.means_to_target
     assert all_means.means_to_target > 2 * before.means_to_target
     assert uncut.sheet_to_target == all_means.sheet_to_target

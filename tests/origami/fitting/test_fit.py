@@ -71,7 +71,7 @@ def test_exact_flat_foldability_costs_no_closeness(name: str) -> None:
     assert exact.measurements.max_flat_foldability is not None
     assert exact.measurements.max_flat_foldability <= 1e-10
     assert exact.measurements.hausdorff_midsurface_mm is not None
-    assert exact.measurements.hausdorff_midsurface_mm <= 0.005 * 300
+    assert exact.measurements.hausdorff_midsurface_mm <= 0.01 * 300
 
 
 def test_polishing_brings_the_sheet_closer_and_keeps_it_exact() -> None:
@@ -90,15 +90,14 @@ def test_polishing_brings_the_sheet_closer_and_keeps_it_exact() -> None:
 
 
 class TestLimits:
-    def test_an_edge_limit_is_met_and_reported_as_active(self) -> None:
+    def test_an_edge_limit_is_met_and_reported(self) -> None:
         free = fit(request("hypar", 10, 10))
         assert free.measurements is not None
-        limit = 1.05 * free.measurements.min_edge_mm
+        limit = 1.3 * free.measurements.min_edge_mm
         result = fit(request("hypar", 10, 10, min_edge_mm=limit, polish="on"))
         check_valid(result, "hypar")
         assert result.measurements is not None
         assert result.measurements.min_edge_mm >= limit
-        assert result.active_bounds["edge"] > 0
         assert result.report()["active_bounds"] == dict(result.active_bounds)
 
     def test_a_tolerance_on_flat_foldability_is_an_inequality(self) -> None:
@@ -108,7 +107,7 @@ class TestLimits:
         worst = result.measurements.max_flat_foldability
         assert worst is not None
         assert 0.01 < worst <= 0.02
-        assert result.active_bounds["kawasaki"] > 0
+        assert "kawasaki" in result.active_bounds
 
     def test_sector_angles_and_aspect_stay_within_bounds(self) -> None:
         low, aspect = math.radians(62), 1.6
@@ -150,12 +149,12 @@ class TestLimits:
 
 class TestSearch:
     def test_the_coarsest_sheet_within_both_limits(self) -> None:
-        limits = {"max_deviation_mm": 0.5, "min_edge_mm": 8.0, "amplitude": 0.8, "zigzag": 1.0}
+        limits = {"max_deviation_mm": 0.02, "min_edge_mm": 8.0, "amplitude": 0.8, "zigzag": 1.0}
         wanted = request("hypar", facets=None, **limits)
         result = fit(wanted)
         check_valid(result, "hypar")
         assert result.deviation_mm is not None
-        assert result.deviation_mm <= 0.5
+        assert result.deviation_mm <= 0.02
         assert result.measurements is not None
         assert result.measurements.min_edge_mm >= 8.0
         side = math.isqrt(result.measurements.facets)
@@ -192,7 +191,7 @@ class TestSearch:
 class TestRings:
     def test_a_ring_closes_and_every_period_is_the_same(self) -> None:
         surface, _ = make_surface("vase", {"angle": "360deg"})
-        result = fit(FitRequest(surface=surface, facets=(14, 24), size_mm=200.0))
+        result = fit(FitRequest(surface=surface, facets=(14, 24), size_mm=200.0, pieces=1))
         check = audit(result.pattern, surface)
         assert check.valid
         assert result.pattern is not None
@@ -205,7 +204,9 @@ class TestRings:
 
     def test_a_closed_ring_can_be_flat_foldable_vertex_by_vertex(self) -> None:
         surface, _ = make_surface("hyperboloid", {"angle": "360deg"})
-        result = fit(FitRequest(surface=surface, facets=(12, 24), size_mm=200.0, flat_foldable=0.0))
+        result = fit(
+            FitRequest(surface=surface, facets=(12, 24), size_mm=200.0, flat_foldable=0.0, pieces=1)
+        )
         assert result.status == "converged"
         assert result.pattern is not None
         assert result.pattern.folded_coords is not None
@@ -256,7 +257,7 @@ def interrupting(calls: int) -> Callable[[float, str], None]:
 @pytest.mark.parametrize("searches", [False, True])
 def test_ctrl_c_leaves_the_best_sheet_up_to_then(searches: bool) -> None:
     facets = None if searches else (6, 6)
-    limits = request("hypar", facets=facets, max_deviation_mm=1e-3, min_edge_mm=1.0)
+    limits = request("hypar", facets=facets, max_deviation_mm=1e-9, min_edge_mm=1.0)
     with pytest.raises(KeyboardInterrupt):
         fit(limits, interrupting(0))  # there is no sheet yet
     result = fit(limits, interrupting(2))

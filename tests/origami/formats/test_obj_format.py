@@ -72,7 +72,7 @@ def test_the_published_pair_is_developable_and_cannot_be_made():
     assert measured.self_intersections == 0
     assert measured.overlaps == 0
     found = {finding.code: finding for finding in result.findings}
-    assert set(found) == {"degenerate-edge", "isometry"}
+    assert set(found) == {"bow-tie", "degenerate-edge", "isometry"}
     edges = pattern.edges_vertices[list(found["degenerate-edge"].where)]
     assert edges.tolist() == [[1364, 1365], [1381, 1382]]
     assert "cannot be made" in found["degenerate-edge"].sentence
