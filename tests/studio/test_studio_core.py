@@ -147,13 +147,13 @@ def test_a_pattern_stays_when_only_its_folding_is_cancelled(asked):
 
 
 def test_from_a_surface_to_sheets(done):
-    assert done.fit("hypar", "6x6", size="300mm").status == 200
+    assert done.fit("hypar", "6x6", size="220mm").status == 200
     state = done.state()
     assert state["task"]["error"] == ""
     pattern = state["pattern"]
     assert pattern["status"] == "converged"
     assert pattern["headline"].endswith(".")
-    assert pattern["command"] == "miurafab fit hypar --facets 6x6 --size 300mm -o hypar.fold"
+    assert pattern["command"] == "miurafab fit hypar --facets 6x6 --size 220mm -o hypar.fold"
     lines = {line["name"]: line for line in pattern["lines"]}
     assert lines["Flat facets"]["mark"] == lines["Folds from flat paper"]["mark"] == "good"
     assert lines["Facets"]["value"] == "36"
@@ -170,7 +170,7 @@ def test_from_a_surface_to_sheets(done):
     assert done.post("sheets", wanted).status == 200
     job = done.state()["job"]
     lines = {line["name"]: line["value"] for line in job["lines"]}
-    assert lines["Sheets"] == lines["Patches"] == "2"
+    assert lines["Sheets"] == lines["Patches"] == "1"
     assert re.fullmatch(r"\d+:\d\d", lines["Machine time"])
     assert job["cut"] == "miurafab cut hypar-job --port /dev/ttyUSB0"
     assert job["command"] == (
