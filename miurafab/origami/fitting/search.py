@@ -50,7 +50,10 @@ def coarsest(
             left = None if limit is None else limit - (time.perf_counter() - started)
             if left is not None and left <= 0:
                 raise TimeoutError
-            tried[longer] = fit(replace(request, facets=(columns, rows), timeout=left))
+            # more pieces would hide that a size is too coarse
+            pieces = request.pieces or 1
+            size = replace(request, facets=(columns, rows), timeout=left, pieces=pieces)
+            tried[longer] = fit(size)
             if tried[longer].status == "interrupted":
                 raise KeyboardInterrupt
         return tried[longer]

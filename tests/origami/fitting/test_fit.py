@@ -149,14 +149,13 @@ class TestLimits:
 
 class TestSearch:
     def test_the_coarsest_sheet_within_both_limits(self) -> None:
-        limits = {"max_deviation_mm": 0.02, "min_edge_mm": 8.0, "amplitude": 0.8, "zigzag": 1.0}
-        wanted = request("hypar", facets=None, **limits)
+        limits = {"max_distance_mm": 22.0, "min_edge_mm": 4.0, "amplitude": 0.8, "zigzag": 1.0}
+        wanted = request("hypar", facets=None, pieces=1, **limits)
         result = fit(wanted)
         check_valid(result, "hypar")
-        assert result.deviation_mm is not None
-        assert result.deviation_mm <= 0.02
         assert result.measurements is not None
-        assert result.measurements.min_edge_mm >= 8.0
+        assert result.measurements.hausdorff_mm <= 22.0
+        assert result.measurements.min_edge_mm >= 4.0
         side = math.isqrt(result.measurements.facets)
         coarser = fit(replace(wanted, facets=(side - 2, side - 2)))
         assert coarser.status != "converged"
