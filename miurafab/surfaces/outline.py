@@ -35,7 +35,7 @@ from miurafab.surfaces.mesh_repair import even_triangles
 from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.placement import turned
 from miurafab.surfaces.smoothing import continued, smooth
-from miurafab.surfaces.surface import Domain, unit
+from miurafab.surfaces.surface import Domain, gauss_newton, unit
 
 LEAST_SHARE = 0.05
 """A cell with a smaller part inside the outline is not kept."""
@@ -170,12 +170,7 @@ class WholeMesh:
         active = np.arange(len(points))
         for _ in range(_STEPS):
             at = uv[active]
-            along, across = self.tangents(at)
-            gap = self.point(at) - points[active]
-            a, b, c = _dot(along, along), _dot(along, across), _dot(across, across)
-            f, g = _dot(along, gap), _dot(across, gap)
-            det = a * c - b * b
-            step = np.stack([(b * g - c * f) / det, (b * f - a * g) / det], axis=1)
+            step = gauss_newton(*self.tangents(at), self.point(at) - points[active])[0]
             step *= np.minimum(1.0, cap / np.maximum(np.linalg.norm(step, axis=1), 1e-300))[:, None]
             uv[active] = at + step
             active = active[np.linalg.norm(step, axis=1) > 1e-9 * cap]
@@ -223,7 +218,3 @@ def _even_beyond(target: WholeMesh) -> bool:
     near = lattice[(phi < 0) & (phi > -strip)]
     speeds = np.concatenate([np.linalg.norm(t, axis=1) for t in target.tangents(near)])
     return bool(speeds.min() > EVEN[0] and speeds.max() < EVEN[1])
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("nk,nk->n", a, b))

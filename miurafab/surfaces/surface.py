@@ -265,9 +265,13 @@ def _nearest_lattice_point(
 
 
 def _towards(surface: TargetSurface, uv: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """The Gauss-Newton step (n, 2) of u and v together, and the steps (n, 2) of each alone."""
-    along, across = tangents(surface, uv)
-    gap = surface.point(uv) - points
+    return gauss_newton(*tangents(surface, uv), surface.point(uv) - points)
+
+
+def gauss_newton(along: Floats, across: Floats, gap: Floats) -> tuple[Floats, Floats]:
+    """The step (n, 2) of u and v together that lowers |``gap``|^2, and the steps (n, 2) of each
+    alone; ``along`` and ``across`` (n, 3) are the tangents, ``gap`` (n, 3) is S(u, v) - p.
+    """
     a = np.einsum("nk,nk->n", along, along)
     b = np.einsum("nk,nk->n", along, across)
     c = np.einsum("nk,nk->n", across, across)

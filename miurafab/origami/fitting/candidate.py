@@ -16,7 +16,7 @@ from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.inequalities import limits
-from miurafab.origami.fitting.objective import Follow
+from miurafab.origami.fitting.nominal import Follow
 from miurafab.origami.fitting.outlined import with_border
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.result import Attempt

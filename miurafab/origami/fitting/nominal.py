@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.quads import QuadCharts
-from miurafab.surfaces.surface import TargetSurface, tangents, unit
+from miurafab.surfaces.surface import TargetSurface, gauss_newton, tangents, unit
+
+Follow = Literal["middle", "top", "bottom"]
+"""What lies on the target: the means of the facets, or the vertices of the odd or even rows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,15 +112,6 @@ def feet_of(surface: TargetSurface, points: Floats, start: Floats, steps: int = 
     cap = np.array([d.width, d.height]) / 20
     uv = start
     for _ in range(steps):
-        along, across = tangents(surface, uv)
-        gap = surface.point(uv) - points
-        a, b, c = _dot(along, along), _dot(along, across), _dot(across, across)
-        f, g = _dot(along, gap), _dot(across, gap)
-        det = a * c - b * b
-        step = np.stack([(b * g - c * f) / det, (b * f - a * g) / det], axis=1)
+        step = gauss_newton(*tangents(surface, uv), surface.point(uv) - points)[0]
         uv = uv + np.clip(step, -cap, cap)
     return uv
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("nk,nk->n", a, b))

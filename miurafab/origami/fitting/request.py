@@ -20,7 +20,7 @@ from miurafab.options import (
     option,
 )
 from miurafab.origami.fitting.kinds import CutColumns, FlatFoldability, Pieces, Poles
-from miurafab.origami.fitting.objective import Follow
+from miurafab.origami.fitting.nominal import Follow
 from miurafab.origami.verify import EXACT
 from miurafab.surfaces.analytic import GeneralizedCylinder
 from miurafab.surfaces.mesh_repair import Holes

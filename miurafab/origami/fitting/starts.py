@@ -28,8 +28,7 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.cylinder import cylinder_on
-from miurafab.origami.fitting.nominal import Nominal, Rim, rim_of_domain
-from miurafab.origami.fitting.objective import Follow
+from miurafab.origami.fitting.nominal import Follow, Nominal, Rim, rim_of_domain
 from miurafab.origami.fitting.outlined import OutlinedLattice, angles_of
 from miurafab.origami.fitting.reduction import Unknowns, about_z
 from miurafab.origami.fitting.request import FitRequest
