@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable
+from typing import Any
 
 from miurafab.errors import UnitError
 from miurafab.options import Kind
@@ -27,7 +29,8 @@ class FlatFoldability(Kind):
         if value == "off":
             return None
         try:
-            float(value)  # type: ignore[arg-type]  # TypeError below
+            # whatever is no number is told by its TypeError
+            float(value)  # type: ignore[arg-type]
         except (TypeError, ValueError):
             pass
         else:
@@ -86,9 +89,8 @@ class Poles(Kind):
         return "X,Y,Z,X,Y,Z"
 
     def read(self, value: object) -> tuple[float, ...]:
-        parts = value.split(",") if isinstance(value, str) else value
         try:
-            numbers = tuple(float(part) for part in parts)  # type: ignore[attr-defined] # TypeError
+            numbers = tuple(float(part) for part in _parts(value))
         except (TypeError, ValueError):
             raise ValueError(
                 f"is {value!r}; write six numbers with commas between, such as 0,0,-50,0,0,50"
@@ -114,9 +116,8 @@ class CutColumns(Kind):
         return "I,J"
 
     def read(self, value: object) -> tuple[int, ...]:
-        parts = value.split(",") if isinstance(value, str) else value
         try:
-            columns = tuple(int(str(part)) for part in parts)  # type: ignore[attr-defined] # TypeError
+            columns = tuple(int(str(part)) for part in _parts(value))
         except (TypeError, ValueError):
             raise ValueError(
                 f"is {value!r}; write column numbers with commas between, such as 8,16"
@@ -132,3 +133,12 @@ class CutColumns(Kind):
 
     def show(self, inside: tuple[int, ...]) -> str:
         return ",".join(map(str, inside))
+
+
+def _parts(value: object) -> list[Any]:
+    """The parts of text with commas, or of a sequence. Raises ``TypeError`` for anything else."""
+    if isinstance(value, str):
+        return list(value.split(","))
+    if not isinstance(value, Iterable):
+        raise TypeError
+    return list(value)
