@@ -79,12 +79,14 @@ def fairest(
     unknowns: Unknowns,
     constraints: Constraints,
     x: Floats,
+    feet: Floats,
     *,
     steps: int = STEPS,
     penalty: float = PENALTY,
     on_step: Callable[[int, float], None] | None = None,
 ) -> FairSheet:
-    """Minimise ``objective`` from ``x`` (n,), near which ``constraints`` hold.
+    """Minimise ``objective`` from ``x`` (n,), near which ``constraints`` hold, with the nearest
+    points near the parameters ``feet`` (K, 2).
 
     ``on_step`` gets the number and the objective of each step.
     """
@@ -96,7 +98,7 @@ def fairest(
 
     least, damping, most = DAMPING
     solver = SymmetricSolver()
-    state = at(x, objective.feet)
+    state = at(x, feet)
     taken = resting = 0
     while taken < steps:
         following = _step(state, constraints, at, solver, damping, CAP * unknowns.length)

@@ -10,15 +10,22 @@ Lengths are divided by the mean edge length L, so that all values have the same 
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 
-from miurafab.geometry.angles import sectors
-from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats
 from miurafab.geometry.quads import QuadCharts
+from miurafab.origami.fitting.blocks import (
+    Block,
+    corner_angles,
+    kawasaki,
+    lengths,
+    side_ratios,
+    stacked,
+)
 from miurafab.origami.fitting.reduction import Unknowns
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.origami.verify import EXACT
@@ -42,10 +49,7 @@ class Bounds:
 
     def __call__(self, x: Floats) -> tuple[Floats, sparse.csr_array]:
         """g (p,) and its gradient (p, 3V), kind after kind in the order above."""
-        points = x.reshape(-1, 3)
-        blocks = [block for _, block in self._blocks(points)]
-        values = np.concatenate([value for value, _ in blocks])
-        return values, _stacked([rows for _, rows in blocks])
+        return stacked(list(self._blocks(x.reshape(-1, 3))), x.size)
 
     @property
     def any(self) -> bool:
@@ -66,45 +70,22 @@ class Bounds:
         counts = {kind: int(part.sum()) for kind, part in zip(sizes, parts, strict=True)}
         return {kind: number for kind, number in counts.items() if sizes[kind]}
 
-    def _blocks(self, points: Floats) -> list[tuple[str, tuple[Floats, sparse.csr_array]]]:
-        blocks: list[tuple[str, tuple[Floats, sparse.csr_array]]] = []
+    def _blocks(self, points: Floats) -> Iterator[Block]:
         if self.min_edge is not None:
-            lengths, along = _lengths(points, self.charts.edges_vertices)
-            gradient = sparse.csr_array(along / self.length)
-            blocks.append(("edge", ((lengths - self.min_edge) / self.length, gradient)))
+            length, edges, rows = lengths(points, self.charts.edges_vertices)
+            yield (length - self.min_edge) / self.length, edges, rows / self.length
         if self.angles is not None:
             low, high = self.angles
-            alpha, rows = self._corner_angles(points)
-            both = _stacked([rows, -rows])
-            blocks.append(("angle", (np.concatenate([alpha - low, high - alpha]), both)))
+            alpha, corners, rows = corner_angles(points, self.charts.faces_vertices)
+            yield alpha - low, corners, rows
+            yield high - alpha, corners, -rows
         if self.aspect is not None:
-            blocks.append(("aspect", self._aspect(points, self.aspect)))
+            ratio, sides, rows = side_ratios(points, self.charts.faces_vertices, self.aspect)
+            yield ratio / self.length, sides, rows / self.length
         if self.kawasaki is not None:
-            residual, rows = self._kawasaki(points)
-            both = _stacked([-rows, rows])
-            slack = np.concatenate([self.kawasaki - residual, self.kawasaki + residual])
-            blocks.append(("kawasaki", (slack, both)))
-        return blocks
-
-    def _corner_angles(self, points: Floats) -> tuple[Floats, sparse.csr_array]:
-        faces = self.charts.faces_vertices
-        corners = np.stack([faces, np.roll(faces, -1, axis=1), np.roll(faces, 1, axis=1)], axis=-1)
-        return _angles(points, corners.reshape(-1, 3))
-
-    def _kawasaki(self, points: Floats) -> tuple[Floats, sparse.csr_array]:
-        centre, ring = self.charts.interior_vertices, self.charts.interior_neighbours
-        first, by_first = _angles(points, np.stack([centre, ring[:, 0], ring[:, 1]], axis=1))
-        third, by_third = _angles(points, np.stack([centre, ring[:, 2], ring[:, 3]], axis=1))
-        return first + third - np.pi, by_first + by_third
-
-    def _aspect(self, points: Floats, limit: float) -> tuple[Floats, sparse.csr_array]:
-        faces = self.charts.faces_vertices
-        sides = [_lengths(points, faces[:, [k, (k + 1) % 4]]) for k in range(4)]
-        values, rows = [], []
-        for (short, by_short), (long, by_long) in itertools.permutations(sides, 2):
-            values.append((limit * short - long) / self.length)
-            rows.append((limit * by_short - by_long) / self.length)
-        return np.concatenate(values), _stacked(rows)
+            residual, spokes, rows = kawasaki(points, self.charts)
+            yield self.kawasaki - residual, spokes, -rows
+            yield self.kawasaki + residual, spokes, rows
 
 
 def limits(options: FitOptions, unknowns: Unknowns, scale: float, margin: float = 0.0) -> Bounds:
@@ -124,30 +105,3 @@ def limits(options: FitOptions, unknowns: Unknowns, scale: float, margin: float 
         aspect=None if options.max_aspect is None else options.max_aspect * looser,
         kawasaki=None if tolerance is None or tolerance <= EXACT else tolerance * looser,
     )
-
-
-def _lengths(points: Floats, edges: Ints) -> tuple[Floats, sparse.csr_array]:
-    """(E,) lengths of ``edges`` (E, 2) and their gradient (E, 3V)."""
-    along = points[edges[:, 1]] - points[edges[:, 0]]
-    lengths = np.linalg.norm(along, axis=1)
-    unit = along / lengths[:, None]
-    return lengths, _rows(edges, np.stack([-unit, unit], axis=1), points.size)
-
-
-def _angles(points: Floats, corners: Ints) -> tuple[Floats, sparse.csr_array]:
-    """(n,) angles at ``corners`` (n, 3), each a vertex and the ends of its two sides."""
-    centre = points[corners[:, 0]]
-    alpha, to_a, to_b = sectors(points[corners[:, 1]] - centre, points[corners[:, 2]] - centre)
-    return alpha, _rows(corners, np.stack([-(to_a + to_b), to_a, to_b], axis=1), points.size)
-
-
-def _rows(stencil: Ints, gradient: Floats, unknowns: int) -> sparse.csr_array:
-    """The matrix with the rows ``gradient`` (n, k, 3) over the vertices ``stencil`` (n, k)."""
-    n, k = stencil.shape
-    columns = (stencil[:, :, None] * 3 + np.arange(3)).reshape(-1)
-    starts = np.arange(0, 3 * n * k + 1, 3 * k)
-    return sparse.csr_array((gradient.reshape(-1), columns, starts), shape=(n, unknowns))
-
-
-def _stacked(matrices: list[sparse.csr_array]) -> sparse.csr_array:
-    return sparse.csr_array(sparse.vstack(matrices, format="csr"))

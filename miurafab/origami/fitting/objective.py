@@ -30,15 +30,23 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from scipy import sparse
 
-from miurafab.geometry.angles import sectors
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.geometry.quads import QuadCharts
+from miurafab.origami.fitting.blocks import (
+    Block,
+    corner_angles,
+    kawasaki,
+    lengths,
+    side_ratios,
+    stacked,
+)
 from miurafab.origami.fitting.nominal import (
+    Follow,
     Nominal,
     Rim,
     chains_of,
@@ -47,16 +55,12 @@ from miurafab.origami.fitting.nominal import (
 )
 from miurafab.surfaces.surface import TargetSurface
 
-Block = tuple[Floats, Ints, Floats]
-"""Residuals (n,), the vertices that each depends on (n, k), and its gradient (n, k, 3)."""
-
-
-Follow = Literal["middle", "top", "bottom"]
-"""What lies on the target: the means of the facets, or the vertices of the odd or even rows."""
-
 INACTIVE = 1e-30
 """The weight of an inactive hinge: nothing, but not zero, so that the products of the Jacobian keep
 their pattern of entries and the order of elimination is found once."""
+
+KAWASAKI = 10.0
+"""The weight of Kawasaki's residual over that of a sector."""
 
 LEAST_AREA = 0.15
 """A of a facet in the convexity term is at least this part of the median."""
@@ -127,8 +131,6 @@ class FairObjective:
         area = np.linalg.norm(
             np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1
         )
-        edges = charts.edges_vertices
-        length = float(np.linalg.norm(start[edges[:, 1]] - start[edges[:, 0]], axis=1).mean())
         if follow == "middle":
             followers, places, feet = charts.faces_vertices, nominal.centres, nominal.parameters
         else:
@@ -142,7 +144,7 @@ class FairObjective:
         return cls(
             surface,
             charts,
-            length,
+            float(edge_lengths(start, charts.edges_vertices).mean()),
             nominal,
             followers,
             places,
@@ -182,26 +184,22 @@ class FairObjective:
         faces, w = self.charts.faces_vertices, self.weights
         yield self._sectors(points, faces)
         yield self._folds(points)
-        edges = self.charts.edges_vertices
-        along = points[edges[:, 1]] - points[edges[:, 0]]
-        length = np.linalg.norm(along, axis=1)
-        unit_along = along / length[:, None] / self.length
+        length, edges, rows = lengths(points, self.charts.edges_vertices)
         short = w.shortest_edge - length / self.length
-        yield _hinge(w.edges, short, edges, np.stack([unit_along, -unit_along], axis=1))
+        yield _hinge(w.edges, short, edges, -rows / self.length)
         for turn in (0, 1):
             yield self._convexity(points, np.roll(faces, -turn, axis=1))
         if self.aspect is not None:
-            yield self._aspect(points, self.aspect)
+            ratio, sides, rows = side_ratios(points, faces, self.aspect)
+            yield _hinge(w.edges, -ratio / self.length, sides, -rows / self.length)
         if self.kawasaki is not None:
+            residual, spokes, rows = kawasaki(points, self.charts)
             for sign in (1.0, -1.0):
-                yield self._kawasaki(points, sign, self.kawasaki)
+                over = sign * residual - self.kawasaki
+                yield _hinge(KAWASAKI * w.sectors, over, spokes, sign * rows)
 
     def _sectors(self, points: Floats, faces: Ints) -> Block:
-        corners = np.stack([faces, np.roll(faces, -1, axis=1), np.roll(faces, 1, axis=1)], axis=-1)
-        corners = corners.reshape(-1, 3)
-        p = points[corners]
-        alpha, to_a, to_b = sectors(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-        rows = np.stack([-(to_a + to_b), to_a, to_b], axis=1)
+        alpha, corners, rows = corner_angles(points, faces)
         w = self.weights
         low, high = w.least_sector - alpha, alpha - w.greatest_sector
         sign = np.where(high > 0, w.sectors, np.where(low > 0, -w.sectors, INACTIVE))
@@ -243,39 +241,6 @@ class FairObjective:
         rows = np.stack([-(by_u + by_v + by_w), by_u, by_v, by_w], axis=1) / scale[:, None, None]
         return _hinge(self.weights.convexity / 4, 4 * self.weights.convex - h, faces, -rows)
 
-    def _aspect(self, points: Floats, limit: float) -> Block:
-        """max(0, |e'| - A |e|) / L for each ordered pair of sides of a facet."""
-        faces = self.charts.faces_vertices
-        p = points[faces]
-        side = np.roll(p, -1, axis=1) - p
-        length = np.linalg.norm(side, axis=2)
-        along = side / length[..., None]
-        values, vertices, rows = [], [], []
-        for k in range(4):
-            for other in range(4):
-                if k == other:
-                    continue
-                values.append((length[:, other] - limit * length[:, k]) / self.length)
-                ends = [k, (k + 1) % 4, other, (other + 1) % 4]
-                vertices.append(faces[:, ends])
-                short, long = limit * along[:, k], along[:, other]
-                rows.append(np.stack([short, -short, -long, long], axis=1) / self.length)
-        over, gradient = np.concatenate(values), np.concatenate(rows)
-        return _hinge(self.weights.edges, over, np.concatenate(vertices), gradient)
-
-    def _kawasaki(self, points: Floats, sign: float, limit: float) -> Block:
-        centre, ring = self.charts.interior_vertices, self.charts.interior_neighbours
-        total, rows = np.full(len(centre), -np.pi), np.zeros((len(centre), 5, 3))
-        for k in (0, 2):
-            a, b = points[ring[:, k]] - points[centre], points[ring[:, k + 1]] - points[centre]
-            alpha, to_a, to_b = sectors(a, b)
-            total += alpha
-            rows[:, 0] -= to_a + to_b
-            rows[:, 1 + k] += to_a
-            rows[:, 2 + k] += to_b
-        spokes = np.concatenate([centre[:, None], ring], axis=1)
-        return _hinge(self.weights.sectors * 10, sign * total - limit, spokes, sign * rows)
-
     def _fair(self, points: Floats) -> Iterator[Block]:
         chains, bend = self.chains
         w = self.weights.fairness / self.length
@@ -300,16 +265,3 @@ def _hinge(weight: float, over: Floats, vertices: Ints, gradient: Floats) -> Blo
 
 def _dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.einsum("nk,nk->n", a, b))
-
-
-def stacked(blocks: list[Block], size: int) -> tuple[Floats, sparse.csr_array]:
-    """The residuals (n,) of all ``blocks`` and their Jacobian (n, ``size``)."""
-    columns, widths = [], []
-    for _, vertices, _ in blocks:
-        columns.append((vertices[:, :, None] * 3 + np.arange(3)).reshape(-1))
-        widths.append(np.full(len(vertices), 3 * vertices.shape[1]))
-    starts = np.concatenate([[0], np.cumsum(np.concatenate(widths))])
-    data = np.concatenate([gradient.reshape(-1) for _, _, gradient in blocks])
-    values = np.concatenate([value for value, _, _ in blocks])
-    matrix = sparse.csr_array((data, np.concatenate(columns), starts), shape=(len(values), size))
-    return values, matrix

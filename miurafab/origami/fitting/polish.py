@@ -76,13 +76,21 @@ def polished(
         bounds = limits(asked, unknowns, scale, BOUND_MARGIN)
         objective = _objective(asked, start, x, bounds)
         last: Candidate | None = None
+        feet = objective.feet
         for penalty, steps in LEGS if number else (*EASING, *LEGS):
             if (penalty, steps) == LEGS[-1] and len(x) < FEW:
                 steps = MORE
             sheet = fairest(
-                objective, unknowns, constraints, x, steps=steps, penalty=penalty, on_step=tick
+                objective,
+                unknowns,
+                constraints,
+                x,
+                feet,
+                steps=steps,
+                penalty=penalty,
+                on_step=tick,
             )
-            x, objective = sheet.x, replace(objective, feet=sheet.feet)
+            x, feet = sheet.x, sheet.feet
             iterations += sheet.steps
             if penalty < PENALTY:
                 continue

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from miurafab.geometry.quads import QuadCharts
+from miurafab.origami.fitting.blocks import stacked
 from miurafab.origami.fitting.nominal import Nominal, Rim, chains_of
-from miurafab.origami.fitting.objective import FairObjective, stacked
+from miurafab.origami.fitting.objective import FairObjective
 from miurafab.origami.fitting.score import bow_ties
 from miurafab.origami.fitting.seed import Corrugation, seed
 from miurafab.surfaces.catalogue import make_surface
