@@ -27,6 +27,15 @@ class Rim:
     outward: Floats
     overhang: float = 1.0
 
+    def with_also(self, other: Rim) -> Rim:
+        """Both rims, with the overhang of this one."""
+        return Rim(
+            np.concatenate([self.facets, other.facets]),
+            np.concatenate([self.places, other.places]),
+            np.concatenate([self.outward, other.outward]),
+            self.overhang,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Nominal:
@@ -77,6 +86,19 @@ def rim_of_domain(
         outward.append(unit(surface.point(uv + step) - surface.point(uv - step)))
     together = np.concatenate(facets)
     return Rim(together, nominal.centres[together], np.concatenate(outward))
+
+
+def rim_around(surface: TargetSurface, charts: QuadCharts, nominal: Nominal, rows: int) -> Rim:
+    """The rim across v of a lattice of ``rows`` rows of cells that repeats itself after two rows.
+
+    The first row of cells stands for the side of least v, the second for the other.
+    """
+    step = np.array([0.0, surface.domain.height / rows / 2])
+    facets = np.flatnonzero(np.isin(charts.cells[:, 1], (0, 1)))
+    uv = nominal.parameters[facets]
+    sign = np.where(charts.cells[facets, 1] == 0, -1.0, 1.0)[:, None]
+    outward = sign * unit(surface.point(uv + step) - surface.point(uv - step))
+    return Rim(facets, nominal.centres[facets], outward)
 
 
 def chains_of(charts: QuadCharts, corners: Floats) -> tuple[Ints, Floats]:

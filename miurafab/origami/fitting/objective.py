@@ -74,7 +74,7 @@ class Weights:
     place: float = 0.05
     rim: float = 3.0
     sectors: float = 4.0
-    folds: float = 3.0
+    folds: float = 2.0
     edges: float = 8.0
     convexity: float = 10.0
     fairness: float = 0.3

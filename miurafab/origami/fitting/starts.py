@@ -28,7 +28,7 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.cylinder import cylinder_on
-from miurafab.origami.fitting.nominal import Follow, Nominal, Rim, rim_of_domain
+from miurafab.origami.fitting.nominal import Follow, Nominal, Rim, rim_around, rim_of_domain
 from miurafab.origami.fitting.outlined import OutlinedLattice, angles_of
 from miurafab.origami.fitting.reduction import Unknowns, about_z
 from miurafab.origami.fitting.request import FitRequest
@@ -191,13 +191,13 @@ def direct(request: FitRequest) -> Iterator[Start]:
     assert isinstance(surface, GeneralizedCylinder)
     cells = request.columns, request.rows
     charts = QuadCharts.of_cells(np.ones((cells[1], cells[0]), dtype=bool))
-    nowhere = Rim(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
+    rim = rim_of_domain(surface, charts, Nominal.of(surface, charts, *cells), cells)
     for c in corrugations_of(request):
         level = LEVELS[request.follow]
         made = cylinder_on(surface, cells[0] + 1, cells[1] + 1, c.amplitude, c.zigzag, level)
         unknowns = Unknowns.all_of(charts, float(made.edge_lengths.mean()))
         x = made.vertices.ravel()
-        yield Start("direct", surface, "u", c, cells, unknowns, x, 0.0, nowhere)
+        yield Start("direct", surface, "u", c, cells, unknowns, x, 0.0, rim)
 
 
 def sheet(
@@ -239,6 +239,8 @@ def ring(
     unknowns = Unknowns.ring(bands_of_columns, rows, length, 2 * beta)
     nominal = Nominal.of(surface, unknowns.charts, *cells)
     rim = rim_of_domain(surface, unknowns.charts, nominal, cells, axes=(0,))
+    if not surface.closed:
+        rim = rim.with_also(rim_around(surface, unknowns.charts, nominal, rows))
     x = (made.vertices @ about_z((beta - surface.angle) / 2).T).ravel()
     return Start("ring", surface, "u", corrugation, cells, unknowns, x, made.steepest, rim, bands)
 
