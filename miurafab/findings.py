@@ -90,7 +90,9 @@ RULES = {
     "bridges": Rule("warning", "outlines without room for all holding bridges"),
     "nesting-limit": Rule("note", "a nesting that ended before every order was tried"),
     "unassigned-creases": Rule("warning", "creases that are neither mountain nor valley"),
-    "untabbed": Rule("warning", "seam edges without room for a tab"),
+    "untabbed": Rule(
+        "warning", "edges of seams, or of open borders with tabs, without room for one"
+    ),
     "unlettered": Rule("warning", "names and numbers without room on the sheets"),
     # A job, judged without a machine (miurafab.machine.judge_job)
     "lines": Rule("refusal", "a line too long for the controller, or not printable ASCII"),

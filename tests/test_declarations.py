@@ -15,7 +15,7 @@ from importlib import resources
 import pytest
 
 from miurafab.errors import OptionError, spell_options
-from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.options import Borders, LayoutOptions
 from miurafab.options import (
     Choice,
     Declared,
@@ -74,6 +74,7 @@ def example(kind: Kind) -> str:
         File: lambda: "stock.toml",
         FlatFoldability: lambda: "0.9deg",
         Pieces: lambda: "3",
+        Borders: lambda: "1,2",
         CutColumns: lambda: "1,2",
         Poles: lambda: "0,0,-1,0,0,1",
     }.get(type(kind), lambda: "0.1,0.9,0.2,0.8")()

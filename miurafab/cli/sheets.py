@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +9,7 @@ import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, MaterialOption, argument, option, takes
 from miurafab.errors import DONE
-from miurafab.findings import Finding, findings_json
+from miurafab.findings import findings_json
 from miurafab.options import File, Text
 
 if TYPE_CHECKING:
@@ -76,7 +75,7 @@ def sheets(
             on_progress=lambda fraction, note: progress(0.7 + 0.3 * fraction, note),
         )
     answer = _answer(job, out)
-    console.answer(answer, lambda: _show(console, answer, job.findings))
+    console.answer(answer, lambda: _show(console, answer, job))
     return DONE
 
 
@@ -101,24 +100,36 @@ def _answer(job: JobDirectory, out: Path) -> dict[str, Any]:
             "sheets": totals.sheets,
             "seam_mm": totals.seam_mm,
             "tabs": totals.tabs,
+            "border_tabs": totals.border_tabs,
             "density": totals.density,
             "cut_mm": totals.cut_mm,
             "perforated_mm": totals.perforated_mm,
             "travel_mm": totals.travel_mm,
             "seconds": totals.seconds,
         },
+        "borders": [
+            {"number": each.number, "length_mm": each.length_mm, "across_mm": each.across_mm}
+            for each in job.layout.borders
+        ],
         "findings": findings_json(job.findings),
     }
 
 
-def _show(console: Console, answer: dict[str, Any], findings: Iterable[Finding]) -> None:
+def _show(console: Console, answer: dict[str, Any], job: JobDirectory) -> None:
     from miurafab.workflow.dry_run import clock_text, length_text
 
     totals, sheets = answer["totals"], answer["sheets"]
     facts = {key: answer[key] for key in ("job", "machine", "material")}
     facts["patches"] = totals["patches"]
-    if totals["tabs"]:
-        facts["tabs"] = f"{totals['tabs']:,} on {length_text(totals['seam_mm'])} of seams"
+    on_borders = totals["border_tabs"]
+    on_seams = totals["tabs"] - on_borders
+    tabs = [f"{on_seams:,} on {length_text(totals['seam_mm'])} of seams"] if on_seams else []
+    tabs += [f"{on_borders:,} on open borders"] if on_borders else []
+    if tabs:
+        facts["tabs"] = ", ".join(tabs)
+    if job.layout.borders:
+        sizes = (f"{each.number}: {each.size}" for each in job.layout.borders)
+        facts["open borders"] = "; ".join(sizes)
     facts["sheets"] = f"{totals['sheets']:,}, {totals['density']:.0%} of their room used"
     for key in ("cut", "perforated", "travel"):
         facts[key] = length_text(totals[f"{key}_mm"])
@@ -133,5 +144,5 @@ def _show(console: Console, answer: dict[str, Any], findings: Iterable[Finding])
         )
     elif len(sheets) > 1:
         console.rows(("sheet", "patches", "machine time"), rows)
-    console.findings(findings)
+    console.findings(job.findings)
     console.line(f"Look at it first: miurafab preview {answer['job']}")

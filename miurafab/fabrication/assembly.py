@@ -21,12 +21,10 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.fabrication.partition.boundary import Boundary, boundaries
 from miurafab.fabrication.partition.pieces import components
-from miurafab.fabrication.seams import Seams, border_seams
+from miurafab.fabrication.seams import border_seams, shell_points
 from miurafab.fabrication.sheets import Layout
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import edge_lengths
@@ -79,12 +77,13 @@ class _Assembly:
         )
         # The only facet of a border edge lies on one of its sides.
         self.across[between.edges] = between.faces[:, ::-1, None]
-        self.point = _shell_vertices(pattern, between)
+        self.point = shell_points(pattern, between)
         self.number = {
             edge: tab.number
             for patch in layout.patches
             for tab in patch.tabs
             for edge in (tab.edge, tab.mate_edge)
+            if edge is not None
         }
         self.around = boundaries(pattern, self.owner[:-1])
         self.length = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
@@ -194,18 +193,3 @@ class _Assembly:
             )
             for pair in np.unique(pairs, axis=0)
         ]
-
-
-def _shell_vertices(pattern: CreasePattern, seams: Seams) -> Ints:
-    """(V,) the number of the point of the shell at each vertex: those of ``seams`` come together.
-
-    Facets run along their seam in opposite directions.
-    """
-    vertices = len(pattern.vertices_coords)
-    ends = [pattern.edges_vertices[seams.edges[:, side]] for side in (0, 1)]
-    for side in (0, 1):
-        turned = pattern.edges_faces[seams.edges[:, side], 0] < 0
-        ends[side] = np.where(turned[:, None], ends[side][:, ::-1], ends[side])
-    one, other = ends[0].ravel(), ends[1][:, ::-1].ravel()
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(vertices, vertices))
-    return connected_components(graph, directed=False)[1].astype(np.int64)

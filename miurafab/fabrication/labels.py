@@ -126,16 +126,19 @@ def _tab_numbers(
     words = [str(number) for number in numbers.tolist()]
     folds = tabs.seams.fold.tolist()
     marked = [w + f if f in MARKED else w for w, f in zip(words, folds, strict=True)]
-    for faces, points, wanted in (
-        (tabs.own_face, tabs.points, marked),
-        (tabs.mate_face, tabs.glued, words),
+    glued = np.flatnonzero(tabs.mate_face >= 0)
+    mates = tabs.take(glued)
+    for faces, points, present, wanted in (
+        (tabs.own_face, tabs.points, tabs.present, marked),
+        (mates.mate_face, mates.glued, mates.present, [words[tab] for tab in glued.tolist()]),
     ):
         patch, base = face_patch[faces], points[:, 1] - points[:, 0]
-        spots = _spots(points, tabs.present, _upright(base, turns[patch]))
+        spots = _spots(points, present, _upright(base, turns[patch]))
         shown, height = list(wanted), spots.height(np.array([text_width(word) for word in wanted]))
-        bare = spots.height(np.array([text_width(word) for word in words]))
+        numbers_alone = [word.rstrip("MV") for word in wanted]
+        bare = spots.height(np.array([text_width(word) for word in numbers_alone]))
         for tab in np.flatnonzero((height < NUMBER_MM[0]) & (bare >= NUMBER_MM[0])).tolist():
-            shown[tab], height[tab] = words[tab], bare[tab]
+            shown[tab], height[tab] = numbers_alone[tab], bare[tab]
             unmarked += 1
         height = np.minimum(height, NUMBER_MM[1])
         room = height >= NUMBER_MM[0]
@@ -156,7 +159,7 @@ def _facet_spots(pattern: CreasePattern, tabs: TabRegions, turns: Floats) -> _Sp
     length = np.where(corners >= 0, np.round(np.linalg.norm(side, axis=2), 6), -1.0)
     longest = side[np.arange(len(corners)), length.argmax(axis=1)]
 
-    left = np.arange(len(tabs))
+    left = np.flatnonzero(tabs.mate_face >= 0)
     while len(left):
         # One tab of each facet at a time.
         faces, first = np.unique(tabs.mate_face[left], return_index=True)

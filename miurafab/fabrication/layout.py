@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from miurafab.errors import LayoutError
+from miurafab.fabrication.borders import OpenBorder
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.sheets import Layout, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
@@ -33,6 +34,7 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
         "material": layout.material,
         "sheets": [dataclasses.asdict(sheet) for sheet in layout.sheets],
         "patches": [_patch_table(patch) for patch in layout.patches],
+        "borders": [dataclasses.asdict(border) for border in layout.borders],
         "totals": dataclasses.asdict(layout.totals),
         "findings": findings_json(layout.findings),
     }
@@ -59,6 +61,7 @@ def read_layout(text: str) -> Layout:
             sheets=tuple(_sheet(table) for table in document["sheets"]),
             totals=Totals(**document["totals"]),
             findings=tuple(map(finding_from_json, document.get("findings", ()))),
+            borders=tuple(map(_border, document.get("borders", ()))),
         )
     except KeyError as fault:
         raise LayoutError(f"The layout lacks {fault}.") from None
@@ -104,8 +107,8 @@ def _patch(table: dict[str, Any]) -> Patch:
             Tab(
                 number=int(tab["number"]),
                 edge=int(tab["edge"]),
-                mate_edge=int(tab.get("mate_edge", tab["edge"])),
-                mate_patch=int(tab["mate_patch"]),
+                mate_edge=_mate(tab.get("mate_edge", tab["edge"])),
+                mate_patch=_mate(tab["mate_patch"]),
                 polygon_mm=_points(tab["polygon_mm"]),
                 fold=str(tab.get("fold", "flat")),
             )
@@ -129,6 +132,17 @@ def _sheet(table: dict[str, Any]) -> Sheet:
             tuple((float(x), float(y)) for x, y in ring) for ring in table.get("defects_mm", ())
         ),
     )
+
+
+def _border(table: dict[str, Any]) -> OpenBorder:
+    return OpenBorder(**{**table, "edges": tuple(map(int, table["edges"]))})
+
+
+def _mate(number: object) -> int | None:
+    """The number of what a tab is glued to; None on an open border."""
+    if number is None or type(number) is int:
+        return number
+    raise ValueError(f"{number!r} is no mate of a tab")
 
 
 def _points(values: list[list[float]]) -> Floats:

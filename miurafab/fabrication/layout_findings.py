@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from miurafab.fabrication.borders import chosen_edges
 from miurafab.fabrication.labels import Lettering
 from miurafab.fabrication.nesting import Nesting
 from miurafab.fabrication.options import LayoutOptions
@@ -12,6 +13,7 @@ from miurafab.fabrication.strokes import Drawn
 from miurafab.fabrication.tabs import MIN_BASE_MM
 from miurafab.fabrication.wording import count
 from miurafab.findings import Finding
+from miurafab.geometry.arrays import Ints
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
@@ -67,16 +69,27 @@ def layout_findings(
         creases = count(unassigned, "crease is", "creases are")
         sentence = f"{creases} neither mountain nor valley in the pattern."
         findings.append(Finding("unassigned-creases", sentence))
-    untabbed = framed.outlined.untabbed.tolist()
-    if untabbed:
-        edges = count(len(untabbed), "seam edge bears", "seam edges bear")
-        ends = pattern.edges_vertices[framed.outlined.untabbed]
-        short = int((edge_lengths(pattern.vertices_coords, ends) < MIN_BASE_MM).sum())
-        which = f", {short} of them shorter than {MIN_BASE_MM:g} mm" if short else ""
-        sentence = f"{edges} no tab{which}, since there is no room: use tape there."
-        findings.append(Finding("untabbed", sentence, tuple(untabbed)))
+    findings += _untabbed(pattern, framed.outlined.untabbed, options)
     if lettering.left_out:
         names = count(lettering.left_out, "name or number", "names and numbers")
         sentence = f"{names} found no room on the sheets: go by the pictures of the assembly guide."
         findings.append(Finding("unlettered", sentence))
     return tuple(findings)
+
+
+def _untabbed(pattern: CreasePattern, edges: Ints, options: LayoutOptions) -> list[Finding]:
+    """The edges without the tab that is wanted, those of seams before those of open borders."""
+    rim = np.isin(edges, chosen_edges(pattern, options.border_tabs))
+    found = []
+    for own, (one, many), remedy in (
+        (edges[~rim], ("seam edge bears", "seam edges bear"), "use tape there"),
+        (edges[rim], ("edge of an open border bears", "edges of open borders bear"), "glue beside"),
+    ):
+        if not len(own):
+            continue
+        ends = pattern.edges_vertices[own]
+        short = int((edge_lengths(pattern.vertices_coords, ends) < MIN_BASE_MM).sum())
+        which = f", {short} of them shorter than {MIN_BASE_MM:g} mm" if short else ""
+        sentence = f"{count(len(own), one, many)} no tab{which}, since there is no room: {remedy}."
+        found.append(Finding("untabbed", sentence, tuple(own.tolist())))
+    return found

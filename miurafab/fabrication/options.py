@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from miurafab.display import Shown
 from miurafab.errors import OptionError
@@ -15,6 +16,7 @@ from miurafab.options import (
     Choice,
     File,
     Flag,
+    Kind,
     Pair,
     Several,
     Whole,
@@ -30,6 +32,33 @@ TAB_SIDES = ("lower", "upper", "alternate")
 BRIDGE_MM = 0.5
 LINES = Whole(1, 10**6)
 """A line of the vertex grid, from 1: the number of facets before it."""
+
+
+Chosen = tuple[int, ...] | Literal["all"]
+"""The numbers of the open borders that are meant."""
+
+
+class Borders(Kind):
+    """``all``, or the numbers of open borders."""
+
+    numbers = Several(Whole(1, 10**6), distinct)
+
+    @property
+    def metavar(self) -> str:
+        return "all|N,..."
+
+    def read(self, value: object) -> Chosen:
+        if value == "all":
+            return "all"
+        numbers: tuple[int, ...] = self.numbers.read(value)
+        return numbers
+
+    def check(self, inside: Chosen) -> None:
+        if inside != "all":
+            self.numbers.check(inside)
+
+    def show(self, inside: Chosen) -> str:
+        return "all" if inside == "all" else self.numbers.show(inside)
 
 
 def longer_first(sides: tuple[float, float]) -> tuple[float, float]:
@@ -155,6 +184,14 @@ class LayoutOptions(Shown):
         Flag(),
         "Make each tab as large as the facet that it is glued to, less the inset.",
         False,
+        group="Tabs",
+        page="more",
+    )
+    border_tabs: Chosen = option(
+        Borders(),
+        "Tabs on open borders, to fix the shell to a base or a frame: all, or the numbers that the "
+        "report gives.",
+        (),
         group="Tabs",
         page="more",
     )

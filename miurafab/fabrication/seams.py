@@ -17,11 +17,13 @@ printed side, the side from which the flat pattern is seen.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.spatial
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.angles import fold_angles
 from miurafab.geometry.arrays import Bools, Ints
@@ -108,6 +110,25 @@ def border_seams(pattern: CreasePattern) -> Seams:
     fold = np.select([angle > FLAT_ANGLE, angle < -FLAT_ANGLE], ["V", "M"], "F")
     seams = Seams(pairs, faces, fold)
     return seams if pattern.seams is not None else seams.take(np.abs(angle) < math.pi - TOGETHER)
+
+
+def with_seams(pattern: CreasePattern) -> CreasePattern:
+    """``pattern`` with its seams named, found in the folded form if need be."""
+    if pattern.seams is not None:
+        return pattern
+    return replace(pattern, seams=border_seams(pattern).edges)
+
+
+def shell_points(pattern: CreasePattern, seams: Seams) -> Ints:
+    """(V,) the number of the point of the shell at each vertex: those of ``seams`` come together.
+
+    Facets run along their seam in opposite directions.
+    """
+    vertices = len(pattern.vertices_coords)
+    ends = [_with_facet_on_the_left(pattern, seams.edges[:, side]) for side in (0, 1)]
+    one, other = ends[0].ravel(), ends[1][:, ::-1].ravel()
+    graph = coo_array((np.ones(len(one)), (one, other)), shape=(vertices, vertices))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _coinciding(pattern: CreasePattern) -> Ints:

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from miurafab.display import Shown
+from miurafab.fabrication.borders import OpenBorder, open_borders
 from miurafab.fabrication.labels import Lettering, place_texts
 from miurafab.fabrication.layout_findings import layout_findings
 from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, nest, turned
@@ -87,7 +88,8 @@ class Sheet:
 
 @dataclass(frozen=True)
 class Totals:
-    """Sums over a layout. ``seam_mm`` is the length of all seams, ``density`` the area of the
+    """Sums over a layout. ``tabs`` are all tabs, of which ``border_tabs`` stand on open borders.
+    ``seam_mm`` is the length of all seams, ``density`` the area of the
     patches over the usable area of the sheets, ``sheets_bound`` the lower bound of the number of
     sheets for these patches, ``seconds`` the estimated time, None until it is estimated.
     """
@@ -102,6 +104,7 @@ class Totals:
     travel_mm: float
     seconds: float | None = None
     sheets_bound: int | None = None
+    border_tabs: int = 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,6 +125,8 @@ class Layout(Shown):
         What nested the patches.
     findings : tuple of Finding
         For the assembly: options that could not be honoured, and everything that has no room.
+    borders : tuple of OpenBorder
+        The borders that the glued shell leaves open.
     """
 
     machine: str
@@ -130,6 +135,7 @@ class Layout(Shown):
     sheets: tuple[Sheet, ...]
     totals: Totals
     findings: tuple[Finding, ...] = ()
+    borders: tuple[OpenBorder, ...] = ()
 
     def _summary(self) -> str:
         totals = self.totals
@@ -140,9 +146,9 @@ class Layout(Shown):
 
     @property
     def untabbed(self) -> tuple[int, ...]:
-        """The pattern edges of seams without room for a tab."""
+        """The pattern edges without room for a tab that is wanted."""
         edges = (finding.where for finding in self.findings if finding.code == "untabbed")
-        return next((where for where in edges if isinstance(where, tuple)), ())
+        return tuple(edge for where in edges if isinstance(where, tuple) for edge in where)
 
     @property
     def copies(self) -> int:
@@ -259,6 +265,7 @@ def lay_out(
         sheets=sheets,
         totals=_totals(pattern, outlined, patches, nesting, toolpaths + behind, usable),
         findings=layout_findings(pattern, framed, nesting, lettering, drawn, material, options),
+        borders=open_borders(pattern),
         toolpaths=toolpaths,
         backs=behind,
         pattern=pattern,
@@ -382,4 +389,5 @@ def _totals(
         perforated_mm=sum(toolpath.length_of("perforate") for toolpath in toolpaths),
         travel_mm=sum(toolpath.travel_mm for toolpath in toolpaths),
         sheets_bound=nesting.bound,
+        border_tabs=int((outlined.tabs.mate_face < 0).sum()) * copies,
     )

@@ -26,8 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.seams import Seams, all_seams, border_seams
+from miurafab.fabrication.seams import Seams
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import edge_lengths, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
@@ -57,14 +56,14 @@ class Tab:
     """A tab of one patch. ``number`` is engraved on both sides of the seam. ``edge`` is the pattern
     edge on which the tab stands and ``mate_edge`` the edge that it is joined to: the same edge,
     unless two borders of the pattern are joined. ``mate_patch`` is the id of the patch to which it
-    is glued, ``polygon_mm`` (n, 2) its outline in the patch frame, counter-clockwise from the base.
-    ``fold`` is one of :data:`FOLDS`, or flat.
+    is glued; both are None on an open border. ``polygon_mm`` (n, 2) is its outline in the patch
+    frame, counter-clockwise from the base. ``fold`` is one of :data:`FOLDS`, or flat.
     """
 
     number: int
     edge: int
-    mate_edge: int
-    mate_patch: int
+    mate_edge: int | None
+    mate_patch: int | None
     polygon_mm: Floats
     fold: str = "flat"
 
@@ -74,7 +73,7 @@ class TabRegions:
     """N tabs in the plane of the pattern, on ``seams`` (N). ``points`` (N, m, 2) in mm are their
     corners, counter-clockwise from the base; the first ``count`` (N,) corners of each are real,
     none if there is no region. ``glued`` (N, m, 2) are the same corners in the facet to which the
-    tab is glued.
+    tab is glued; they mean nothing on an open border.
     """
 
     seams: Seams
@@ -97,7 +96,7 @@ class TabRegions:
 
     @property
     def mate_face(self) -> Ints:
-        """(N,) the facet to which each tab is glued."""
+        """(N,) the facet to which each tab is glued, -1 on an open border."""
         return self.seams.faces[:, 1]
 
     def polygon(self, index: int | np.integer) -> Floats:
@@ -108,6 +107,20 @@ class TabRegions:
         """The tabs that ``which`` picks."""
         points, glued = self.points[which], self.glued[which]
         return TabRegions(self.seams.take(which), points, glued, self.count[which])
+
+    def joined(self, others: TabRegions) -> TabRegions:
+        """These tabs and then ``others``."""
+        slots = max(self.points.shape[1], others.points.shape[1])
+
+        def wide(points: Floats) -> Floats:
+            return np.pad(points, ((0, 0), (0, slots - points.shape[1]), (0, 0)))
+
+        return TabRegions(
+            self.seams.joined(others.seams),
+            np.concatenate([wide(self.points), wide(others.points)]),
+            np.concatenate([wide(self.glued), wide(others.glued)]),
+            np.concatenate([self.count, others.count]),
+        )
 
     @property
     def present(self) -> Bools:
@@ -158,7 +171,7 @@ def tab_regions(
     """
     mate, count = seams.faces[:, 1], len(seams)
     ends_of = pattern.edges_vertices[seams.edges[:, 1]]
-    a, _, frame = _edge_axes(pattern, seams.edges[:, 1], mate)
+    a, _, frame = edge_axes(pattern, seams.edges[:, 1], mate)
 
     corners = pattern.faces_vertices[mate]
     real = corners >= 0
@@ -200,7 +213,7 @@ def tab_regions(
         shared = other[:, k] & bearing[mate, k]
         limit = offset[:, k] + inset * np.linalg.norm(towards, axis=1)
         points, sides = clip_convex(points, sides, towards, np.where(shared, limit, NO_LIMIT))
-    points, sides = _base_first(points, sides)
+    points, sides = base_first(points, sides)
     # If the facet is not convex at an end of its side, the line of the side continues inside it.
     length = edge_lengths(pattern.vertices_coords, ends_of)
     for way, reach_out, limit in (
@@ -210,19 +223,18 @@ def tab_regions(
         normals = np.broadcast_to(np.array([way, 0.0]), (count, 2))
         over = (sides >= 3) & reach_out
         points, sides = clip_convex(points, sides, normals, np.where(over, limit, NO_LIMIT))
-        points, sides = _base_first(points, sides)
+        points, sides = base_first(points, sides)
     if material.tabs.max_angle < math.pi and not full_facet:
-        free = np.zeros(count, dtype=bool) if raised is None else raised
-        points, sides = _not_steeper(points, sides, material.tabs.max_angle, free)
+        points, sides = not_steeper(points, sides, material.tabs.max_angle, raised)
     glued = placed = a[:, None] + np.einsum("nij,nki->nkj", frame, points)
     if (seams.edges[:, 0] != seams.edges[:, 1]).any():
         # The side of the facet that bears the tab runs the opposite way.
-        _, a, frame = _edge_axes(pattern, seams.edges[:, 0], seams.faces[:, 0])
+        _, a, frame = edge_axes(pattern, seams.edges[:, 0], seams.faces[:, 0])
         placed = a[:, None] - np.einsum("nij,nki->nkj", frame, points)
     return TabRegions(seams, placed, glued, sides)
 
 
-def _edge_axes(pattern: CreasePattern, edges: Ints, faces: Ints) -> tuple[Floats, Floats, Floats]:
+def edge_axes(pattern: CreasePattern, edges: Ints, faces: Ints) -> tuple[Floats, Floats, Floats]:
     """For each of ``edges`` (N,) with its facet in ``faces`` (N,) on the left: its first and last
     ends (N, 2), and the unit vectors along it and into the facet (N, 2, 2).
     """
@@ -236,75 +248,9 @@ def _edge_axes(pattern: CreasePattern, edges: Ints, faces: Ints) -> tuple[Floats
     return start, end, np.stack([along, np.column_stack([-along[:, 1], along[:, 0]])], axis=1)
 
 
-def choose_tabs(
-    pattern: CreasePattern,
-    face_patch: Ints,
-    material: Material,
-    options: LayoutOptions | None = None,
-    tight: Bools | None = None,
-) -> tuple[TabRegions, Bools, Ints]:
-    """One tab for each seam of ``face_patch`` (F,), the patch id of each facet.
-
-    The patch that ``options`` name bears the tab. If the tab has less glue area than the material
-    requires, it goes to the other patch if it is larger there. If that is not enough, it is raised:
-    up to :data:`RAISED` times as high, and as wide as its facet allows. If a patch is glued to
-    itself, the lower pattern edge counts as the lower patch. ``tight`` patches (P,) may carry
-    standard tabs only.
-
-    Returns the tabs, (N,) whether each is not standard, and (M,) the seam edges where neither patch
-    can bear a tab. Cuts in the pattern (assignment C) get no tab.
-    """
-    options = options or LayoutOptions()
-    seams = all_seams(pattern, face_patch)
-    patch = face_patch[seams.faces]
-    lower = patch[:, 0] < patch[:, 1]
-    lower |= (patch[:, 0] == patch[:, 1]) & (seams.edges[:, 0] < seams.edges[:, 1])
-    seams = seams.swapped(_by_lower(patch, options.tab_side) != lower)
-
-    def made(seams: Seams, raised: Bools | None = None) -> TabRegions:
-        bearing = _bearing(pattern, seams)
-        full = options.full_facet
-        return tab_regions(pattern, seams, material, bearing, full_facet=full, raised=raised)
-
-    tabs = made(seams)
-    weak = tabs.glue < material.tabs.min_area_mm2
-    unusual = np.zeros(len(seams), dtype=bool)
-    if weak.any():
-        free = np.ones(face_patch.max() + 1, dtype=bool) if tight is None else ~tight
-        better = made(seams.swapped(weak)).glue > tabs.glue
-        swapped = weak & better & free[face_patch[seams.faces[:, 1]]]
-        tabs = made(seams.swapped(swapped))
-        weak = tabs.glue < material.tabs.min_area_mm2
-        weak &= free[face_patch[tabs.own_face]]
-        tabs = made(tabs.seams, weak)
-        unusual = swapped | weak
-    kept = tabs.glue > 0
-    return tabs.take(kept), unusual[kept], seams.edges[~kept, 0]
-
-
-def border_tabs(pattern: CreasePattern, material: Material, options: LayoutOptions) -> TabRegions:
-    """All tabs that may stand on borders of the pattern, on either side of each seam."""
-    seams = border_seams(pattern)
-    seams = seams.joined(seams.swapped(np.ones(len(seams), dtype=bool)))
-    return tab_regions(pattern, seams, material, full_facet=options.full_facet)
-
-
-def _by_lower(patch: Ints, side: str) -> Bools:
-    """(N,) whether the lower of the two patches ``patch`` (N, 2) bears the tab."""
-    if side != "alternate":
-        return np.full(len(patch), side == "lower")
-    # Every second edge of each seam, in the order of the edges.
-    order = np.lexsort((np.arange(len(patch)), patch.max(axis=1), patch.min(axis=1)))
-    pair = np.sort(patch, axis=1)[order]
-    fresh = np.append(True, (pair[1:] != pair[:-1]).any(axis=1))[: len(patch)]
-    place = np.arange(len(patch))
-    first = np.maximum.accumulate(np.where(fresh, place, 0))
-    found = np.empty(len(patch), dtype=bool)
-    found[order] = (place - first) % 2 == 0
-    return found
-
-
-def _not_steeper(points: Floats, count: Ints, angle: float, free: Bools) -> tuple[Floats, Ints]:
+def not_steeper(
+    points: Floats, count: Ints, angle: float, free: Bools | None = None
+) -> tuple[Floats, Ints]:
     """The polygons, on the base y = 0, with inner angles at the base cut to at most ``angle``;
     ``free`` (N,) polygons are not cut.
     """
@@ -314,20 +260,13 @@ def _not_steeper(points: Floats, count: Ints, angle: float, free: Bools) -> tupl
         beyond = points[row, 2 if end else np.maximum(count, 1) - 1]
         limit = points[:, end] @ normal
         # Only sides that are too steep are cut: elsewhere the clip would double the corner.
-        steep = ~free & (count >= 3) & (beyond @ normal < limit - 1e-9)
+        steep = (count >= 3) & (beyond @ normal < limit - 1e-9)
+        if free is not None:
+            steep &= ~free
         limit = np.where(steep, limit + 1e-9, NO_LIMIT)
         points, count = clip_convex(points, count, np.broadcast_to(normal, (len(points), 2)), limit)
-        points, count = _base_first(points, count)
+        points, count = base_first(points, count)
     return points, count
-
-
-def _bearing(pattern: CreasePattern, seams: Seams) -> Bools:
-    """(F, k) whether a tab is glued inside each side of each facet."""
-    found = np.zeros(pattern.faces_edges.shape, dtype=bool)
-    mate = seams.faces[:, 1]
-    side = (pattern.faces_edges[mate] == seams.edges[:, 1:]).argmax(axis=1)
-    found[mate, side] = True
-    return found
 
 
 def clip_convex(points: Floats, count: Ints, normal: Floats, limit: Floats) -> tuple[Floats, Ints]:
@@ -357,7 +296,7 @@ def clip_convex(points: Floats, count: Ints, normal: Floats, limit: Floats) -> t
     return np.take_along_axis(handed, order[..., None], axis=1), total
 
 
-def _base_first(points: Floats, count: Ints) -> tuple[Floats, Ints]:
+def base_first(points: Floats, count: Ints) -> tuple[Floats, Ints]:
     """The polygons with their base, the two corners on y = 0, as first side; those without a
     base are left without corners.
     """

@@ -10,6 +10,7 @@ import numpy as np
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.picture import CREASES, DASHES, azimuth_of, fills, project
+from miurafab.origami.seam_lines import SEAM_WORDS, seam_lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,11 +19,15 @@ _NAMES = {"M": "mountain", "V": "valley", "F": "flat", "U": "unassigned", "B": "
 
 
 def draw_flat(pattern: CreasePattern, axes: Axes) -> None:
-    """The flat pattern in mm, mountains dash-dotted and valleys dashed."""
+    """The flat pattern in mm, mountains dash-dotted, valleys dashed, and seams numbered."""
     from matplotlib.collections import LineCollection
 
+    lines = seam_lines(pattern)
+    seam = np.zeros(len(pattern.edges_vertices), dtype=bool)
+    for line in lines:
+        seam[line.edges] = True
     for letter, colour in CREASES.items():
-        chosen = pattern.edges_vertices[pattern.edges_assignment == letter]
+        chosen = pattern.edges_vertices[(pattern.edges_assignment == letter) & ~seam]
         if not len(chosen):
             continue
         dashes: Any = (0, DASHES[letter]) if letter in DASHES else "solid"
@@ -35,6 +40,17 @@ def draw_flat(pattern: CreasePattern, axes: Axes) -> None:
                 label=_NAMES[letter],
             )
         )
+    for line in lines:
+        ends = pattern.vertices_coords[pattern.edges_vertices[line.edges.ravel()]]
+        label = SEAM_WORDS.replace(": ", ":\n") if line.number == 1 else None
+        axes.add_collection(
+            LineCollection(list(ends), colors=line.colour, linewidths=1.8, label=label)
+        )
+        for x, y in line.places.tolist():
+            axes.annotate(
+                str(line.number), (x, y), color="white", fontsize=7, ha="center", va="center",
+                bbox={"boxstyle": "circle,pad=0.2", "facecolor": line.colour, "edgecolor": "white"},
+            )  # fmt: skip
     axes.autoscale()
     axes.set_aspect("equal")
     axes.set_xlabel("mm")

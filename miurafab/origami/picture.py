@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import facet_normals, filled
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.seam_lines import SEAM_WORDS, SeamLine, seam_lines
 
 AZIMUTH, ELEVATION = math.radians(-55), math.radians(30)
 """From where a folded form is seen: over its front right corner."""
@@ -30,6 +31,8 @@ picture. Colour is never the only difference."""
 
 _KEY, _FILL = np.array([-0.45, 0.6, 0.66]), np.array([0.7, -0.15, 0.5])
 _MARGIN, _ASIDE = 8.0, math.radians(25)
+_DISK = 7.0
+"""The radius of the disk around the number of a seam line."""
 MOST_FACETS = 6000
 """A pattern of more facets has no picture in a notebook: it would be megabytes of grey."""
 
@@ -92,16 +95,18 @@ def fills(view: View) -> NDArray[np.uint8]:
 
 
 def flat_svg(pattern: CreasePattern, width: float) -> str:
-    """The flat pattern, mountains red and dash-dotted, valleys blue and dashed."""
-    points, height = _placed(pattern.vertices_coords, width)
-    return _svg(width, height, _creases(pattern, points))
+    """The flat pattern, mountains red and dash-dotted, valleys blue and dashed, and seams with
+    numbers.
+    """
+    height, lines = _flat(pattern, width)
+    return _svg(width, height, lines)
 
 
 def pattern_svg(pattern: CreasePattern, width: float = 640.0) -> str:
     """The flat pattern, and beside it the folded form where the pattern has one."""
     if pattern.folded_coords is None:
         return flat_svg(pattern, width / 2)
-    points, flat_height = _placed(pattern.vertices_coords, width / 2)
+    flat_height, lines = _flat(pattern, width / 2)
     folded_height, polygons = _folded(pattern, width / 2)
     height = max(flat_height, folded_height)
     return _svg(
@@ -109,12 +114,30 @@ def pattern_svg(pattern: CreasePattern, width: float = 640.0) -> str:
         height,
         [
             f'<g transform="translate(0 {(height - flat_height) / 2:.1f})">',
-            *_creases(pattern, points),
+            *lines,
             f'</g><g transform="translate({width / 2:g} {(height - folded_height) / 2:.1f})">',
             *polygons,
             "</g>",
         ],
     )
+
+
+def _flat(pattern: CreasePattern, width: float) -> tuple[float, list[str]]:
+    """The height of the picture of the flat pattern, and its parts."""
+    lines = seam_lines(pattern)
+    marks = [line.places for line in lines]
+    points, height = _placed(np.concatenate([pattern.vertices_coords, *marks]), width)
+    parts = _creases(pattern, points, lines)
+    marks = np.split(points[len(pattern.vertices_coords) :], len(lines)) if lines else []
+    for line, places in zip(lines, marks, strict=True):
+        parts += [_numbered(line, x, y) for x, y in places.tolist()]
+    if lines:
+        parts.append(
+            f'<text x="{_MARGIN:g}" y="{height + _DISK:.1f}" font-family="sans-serif" '
+            f'font-size="11" fill="{INK}">{SEAM_WORDS}</text>'
+        )
+        height += 2 * _DISK + _MARGIN / 2
+    return height, parts
 
 
 def _svg(width: float, height: float, parts: Iterable[str]) -> str:
@@ -138,24 +161,46 @@ def _placed(points: Floats, width: float) -> tuple[Floats, float]:
     return np.stack([x, y], axis=1), float(scale * size[1] + 2 * _MARGIN)
 
 
-def _creases(pattern: CreasePattern, points: Floats) -> list[str]:
-    """One path for each kind of edge."""
+def _creases(pattern: CreasePattern, points: Floats, lines: tuple[SeamLine, ...]) -> list[str]:
+    """One path for each kind of edge and for each seam line."""
     lengths = np.linalg.norm(np.diff(points[pattern.edges_vertices], axis=1)[:, 0], axis=1)
     unit = float(np.clip(np.median(lengths) / 10, 0.4, 1.2))
     parts = []
+    seam = np.zeros(len(pattern.edges_vertices), dtype=bool)
+    for line in lines:
+        seam[line.edges] = True
     for letter, colour in CREASES.items():
-        chosen = pattern.edges_vertices[pattern.edges_assignment == letter]
+        chosen = pattern.edges_vertices[(pattern.edges_assignment == letter) & ~seam]
         if not len(chosen):
             continue
-        ends = points[chosen].reshape(-1, 4).tolist()
-        data = "".join(f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for a, b, c, d in ends)
+        data = _path(points, chosen)
         dashes = " ".join(f"{unit * part:.2f}" for part in DASHES.get(letter, ()))
         dashed = f' stroke-dasharray="{dashes}"' if dashes else ""
         parts.append(
             f'<path d="{data}" fill="none" stroke="{colour}" stroke-width="{0.7 * unit:.2f}"'
             f"{dashed}/>"
         )
+    for line in lines:
+        data = _path(points, pattern.edges_vertices[line.edges.ravel()])
+        parts.append(
+            f'<path d="{data}" fill="none" stroke="{line.colour}" stroke-width="{1.6 * unit:.2f}"/>'
+        )
     return parts
+
+
+def _path(points: Floats, ends: Ints) -> str:
+    """The data of a path along each of ``ends`` (n, 2)."""
+    corners = points[ends].reshape(-1, 4).tolist()
+    return "".join(f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for a, b, c, d in corners)
+
+
+def _numbered(line: SeamLine, x: float, y: float) -> str:
+    """The number of a seam line in a disk of its colour."""
+    return (
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{_DISK:g}" fill="{line.colour}" stroke="#fff"/>'
+        f'<text x="{x:.1f}" y="{y + 0.38 * _DISK:.1f}" font-family="sans-serif" font-weight="bold" '
+        f'font-size="{1.15 * _DISK:.1f}" text-anchor="middle" fill="#fff">{line.number}</text>'
+    )
 
 
 def azimuth_of(points: Floats, faces: Ints) -> float:

@@ -109,10 +109,11 @@ def layout_lines(totals: Mapping[str, Any]) -> list[dict[str, str]]:
     lines += [
         ReportLine("Patches", f"{totals['patches']:,}"),
     ]
-    if totals["patches"] > 1 or totals["tabs"]:
-        lines.append(
-            ReportLine("Seams", length_text(totals["seam_mm"]), f"{totals['tabs']:,} tabs")
-        )
+    on_seams = totals["tabs"] - totals["border_tabs"]
+    if totals["patches"] > 1 or on_seams:
+        lines.append(ReportLine("Seams", length_text(totals["seam_mm"]), f"{on_seams:,} tabs"))
+    if totals["border_tabs"]:
+        lines.append(ReportLine("Open borders", "", f"{totals['border_tabs']:,} tabs"))
     lines += [
         ReportLine("Cut", length_text(totals["cut_mm"])),
         ReportLine("Creases", length_text(totals["perforated_mm"]), "perforated or scored"),

@@ -15,7 +15,7 @@ from miurafab.fabrication.labels import CLEARANCE_MM, place_texts
 from miurafab.fabrication.lettering import text_strokes, text_width
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.sheets import lay_out
-from miurafab.fabrication.tabs import choose_tabs
+from miurafab.fabrication.tab_choice import choose_tabs
 
 ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ-./%"
 

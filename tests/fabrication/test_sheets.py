@@ -198,7 +198,7 @@ def test_the_file_reads_back_as_it_was_written(case):
     assert document["pattern"] == {"file": "pattern.fold", "sha256": "0" * 64}
     assert set(document["totals"]) == {
         "patches", "sheets", "seam_mm", "tabs", "density", "cut_mm", "perforated_mm",
-        "travel_mm", "seconds", "sheets_bound",
+        "travel_mm", "seconds", "sheets_bound", "border_tabs",
     }  # fmt: skip
     again = read_layout(text)
     assert again.sheets == layout.sheets

@@ -14,7 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miurafab.fabrication.partition.patch_outline import outline_patches
-from miurafab.fabrication.tabs import MIN_AREA_MM2, MIN_BASE_MM, choose_tabs, inset_of
+from miurafab.fabrication.tab_choice import choose_tabs
+from miurafab.fabrication.tabs import MIN_AREA_MM2, MIN_BASE_MM, inset_of
 from miurafab.origami.crease_pattern import CreasePattern
 
 CASES = {

@@ -12,6 +12,7 @@ import io
 from dataclasses import dataclass
 
 import numpy as np
+from reportlab.lib.colors import HexColor
 from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 
@@ -41,6 +42,7 @@ from miurafab.fabrication.sheets import DrawnLayout
 from miurafab.fabrication.wording import count
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.seam_lines import SEAM_WORDS
 from miurafab.profiles import MachineProfile, Material
 
 
@@ -102,6 +104,9 @@ class _Overview:
         scale_bar(canvas, scale, MARGIN, below)
         entries = [("mountain", MOUNTAIN, 0.3), ("valley", VALLEY, 0.3), ("cut", INK, 0.45)]
         legend(canvas, entries, MARGIN + beside, below - 7)
+        if self.views.seams:
+            colour = HexColor(self.views.seams[0].colour)
+            legend(canvas, [(SEAM_WORDS, colour, 0.6)], MARGIN + beside, below - 12)
         x, y = MARGIN + beside + 12, top - 3.2
         for name, lines in self.facts():
             text(canvas, x, y, name, 7.5, colour=QUIET)
@@ -129,9 +134,19 @@ class _Overview:
             ("Creases", [*_ways(material), f"kerf {material.kerf_mm:g} mm"]),
             ("Settings", [_setting(self.machine, material, name) for name in material.operations]),
         ]
-        if totals.tabs:
-            words = f"{count(totals.tabs, 'tab', 'tabs')} on {totals.seam_mm / 1000:.2f} m of seams"
-            found.append(("Glue", [words]))
+        on_borders = totals.border_tabs
+        on_seams = count(totals.tabs - on_borders, "tab", "tabs")
+        glue = []
+        if totals.tabs > on_borders:
+            glue.append(f"{on_seams} on {totals.seam_mm / 1000:.2f} m of seams")
+        if on_borders:
+            glue.append(f"{count(on_borders, 'tab', 'tabs')} on open borders")
+        if glue:
+            found.append(("Glue", glue))
+        borders = self.views.layout.borders
+        if pattern.pieces_count > 1 or len(borders) != 1:
+            lines = [f"B{border.number}: {border.size}" for border in borders]
+            found.append(("Open borders", lines or ["none: the shell is closed"]))
         if totals.seconds is not None:
             minutes = max(round(totals.seconds / 60), 1)
             hours = (

@@ -61,7 +61,8 @@ class GluePages:
         steps = assembly_order(self.layout.model, self.views.pattern)
         top, notes = HEIGHT - MARGIN - 19, self.notes()
         height = 20.0 + (_TALL if self.in_space else min(_STEP * self.views.aspect, 40.0))
-        glue = glueing(self.layout.totals.tabs, self.views.pattern.pieces_count)
+        totals = self.layout.totals
+        glue = glueing(totals.tabs - totals.border_tabs, self.views.pattern.pieces_count)
         copies = self.layout.copies
         each = f", each of the {copies} copies" if copies > 1 else ""
         taken = height_of_instructions(notes, glue)
@@ -97,8 +98,15 @@ class GluePages:
             yield more
 
     def notes(self) -> list[str]:
-        """The findings that matter for the assembly."""
-        return [str(finding) for finding in self.layout.findings]
+        """What follows the gluing, and the findings that matter for the assembly."""
+        rims = ((self.views.standing(border), border) for border in self.layout.borders)
+        fixed = [
+            f"At last fold {tabs_called(tabs)}, which stand on open border {border.number} "
+            f"({border.size}), inwards or outwards, and glue them to the base or frame."
+            for tabs, border in rims
+            if tabs
+        ]
+        return fixed + [str(finding) for finding in self.layout.findings]
 
     def step(
         self,

@@ -161,6 +161,15 @@ def chip(canvas: Canvas, words: str, x: float, y: float, fill: Color, size: floa
     text(canvas, x, y - 0.125 * size, words, size, bold=True, align="middle")
 
 
+def disk(canvas: Canvas, words: str, x: float, y: float, fill: Color) -> None:
+    """One or two letters in a disk around (``x``, ``y``)."""
+    canvas.setFillColor(fill)
+    canvas.setStrokeColor(white)
+    canvas.setLineWidth(0.2 * mm)
+    canvas.circle(x * mm, y * mm, 1.6 * mm, stroke=1, fill=1)
+    text(canvas, x, y - 0.85, words, 6.5, bold=True, colour=white, align="middle")
+
+
 def polygon(canvas: Canvas, points: Floats, *, stroke: bool = False) -> None:
     """A filled closed polygon (n, 2) in the current colours."""
     path = canvas.beginPath()

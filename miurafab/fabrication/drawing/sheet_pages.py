@@ -261,6 +261,8 @@ class SheetPages:
         found: dict[int, list[int]] = {}
         for other in self.layout.patches:
             for tab in other.tabs:
+                if tab.mate_patch is None or tab.mate_edge is None:
+                    continue
                 if other.id == patch:
                     found.setdefault(tab.mate_patch, []).append(tab.edge)
                 elif tab.mate_patch == patch:
@@ -314,8 +316,10 @@ class SheetPages:
         """A sentence for each neighbour of a patch and each side that bears the tabs."""
         own: dict[int, list[int]] = {}
         others: dict[int, list[int]] = {}
+        free = tuple(t.number for t in self.layout.patches[patch].tabs if t.mate_patch is None)
         for tab in self.layout.patches[patch].tabs:
-            own.setdefault(tab.mate_patch, []).append(tab.number)
+            if tab.mate_patch is not None:
+                own.setdefault(tab.mate_patch, []).append(tab.number)
         for other in self.layout.patches:
             for tab in other.tabs:
                 if tab.mate_patch == patch and other.id != patch:
@@ -328,6 +332,8 @@ class SheetPages:
             f"Over {tabs_called(tuple(numbers))} of {self.label(mate)}"
             for mate, numbers in sorted(others.items())
         ]
+        if free:
+            found.append(f"{tabs_called(free).capitalize()} to the base or frame")
         return found or ["Stands alone: nothing is glued to it."]
 
 

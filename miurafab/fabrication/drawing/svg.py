@@ -16,10 +16,12 @@ import numpy as np
 import svgwrite
 
 from miurafab.fabrication.drawing.colours import hex_of, patch_colour
+from miurafab.fabrication.seams import with_seams
 from miurafab.fabrication.sheets import Layout
 from miurafab.fabrication.toolpath import Toolpath
-from miurafab.geometry.arrays import Floats
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.seam_lines import SEAM_WORDS, SeamLine, seam_lines
 from miurafab.profiles import OPERATIONS
 
 COLOURS = {
@@ -43,6 +45,8 @@ _CREASES = {
     "C": ("cut", "#222222"),
     "B": ("border", "#222222"),
 }
+_WEIGHTS = {letter: 1.8 if letter in "BC" else 1.0 for letter in _CREASES}
+"""The weights of lines over that of a crease."""
 
 
 def sheet_svg(toolpath: Toolpath) -> str:
@@ -73,8 +77,10 @@ def sheet_svg(toolpath: Toolpath) -> str:
 def layout_svg(pattern: CreasePattern, layout: Layout) -> str:
     """A picture of the flat pattern with the patches of ``layout`` tinted and named.
 
-    Mountains are red, valleys blue, the border black.
+    Mountains are red, valleys blue, the border black. Each seam line has a colour and a number of
+    its own on both of its sides. A legend says so.
     """
+    lines = seam_lines(with_seams(pattern))
     points = pattern.vertices_coords * np.array([1.0, -1.0])
     low, high = points.min(axis=0), points.max(axis=0)
     span = float(np.max(high - low))
@@ -82,23 +88,94 @@ def layout_svg(pattern: CreasePattern, layout: Layout) -> str:
     line = span / 600
     points = points - low + margin
     width, height = high - low + 2 * margin
+    size = span / 45
+    entries = _legend_entries(pattern, lines)
+    height += 2 * size * len(entries) + size
     drawing = _drawing(width, height, (_PICTURE, _short(_PICTURE * height / width)))
     drawing.add(drawing.rect((0, 0), (_short(width), _short(height)), fill="#ffffff"))
     _add_facets(drawing, pattern, points, layout)
     for letter, (name, colour) in _CREASES.items():
         edges = np.flatnonzero(pattern.edges_assignment == letter)
-        if not len(edges):
-            continue
-        ends = points[pattern.edges_vertices[edges]]
-        data = [
-            f"M{_short(x0)} {_short(y0)}L{_short(x1)} {_short(y1)}"
-            for (x0, y0), (x1, y1) in ends.tolist()
-        ]
-        weight = line * (1.8 if letter in "BC" else 1.0)
-        style = {"fill": "none", "stroke": colour, "stroke_linecap": "round"}
-        drawing.add(drawing.path(d="".join(data), id=name, stroke_width=_short(weight), **style))
+        edges = np.setdiff1d(edges, [edge for seam in lines for edge in seam.edges.ravel()])
+        if len(edges):
+            _add_lines(drawing, pattern, points, edges, name, colour, line * _WEIGHTS[letter])
+    for seam in lines:
+        name, weight = f"seam-{seam.number}", line * 3.0
+        _add_lines(drawing, pattern, points, seam.edges.ravel(), name, seam.colour, weight)
     _add_names(drawing, pattern, points, layout)
+    for seam in lines:
+        for x, y in (seam.places * [1.0, -1.0] - low + margin).tolist():
+            _add_number(drawing, seam, x, y, size)
+    for place, (words, colour) in enumerate(entries):
+        y = height - 2 * size * (len(entries) - place)
+        ends = (_short(margin), _short(y)), (_short(margin + 3 * size), _short(y))
+        drawing.add(drawing.line(*ends, stroke=colour, stroke_width=_short(3 * line)))
+        drawing.add(
+            drawing.text(
+                words,
+                insert=(_short(margin + 4 * size), _short(y + 0.35 * size)),
+                font_family="sans-serif",
+                font_size=_short(size),
+                fill="#222222",
+            )
+        )
     return _text(drawing)
+
+
+def _legend_entries(pattern: CreasePattern, lines: tuple[SeamLine, ...]) -> list[tuple[str, str]]:
+    """The words and the colour of each kind of line that is drawn."""
+    seams = {edge for seam in lines for edge in seam.edges.ravel().tolist()}
+    letters = {
+        letter for edge, letter in enumerate(pattern.edges_assignment.tolist()) if edge not in seams
+    }
+    entries = [(name, colour) for letter, (name, colour) in _CREASES.items() if letter in letters]
+    if lines:
+        entries.append((SEAM_WORDS, lines[0].colour))
+    return entries
+
+
+def _add_lines(
+    drawing: svgwrite.Drawing,
+    pattern: CreasePattern,
+    points: Floats,
+    edges: Ints,
+    name: str,
+    colour: str,
+    weight: float,
+) -> None:
+    """Some ``edges`` (n,) of the pattern as one path."""
+    data = [
+        f"M{_short(x0)} {_short(y0)}L{_short(x1)} {_short(y1)}"
+        for (x0, y0), (x1, y1) in points[pattern.edges_vertices[edges]].tolist()
+    ]
+    style = {"fill": "none", "stroke": colour, "stroke_linecap": "round"}
+    drawing.add(drawing.path(d="".join(data), id=name, stroke_width=_short(weight), **style))
+
+
+def _add_number(drawing: svgwrite.Drawing, seam: SeamLine, x: float, y: float, size: float) -> None:
+    """The number of a seam line in a disk of its colour."""
+    wide = 0.75 if seam.number < 10 else 0.95
+    at = (_short(x), _short(y))
+    drawing.add(
+        drawing.circle(
+            at,
+            _short(wide * size),
+            fill=seam.colour,
+            stroke="#ffffff",
+            stroke_width=_short(0.15 * size),
+        )
+    )
+    drawing.add(
+        drawing.text(
+            str(seam.number),
+            insert=(_short(x), _short(y + 0.35 * size)),
+            font_family="sans-serif",
+            font_size=_short(size),
+            font_weight="bold",
+            text_anchor="middle",
+            fill="#ffffff",
+        )
+    )
 
 
 def _add_facets(

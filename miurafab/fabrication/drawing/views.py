@@ -12,16 +12,18 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from reportlab.lib.colors import Color, white
+from reportlab.lib.colors import Color, HexColor, white
 from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 from reportlab.pdfgen.pathobject import PDFPathObject
 
+from miurafab.fabrication.borders import OpenBorder
 from miurafab.fabrication.drawing.page import (
     CREASE_COLOURS,
     INK,
     PALE,
     Box,
+    disk,
     fitted,
     polygon,
     text,
@@ -29,10 +31,12 @@ from miurafab.fabrication.drawing.page import (
 )
 from miurafab.fabrication.partition.boundary import boundaries
 from miurafab.fabrication.partition.patch_frame import Patch
+from miurafab.fabrication.seams import with_seams
 from miurafab.fabrication.sheets import DrawnLayout, Layout
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.picture import AZIMUTH, ELEVATION, View, project
+from miurafab.origami.seam_lines import SeamLine, seam_lines
 
 _TALL = 1.25
 """A flat pattern with a larger ratio of height to width is turned by a right angle."""
@@ -46,7 +50,9 @@ def edge_letters(layout: Layout, pattern: CreasePattern) -> NDArray[np.str_]:
     letters = pattern.edges_assignment.copy()
     for patch in layout.patches:
         for tab in patch.tabs:
-            if tab.edge != tab.mate_edge:
+            if tab.mate_edge is None:
+                letters[tab.edge] = "U"
+            elif tab.edge != tab.mate_edge:
                 fold = {"mountain": "M", "valley": "V"}.get(tab.fold, "F")
                 letters[[tab.edge, tab.mate_edge]] = fold
     return letters
@@ -93,10 +99,17 @@ class Views:
     @cached_property
     def flat(self) -> Floats:
         """(V, 2) the flat pattern, turned by a right angle if it is tall."""
-        points = self.pattern.vertices_coords
-        width, height = np.ptp(points, axis=0)
-        turned = points[:, ::-1] * [-1.0, 1.0]
-        return turned if height > _TALL * width else points
+        return self._upright(self.pattern.vertices_coords)
+
+    def _upright(self, points: Floats) -> Floats:
+        """``points`` (n, 2) of the flat pattern in flat views."""
+        width, height = np.ptp(self.pattern.vertices_coords, axis=0)
+        return points[:, ::-1] * [-1.0, 1.0] if height > _TALL * width else points
+
+    @cached_property
+    def seams(self) -> tuple[SeamLine, ...]:
+        """The lines along which borders are glued."""
+        return seam_lines(with_seams(self.pattern))
 
     @property
     def aspect(self) -> float:
@@ -114,6 +127,11 @@ class Views:
     def letters(self) -> NDArray[np.str_]:
         """(E,) as :func:`edge_letters`."""
         return edge_letters(self.layout, self.pattern)
+
+    def standing(self, border: OpenBorder) -> tuple[int, ...]:
+        """The numbers of the tabs on an open border."""
+        edges = set(border.edges)
+        return tuple(tab.number for p in self.patches for tab in p.tabs if tab.edge in edges)
 
     def folded_view(self, canvas: Canvas, box: Box, shown: Collection[int] | None = None) -> float:
         """An orthographic view, far facets first, lit from the upper left; returns its scale. If
@@ -189,8 +207,12 @@ class Views:
         polygon(canvas, seen[corners], stroke=len(faces) <= OUTLINED)
 
     def flat_view(self, canvas: Canvas, box: Box) -> float:
-        """The flat pattern with its creases and the names of its patches; returns its scale."""
-        points, scale = fitted(self.flat, box)
+        """The flat pattern with its creases, its seams with their numbers and the names of its
+        patches; returns its scale.
+        """
+        count = len(self.pattern.vertices_coords)
+        marks = (self._upright(line.places) for line in self.seams)
+        points, scale = fitted(np.concatenate([self.flat, *marks]), box)
         for patch in self.patches:
             canvas.setFillColor(tint(patch.id, 0.75))
             self._filled(canvas, points, patch.id)
@@ -201,9 +223,25 @@ class Views:
             canvas.setLineWidth(0.12 * mm)
             canvas.lines(ends[self.pattern.edges_assignment == letter].tolist())
         self._around(canvas, points, 0.3, INK)
+        for line in self.seams:
+            canvas.setStrokeColor(HexColor(line.colour))
+            canvas.setLineWidth(0.6 * mm)
+            canvas.lines(ends[line.edges.ravel()].tolist())
         size = _fitting(11.0, len(self.patches))
         for patch in self.patches:
             self._name(canvas, points, patch.id, size)
+        for place, line in enumerate(self.seams):
+            for x, y in points[count + 2 * place :][:2].tolist():
+                disk(canvas, str(line.number), x, y, HexColor(line.colour))
+        borders = self.layout.borders if len(self.layout.borders) > 1 else ()
+        for border in borders:
+            own = np.array(border.edges)
+            patch = self.face_patch[self.pattern.edges_faces[own].max(axis=1)]
+            for number in np.unique(patch).tolist():
+                middle = ends[own[patch == number]].reshape(-1, 2) / mm
+                far = np.linalg.norm(middle - middle.mean(axis=0), axis=1)
+                x, y = middle[int(np.argmin(far))].tolist()
+                disk(canvas, f"B{border.number}", x, y, INK)
         return scale
 
     def _filled(self, canvas: Canvas, points: Floats, patch: int) -> None:

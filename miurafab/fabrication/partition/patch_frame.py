@@ -97,7 +97,10 @@ def copied(patches: tuple[Patch, ...], quantity: int) -> tuple[Patch, ...]:
             id=patch.id + count * copy,
             label=f"{patch.label}-{copy + 1}",
             tabs=tuple(
-                replace(tab, mate_patch=tab.mate_patch + count * copy) for tab in patch.tabs
+                tab
+                if tab.mate_patch is None
+                else replace(tab, mate_patch=tab.mate_patch + count * copy)
+                for tab in patch.tabs
             ),
             copy=copy + 1,
         )
@@ -129,6 +132,7 @@ def _patch(
         return np.round(turned(points - origin, rotation), DIGITS)
 
     tabs = outlined.tabs
+    mates = np.where(tabs.mate_face < 0, -1, outlined.face_patch[tabs.mate_face])
     return Patch(
         id=number,
         label=f"P{number + 1}",
@@ -141,11 +145,16 @@ def _patch(
             Tab(
                 number=int(numbers[tab]),
                 edge=int(tabs.edge[tab]),
-                mate_edge=int(tabs.seams.edges[tab, 1]),
-                mate_patch=int(outlined.face_patch[tabs.mate_face[tab]]),
+                mate_edge=_mate(tabs.seams.edges[tab, 1]),
+                mate_patch=_mate(mates[tab]),
                 polygon_mm=framed(tabs.polygon(tab)),
                 fold=FOLDS.get(str(tabs.seams.fold[tab]), "flat"),
             )
             for tab in patch.tabs.tolist()
         ),
     )
+
+
+def _mate(number: np.int64) -> int | None:
+    """The number of a mate, None for -1."""
+    return None if number < 0 else int(number)

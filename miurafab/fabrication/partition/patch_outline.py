@@ -20,7 +20,8 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.boundary import Boundary, boundaries
 from miurafab.fabrication.partition.fit_box import Space
 from miurafab.fabrication.partition.split import split
-from miurafab.fabrication.tabs import TabRegions, choose_tabs
+from miurafab.fabrication.tab_choice import choose_tabs
+from miurafab.fabrication.tabs import TabRegions
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.shapes import common_area
 from miurafab.origami.crease_pattern import CreasePattern
@@ -46,7 +47,7 @@ class OutlinedPatch:
 @dataclass(frozen=True, eq=False)
 class OutlinedPatches:
     """All ``patches`` of a pattern: ``face_patch`` (F,) the patch of each facet, ``tabs`` all tabs,
-    ``untabbed`` (u,) the seam edges where neither side can bear a tab.
+    ``untabbed`` (u,) the edges where no side can bear the tab that is wanted.
     """
 
     patches: list[OutlinedPatch]
@@ -145,7 +146,9 @@ def _without_collisions(
     for patch in np.flatnonzero(~shapely.is_valid(np.array(shapes))).tolist():
         outer, *holes = (pattern.vertices_coords[loop.vertices] for loop in around[patch].loops)
         taken: BaseGeometry = shapely.Polygon(outer, holes)
-        for tab in standing[patch].tolist():
+        own = standing[patch]
+        # What is glued comes before what stands on an open border.
+        for tab in own[np.argsort(tabs.mate_face[own] < 0, kind="stable")].tolist():
             shape = shapely.Polygon(tabs.polygon(tab))
             if common_area(taken, shape) < 1e-6 and _meets_in_base(taken, shape):
                 taken = shapely.union(taken, shape, grid_size=1e-9)

@@ -32,7 +32,8 @@ from miurafab.fabrication.partition.pieces import (
 )
 from miurafab.fabrication.partition.region_growing import grow_patches
 from miurafab.fabrication.seams import inner_seams
-from miurafab.fabrication.tabs import TabRegions, border_tabs, choose_tabs, tab_regions
+from miurafab.fabrication.tab_choice import border_tabs, choose_tabs
+from miurafab.fabrication.tabs import TabRegions, tab_regions
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import signed_areas, smallest_box
 from miurafab.origami.crease_pattern import CreasePattern

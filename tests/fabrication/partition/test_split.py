@@ -18,7 +18,7 @@ from miurafab.fabrication.partition.boundary import boundaries
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.partition.split import split
-from miurafab.fabrication.tabs import choose_tabs
+from miurafab.fabrication.tab_choice import choose_tabs
 from miurafab.origami.crease_pattern import CreasePattern
 
 CASES = {
