@@ -100,7 +100,10 @@ def test_the_picture_of_a_layout_shows_every_edge_once(pattern):
     _, _, width, height = (float(n) for n in root.get("viewBox").split())
     tall = np.ptp(pattern.vertices_coords, axis=0)
     assert width == pytest.approx(tall[0] + 0.04 * tall.max(), abs=1e-3)
-    assert height == pytest.approx(tall[1] + 0.04 * tall.max(), abs=1e-3)
+    legend = [text.text for text in root.iter(SVG + "text")][-3:]
+    assert legend == ["mountain", "valley", "border"]
+    below = (2 * len(legend) + 1) * tall.max() / 45
+    assert height == pytest.approx(tall[1] + 0.04 * tall.max() + below, abs=1e-3)
 
 
 def test_the_picture_of_a_pattern_shows_every_edge_once():
@@ -115,7 +118,7 @@ def test_the_picture_of_a_layout_names_its_patches():
     pattern = miura(30, 26)
     layout = lay_out(pattern, bed(200.0, 150.0), card())
     root = ElementTree.fromstring(layout_svg(pattern, layout))
-    names = [text.text for text in root.iter(SVG + "text")]
+    names = [text.text for text in root.iter(SVG + "text")][:-3]
     # Each with a rim of its own below: many programs do not know paint-order.
     assert names == [patch.label for patch in layout.patches for _ in range(2)]
     assert [text.get("stroke") for text in root.iter(SVG + "text")][:2] == ["#ffffff", None]
