@@ -120,9 +120,13 @@ RULES = {
     "beam": _check("a beam that is on already"),
     "s-range": _check("an S range (`$30`, `$31`) that is not the profile's"),
     "settings": _check("another `$` setting that is not the profile's"),
+    "modes": Rule(
+        "warning", "modes or startup blocks of the controller that a job does not expect"
+    ),
     "travel": _check("a move beyond the soft limits, from where the machine stands"),
     # A job that was sent (miurafab.machine.sender)
     "no-emergency-parser": Rule("warning", "a Marlin that obeys a stop only between two commands"),
+    "overrides": Rule("note", "a feed, a rapid rate or a power that a key changed while a job ran"),
     "records": Rule("warning", "a journal or a transcript that could not be finished"),
     "no-answer": Rule("note", "a cutter that answers nothing"),
     "resumed": Rule("note", "where an interrupted job goes on, and what may be burnt twice"),

@@ -153,7 +153,8 @@ def _stream(
             bar(
                 now.stroke / max(now.strokes, 1),
                 f"sheet {now.number} of {len(prepared.jobs)}, stroke {now.stroke} of "
-                f"{now.strokes}, {clock_text(now.seconds_left)} left, {now.stream.state}",
+                f"{now.strokes}, {clock_text(now.seconds_left)} left, {now.stream.state}"
+                + (f", {words}" if (words := now.stream.overrides.words) else ""),
             )
 
         with terminal_keys() as keys:

@@ -10,7 +10,7 @@ mm/min, spindle speeds in S words.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from miurafab.gcode.job import SendLine
 
@@ -78,6 +78,19 @@ class StatusReport(Event):
     overrides: tuple[int, ...] | None = None
     accessories: str | None = None
 
+    def scaled(self, factor: float) -> StatusReport:
+        """The same with its positions times ``factor``."""
+        if factor == 1.0:
+            return self
+        return replace(
+            self,
+            **{
+                name: tuple(factor * value for value in position)
+                for name in ("machine_position", "work_position", "work_offset")
+                if (position := getattr(self, name)) is not None
+            },
+        )
+
     @property
     def beam_on(self) -> bool:
         """Whether the report says that the beam is on: S is above 0 or a spindle is on."""
@@ -125,6 +138,29 @@ class Options(Event):
     flags: str
     planner_blocks: int | None
     rx_bytes: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Modes(Event):
+    """``[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]``: the modes in force, as ``words``."""
+
+    words: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter(Event):
+    """``[G54:0.000,0.000,0.000]``, one line of ``$#``: a position, in the reporting unit."""
+
+    name: str
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StartupBlock(Event):
+    """``$N0=G20``: what the controller runs after each reset; ``text`` may be empty."""
+
+    number: int
+    text: str
 
 
 @dataclass(frozen=True, slots=True)

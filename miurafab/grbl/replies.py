@@ -20,9 +20,12 @@ from miurafab.grbl.events import (
     Error,
     Event,
     Feedback,
+    Modes,
     Ok,
     Options,
+    Parameter,
     Setting,
+    StartupBlock,
     StatusReport,
     Unknown,
     Version,
@@ -32,6 +35,9 @@ _BANNER = re.compile(r"(grbl\w*) (\S+) \[.*\]", re.IGNORECASE)
 _ANSWER = re.compile(r"(error|ALARM): ?(.+)")
 _STATUS = re.compile(r"<([A-Z][A-Za-z]*)(?::(\d+))?((?:[|,][^|<>]*)*)>")
 _BRACKET = re.compile(r"\[(\w[\w.]*):(.*)\]")
+_MODES = re.compile(r"\[(?:GC:)?([GM]\d[\dGMTFS. -]*)\]")
+_PARAMETER = re.compile(r"\[(G5[4-9](?:\.[1-3])?|G28|G30|G92|TLO):(-?[\d.]+(?:,-?[\d.]+)*)\]")
+_STARTUP = re.compile(r"\$N(\d)=(.*)")
 _SETTING = re.compile(r"\$(\d+)=([^()]*?)(?: *\(.*\))?")
 
 
@@ -126,7 +132,10 @@ def _bracket(match: re.Match[str]) -> Event | None:
 _FORMS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], Event | None]], ...] = (
     (_STATUS, _status),
     (_ANSWER, _answer),
+    (_PARAMETER, lambda match: Parameter(match[1], _numbers(match[2]))),
+    (_MODES, lambda match: Modes(tuple(match[1].split()))),
     (_BRACKET, _bracket),
+    (_STARTUP, lambda match: StartupBlock(int(match[1]), match[2])),
     (_SETTING, lambda match: Setting(int(match[1]), match[2])),
     (_BANNER, lambda match: Banner(match[1], match[2])),
 )

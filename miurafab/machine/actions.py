@@ -17,6 +17,7 @@ from miurafab.gcode.job import Job
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Options, StatusReport, Version
 from miurafab.grbl.settings import Settings, parse_dump
+from miurafab.machine.modes import ask_modes
 from miurafab.machine.session import HOMING_S, Session
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import open_port
@@ -28,7 +29,8 @@ _POLL_S = 0.1
 class MachineInfo:
     """The controller's report on itself; a figure that it does not report is None.
 
-    ``position`` and ``machine_position`` are in mm, ``state`` as in its status report.
+    ``position`` and ``machine_position`` are in mm, ``state`` as in its status report. ``modes``
+    are those in force, ``startup_blocks`` the lines that it runs after each reset.
     """
 
     port: str
@@ -42,6 +44,8 @@ class MachineInfo:
     position: tuple[float, ...] | None
     machine_position: tuple[float, ...] | None
     beam_off: bool
+    modes: str
+    startup_blocks: tuple[str, ...]
 
 
 class LineOptions(TypedDict, total=False):
@@ -84,8 +88,9 @@ def machine_info(port: str, **line: Unpack[LineOptions]) -> MachineInfo:
     """The identity and state of the controller at ``port``; moves and changes nothing."""
     with conversation(port, **line) as session:
         banner = session.banner
-        status = session.wait_status()
         said = session.command("$I")
+        modes = ask_modes(session)
+        status = _state(session)
         version = next((event for event in said if isinstance(event, Version)), None)
         options = next((event for event in said if isinstance(event, Options)), None)
         return MachineInfo(
@@ -100,6 +105,8 @@ def machine_info(port: str, **line: Unpack[LineOptions]) -> MachineInfo:
             position=session.position,
             machine_position=status.machine_position,
             beam_off=status.beam_off,
+            modes=" ".join(modes.modes),
+            startup_blocks=tuple(f"$N{n}={text}" for n, text in modes.startup.items() if text),
         )
 
 
@@ -140,14 +147,14 @@ def unlock(port: str, **line: Unpack[LineOptions]) -> StatusReport:
     """Unlock the controller after an alarm (``$X``); its position must still be right."""
     with conversation(port, **line) as session:
         session.command("$X")
-        return session.wait_status()
+        return _state(session)
 
 
 def home(port: str, **line: Unpack[LineOptions]) -> StatusReport:
     """Run the homing cycle (``$H``) and wait for its end."""
     with conversation(port, moves=True, **line) as session:
         session.home()
-        return session.wait_status()
+        return _state(session)
 
 
 def jog(
@@ -174,10 +181,16 @@ def jog(
         while True:
             status = session.wait_status()
             if status.state == "Idle":
-                return status
+                return _state(session)
             if status.state != "Jog":
                 raise ControllerError(f"The jog ended in state {status.state}.")
             session.pause(_POLL_S)
+
+
+def _state(session: Session) -> StatusReport:
+    """The state, with positions in mm: ``$$`` tells the unit in which they are reported."""
+    session.ask("$$")
+    return session.wait_status()
 
 
 def talk(

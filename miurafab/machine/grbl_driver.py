@@ -19,7 +19,8 @@ from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Error, Ok, Options, StatusReport
 from miurafab.grbl.settings import Settings
 from miurafab.grbl.streamer import LineRefused, Streamer
-from miurafab.machine.keys import NoKeys
+from miurafab.machine.keys import OVERRIDES_OFF, NoKeys, obeys_overrides
+from miurafab.machine.modes import ask_modes, job_offset, set_modes
 from miurafab.machine.preflight import (
     check_settings,
     check_status,
@@ -78,12 +79,13 @@ class GrblDriver(StreamDriver):
         """See :class:`StreamDriver`."""
         plan, session = self.plan, self._session
         session.greet()
+        if obeys_overrides(plan.machine.dialect):
+            for order in OVERRIDES_OFF:
+                session.write(session.connection.send_realtime(order))
         if plan.options.home:
             self.at_risk = True
             session.home()
             self.at_risk = False
-        if plan.options.at is not None:
-            session.command("G92X{:.3f}Y{:.3f}".format(*plan.options.at))
         forced = raise_findings(
             check_status(session.wait_status()), plan.options.force, ControllerError
         )
@@ -92,10 +94,16 @@ class GrblDriver(StreamDriver):
             if self.journal is not None and option.planner_blocks is not None:
                 self.journal.plans_ahead(option.planner_blocks)
         settings = Settings.from_events(session.command("$$"))
-        findings = list(check_settings(plan.machine, settings))
-        if plan.program is not None:
-            findings.extend(check_travel(plan.program, settings, session.work_offset))
+        findings = check_settings(plan.machine, settings)
         forced += raise_findings(findings, plan.options.force, ControllerError)
+        modes = ask_modes(session)
+        set_modes(session, modes)
+        if plan.options.at is not None:
+            session.command("G92X{:.3f}Y{:.3f}".format(*plan.options.at))
+        if plan.program is not None:
+            travel = check_travel(plan.program, settings, job_offset(session))
+            forced += raise_findings(travel, plan.options.force, ControllerError)
+        forced += tuple(modes.findings())
         if plan.options.check_mode:
             self.at_risk = True
             session.command("$C")
@@ -128,7 +136,7 @@ class GrblDriver(StreamDriver):
                         event.state,
                         session.position,
                         session.connection.in_flight_bytes,
-                        session.feed_override,
+                        session.overrides,
                     )
                     if asked_last and event.state in ("Idle", "Check"):
                         return

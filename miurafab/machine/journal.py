@@ -5,9 +5,9 @@ header: ``schema``, ``job``, ``sha256`` of the whole program's text, ``machine``
 ``lines``, and ``from_line``, where the run began (1 unless it resumed another). Then, when the
 controller has said so, ``{"blocks": n}``: it plans n moves ahead. Then, four times a second of
 the wire's clock at most, ``{"taken": n, "line": k, "seconds": t}``: n lines were acknowledged (or
-handed over, to a cutter that answers nothing), the last of them line k of the file. At the end
-``{"ended": how, "why": sentence}``, how being
-``done``, ``stopped`` or ``failed``.
+handed over, to a cutter that answers nothing), the last of them line k of the file. When a key
+changes them, ``{"overrides": [feed, rapid, power], "line": k, "seconds": t}`` in percent. At the
+end ``{"ended": how, "why": sentence}``, how being ``done``, ``stopped`` or ``failed``.
 
 What it says was taken, was taken; a little more may have been when a run ends without a last
 word (power loss). *Taken* is not *burnt*: the planner and the receive buffer still held lines.
@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from typing import Any
 from miurafab.errors import InputError
 from miurafab.gcode.job import Job
 from miurafab.machine.append_log import DurableFile
+from miurafab.machine.progress import AS_WRITTEN, Overrides
 
 SCHEMA = "miurafab-journal/1"
 _PERIOD = 0.25  # s between two records
@@ -81,6 +83,13 @@ class Journal:
             self._file.append(_record(self._pending))
             self._pending = None
 
+    def overridden(self, overrides: Overrides, line: int, seconds: float) -> None:
+        """Record that ``overrides`` are in force from about ``line`` of the file on."""
+        self._flush()
+        self._file.append(
+            _record({"overrides": overrides, "line": line, "seconds": round(seconds, 3)})
+        )
+
     def ended(self, how: str, why: str) -> None:
         """Record how the run ended."""
         self._flush()
@@ -113,6 +122,7 @@ class JournalRun:
     taken: int = 0
     line: int = 0
     seconds: float = 0.0
+    overrides: Sequence[int] = AS_WRITTEN
     ended: str | None = None
     why: str | None = None
 

@@ -6,8 +6,12 @@ there are no keys. What a key does is one byte to the controller, or the end of 
 
 from __future__ import annotations
 
+import codecs
+import math
+import re
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Protocol
 
@@ -26,11 +30,21 @@ KEYS = {
 """What each key sends (GRBL 1.1 ``config.h``): feed +10 %, -10 %, as written; power likewise."""
 
 
+OVERRIDES_OFF = (b"\x90", b"\x95", b"\x99")
+"""What sets feed, rapid rate and power back to what is written: a controller that was not reset may
+still override them, and some keep them over a reset (grblHAL, ``$676``)."""
+
+
+def obeys_overrides(dialect: str) -> bool:
+    """Whether a machine of this dialect has realtime overrides."""
+    return dialect not in ("grbl-0.9", "marlin", "hpgl")
+
+
 def keys_of(dialect: str) -> dict[str, bytes]:
-    """The keys that a machine of this dialect obeys: few dialects have realtime overrides."""
-    if dialect in ("grbl-0.9", "marlin", "hpgl"):
-        return {key: order for key, order in KEYS.items() if order in (HOLD, RESUME, ABORT)}
-    return KEYS
+    """The keys that a machine of this dialect obeys."""
+    if obeys_overrides(dialect):
+        return KEYS
+    return {key: order for key, order in KEYS.items() if order in (HOLD, RESUME, ABORT)}
 
 
 class Keys(Protocol):
@@ -54,23 +68,91 @@ def terminal_keys() -> Iterator[Keys]:
     if not sys.stdin.isatty():
         yield NoKeys()
     elif sys.platform == "win32":
-        yield _WindowsKeys()
+        import msvcrt
+
+        yield ConsoleKeys(msvcrt.kbhit, msvcrt.getwch)
     else:
         with _posix_keys() as keys:
             yield keys
 
 
-if sys.platform == "win32":
-    import msvcrt
+class Typed:
+    """Characters typed at a terminal, without the sequences that stand for other keys.
 
-    class _WindowsKeys:
-        def pressed(self) -> str:
-            keys = ""
-            while msvcrt.kbhit():
-                keys += msvcrt.getwch()
-            return keys
+    An arrow, a function key, Alt with a key, a mouse or an answer of the terminal arrives as an
+    escape sequence of printable characters (ECMA-48, 5.4; xterm, "Control Sequences"). A sequence
+    is dropped whole, over any number of reads. An escape that nothing follows for ``wait``
+    seconds is the key itself, so that it swallows no later key.
+    """
 
-else:
+    def __init__(self, now: Callable[[], float] = time.monotonic, wait: float = 0.05) -> None:
+        self._decode = codecs.getincrementaldecoder("utf-8")("surrogateescape").decode
+        self._now, self._wait = now, wait
+        self._sequence = ""
+        self._heard = -math.inf
+
+    def keys(self, data: bytes) -> str:
+        """The keys that ``data``, the bytes typed since the last call, hold."""
+        now = self._now()
+        if data:
+            self._heard = now
+        elif now - self._heard > self._wait:
+            self._sequence = ""
+        return "".join(map(self._key, self._decode(data)))
+
+    def _key(self, character: str) -> str:
+        if character in _BEGINS and not _STRING.match(self._sequence):
+            self._sequence = _BEGINS[character]
+        elif self._sequence:
+            self._sequence += character
+            if _ENDED.fullmatch(self._sequence):
+                self._sequence = ""
+        else:
+            return character
+        return ""
+
+
+_BEGINS = {"\x1b": "\x1b"} | {
+    control: f"\x1b{chr(code - 0x40)}"
+    for code in (0x8F, 0x90, 0x98, 0x9B, 0x9D, 0x9E, 0x9F)
+    for control in (chr(code), bytes((code,)).decode("utf-8", "surrogateescape"))
+}
+"""How a sequence begins, also by one 8-bit control; that is no UTF-8 by itself."""
+_ENDED = re.compile(
+    r"\x1b(?:"
+    r"\[(?:\[.|M.{3}|[0-?]*[ -/]*(?:[@-LN-Z\\-~]|(?<!\[)M))"  # control sequences; Linux's F1, mice
+    r"|O[0-9]*[@-~]"  # function keys and the keypad
+    r"|[PX\]^_].*(?:\x07|\x1b.|\x9c)"  # strings: answers of the terminal
+    r"|[ -NQ-WYZ\\`-~]"  # Alt with a key
+    r")",
+    re.DOTALL,
+)
+_STRING = re.compile(r"\x1b[PX\]^_]")
+
+
+class ConsoleKeys:
+    """The keys of a Windows console: ``waiting`` and ``read`` are ``kbhit`` and ``getwch``.
+
+    A key without a character is two: NUL or 0xE0, and a code, which may look like a letter
+    (Microsoft C runtime, ``_getch``). Both are dropped.
+    """
+
+    def __init__(self, waiting: Callable[[], bool], read: Callable[[], str]) -> None:
+        self._waiting, self._read = waiting, read
+
+    def pressed(self) -> str:
+        """The keys pressed since the last call; never waits."""
+        keys = ""
+        while self._waiting():
+            key = self._read()
+            if key in "\0\xe0":
+                self._read()
+            else:
+                keys += key
+        return keys
+
+
+if sys.platform != "win32":
     import os
     import select
     import termios
@@ -78,17 +160,25 @@ else:
     class _PosixKeys:
         def __init__(self, descriptor: int) -> None:
             self._descriptor = descriptor
+            self._typed = Typed()
 
         def pressed(self) -> str:
+            return self._typed.keys(self._read())
+
+        def _read(self) -> bytes:
             try:
                 # In the background, reading from the terminal would stop the whole process.
                 if os.tcgetpgrp(self._descriptor) != os.getpgrp():
-                    return ""
-                if not select.select([self._descriptor], [], [], 0)[0]:
-                    return ""
-                return os.read(self._descriptor, 64).decode("ascii", "ignore")
+                    return b""
+                data = b""
+                while select.select([self._descriptor], [], [], 0)[0]:
+                    more = os.read(self._descriptor, 1024)
+                    if not more:  # the terminal was closed
+                        break
+                    data += more
+                return data
             except OSError:  # the terminal was closed
-                return ""
+                return b""
 
     @contextmanager
     def _posix_keys() -> Iterator[Keys]:

@@ -3,17 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from miurafab.errors import JobStopped
 from miurafab.findings import Finding
 from miurafab.grbl.streamer import Refusal
 
 
+class Overrides(NamedTuple):
+    """What the controller makes of the programmed feed, rapid rate and power, in percent."""
+
+    feed: int = 100
+    rapid: int = 100
+    power: int = 100
+
+    @property
+    def words(self) -> str:
+        """Those that are not as written, as ``feed 110 %, power 70 %``; empty if all are."""
+        return ", ".join(
+            f"{name} {percent} %"
+            for name, percent in zip(self._fields, self, strict=True)
+            if percent != 100
+        )
+
+
+AS_WRITTEN = Overrides()
+"""Nothing is overridden."""
+
+
 @dataclass(frozen=True, slots=True)
 class Progress:
     """The progress of a running job; ``position`` in work coordinates, ``in_flight`` in bytes.
 
-    ``line`` is the last acknowledged line of the file (0: none); ``feed_override`` in percent.
+    ``line`` is the last acknowledged line of the file (0: none).
     """
 
     lines_acknowledged: int
@@ -23,7 +45,7 @@ class Progress:
     position: tuple[float, ...] | None
     in_flight: int
     line: int
-    feed_override: int
+    overrides: Overrides
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,10 @@ from collections.abc import Callable
 from miurafab.errors import ControllerError, PortError
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.connection import FEED_HOLD, SOFT_RESET, STATUS_QUERY, Connection
-from miurafab.grbl.events import Alarm, Banner, Error, Event, Ok, StatusReport
+from miurafab.grbl.events import Alarm, Banner, Error, Event, Ok, Setting, StatusReport
 from miurafab.grbl.states import State
 from miurafab.grbl.streamer import alarm_words, error_words
+from miurafab.machine.progress import AS_WRITTEN, Overrides
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
 
@@ -34,6 +35,8 @@ _RESET_S = 0.8  # from a soft reset to its banner
 _RESETS = 3
 _HOLD_S = 1.0  # to come to rest from full speed before the reset that ends a refused job
 _ASK_AGAIN_S = 1.0  # a status query that noise swallowed is asked again
+_REPORT_INCHES = 13  # GRBL's setting: positions are reported in inches
+_MM_PER_INCH = 25.4
 _BUSY = ("Run", "Jog", "Home", "Hold", "Door")
 
 
@@ -55,7 +58,8 @@ class Session:
         self.banner = Banner("", "")
         self.status: StatusReport | None = None
         self.work_offset: tuple[float, ...] | None = None
-        self.feed_override = 100
+        self.overrides = AS_WRITTEN
+        self.mm_per_unit = 1.0
         self.heard = 0.0
         self.on_data: Callable[[bytes], None] = lambda data: None
         self._transport = transport
@@ -111,15 +115,26 @@ class Session:
         events = list(self.connection.events())
         for event in events:
             if isinstance(event, StatusReport):
-                self.status = event
+                self.status = event = event.scaled(self.mm_per_unit)
                 self.work_offset = event.work_offset or self.work_offset
-                if event.overrides is not None:
-                    self.feed_override = event.overrides[0]
+                if event.overrides is not None and len(event.overrides) == 3:
+                    self.overrides = Overrides(*event.overrides)
                 self._asked_at = None
             elif isinstance(event, Banner):
                 self.banner = event
+                self.overrides = AS_WRITTEN
                 self._asked_at = None
+            elif isinstance(event, Setting) and event.number == _REPORT_INCHES:
+                self._report_in(_MM_PER_INCH if event.text.strip() not in ("0", "0.0") else 1.0)
         return events
+
+    def _report_in(self, mm_per_unit: float) -> None:
+        """Take positions, those of the past too, as ``mm_per_unit`` long."""
+        factor, self.mm_per_unit = mm_per_unit / self.mm_per_unit, mm_per_unit
+        if self.status is not None:
+            self.status = self.status.scaled(factor)
+        if self.work_offset is not None:
+            self.work_offset = tuple(factor * value for value in self.work_offset)
 
     def pause(self, seconds: float) -> None:
         """Let time pass on the wire's clock, and receive meanwhile."""
@@ -173,6 +188,19 @@ class Session:
         Raises :class:`~miurafab.errors.ControllerError` for ``error:``, an alarm, an unexpected
         reset, or ``timeout`` seconds without an answer.
         """
+        said, refusal = self._exchange(text, timeout)
+        if refusal is not None:
+            raise ControllerError(f"The controller refused '{text}': {error_words(refusal)}.")
+        return said
+
+    def ask(self, text: str) -> list[Event]:
+        """The events that answer a question; none where the firmware does not know it.
+
+        Raises as :meth:`command` does, but for ``error:``.
+        """
+        return self._exchange(text, ANSWER_S)[0]
+
+    def _exchange(self, text: str, timeout: float) -> tuple[list[Event], Error | None]:
         self._require_ready(text)
         self.write(self.connection.send_line(SendLine(0, text.encode("ascii"))))
         said: list[Event] = []
@@ -181,11 +209,9 @@ class Session:
             for event in self.receive(end - self.now()):
                 match event:
                     case Ok():
-                        return said
+                        return said, None
                     case Error():
-                        raise ControllerError(
-                            f"The controller refused '{text}': {error_words(event)}."
-                        )
+                        return said, event
                     case Alarm():
                         raise ControllerError(
                             f"The controller stopped at '{text}': {alarm_words(event)}."

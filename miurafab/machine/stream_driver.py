@@ -20,7 +20,7 @@ from miurafab.grbl.streamer import Refusal
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import ABORT, HOLD, Keys, keys_of
 from miurafab.machine.planning import JobPlan
-from miurafab.machine.progress import JobAborted, Progress, StreamResult
+from miurafab.machine.progress import AS_WRITTEN, JobAborted, Overrides, Progress, StreamResult
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import FlowTransport
 
@@ -64,6 +64,8 @@ class StreamDriver(ABC):
         self._context = context
         self._records = [r for r in (context.transcript, context.journal) if r is not None]
         self._begin = self._tell_at = 0.0
+        self._overrides = AS_WRITTEN
+        self._overridden: set[Overrides] = set()
 
     # Defined by each dialect
 
@@ -117,6 +119,8 @@ class StreamDriver(ABC):
         self.stream()
         seconds = self._seconds
         findings += self.finish()
+        if self._overridden:
+            findings += (_were_in_force(self._overridden),)
         self.at_risk = False
         if self.journal is not None:
             self.journal.ended("done", f"{self.acknowledged} lines {self.taken}")
@@ -157,9 +161,17 @@ class StreamDriver(ABC):
         state: str,
         position: tuple[float, ...] | None = None,
         in_flight: int = 0,
-        feed_override: int = 100,
+        overrides: Overrides = AS_WRITTEN,
     ) -> None:
-        """Report the progress; see :class:`~miurafab.machine.progress.Progress`."""
+        """Report the progress; see :class:`~miurafab.machine.progress.Progress`.
+
+        The journal and the end of the job name each of ``overrides`` that was in force.
+        """
+        if overrides != self._overrides:
+            self._overrides = overrides
+            self._overridden |= {overrides} - {AS_WRITTEN}
+            if self.journal is not None:
+                self.journal.overridden(overrides, self.line, self._seconds)
         if self._context.on_progress is not None:
             self._context.on_progress(
                 Progress(
@@ -170,7 +182,7 @@ class StreamDriver(ABC):
                     position,
                     in_flight,
                     self.line,
-                    feed_override,
+                    overrides,
                 )
             )
 
@@ -210,3 +222,16 @@ class StreamDriver(ABC):
         if self.at_risk:
             self.at_risk = False
             self.stop(None)
+
+
+def _were_in_force(overridden: set[Overrides]) -> Finding:
+    """The finding for overrides that a key or a knob of the machine set while the job ran."""
+    changed = []
+    for name in Overrides._fields:
+        percents = {getattr(each, name) for each in overridden} | {100}
+        if len(percents) > 1:
+            changed.append(f"the {name} was between {min(percents)} and {max(percents)} %")
+    return Finding(
+        "overrides",
+        f"While the job ran, {' and '.join(changed)} of what is written in it.",
+    )

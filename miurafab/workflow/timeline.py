@@ -61,7 +61,7 @@ class Timeline:
         begun = self._ends[first]
         ended = self._ends[min(first + 1, len(self._ends) - 1)]
         left = self._ends[-1] - begun - share * (ended - begun)
-        return done, max(0.0, float(left)) * 100.0 / max(now.feed_override, 1)
+        return done, max(0.0, float(left)) * 100.0 / max(now.overrides.feed, 1)
 
 
 def placed(

@@ -168,7 +168,7 @@ class Run:
                 assert self.wire.commands.endswith(b"\x18")
         # Lines went out once each, in order; those taken are the first of them.
         lines = b"".join(line.data + b"\n" for line in LINES)
-        assert lines.startswith(sent.translate(None, REALTIME).partition(b"$$\n")[2])
+        assert lines.startswith(sent.translate(None, REALTIME).partition(b"$#\n")[2])
         assert all(0 <= now.in_flight <= 128 for now in self.seen)
         assert [p.lines_acknowledged for p in self.seen] == sorted(
             p.lines_acknowledged for p in self.seen

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import os
+import random
 import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from wires import FakeWire
 
 from miurafab.errors import GcodeError, InputError, JobStopped
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
 from miurafab.machine.actions import talk
-from miurafab.machine.keys import NoKeys, terminal_keys
+from miurafab.machine.journal import read_journal
+from miurafab.machine.keys import KEYS, ConsoleKeys, NoKeys, Typed, terminal_keys
 from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import StreamResult, deliver
 from miurafab.machine.signals import StopSignals
@@ -103,6 +107,83 @@ def test_the_feed_follows_the_keys() -> None:
     assert isinstance(plain, StreamResult)
     assert wire.commands.count(b"\x92") == 5
     assert slow.seconds > 1.3 * plain.seconds
+
+
+SEQUENCES = (
+    *(f"\x1b[{final}" for final in "ABCDHFZ"),  # arrows, Home, End, Shift-Tab
+    *(f"\x1bO{final}" for final in "ABCDPQRSHFM"),  # the same in application mode; F1 to F4
+    *(f"\x1b[{number}~" for number in (1, 2, 3, 5, 6, 15, 17, 20, 21, 24, "15;2", "3;5")),
+    *(f"\x1b[[{final}" for final in "ABCDE"),  # F1 to F5 of a Linux console
+    *("\x1b[1;5C", "\x1b[I", "\x1b[<0;10;20M", "\x1b[M !]"),
+    *("\x1bq", "\x1b ", "\x1b-", "\x1b\x1b[A", "\x1bOq"),  # Alt with a key
+    *("\x1b]0;q -\x07", "\x1bP1$r0q\x1b\\", "\x1b_[-]\x1b\\"),  # answers of the terminal
+    *("\x9b20~", "\x9bA"),
+)
+
+
+@pytest.mark.parametrize("sequence", SEQUENCES)
+def test_a_key_that_is_not_listed_is_dropped_whole(sequence: str) -> None:
+    data = sequence.encode()
+    assert Typed().keys(data + b"r") == "r"
+    slow = Typed()
+    assert [slow.keys(data[n : n + 1]) for n in range(len(data))] == [""] * len(data)
+    assert slow.keys(b"r") == "r"
+
+
+@given(st.lists(st.sampled_from([*SEQUENCES, *KEYS, "x", "\u015b"])), st.randoms())
+@settings(max_examples=50)
+def test_a_storm_of_keys_holds_those_listed_and_no_other(
+    pressed: list[str], chance: random.Random
+) -> None:
+    """However the bytes are torn between two reads."""
+    data, typed, keys = "".join(pressed).encode(), Typed(), ""
+    while data:
+        size = chance.randint(1, 5)
+        keys += typed.keys(data[:size])
+        data = data[size:]
+    assert keys == "".join(key for key in pressed if len(key) == 1)
+
+
+def test_escape_alone_swallows_no_later_key() -> None:
+    now = [0.0]
+    typed = Typed(lambda: now[0])
+    assert typed.keys(b"\x1b") == ""
+    now[0] = 0.2
+    assert typed.keys(b"") == ""
+    assert typed.keys(b"q") == "q"
+
+
+def test_a_windows_console_gives_two_characters_for_a_key_without_one() -> None:
+    typed = list("\0q r\xe0H+")
+    keys = ConsoleKeys(lambda: bool(typed), lambda: typed.pop(0))
+    assert keys.pressed() == " r+"
+    assert keys.pressed() == ""
+
+
+def test_overrides_are_shown_journalled_named_and_taken_back(tmp_path: Path) -> None:
+    seen: list[str] = []
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
+    result = deliver(
+        plan_job(JOB, MACHINE),
+        wire,
+        StopSignals(),
+        keys=Script(wire.device, [(1.0, "--"), (1.5, "[[["), (2.0, "]")]),
+        journal_path=tmp_path / "journal",
+        on_progress=lambda now: seen.append(now.overrides.words),
+    )
+    shown = ["", "feed 80 %", "feed 80 %, power 70 %", "feed 80 %, power 80 %"]
+    assert list(dict.fromkeys(seen)) == shown
+    (finding,) = result.findings
+    assert finding.sentence == (
+        "While the job ran, the feed was between 80 and 100 % and the power was between 70 and "
+        "100 % of what is written in it."
+    )
+    (run,) = read_journal(tmp_path / "journal")
+    assert run.overrides == [80, 100, 80]
+    # The controller does not restart, and the next job is cut as it is written.
+    wire = FakeWire(wire.device)
+    again = deliver(plan_job(JOB, MACHINE), wire, StopSignals())
+    assert again.findings == ()
 
 
 def test_without_a_terminal_there_are_no_keys(monkeypatch: pytest.MonkeyPatch) -> None:

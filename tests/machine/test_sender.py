@@ -62,6 +62,11 @@ def send(
         assert wire.closed
 
 
+AS_WRITTEN = b"\x90\x95\x99"
+HANDSHAKE = b"$I\n$$\n$G\n$N\nG21G90G17G94G54\n$#\n"
+"""All that comes before the first line of a job: no override, the questions, the modes."""
+
+
 def assert_dark_after_reset(wire: FakeWire) -> None:
     """The reset is the last command, and from when it had arrived nothing burns."""
     assert wire.commands.endswith(b"\x18")
@@ -94,7 +99,7 @@ def test_every_line_is_acknowledged_once_in_order_and_none_is_lost(
     result = send(job, wire, machine=machine, on_progress=seen.append)
     lines = tuple(job.send_lines())
     assert result.lines == len(lines)
-    sent = wire.commands.partition(b"$$\n")[2]
+    sent = wire.commands.partition(HANDSHAKE)[2]
     assert sent == b"".join(line.data + b"\n" for line in lines)
     assert device.lost_bytes == 0
     assert all(0 <= item.in_flight <= 128 for item in seen)
@@ -156,7 +161,7 @@ def test_the_embedded_controller_is_reached_by_name(tmp_path: Path) -> None:
     assert lines[0] == "# zigzag.nc to virtual"
     assert all(re.fullmatch(r"\d+\.\d{6} [<>] \S.*", line) for line in lines[1:])
     assert any(line.endswith(" < Grbl 1.1h ['$' for help]\\r\\n") for line in lines)
-    assert sum(line.endswith(" < ok\\r\\n") for line in lines) == 105 + 2
+    assert sum(line.endswith(" < ok\\r\\n") for line in lines) == 105 + len(HANDSHAKE.split())
 
 
 def test_the_same_job_makes_the_same_records(tmp_path: Path) -> None:
@@ -450,7 +455,7 @@ def test_a_banner_is_needed_but_may_be_asked_for() -> None:
     assert BANNER in device.take_output()
     wire = FakeWire(device)
     assert send(STOPPED, wire).lines == 65
-    assert wire.commands.startswith(b"\x18$I\n$$\n")
+    assert wire.commands.startswith(b"\x18" + AS_WRITTEN + HANDSHAKE + b"G21\nG90\n")
 
 
 def test_a_board_at_work_is_left_alone() -> None:
@@ -491,7 +496,7 @@ def test_a_machine_with_homing_is_homed_first_if_asked() -> None:
     plan = plan_job(job, MACHINE, SendOptions(force=force, home=True))
     wire = FakeWire(new_device(**homing))
     assert deliver(plan, wire, StopSignals()).lines == 2
-    assert wire.commands.startswith(b"$H\n$I\n$$\nG90\n")
+    assert wire.commands.startswith(AS_WRITTEN + b"$H\n" + HANDSHAKE + b"G90\n")
     assert wire.device.position[0] == pytest.approx(-5)
 
 

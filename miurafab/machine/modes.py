@@ -1,0 +1,98 @@
+"""The modes that a controller is in before a job: asked for, compared, and set.
+
+A program means what it says only in known modes: ``X10`` is 254 mm in inches, and lies elsewhere
+with another work offset. A controller need not begin in the modes that GRBL has after power-up. It
+runs its startup blocks (``$N0``, ``$N1``) after each reset, and a person may have typed something.
+So the sender asks for the modes (``$G``), the offsets (``$#``) and the startup blocks (``$N``), and
+sets every mode that a program may leave unsaid (:data:`SET`).
+
+Sources: gnea/grbl 1.1, ``report.c`` (the answers), ``gcode.c`` (the modal groups); NIST RS274/NGC,
+table 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from miurafab.findings import Finding
+from miurafab.grbl.events import Modes, Parameter, StartupBlock
+from miurafab.machine.session import Session
+
+SET = "G21G90G17G94G54"
+"""What is sent before anything that needs it: mm, absolute, XY plane, feed per minute, offset 1."""
+
+_MEANS = {
+    "G20": "inches",
+    "G91": "relative moves",
+    "G18": "the XZ plane",
+    "G19": "the YZ plane",
+    "G93": "inverse time feed",
+    "G95": "feed per turn",
+    "G51": "scaled coordinates",
+    "M3": "the spindle or beam armed",
+    "M4": "the spindle or beam armed",
+    "M7": "mist on",
+    "M8": "air or coolant on",
+} | {f"G{n}": f"the work offset G{n}" for n in (55, 56, 57, 58, 59, "59.1", "59.2", "59.3")}
+"""The modes that a job does not begin in."""
+_BACK = {"G51": "G50", "M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
+"""What ends those that :data:`SET` does not end."""
+
+
+@dataclass(frozen=True)
+class ControllerModes:
+    """What the controller answered: the words of its ``modes``, none if it did not say, and its
+    ``startup`` blocks by number.
+    """
+
+    modes: tuple[str, ...]
+    startup: Mapping[int, str]
+
+    def findings(self) -> Iterator[Finding]:
+        """The finding ``modes``: what a job would have met, and what was set instead."""
+        met = ", ".join(f"{word} ({_MEANS[word]})" for word in self.modes if word in _MEANS)
+        blocks = " and ".join(f"$N{n}={text}" for n, text in self.startup.items() if text)
+        if met and blocks:
+            what = f"was in {met} and runs {blocks} after each reset"
+        elif met:
+            what = f"was in {met}"
+        elif blocks:
+            what = f"runs {blocks} after each reset"
+        else:
+            return
+        yield Finding(
+            "modes",
+            f"The controller {what}; {SET}{self.way_out} was sent, so that the job begins in mm, "
+            "absolute, with the work offset G54.",
+        )
+
+    @property
+    def way_out(self) -> str:
+        """What ends the modes that :data:`SET` does not end."""
+        return "".join(dict.fromkeys(_BACK[word] for word in self.modes if word in _BACK))
+
+
+def ask_modes(session: Session) -> ControllerModes:
+    """Ask for the modes, the startup blocks and the offsets."""
+    modes = next((each.words for each in session.ask("$G") if isinstance(each, Modes)), ())
+    startup = {
+        each.number: each.text for each in session.ask("$N") if isinstance(each, StartupBlock)
+    }
+    return ControllerModes(modes, startup)
+
+
+def set_modes(session: Session, found: ControllerModes) -> None:
+    """Set the modes in which a job begins."""
+    session.command(SET + found.way_out)
+
+
+def job_offset(session: Session) -> tuple[float, ...] | None:
+    """What the controller adds to the coordinates of a job in G54, in mm; None: it does not say."""
+    stored = {each.name: each.values for each in session.ask("$#") if isinstance(each, Parameter)}
+    if "G54" not in stored:
+        return session.work_offset
+    return tuple(
+        session.mm_per_unit * (own + shift)
+        for own, shift in zip(stored["G54"], stored.get("G92", (0.0,) * 9), strict=False)
+    )

@@ -1,0 +1,126 @@
+"""A job burns the same place and size whatever modes the controller is in: by its beam log."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from wires import FakeWire
+
+from miurafab.errors import ControllerError
+from miurafab.gcode.job import Job
+from miurafab.machine.modes import SET
+from miurafab.machine.planning import SendOptions, plan_job
+from miurafab.machine.sender import StreamResult, deliver
+from miurafab.machine.signals import StopSignals
+from miurafab.machine.trace_box import frame_job
+from miurafab.profiles import load_machine
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
+
+MACHINE = load_machine("grbl-laser-400")
+SAID = "G21\nG90\nM4 S0\nG0 X10 Y10\nG1 X20 S500 F3000\nM5\n"
+UNSAID = SAID.removeprefix("G21\nG90\n")
+BLOCKS = ("G20", "G91", "G55", "G18", "G93", "M8", "G20G91", "G20G55", "G91M8", "G93G18")
+
+
+def controller(*startup: str, offset: str = "G10L2P2X100Y100", **changes: float) -> VirtualGrbl:
+    """A controller with startup blocks, an ``offset`` stored, and settings as ``s13=1``."""
+    values = virtual_settings(MACHINE) | {int(name[1:]): value for name, value in changes.items()}
+    device = VirtualGrbl(values, baud=MACHINE.controller.baud)
+    device.advance(0.1)
+    for line in ("$X", offset, *(f"$N{n}={block}" for n, block in enumerate(startup))):
+        device.receive(line.encode() + b"\n")
+        device.advance(0.5)
+    assert b"error" not in device.take_output()
+    device.power_cycle()
+    return device
+
+
+def cut(device: VirtualGrbl, text: str, **options: object) -> tuple[StreamResult, np.ndarray]:
+    """The result, and the burnt box (x0, y0, x1, y1) in mm of the machine."""
+    plan = plan_job(Job("job.nc", text), MACHINE, SendOptions(**options))
+    result = deliver(plan, FakeWire(device), StopSignals())
+    assert not any(segment.standing for segment in device.beam_log)
+    ends = np.array([((s.x0, s.y0), (s.x1, s.y1)) for s in device.beam_log]).reshape(-1, 2)
+    return result, np.concatenate([ends.min(axis=0), ends.max(axis=0)])
+
+
+@pytest.mark.parametrize("text", [SAID, UNSAID], ids=["said", "unsaid"])
+@pytest.mark.parametrize("block", BLOCKS)
+def test_startup_blocks_change_nothing_that_is_burnt(block: str, text: str) -> None:
+    result, box = cut(controller(block), text)
+    np.testing.assert_allclose(box, [10, 10, 20, 10], atol=0.06)
+    (finding,) = result.findings
+    assert finding.code == "modes"
+    assert f"runs $N0={block} after each reset" in finding.sentence
+
+
+@pytest.mark.parametrize("block", ["G20", "G91", "G55"])
+def test_the_stated_position_is_set_in_known_modes(block: str) -> None:
+    """The head stands at 0 of the machine and is said to be at 5, 5 of the job."""
+    _, box = cut(controller(block), UNSAID, at=(5.0, 5.0))
+    np.testing.assert_allclose(box, [5, 5, 15, 5], atol=0.06)
+
+
+def test_both_blocks_are_named_and_what_was_set() -> None:
+    result, _ = cut(controller("G20", "M8"), SAID)
+    (finding,) = result.findings
+    assert finding.sentence == (
+        "The controller was in G20 (inches), M8 (air or coolant on) and runs $N0=G20 and $N1=M8 "
+        "after each reset; G21G90G17G94G54M9 was sent, so that the job begins in mm, absolute, "
+        "with the work offset G54."
+    )
+
+
+def test_the_frame_is_traced_in_mm() -> None:
+    device = controller("G20G91")
+    wire = FakeWire(device)
+    deliver(plan_job(frame_job("a", (1, 1, 9, 9), MACHINE), MACHINE), wire, StopSignals())
+    assert device.position[:2] == pytest.approx((0, 0))
+    assert f"{SET}\n".encode() in wire.commands
+    assert wire.commands.index(SET.encode()) < wire.commands.index(b"G0X1.000Y1.000")
+
+
+@pytest.mark.parametrize("inches", [0, 1])
+@pytest.mark.parametrize(("x", "passes"), [(-390, True), (395, False)])
+def test_soft_limits_hold_in_whatever_unit_the_controller_reports(
+    inches: int, x: float, passes: bool
+) -> None:
+    """Machine coordinates run from -400 to 0 mm; the job goes from X0 to X20."""
+    device = controller(offset=f"G10L2P1X{x}Y-390", s13=inches, s20=1, s22=1, s24=500, s25=3000)
+    if passes:
+        result, box = cut(device, SAID, home=True)
+        assert result.findings == ()
+        np.testing.assert_allclose(box, [x + 10, -380, x + 20, -380], atol=0.06)
+    else:
+        with pytest.raises(ControllerError, match=r"X405\.000 Y-\d+\.\d+ .* past its soft limits"):
+            cut(device, SAID, home=True)
+
+
+@pytest.mark.parametrize("inches", [0, 1])
+def test_progress_is_in_mm(inches: int) -> None:
+    seen: list[tuple[float, ...]] = []
+    device = controller(s13=inches)
+    plan = plan_job(Job("job.nc", SAID + "G0 X40\nG1 X300 F3000\n"), MACHINE)
+    deliver(
+        plan,
+        FakeWire(device),
+        StopSignals(),
+        on_progress=lambda now: seen.append(now.position or (0.0,)),
+    )
+    assert max(x for x, *_ in seen) == pytest.approx(300, abs=0.1)
+    assert all(b - a < 60 for a, b in itertools.pairwise(x for x, *_ in seen))
+
+
+def test_a_controller_that_knows_no_such_question_is_still_set() -> None:
+    """``$N`` and ``$#`` answered by an error: the modes are set all the same."""
+    device = controller()
+
+    class Terse(FakeWire):
+        def write(self, data: bytes) -> None:
+            super().write(data.replace(b"$N\n", b"$Q\n").replace(b"$#\n", b"$Q\n"))
+
+    plan = plan_job(Job("job.nc", UNSAID), MACHINE)
+    assert deliver(plan, Terse(device), StopSignals()).findings == ()
+    assert device.position[:2] == pytest.approx((20, 10))
