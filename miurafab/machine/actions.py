@@ -57,15 +57,20 @@ class LineOptions(TypedDict, total=False):
 
 @contextmanager
 def conversation(
-    port: str, *, moves: bool = False, **line: Unpack[LineOptions]
+    port: str,
+    *,
+    moves: bool = False,
+    signals: StopSignals | None = None,
+    **line: Unpack[LineOptions],
 ) -> Iterator[Session]:
     """A session with the controller at ``port``, greeted; closed at the end.
 
-    With ``moves`` the controller is reset if the block ends by an exception. Raises
+    With ``moves`` the controller is reset if the block ends by an exception. ``signals`` are
+    caught by the block, so that it can rule when they raise. Raises
     :class:`~miurafab.errors.JobStopped` for Ctrl-C, SIGTERM and SIGHUP, and what
     :meth:`~miurafab.machine.session.Session.greet` raises.
     """
-    with StopSignals() as signals:
+    with signals or StopSignals() as signals:
         transport = open_port(port, **line)
         signals.at_once = transport.blocks
         session = Session(transport, Connection(), check=signals.check)
@@ -206,7 +211,8 @@ def talk(
     moves. Then, and on every way out, it resets the controller unless that is idle with the beam
     off.
     """
-    with conversation(port, moves=True, **line) as session:
+    signals = StopSignals()
+    with conversation(port, moves=True, signals=signals, **line) as session:
         heard = bytearray()
 
         def hear(data: bytes) -> None:
@@ -218,7 +224,7 @@ def talk(
                     tell(line.decode("ascii", "backslashreplace").strip())
 
         session.on_data = hear
-        for each in lines:
+        for each in _awaited(lines, signals):
             text = each.strip()
             try:
                 if text in _REALTIME:
@@ -236,6 +242,21 @@ def talk(
             status = session.wait_status()
         if status.beam_on or status.state != "Idle":
             session.stop()
+
+
+def _awaited(lines: Iterable[str], signals: StopSignals) -> Iterator[str]:
+    """``lines``; a signal ends the wait for a line, since no read of the wire is torn then."""
+    iterator, at_once = iter(lines), signals.at_once
+    while True:
+        signals.at_once = True
+        try:
+            signals.check()
+            line = next(iterator, None)
+        finally:
+            signals.at_once = at_once
+        if line is None:
+            return
+        yield line
 
 
 _REALTIME = {"?": b"?", "!": b"!", "~": b"~", "reset": b"\x18"}

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import random
+import signal
 import sys
 from pathlib import Path
+from subprocess import PIPE, Popen
 
 import pytest
 from hypothesis import given, settings
@@ -264,3 +266,14 @@ def test_the_console_tells_what_is_answered_and_goes_on_after_a_refusal() -> Non
     assert any("refused 'G1X5'" in line for line in said)
     assert any("feed hold" in line for line in said)
     assert any(line.startswith("Grbl 1.1h") for line in said)  # the reset of an armed laser
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them on POSIX")
+def test_ctrl_c_ends_a_console_that_waits_for_a_line():
+    command = [sys.executable, "-m", "miurafab", "machine", "console", "--port", "virtual"]
+    with Popen(command, stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True, bufsize=1) as process:
+        process.stdin.write("?\n")
+        assert process.stdout.readline().startswith("<Idle|")
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == JobStopped.exit_code
+        assert process.stderr.read() == "miurafab: Stopped by Ctrl-C.\n"
