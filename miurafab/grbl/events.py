@@ -82,13 +82,15 @@ class StatusReport(Event):
         """The same with its positions times ``factor``."""
         if factor == 1.0:
             return self
+
+        def times(position: tuple[float, ...] | None) -> tuple[float, ...] | None:
+            return None if position is None else tuple(factor * value for value in position)
+
         return replace(
             self,
-            **{
-                name: tuple(factor * value for value in position)
-                for name in ("machine_position", "work_position", "work_offset")
-                if (position := getattr(self, name)) is not None
-            },
+            machine_position=times(self.machine_position),
+            work_position=times(self.work_position),
+            work_offset=times(self.work_offset),
         )
 
     @property
