@@ -99,6 +99,7 @@ def cut(
             material=material,
             out=out,
             options=fitting,
+            unread=options.unread,
             on_progress=progress,
         )
         progress(1.0, "")

@@ -19,6 +19,7 @@ _LINES = re.compile(r"([^\r\n]*)(?:\r\n|\n|\r|$)")
 # As the controller reads them: "(" up to ")" or the line's end, or ";" to the line's end.
 _COMMENTS = re.compile(r"\([^)]*\)?|;.*", re.DOTALL)
 _FORBIDDEN = re.compile(r"[^!-~]|[!?~]")
+_FRAME = re.compile(r"%|[oO]\d+")
 _REALTIME = {"!": "the feed hold", "?": "the status query", "~": "the cycle start"}
 
 
@@ -69,7 +70,11 @@ class Job:
 
 
 def bare_code(name: str, number: int, line: str) -> str:
-    """``line`` without comments and blanks; raises ``GcodeError`` for a forbidden character."""
+    """``line`` without comments and blanks; raises ``GcodeError`` for a forbidden character.
+
+    ``%`` alone marks the first and the last line of a program, ``O1000`` alone numbers it
+    (ISO 6983-1). They are no code, and GRBL would refuse them.
+    """
     code = line.rstrip("\r\n")
     if "(" in code or ";" in code:
         code = _COMMENTS.sub("", code)
@@ -77,7 +82,7 @@ def bare_code(name: str, number: int, line: str) -> str:
     bad = _FORBIDDEN.search(code)
     if bad is not None:
         raise GcodeError(f"{name}, line {number}: {_why_forbidden(bad[0])}.")
-    return code
+    return "" if _FRAME.fullmatch(code) else code
 
 
 def _why_forbidden(character: str) -> str:

@@ -22,6 +22,7 @@ from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.keys import OVERRIDES_OFF, NoKeys, obeys_overrides
 from miurafab.machine.modes import ask_modes, job_offset, set_modes
 from miurafab.machine.preflight import (
+    check_build,
     check_settings,
     check_status,
     check_travel,
@@ -89,12 +90,15 @@ class GrblDriver(StreamDriver):
         forced = raise_findings(
             check_status(session.wait_status()), plan.options.force, ControllerError
         )
+        findings: list[Finding] = []
         options = (event for event in session.command("$I") if isinstance(event, Options))
         for option in options:
             if self.journal is not None and option.planner_blocks is not None:
                 self.journal.plans_ahead(option.planner_blocks)
+            if not plan.options.check_mode:
+                findings += check_build(plan.job, plan.machine, option.flags)
         settings = Settings.from_events(session.command("$$"))
-        findings = check_settings(plan.machine, settings)
+        findings += check_settings(plan.machine, settings)
         forced += raise_findings(findings, plan.options.force, ControllerError)
         modes = ask_modes(session)
         set_modes(session, modes)

@@ -43,6 +43,9 @@ _M3 = re.compile(r"M\+?0*3(?:\.\d*)?(?![\d.])")
 _SPINDLE = re.compile(r"M\+?0*(30?|2|4|5)(?:\.\d*)?(?![\d.])")
 _POWER = re.compile(r"S(\d+\.?\d*|\.\d+)")
 _DWELL = re.compile(r"G0*4(?![\d.])")
+_MIST_ANYWHERE = re.compile(rf"[mM]{_GAP}7")
+_MIST = re.compile(r"M\+?0*7(?:\.0*)?(?![\d.])")
+_NO_DWELL = re.compile(r"G0*4[PS][+-]?0*\.?0*$")
 _RELATIVE_ANYWHERE = re.compile(rf"[gG]{_GAP}91")
 _RELATIVE = re.compile(r"G\+?0*91(?![\d.])")
 _PASSED_ON = re.compile(r"[!?~\x18]|[^\x00-\x7f]")
@@ -231,9 +234,10 @@ def _burning_dwells(program: Program) -> list[tuple[int, float]]:
     """
     at, power = 0, 0.0
     burning = []
-    for move, kind, new, line in zip(
+    for move, kind, seconds, new, line in zip(
         program.event_move.tolist(),
         program.event_kind.tolist(),
+        program.event_seconds.tolist(),
         program.event_power.tolist(),
         program.event_line.tolist(),
         strict=True,
@@ -244,7 +248,7 @@ def _burning_dwells(program: Program) -> list[tuple[int, float]]:
             power = float(program.power[move - 1]) if still else 0.0
         if new == new:  # NaN: as before
             power = new
-        if kind == DWELL and power > 0:
+        if kind == DWELL and power > 0 and seconds > 0:
             burning.append((line, power))
     return burning
 
@@ -262,7 +266,7 @@ def _dwells_under_m3(job: Job) -> list[tuple[int, float]]:
         spindle, strength = _SPINDLE.search(code), _POWER.search(code)
         armed = armed if spindle is None else spindle[1] == "3"
         power = power if strength is None or _DWELL.match(code) else float(strength[1])
-        if armed and power > 0 and _DWELL.match(code):
+        if armed and power > 0 and _DWELL.match(code) and not _NO_DWELL.match(code):
             burning.append((number, power))
     return burning
 
@@ -345,6 +349,15 @@ def _relative_moves(job: Job) -> Iterator[Finding]:
                 "absolute moves.",
             )
             return
+
+
+def line_of_mist(job: Job) -> int | None:
+    """The first line with M7, if there is one."""
+    for match in _MIST_ANYWHERE.finditer(job.text):
+        number, line = _line_at(job.text, match.start())
+        if _MIST.search(_code(line)):
+            return number
+    return None
 
 
 def _line_at(text: str, place: int) -> tuple[int, str]:

@@ -14,10 +14,11 @@ import numpy as np
 
 from miurafab.errors import InputError, MiurafabError
 from miurafab.findings import RULES, Finding, refusals
+from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
 from miurafab.grbl.events import StatusReport
 from miurafab.grbl.settings import Settings, profile_settings
-from miurafab.machine.judge_job import first_outside, in_line
+from miurafab.machine.judge_job import first_outside, in_line, line_of_mist
 from miurafab.profiles import MachineProfile
 
 CHECKS = tuple(code for code, rule in RULES.items() if rule.forceable)
@@ -83,6 +84,23 @@ def check_settings(machine: MachineProfile, settings: Settings) -> Iterator[Find
                 f"{', '.join(map(str, differences))}; set it so, or choose the profile of this "
                 "machine.",
             )
+
+
+def check_build(job: Job, machine: MachineProfile, flags: str) -> Iterator[Finding]:
+    """The check ``program`` for what the firmware was built with, by its answer to ``$I``.
+
+    GRBL 1.1 knows M7 only if built with mist coolant, the flag M (``report.c``).
+    """
+    if machine.dialect != "grbl-1.1" or "M" in flags:
+        return
+    line = line_of_mist(job)
+    if line is not None:
+        yield Finding(
+            "program",
+            f"{in_line(job.name, line)} switches the air with M7, which this controller was built "
+            "without; M8 is the air that it knows.",
+            f"{job.name}:{line}",
+        )
 
 
 def check_travel(

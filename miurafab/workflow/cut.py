@@ -64,14 +64,16 @@ def prepare(
     material: AnyPath | None = None,
     out: AnyPath | None = None,
     options: Mapping[str, object] | None = None,
+    unread: bool = False,
     on_progress: Progress | None = None,
 ) -> Prepared:
     """Make whatever is missing between ``thing`` and the G-code of its sheets.
 
     ``machine`` and ``material`` default to those that the job or design names, then to the usual
     ones; ``out`` is the job directory to make (default ``jobs/NAME``); ``options`` are those of a
-    fit. Raises :class:`~miurafab.errors.InputError` and its kin for whatever cannot be read or
-    made.
+    fit. With ``unread`` a program that the controller would refuse is a finding and no error: it
+    is forced, or the controller is asked. Raises :class:`~miurafab.errors.InputError` and its kin
+    for whatever cannot be read or made.
     """
     tell = on_progress or (lambda fraction, note: None)
     path = as_path(thing, "The job") if isinstance(thing, str | os.PathLike) else None
@@ -83,11 +85,12 @@ def prepare(
     if path.is_dir():
         from miurafab.workflow.job_directory import read_job
 
-        return _from_directory(read_job(path), machine)
+        return _from_directory(read_job(path, unread=unread), machine, unread)
     gcode = read_gcode(path)
     named = named_machine(gcode, path.parent) if machine is None else read_machine(machine)
     profile = named or assumed_machine(path)
-    return Prepared(path.name, profile, (gcode,), (_dry_run(gcode, profile),), None, path.parent)
+    sheet = _dry_run(gcode, profile, unread=unread)
+    return Prepared(path.name, profile, (gcode,), (sheet,), None, path.parent)
 
 
 def _fitted_already(options: Mapping[str, object], thing: object) -> None:
@@ -96,11 +99,15 @@ def _fitted_already(options: Mapping[str, object], thing: object) -> None:
         raise OptionError(name, f"is for a target or a design; {shown} is fitted already")
 
 
-def _from_directory(job: JobDirectory, machine: MachineProfile | AnyPath | None) -> Prepared:
+def _from_directory(
+    job: JobDirectory, machine: MachineProfile | AnyPath | None, unread: bool = False
+) -> Prepared:
     profile, dry_runs = job.machine, job.dry_runs
     if machine is not None:
         profile = read_machine(machine)
-        dry_runs = tuple(_dry_run(each, profile, job.most_power) for each in job.jobs)
+        dry_runs = tuple(
+            _dry_run(each, profile, job.most_power, unread=unread) for each in job.jobs
+        )
     return Prepared(job.path.resolve().name, profile, job.jobs, dry_runs, job, job.path)
 
 
@@ -198,6 +205,8 @@ def _from_pattern(
     return replace(_from_directory(directory, None), name=name, report=report)
 
 
-def _dry_run(job: Job, machine: MachineProfile, most_power: float = 1.0) -> SheetPreview:
+def _dry_run(
+    job: Job, machine: MachineProfile, most_power: float = 1.0, *, unread: bool = False
+) -> SheetPreview:
     bed = (machine.bed.width_mm, machine.bed.height_mm)
-    return dry_run(Path(job.name).stem, job, machine, bed, most_power)
+    return dry_run(Path(job.name).stem, job, machine, bed, most_power, unread=unread)

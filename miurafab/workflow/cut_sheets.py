@@ -116,6 +116,11 @@ class CutOptions(Shown):
     def __post_init__(self) -> None:
         check_options(self)
 
+    @property
+    def unread(self) -> bool:
+        """Whether a program may be sent that this computer cannot read."""
+        return self.send.check_mode or "program" in self.send.force
+
 
 DEFAULT_OPTIONS = CutOptions()
 
@@ -199,7 +204,9 @@ def cut(
         raise OptionError("port", "is missing; name the machine's, or 'virtual', which needs none")
     port = read_value("port", Text(), port)
     chosen = None if sheets is None else read_value("sheets", Several(Whole(1)), sheets)
-    prepared = prepare(job, machine=machine, material=material, out=out, options=options)
+    prepared = prepare(
+        job, machine=machine, material=material, out=out, options=options, unread=asked.unread
+    )
     return cut_prepared(
         prepared,
         port=port,

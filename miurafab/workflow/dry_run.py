@@ -5,6 +5,7 @@ All figures come from the text alone, so they hold for a foreign file as well as
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
@@ -15,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.display import Shown
-from miurafab.errors import InputError
+from miurafab.errors import GcodeError, InputError
 from miurafab.findings import Finding, findings_json, refusals
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import Program, strokes
+from miurafab.gcode.program import Program, ProgramBuilder, strokes
 from miurafab.gcode.reading import read_program
 from miurafab.geometry.arrays import Floats
-from miurafab.machine.judge_job import JudgedJob, judge_program
+from miurafab.machine.judge_job import JudgedJob, judge_job, judge_program
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.profiles import OPERATIONS, MachineProfile
@@ -101,8 +102,10 @@ class SheetPreview(Shown):
         return tuple(map(str, self.findings))
 
     @property
-    def judged(self) -> JudgedJob:
-        """What :func:`~miurafab.machine.planning.plan_job` would read again."""
+    def judged(self) -> JudgedJob | None:
+        """What :func:`~miurafab.machine.planning.plan_job` would read again; None: unreadable."""
+        if any(finding.code == "program" for finding in self.findings):
+            return None
         return JudgedJob(len(self.program.line_number), self.program, self.findings)
 
     def _summary(self) -> str:
@@ -136,6 +139,8 @@ def dry_run(
     machine: MachineProfile,
     paper_mm: tuple[float, float],
     most_power: float = 1.0,
+    *,
+    unread: bool = False,
 ) -> SheetPreview:
     """Read ``job`` back, time it on ``machine`` and judge it.
 
@@ -143,9 +148,16 @@ def dry_run(
     fraction of full power.
 
     Raises :class:`~miurafab.errors.GcodeError`, naming the line, for a program that the
-    controller would refuse.
+    controller would refuse. With ``unread`` that is the finding ``program``, and the preview holds
+    no move.
     """
-    program = read_program(job, machine)
+    judged: JudgedJob | None = None
+    try:
+        program = read_program(job, machine)
+    except GcodeError:
+        if not unread:
+            raise
+        judged, program = judge_job(job, machine), ProgramBuilder(job.name).program()
     times = estimate(program, MotionParameters.from_profile(machine), Link.from_profile(machine))
     burning = program.beam_on
     layer = np.where(burning, _layers(program), np.int8(_TRAVEL))
@@ -161,7 +173,11 @@ def dry_run(
         cut_mm=float(lengths[burning].sum()),
         travel_mm=float(lengths[~burning].sum()),
         bounds_mm=_box(burnt.points) if len(burnt) else None,
-        findings=tuple(judge_program(job, program, machine, most_power=most_power)),
+        findings=(
+            tuple(judge_program(job, program, machine, most_power=most_power))
+            if judged is None
+            else judged.findings
+        ),
         program=program,
         layer=layer,
         end_seconds=times.end,
@@ -179,11 +195,20 @@ def readiness(sheets: Iterable[SheetPreview], forced: AbstractSet[str] = frozens
 
 
 def read_gcode(path: Path) -> Job:
-    """A G-code file as a job, whatever bytes it holds: parsing and sending check it."""
+    """A G-code file as a job, whatever bytes it holds: parsing and sending check it.
+
+    A file is UTF-8 or UTF-16 by its byte order mark, else UTF-8; one that is neither is Latin-1,
+    in which every byte is a character.
+    """
     try:
-        return Job(path.name, path.read_bytes().decode("utf-8", "surrogateescape"))
+        data = path.read_bytes()
     except OSError as fault:
         raise InputError(f"{path} cannot be read: {fault.strerror}.") from None
+    utf_16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    try:
+        return Job(path.name, data.decode("utf-16" if utf_16 else "utf-8-sig"))
+    except UnicodeDecodeError:
+        return Job(path.name, data.decode("latin-1"))
 
 
 def _layers(program: Program) -> NDArray[np.int8]:

@@ -70,13 +70,16 @@ class JobDirectory(Shown):
         return {"path": self.path, "machine": self.machine.title, "time": clock_text(seconds)}
 
 
-def read_job(directory: AnyPath) -> JobDirectory:
+def read_job(directory: AnyPath, *, unread: bool = False) -> JobDirectory:
     """Read the job of a directory that :meth:`SheetJob.write` made.
 
     Parameters
     ----------
     directory : str or os.PathLike
         The job directory.
+    unread : bool
+        Whether a program that the controller would refuse is a finding of its dry run instead of
+        an error.
 
     Returns
     -------
@@ -115,7 +118,7 @@ def read_job(directory: AnyPath) -> JobDirectory:
             raise InputError(f"{file} is missing; make the job again with 'miurafab sheets'.")
         jobs.append(read_gcode(file))
     dry_runs = (
-        dry_run(name, job, machine, (sheet.width_mm, sheet.height_mm), most_power)
+        dry_run(name, job, machine, (sheet.width_mm, sheet.height_mm), most_power, unread=unread)
         for (name, sheet), job in zip(made, jobs, strict=True)
     )
     return JobDirectory(directory, layout, machine, most_power, tuple(jobs), tuple(dry_runs))
