@@ -134,6 +134,12 @@ class ControllerError(MachineError):
     """The controller answered an error or went into alarm."""
 
 
+class PersonNeeded(MiurafabError):
+    """The work waits for a person, such as for fresh material, and nobody is there."""
+
+    exit_code = WAITING
+
+
 class JobStopped(MachineError):
     """The job was ended early, with the beam off, at somebody's wish."""
 

@@ -110,6 +110,7 @@ RULES = {
     "armed": Rule("warning", "a job that ends with the laser armed"),
     "characters": Rule("warning", "a character in a comment that other senders pass on"),
     "nothing-burnt": Rule("warning", "a job that burns nothing"),
+    "pauses": Rule("note", "a program that waits for a person (`M0`)"),
     "relative": Rule("note", "relative moves (`G91`)"),
     # A job that is previewed (miurafab.workflow.preview)
     "assumed-machine": Rule("note", "no machine is named, so a common machine is assumed"),

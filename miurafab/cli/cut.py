@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,15 +13,17 @@ from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, MaterialOption, argument, option, split, takes
 from miurafab.cli.fit import RigidOption, fit_options
 from miurafab.cli.machine import PORT
-from miurafab.errors import DONE, MACHINE_FAILED, NO, InputError, MachineError, OptionError
+from miurafab.errors import DONE, MACHINE_FAILED, NO, WAITING, InputError, MachineError, OptionError
 from miurafab.findings import findings_json
 from miurafab.options import File, Flag, Text, Whole, read_options
 
 if TYPE_CHECKING:
+    from miurafab.machine.signals import StopSignals
     from miurafab.workflow.cut import Prepared
     from miurafab.workflow.cut_sheets import CutOptions, CutSheet
     from miurafab.workflow.timeline import SheetProgress
 
+_LOOK_S = 0.05  # between two looks at the keyboard
 EXAMPLES = (
     "miurafab cut jobs/hypar --port /dev/ttyUSB0 --frame",
     "miurafab cut hypar:height=0.5 --facets 8x8 --size 150mm --port virtual",
@@ -36,9 +39,10 @@ PauseOption = Annotated[
     bool | None,
     option(
         Flag(),
-        "Wait for Enter before each further sheet.",
+        "Wait for a person to put in fresh material before each further sheet; without a terminal "
+        "the command ends there with exit code 5.",
         "--pause",
-        default_text="in a terminal",
+        default_text="yes, but for the virtual machine and a machine with roll_fed",
         negative="--no-pause",
     ),
 ]
@@ -108,9 +112,8 @@ def cut(
     if not port or dry_run:
         return _report_dry_run(console, prepared, options)
     if len(port) > 1:
-        return _share(console, prepared, port, sheet, options)
-    waits = pause if pause is not None else port[0] != "virtual" and sys.stdin.isatty()
-    done = _stream(console, prepared, port[0], sheet, options, waits)
+        return _share(console, prepared, port, sheet, options, pause)
+    done = _stream(console, prepared, port[0], sheet, options, pause)
     return _report(console, prepared, done, port[0])
 
 
@@ -131,7 +134,7 @@ def _stream(
     port: str,
     sheet: list[int] | None,
     options: CutOptions,
-    waits: bool,
+    pause: bool | None,
 ) -> tuple[CutSheet, ...]:
     """Cut on one machine, with a progress bar and the keys of the terminal."""
     from miurafab.machine.keys import terminal_keys
@@ -139,14 +142,15 @@ def _stream(
     from miurafab.workflow.dry_run import clock_text
 
     def before(number: int, count: int) -> None:
-        if waits and number > 1 and not options.resume:
-            console.note(f"Sheet {number} of {count}: {_put_in(prepared, number)}, press Enter.")
-            sys.stdin.readline()
+        console.note(f"Sheet {number} of {count}: {_put_in(prepared, number)}, press Enter.")
+        sys.stdin.readline()
 
     def after_frame(number: int) -> None:
-        if waits:
+        if asks and port != "virtual":
             console.note(f"That is the frame of sheet {number}; Enter cuts, Ctrl-C does not.")
             sys.stdin.readline()
+
+    asks = sys.stdin.isatty() or bool(pause)
 
     with _hint_at_resume(console, prepared), console.progress("cutting") as bar:
 
@@ -165,7 +169,8 @@ def _stream(
                 sheets=sheet,
                 options=options,
                 keys=keys,
-                before_sheet=before,
+                pause=pause,
+                before_sheet=before if asks else None,
                 after_frame=after_frame,
                 on_resume=lambda finding: console.note(finding.sentence),
                 on_progress=show_progress,
@@ -178,12 +183,35 @@ def _share(
     ports: list[str],
     sheet: list[int] | None,
     options: CutOptions,
+    pause: bool | None,
 ) -> int:
     """Cut on several machines at once, and say which sheet went where."""
+    from miurafab.machine.keys import NoKeys, terminal_keys
+    from miurafab.workflow.material_change import WAITS
     from miurafab.workflow.multi_machine import share_sheets
 
-    with console.progress("cutting") as bar:
-        outcome = share_sheets(prepared, ports, sheet, options, on_progress=bar)
+    with console.progress("cutting") as bar, terminal_keys() as keys:
+
+        def before(number: int, port: str, signals: StopSignals) -> bool:
+            console.note(
+                f"Sheet {number} of {len(prepared.jobs)} at {port}: {_put_in(prepared, number)} "
+                "there, press Enter."
+            )
+            while not {"\n", "\r"} & set(keys.pressed()):
+                if signals.caught is not None:
+                    return False
+                time.sleep(_LOOK_S)
+            return True
+
+        outcome = share_sheets(
+            prepared,
+            ports,
+            sheet,
+            options,
+            pause=pause,
+            before_sheet=None if isinstance(keys, NoKeys) else before,
+            on_progress=bar,
+        )
     rows = [(each.sheet, each.port, "done" if each.done else each.why) for each in outcome]
     whole = all(each.done for each in outcome)
     console.answer(
@@ -197,7 +225,9 @@ def _share(
         },
         lambda: console.rows(("sheet", "port", "what came of it"), rows),
     )
-    return DONE if whole else MACHINE_FAILED
+    if whole:
+        return DONE
+    return WAITING if all(each.done or each.why == WAITS for each in outcome) else MACHINE_FAILED
 
 
 def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -> int:
@@ -242,7 +272,7 @@ def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -
 @contextmanager
 def _hint_at_resume(console: Console, prepared: Prepared) -> Iterator[None]:
     """Say, when a machine has failed in mid-job, how the job is taken up again."""
-    from miurafab.workflow.cut_sheets import can_go_on
+    from miurafab.workflow.sheet_plans import can_go_on
 
     try:
         yield

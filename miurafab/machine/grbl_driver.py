@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import math
 
-from miurafab.errors import ControllerError, MiurafabError
+from miurafab.errors import ControllerError, MiurafabError, PersonNeeded
 from miurafab.findings import Finding
-from miurafab.gcode.program import BEAM_M3
+from miurafab.gcode.program import BEAM_M3, PAUSE
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Error, Ok, Options, StatusReport
 from miurafab.grbl.settings import Settings
 from miurafab.grbl.streamer import LineRefused, Streamer
-from miurafab.machine.keys import OVERRIDES_OFF, NoKeys, obeys_overrides
+from miurafab.machine.keys import HOLD, OVERRIDES_OFF, RESUME, NoKeys, obeys_overrides
 from miurafab.machine.modes import ask_modes, job_offset, set_modes
 from miurafab.machine.preflight import (
     check_build,
@@ -137,7 +137,7 @@ class GrblDriver(StreamDriver):
                     answered = session.now()
                 elif isinstance(event, StatusReport):
                     self.tell(
-                        event.state,
+                        self._attend_pause(event) or event.state,
                         session.position,
                         session.connection.in_flight_bytes,
                         session.overrides,
@@ -154,11 +154,34 @@ class GrblDriver(StreamDriver):
                 )
             self.attend()
 
+    def _attend_pause(self, report: StatusReport) -> str | None:
+        """Do what the plan says where the program waits for a person; what to tell meanwhile.
+
+        Raises :class:`~miurafab.errors.PersonNeeded` if nobody is there.
+        """
+        program = self.plan.program
+        if program is None or report.state != "Hold" or report.substate != 0 or self.held:
+            return None
+        pauses = program.event_line[program.event_kind == PAUSE]
+        line = next((int(n) for n in pauses if n > self.line), None)
+        if line is None:
+            return None
+        where = f"{self.plan.job.name}, line {line}"
+        if self.plan.at_pause == "stop":
+            raise PersonNeeded(
+                f"{where} waits for a person (M0), and nobody is at the keys; `resume` the job in "
+                "a terminal, or leave the pauses out"
+            )
+        if self.plan.at_pause == "go on":
+            self.orders.append(RESUME)
+        return f"waiting at {where} (M0): r goes on"
+
     def obey(self) -> None:
         """Send ``orders``, unless the controller is deaf while it writes its EEPROM."""
         if not self._session.connection.writing_eeprom:
             for order in self.orders:
                 self._session.write(self._session.connection.send_realtime(order))
+                self.held = order == HOLD or (self.held and order != RESUME)
             self.orders.clear()
 
     def finish(self) -> tuple[Finding, ...]:

@@ -21,7 +21,7 @@ import numpy as np
 from miurafab.errors import GcodeError
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job, bare_code
-from miurafab.gcode.program import BEAM_M3, DWELL, Program
+from miurafab.gcode.program import BEAM_M3, DWELL, PAUSE, Program
 from miurafab.gcode.reading import has_laser_mode, read_program
 from miurafab.geometry.arrays import Bools, Floats
 from miurafab.machine.loose_parts import burnt_on_loose_pieces, open_outlines, says_operations
@@ -110,6 +110,15 @@ def judge_program(
     if not program.beam_on.any():
         yield Finding("nothing-burnt", f"{job.name} burns nothing.", job.name)
     yield from _relative_moves(job)
+    pauses = program.event_line[program.event_kind == PAUSE]
+    if len(pauses):
+        yield _in_line(
+            "pauses",
+            program.name,
+            int(pauses[0]),
+            "waits for a person (M0); the key r goes on.",
+            len(pauses),
+        )
 
 
 def longest_line(machine: MachineProfile) -> int:

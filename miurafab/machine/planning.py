@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from miurafab.errors import GcodeError, InputError
 from miurafab.findings import Finding
@@ -15,6 +16,7 @@ from miurafab.machine.resume import Resumption
 from miurafab.options import Flag, Pair, Several, Text, check_options, length, option
 from miurafab.profiles import MachineProfile
 
+AtPause = Literal["wait", "go on", "stop"]
 _NO_CHECK_MODE = ("marlin", "hpgl")
 
 
@@ -52,7 +54,9 @@ class JobPlan:
     """A job that passed the checks which need no controller.
 
     ``program`` is None where it could not be read and that was forced or is left to check mode;
-    ``forced`` are the refusals that were overridden.
+    ``forced`` are the refusals that were overridden. ``at_pause`` is what is done where the program
+    waits for a person (``M0``): a person at the keys goes on (``wait``), the job goes on by itself
+    (``go on``), or it ends, since nobody is there (``stop``).
     """
 
     job: Job
@@ -62,6 +66,7 @@ class JobPlan:
     options: SendOptions
     resumption: Resumption | None
     forced: tuple[Finding, ...]
+    at_pause: AtPause = "stop"
 
     def with_head_at(self, at: tuple[float, float] | None) -> JobPlan:
         """The same for a head that stands ``at`` (X, Y in mm)."""

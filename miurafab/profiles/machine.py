@@ -42,6 +42,9 @@ class Bed:
     width_mm: float = option(length(10, 20_000), "Work area along X.", REQUIRED)
     height_mm: float = option(length(10, 20_000), "Work area along Y.", REQUIRED)
     margin_mm: float = option(length(0, 500), "Kept free along the edges.", 5.0)
+    roll_fed: bool = option(
+        Flag(), "Whether the machine itself lays fresh material out for each sheet.", False
+    )
 
 
 @dataclass(frozen=True)

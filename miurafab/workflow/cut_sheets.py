@@ -10,19 +10,15 @@ import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from miurafab.display import Shown
-from miurafab.errors import InputError, OptionError
+from miurafab.errors import InputError, OptionError, PersonNeeded
 from miurafab.files import AnyPath
 from miurafab.findings import Finding
-from miurafab.gcode.job import Job
 from miurafab.machine.job_process import stream_apart
-from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import Keys
 from miurafab.machine.planning import JobPlan, SendOptions, plan_job
-from miurafab.machine.resume import resume
 from miurafab.machine.sender import StreamResult, stream_plan
 from miurafab.machine.trace_box import MOST_POINTER, frame_job
 from miurafab.machine.transport import VIRTUAL
@@ -42,6 +38,8 @@ from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.cut import Prepared, prepare
+from miurafab.workflow.material_change import at_pause, needs_person
+from miurafab.workflow.sheet_plans import beside, chosen_sheets, journal_path, plan_sheets
 from miurafab.workflow.timeline import SheetProgress, placed
 
 
@@ -134,6 +132,7 @@ def cut(
     material: AnyPath | None = None,
     out: AnyPath | None = None,
     sheets: Sequence[int] | None = None,
+    pause: bool | None = None,
     keys: Keys | None = None,
     before_sheet: Callable[[int, int], None] | None = None,
     after_frame: Callable[[int], None] | None = None,
@@ -159,11 +158,14 @@ def cut(
         The job directory to make, ``jobs/NAME`` by default. Journal and transcript go there.
     sheets : sequence of int, optional
         The numbers of the sheets to cut, from 1. The default is all.
+    pause : bool, optional
+        Whether a person puts in fresh material before each further sheet. The default is yes,
+        but for the virtual machine and a machine that feeds itself (``roll_fed``).
     keys : Keys, optional
         Keys of a person that hold, resume or stop the job.
     before_sheet : callable, optional
-        Called with the number of the sheet and how many there are, before each: the place to ask
-        for fresh material.
+        Called with the number of the sheet and how many there are, before each further sheet that
+        a person must put in: it returns when the material is there.
     after_frame : callable, optional
         Called with the number of the sheet whose frame was traced.
     on_resume : callable, optional
@@ -188,6 +190,8 @@ def cut(
         If the port cannot be opened, or goes away.
     MachineError
         If the controller fails, or the job is stopped. The beam is off then.
+    PersonNeeded
+        If a further sheet needs fresh material and ``before_sheet`` is not given.
 
     Examples
     --------
@@ -212,6 +216,7 @@ def cut(
         port=port,
         sheets=chosen,
         options=asked,
+        pause=pause,
         keys=keys,
         before_sheet=before_sheet,
         after_frame=after_frame,
@@ -229,6 +234,7 @@ def cut_prepared(
     port: str,
     sheets: Sequence[int] | None = None,
     options: CutOptions = DEFAULT_OPTIONS,
+    pause: bool | None = None,
     keys: Keys | None = None,
     before_sheet: Callable[[int, int], None] | None = None,
     after_frame: Callable[[int], None] | None = None,
@@ -242,11 +248,20 @@ def cut_prepared(
     (:func:`~miurafab.machine.job_process.stream_apart`). Raises what
     :func:`~miurafab.machine.sender.stream_plan` raises.
     """
-    done = []
+    done: list[CutSheet] = []
     at = options.send.at
+    waits = needs_person(prepared, port, pause)
     for number, plan in plan_sheets(prepared, sheets, options):
-        if before_sheet is not None:
-            before_sheet(number, len(prepared.jobs))
+        further = bool(done) or (options.resume and plan.resumption is None)
+        if further and waits:
+            if before_sheet is not None:
+                before_sheet(number, len(prepared.jobs))
+            elif done:
+                raise PersonNeeded(
+                    f"{prepared.jobs[number - 1].name} needs fresh material, and nobody is here to "
+                    f"put it in; then go on with `sheet` {number}. Done: "
+                    f"{', '.join(sheet.name for sheet in done)}."
+                )
         if plan.resumption is not None and on_resume is not None:
             on_resume(plan.resumption.finding)
         if options.frame:
@@ -255,7 +270,7 @@ def cut_prepared(
             if after_frame is not None:
                 after_frame(number)
         send = partial(_stream(port), keys=keys, virtual_speed=options.virtual_speed)
-        plan = plan.with_head_at(at)
+        plan = replace(plan.with_head_at(at), at_pause=at_pause(waits, keys))
         done.append(cut_sheet(prepared, number, plan, port, send, on_progress=on_progress))
         at = head_after(prepared, number, at)
     return tuple(done)
@@ -276,7 +291,7 @@ def cut_sheet(
         plan,
         port,
         journal_path=journal_path(prepared, job),
-        transcript_path=_beside(prepared, job, ".transcript"),
+        transcript_path=beside(prepared, job, ".transcript"),
         on_progress=placed(
             on_progress, number, expected, prepared.machine.controller.planner_blocks
         ),
@@ -312,58 +327,11 @@ def _stream(port: str) -> Callable[..., StreamResult]:
     return stream_plan if port == VIRTUAL else stream_apart
 
 
-def _chosen(prepared: Prepared, sheets: Sequence[int] | None) -> list[int]:
-    if prepared.refused:
-        why = " ".join(finding.sentence for finding in prepared.refused)
-        raise InputError(f"{prepared.name} cannot be cut: {why}")
-    chosen = list(sheets) if sheets else list(range(1, len(prepared.jobs) + 1))
-    for number in chosen:
-        if not 1 <= number <= len(prepared.jobs):
-            raise InputError(f"{prepared.name} has no sheet {number}; it has {len(prepared.jobs)}.")
-    return chosen
-
-
-def plan_sheets(
-    prepared: Prepared, sheets: Sequence[int] | None, options: CutOptions
-) -> list[tuple[int, JobPlan]]:
-    """The plans of the ``sheets`` (None: all), each checked by itself.
-
-    With ``options.resume`` finished sheets are left out and interrupted sheets are resumed. Raises
-    :class:`~miurafab.errors.InputError` for a sheet that cannot be sent.
-    """
-    plans: list[tuple[int, JobPlan]] = []
-    for number in _chosen(prepared, sheets):
-        job = prepared.jobs[number - 1]
-        resumption = None
-        if options.resume:
-            path = journal_path(prepared, job)
-            runs = read_journal(path) if path is not None and path.exists() else []
-            if runs and runs[-1].ended == "done":
-                continue
-            if runs:
-                resumption = resume(job, prepared.machine, runs)
-        plan = plan_job(
-            job,
-            prepared.machine,
-            options.send,
-            resumption=resumption,
-            most_power=prepared.most_power,
-            judged=prepared.dry_runs[number - 1].judged,
-        )
-        plans.append((number, plan))
-    if options.resume and not any(plan.resumption for _, plan in plans):
-        raise InputError(
-            f"No sheet of {prepared.name} was interrupted, by the journals beside it; leave "
-            "`resume` out to cut."
-        )
-    return plans
-
-
 def frame(
     prepared: Prepared, number: int, *, port: str, options: CutOptions = DEFAULT_OPTIONS
 ) -> StreamResult:
     """Trace the box around what sheet ``number`` (from 1) burns, beam off or as a pointer."""
-    (number,) = _chosen(prepared, [number])
+    (number,) = chosen_sheets(prepared, [number])
     bounds = prepared.dry_runs[number - 1].bounds_mm
     name = prepared.jobs[number - 1].name
     if bounds is None:
@@ -378,28 +346,3 @@ def frame(
     start = replace(options.send, check_mode=False, allow_m3=False)
     plan = plan_job(box, prepared.machine, start)
     return _stream(port)(plan, port, virtual_speed=options.virtual_speed)
-
-
-def can_go_on(prepared: Prepared) -> bool:
-    """Whether a sheet was begun and not ended, and its journal can be resumed."""
-    for job in prepared.jobs:
-        path = journal_path(prepared, job)
-        runs = read_journal(path) if path is not None and path.is_file() else []
-        if runs and runs[-1].ended != "done" and runs[-1].line:
-            try:
-                resume(job, prepared.machine, runs)
-            except InputError:
-                continue
-            return True
-    return False
-
-
-def journal_path(prepared: Prepared, job: Job) -> Path | None:
-    """Where the journal of ``job`` is."""
-    return _beside(prepared, job, ".journal")
-
-
-def _beside(prepared: Prepared, job: Job, suffix: str) -> Path | None:
-    if prepared.folder is None:
-        return None
-    return prepared.folder / f"{Path(job.name).stem}{suffix}"

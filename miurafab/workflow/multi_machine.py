@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from miurafab.errors import InputError, JobStopped, MiurafabError
@@ -23,9 +23,9 @@ from miurafab.workflow.cut_sheets import (
     CutOptions,
     cut_sheet,
     head_after,
-    journal_path,
-    plan_sheets,
 )
+from miurafab.workflow.material_change import WAITS, MaterialChange
+from miurafab.workflow.sheet_plans import journal_path, plan_sheets
 
 _LOOK_S = 0.1
 
@@ -48,11 +48,15 @@ def share_sheets(
     sheets: Sequence[int] | None,
     options: CutOptions,
     *,
+    pause: bool | None = None,
+    before_sheet: Callable[[int, str, StopSignals], bool] | None = None,
     on_progress: Callable[[float, str], None],
 ) -> tuple[Shared, ...]:
     """Cut the sheets of a job directory on the machines at ``ports``; returns the outcomes in the
     order of the sheets.
 
+    Before each further sheet of a machine ``before_sheet`` waits for fresh material there, in a
+    thread of that machine; False (or no such function) leaves the sheet to another machine.
     ``on_progress`` gets the fraction done and a note when a sheet is done or has failed. A machine
     that fails is part of the answer. With ``options.resume`` each machine first resumes the sheet
     that it was interrupted at. Raises :class:`~miurafab.errors.InputError` for a job that cannot be
@@ -74,7 +78,8 @@ def share_sheets(
     plans = dict(plan_sheets(prepared, sheets, options))
     with StopSignals() as signals:
         signals.at_once = False
-        work = _Work(prepared, options, plans, ports, signals, on_progress)
+        material = MaterialChange(prepared, ports, pause, before_sheet, signals)
+        work = _Work(prepared, options, plans, ports, signals, material, on_progress)
         threads = [threading.Thread(target=work.at_machine, args=(port,)) for port in ports]
         for thread in threads:
             thread.start()
@@ -85,7 +90,7 @@ def share_sheets(
             raise JobStopped(f"{prepared.name} was stopped by {signals.reason} on every machine.")
     return tuple(
         work.outcome.get(number)
-        or Shared(prepared.dry_runs[number - 1].name, "", False, "no machine was left to cut it")
+        or Shared(prepared.dry_runs[number - 1].name, "", False, work.left_over)
         for number in plans
     )
 
@@ -98,6 +103,7 @@ class _Work:
         plans: dict[int, JobPlan],
         ports: Sequence[str],
         signals: StopSignals,
+        material: MaterialChange,
         on_progress: Callable[[float, str], None],
     ) -> None:
         self.outcome: dict[int, Shared] = {}
@@ -105,6 +111,7 @@ class _Work:
         self._options = options
         self._plans = plans
         self._signals = signals
+        self._material = material
         self._on_progress = on_progress
         self._own = {port: _begun_at(prepared, plans, port) for port in ports}
         begun = {number for numbers in self._own.values() for number in numbers}
@@ -116,20 +123,33 @@ class _Work:
                     "not named now; name its `port` too, or resume it with that port alone."
                 )
 
+    @property
+    def left_over(self) -> str:
+        """Why a sheet was cut by none."""
+        return WAITS if self._material.missing else "no machine was left to cut it"
+
     def at_machine(self, port: str) -> None:
         """Cut sheets at ``port`` until none is left, or the machine has failed."""
         at = self._options.send.at
         send = partial(
             stream_apart, signals=self._signals, virtual_speed=self._options.virtual_speed
         )
+        done = False
         while self._signals.caught is None:
             try:
                 number = (self._own[port] or self._left).popleft()
             except IndexError:
                 return
+            if done and not self._material.is_in(number, port):
+                self._left.appendleft(number)
+                return
+            done = True
             name, why = self._prepared.dry_runs[number - 1].name, ""
             try:
-                cut_sheet(self._prepared, number, self._plans[number].with_head_at(at), port, send)
+                plan = replace(
+                    self._plans[number].with_head_at(at), at_pause=self._material.at_pause(port)
+                )
+                cut_sheet(self._prepared, number, plan, port, send)
             except MiurafabError as error:
                 why = str(error)
             self.outcome[number] = Shared(name, port, not why, why)

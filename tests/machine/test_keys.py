@@ -6,6 +6,7 @@ import os
 import random
 import signal
 import sys
+from dataclasses import replace
 from pathlib import Path
 from subprocess import PIPE, Popen
 
@@ -14,11 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wires import FakeWire
 
-from miurafab.errors import GcodeError, InputError, JobStopped
+from miurafab.errors import GcodeError, InputError, JobStopped, PersonNeeded
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
 from miurafab.machine.actions import talk
 from miurafab.machine.journal import read_journal
+from miurafab.machine.judge_job import judge_job
 from miurafab.machine.keys import KEYS, ConsoleKeys, NoKeys, Typed, terminal_keys
 from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import StreamResult, deliver
@@ -277,3 +279,56 @@ def test_ctrl_c_ends_a_console_that_waits_for_a_line():
         process.send_signal(signal.SIGINT)
         assert process.wait(20) == JobStopped.exit_code
         assert process.stderr.read() == "miurafab: Stopped by Ctrl-C.\n"
+
+
+PAUSED = Job(
+    "paused.nc",
+    "M4 S0\nG0 X10 Y10\nG1 X20 S500 F3000\nM0\nG1 X30\nM5\n",
+)
+
+
+def at_the_pause(at_pause: str, *keys: tuple[float, str]) -> tuple[FakeWire, list[str]]:
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
+    seen: list[str] = []
+    plan = replace(plan_job(PAUSED, MACHINE), at_pause=at_pause)
+    deliver(
+        plan,
+        wire,
+        StopSignals(),
+        keys=Script(wire.device, list(keys)),
+        on_progress=lambda now: seen.append(now.state),
+    )
+    return wire, seen
+
+
+def test_a_program_that_pauses_says_so_and_a_key_goes_on() -> None:
+    wire, seen = at_the_pause("wait", (5.0, "r"))
+    assert "waiting at paused.nc, line 4 (M0): r goes on" in seen
+    assert burnt(wire) == pytest.approx(20, abs=0.2)
+    assert wire.device.now > 5.0
+    assert not any(segment.standing for segment in wire.device.beam_log)
+
+
+def test_a_pause_goes_on_by_itself_where_the_machine_does() -> None:
+    wire, _ = at_the_pause("go on")
+    assert burnt(wire) == pytest.approx(20, abs=0.2)
+    assert wire.device.now < 5.0
+
+
+def test_a_pause_where_nobody_is_ends_the_job_dark() -> None:
+    with pytest.raises(
+        PersonNeeded, match=r"paused\.nc, line 4 waits for a person \(M0\).*beam off"
+    ):
+        at_the_pause("stop")
+
+
+def test_a_hold_of_ones_own_is_no_pause_of_the_program() -> None:
+    wire, seen = at_the_pause("go on", (0.5, " "), (3.0, "r"))
+    assert burnt(wire) == pytest.approx(20, abs=0.2)
+    assert wire.device.now > 3.0
+    assert "Hold" in seen
+
+
+def test_a_pause_is_a_finding() -> None:
+    (finding,) = judge_job(PAUSED, MACHINE).findings
+    assert (finding.code, finding.severity) == ("pauses", "note")

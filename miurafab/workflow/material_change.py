@@ -1,0 +1,64 @@
+"""Material change: who puts fresh material in before each further sheet.
+
+A sheet that is cut lies in the machine. The next one needs other material, and only a person, or a
+machine that feeds itself, can put it in. So a job waits there on every path, and ends where nobody
+is. A program that waits for a person (M0) is treated in the same way.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+
+from miurafab.machine.keys import Keys, NoKeys
+from miurafab.machine.planning import AtPause
+from miurafab.machine.signals import StopSignals
+from miurafab.machine.transport import VIRTUAL
+from miurafab.workflow.cut import Prepared
+
+WAITS = "waits for fresh material"
+"""Why a sheet was not cut that no person put material in for."""
+
+
+def needs_person(prepared: Prepared, port: str, pause: bool | None) -> bool:
+    """Whether a person puts in the material of each further sheet; ``pause`` if that is given."""
+    return port != VIRTUAL and not prepared.machine.bed.roll_fed if pause is None else pause
+
+
+def at_pause(waits: bool, keys: Keys | None) -> AtPause:
+    """What is done where a program waits for a person (M0)."""
+    if not waits:
+        return "go on"
+    return "stop" if keys is None or isinstance(keys, NoKeys) else "wait"
+
+
+class MaterialChange:
+    """The material in each machine: one person puts it in, at one machine after another."""
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        ports: Sequence[str],
+        pause: bool | None,
+        before_sheet: Callable[[int, str, StopSignals], bool] | None,
+        signals: StopSignals,
+    ) -> None:
+        self.missing = False
+        self._waits = {port: needs_person(prepared, port, pause) for port in ports}
+        self._before_sheet = before_sheet
+        self._signals = signals
+        self._one_at_a_time = threading.Lock()
+
+    def at_pause(self, port: str) -> AtPause:
+        """What a machine does where a program waits for a person: nobody is at its keys."""
+        return at_pause(self._waits[port], None)
+
+    def is_in(self, number: int, port: str) -> bool:
+        """Whether fresh material is in the machine at ``port``, for sheet ``number``."""
+        if not self._waits[port]:
+            return True
+        with self._one_at_a_time:
+            ask = self._before_sheet
+            is_in = ask is not None and ask(number, port, self._signals)
+        self.missing = self.missing or not is_in
+        return is_in

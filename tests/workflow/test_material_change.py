@@ -1,0 +1,135 @@
+"""No sheet is burnt onto the one before: a person, or the machine, changes the material."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import SimpleNamespace
+
+import pytest
+from small_jobs import known_toolpath, write_nc
+
+from miurafab.errors import WAITING, PersonNeeded
+from miurafab.machine.journal import read_journal
+from miurafab.machine.keys import NoKeys
+from miurafab.machine.planning import SendOptions
+from miurafab.machine.sender import stream_plan
+from miurafab.workflow import multi_machine
+from miurafab.workflow.cut import prepare
+from miurafab.workflow.cut_sheets import CutOptions, cut_prepared
+from miurafab.workflow.material_change import WAITS, at_pause, needs_person
+from miurafab.workflow.multi_machine import share_sheets
+
+
+@pytest.fixture
+def job(tmp_path):
+    """Three sheets, all alike, and the folder of their journals."""
+    prepared = prepare(str(write_nc(tmp_path, known_toolpath())))
+    names = [dataclasses.replace(prepared.jobs[0], name=f"sheet-0{n}.nc") for n in (1, 2, 3)]
+    return dataclasses.replace(prepared, jobs=tuple(names), dry_runs=prepared.dry_runs * 3)
+
+
+def ended(job):
+    """How the last run of each sheet ended, as far as one was begun."""
+    paths = [(job.folder / name.name).with_suffix(".journal") for name in job.jobs]
+    return [read_journal(path)[-1].ended for path in paths if path.exists()]
+
+
+def test_a_person_is_needed_but_for_machines_that_feed_themselves(job):
+    assert needs_person(job, "/dev/ttyUSB0", None)
+    assert not needs_person(job, "virtual", None)
+    assert not needs_person(job, "/dev/ttyUSB0", False)
+    assert needs_person(job, "virtual", True)
+    bed = dataclasses.replace(job.machine.bed, roll_fed=True)
+    fed = dataclasses.replace(job, machine=dataclasses.replace(job.machine, bed=bed))
+    assert not needs_person(fed, "/dev/ttyUSB0", None)
+    assert at_pause(False, None) == "go on"
+    assert at_pause(True, NoKeys()) == at_pause(True, None) == "stop"
+
+
+def test_where_nobody_is_the_job_ends_after_its_first_sheet_and_says_how_to_go_on(job):
+    with pytest.raises(
+        PersonNeeded, match=r"sheet-02\.nc needs fresh material.*'sheet' 2"
+    ) as fault:
+        cut_prepared(job, port="virtual", pause=True)
+    assert fault.value.exit_code == WAITING
+    assert ended(job) == ["done"]
+    (done,) = cut_prepared(job, port="virtual", sheets=[2], pause=True)
+    assert ended(job) == ["done", "done"]
+    assert done.result.lines > 0
+
+
+def test_the_person_is_asked_before_each_further_sheet(job):
+    asked = []
+    cut_prepared(
+        job,
+        port="virtual",
+        pause=True,
+        before_sheet=lambda *which: asked.append((which, ended(job))),
+    )
+    assert asked == [((2, 3), ["done"]), ((3, 3), ["done", "done"])]
+
+
+def test_a_resumed_job_asks_too(job):
+    """Sheet 1 goes on where it is; sheets 2 and 3 need other material."""
+    cut_prepared(job, port="virtual", sheets=[1])
+    journal = job.folder / "sheet-01.journal"
+    lines = journal.read_text().splitlines(keepends=True)
+    journal.write_text("".join(lines[: len(lines) // 2]))
+    options = CutOptions(send=SendOptions(at=(0.0, 0.0)), resume=True)
+    with pytest.raises(PersonNeeded, match=r"sheet-02\.nc needs fresh material"):
+        cut_prepared(job, port="virtual", options=options, pause=True)
+    asked = []
+    cut_prepared(
+        job,
+        port="virtual",
+        options=options,
+        pause=True,
+        before_sheet=lambda number, count: asked.append(number),
+    )
+    assert asked == [2, 3]
+    assert ended(job) == ["done"] * 3
+
+
+@pytest.mark.parametrize("ready", [{"A", "B"}, {"B"}, set()])
+def test_machines_that_share_a_job_wait_each_for_its_material(job, monkeypatch, ready):
+    def apart(plan, port, *, signals, virtual_speed, **files):
+        return stream_plan(plan, "virtual", signals=signals, **files)
+
+    monkeypatch.setattr(multi_machine, "stream_apart", apart)
+    monkeypatch.setattr(multi_machine, "StopSignals", lambda: NoSignals())
+    job = dataclasses.replace(job, directory=SimpleNamespace(most_power=1.0))
+    asked = []
+
+    def before(number, port, signals):
+        asked.append((number, port))
+        return port in ready
+
+    outcome = share_sheets(
+        job, ["A", "B"], None, CutOptions(), before_sheet=before, on_progress=lambda *a: None
+    )
+    cut = [each for each in outcome if each.done]
+    ports = [each.port for each in cut]
+    firsts = set(ports)
+    assert len(cut) == (3 if ready & firsts or ready == {"A", "B"} else len(firsts))
+    assert all(each.why == WAITS for each in outcome if not each.done)
+    # Each machine cut one sheet unasked; for each other sheet somebody said that it is in.
+    assert len([a for a in asked if a[1] in ready]) == len(cut) - len(firsts)
+
+
+class NoSignals:
+    """Signals that never come; threads of a test cannot catch any."""
+
+    caught = None
+    at_once = False
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *why):
+        pass
+
+    def check(self):
+        pass
+
+    def hold(self):
+        pass
