@@ -12,9 +12,9 @@ from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.sheets import lay_out
 
 CASES = {
-    "miura": miura(40, 36),
-    "fan": flat_patterns.fan(40, 36, radius=250.0),
-    "fan without grid": without_grid(flat_patterns.fan(40, 36, radius=250.0)),
+    "miura": miura(24, 20),
+    "fan": flat_patterns.fan(24, 20, radius=150.0),
+    "fan without grid": without_grid(flat_patterns.fan(24, 20, radius=150.0)),
     "triangles": triangles(3, 20, 700.0),
 }
 
@@ -22,7 +22,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_what_is_assembled_stays_a_disk(name):
     pattern = CASES[name]
-    layout = lay_out(pattern, bed(200.0, 150.0), card())
+    layout = lay_out(pattern, bed(120.0, 100.0), card())
     steps = assembly_order(layout, pattern)
     assert len(steps) == len(layout.patches) > 6
     faces = np.empty(0, dtype=np.int64)

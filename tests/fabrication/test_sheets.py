@@ -263,7 +263,7 @@ def random_pattern(seed: int, columns: int, rows: int, shake: float, gridded: bo
     return pattern if gridded else without_grid(pattern)
 
 
-@settings(derandomize=True, max_examples=60, deadline=None)
+@settings(derandomize=True, max_examples=20, deadline=None)
 @given(
     st.integers(0, 10_000),
     st.integers(1, 8),
