@@ -35,7 +35,7 @@ MACHINE, MATERIAL = load_machine("grbl-laser-400"), load_material("card-250")
 
 @pytest.fixture(scope="module")
 def layout():
-    return lay_out(regular(61, 41), MACHINE, MATERIAL)
+    return lay_out(regular(53, 37), MACHINE, MATERIAL)
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -75,7 +75,7 @@ def test_hpgl(layout):
 def test_tiles_joined_by_their_crosses_are_the_sheet(layout, page):
     """Every page is laid onto the sheet by the crosses that it shares with those laid before."""
     toolpath = layout.toolpaths[0]
-    letters = edge_letters(layout, regular(61, 41))
+    letters = edge_letters(layout, regular(53, 37))
     guide = tiled_pdf((toolpath,), letters, "test", Tiling(page=page))
     reader = pypdf.PdfReader(io.BytesIO(guide))
     first, *tiles = reader.pages
@@ -160,7 +160,7 @@ def test_blank_tiles_are_not_printed():
 
 
 def test_a_page_that_cannot_be_is_refused(layout):
-    letters = edge_letters(layout, regular(61, 41))
+    letters = edge_letters(layout, regular(53, 37))
     with pytest.raises(InputError, match="'a9'"):
         tiled_pdf(layout.toolpaths, letters, "test", Tiling(page="a9"))
     with pytest.raises(InputError, match="no room"):
@@ -182,7 +182,7 @@ def numbers_in(text):
 
 
 def test_the_guide_names_every_patch_and_tab(layout):
-    pattern = regular(61, 41)
+    pattern = regular(53, 37)
     guide = assembly_guide(layout, pattern, MACHINE, MATERIAL, "Test")
     assert guide == assembly_guide(layout, pattern, MACHINE, MATERIAL, "Test")
     pages = pages_of(guide)
@@ -222,7 +222,7 @@ def test_the_guide_to_one_patch_says_nothing_of_glue():
 
 
 def test_the_guide_says_what_could_not_be_had():
-    pattern = regular(61, 41)
+    pattern = regular(53, 37)
     layout = lay_out(pattern, MACHINE, MATERIAL)
     findings = (
         Finding("untabbed", "2 seam edges bear no tab: use tape there.", (3, 7)),
@@ -305,7 +305,7 @@ def test_patches_side_by_side_have_colours_that_differ(number):
 
 
 def test_each_patch_is_glued_onto_what_is_assembled(layout):
-    steps = assembly_order(layout, regular(61, 41))
+    steps = assembly_order(layout, regular(53, 37))
     assert sorted(step.patch for step in steps) == list(range(len(layout.patches)))
     done = set()
     for step in steps:
