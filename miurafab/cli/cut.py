@@ -94,8 +94,11 @@ def cut(
         raise InputError(
             "Name the machine's `port` ('virtual' needs no machine), or ask for `dry_run`."
         )
+    from miurafab.machine.transport import require_port
     from miurafab.workflow.cut import prepare
 
+    for each in port or ():
+        require_port(each)
     with console.progress("preparing") as progress:
         prepared = prepare(
             thing,

@@ -113,6 +113,7 @@ class _Sender:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
+            creationflags=_flags(),
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -196,6 +197,14 @@ class _Sender:
         last = self._complaints.decode("utf-8", "replace").strip().rpartition("\n")[2]
         if last:
             self.death += f" ({last.rstrip('.')})"
+
+
+def _flags() -> int:
+    """On Windows the sending process has no console and a group of its own: when the window closes,
+    the system ends the starting program alone, and the end of the pipe stops the machine.
+    """
+    names = ("CREATE_NO_WINDOW", "CREATE_NEW_PROCESS_GROUP")
+    return sum(getattr(subprocess, name, 0) for name in names)
 
 
 def _make_safe(order: _Order, begun: bool) -> str:

@@ -136,12 +136,12 @@ class StreamDriver(ABC):
         """Serve the files and the keys; called many times a second during every wait.
 
         Raises :class:`~miurafab.machine.progress.JobAborted` if the user ends the job, and
-        :class:`~miurafab.errors.MachineError` for a file that cannot be written.
+        :class:`~miurafab.errors.MachineError` for a journal that cannot be written: the job could
+        not be resumed. A transcript that cannot be written is told at the end.
         """
         if self.journal is not None:
             self.journal.taken(self.acknowledged, self.line, self._seconds)
-        for record in self._records:
-            record.check()
+            self.journal.check()
         known = keys_of(self.plan.machine.dialect)
         self.orders += [known[key] for key in self._context.keys.pressed() if key in known]
         if ABORT in self.orders:

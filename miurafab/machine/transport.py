@@ -295,10 +295,28 @@ def open_port(
     return SerialTransport(port, baud)
 
 
+def require_port(port: str) -> None:
+    """Raise :class:`~miurafab.errors.PortError` for a device that this computer does not have.
+
+    Nothing is opened, so a board is not reset. On Windows, where a device is no file, and for a
+    URL, only opening the port tells.
+    """
+    if port == VIRTUAL or "://" in port or os.name != "posix":
+        return
+    if not os.path.exists(port):  # noqa: PTH110 - a device may be a dangling link of udev
+        raise PortError(_no_such_port(port))
+
+
 def list_ports() -> list[tuple[str, str]]:
     """The serial ports of this computer: device names and what the system says they are."""
     ports = serial.tools.list_ports.comports()
     return sorted((port.device, port.description or "") for port in ports)
+
+
+def _no_such_port(port: str) -> str:
+    known = ", ".join(name for name, _ in list_ports())
+    there = f"the ports here are {known}" if known else "this computer has no serial port"
+    return f"The port {port} does not exist; {there}, and '{VIRTUAL}' needs no machine."
 
 
 def _why_not_opened(port: str, fault: Exception) -> str:
@@ -312,9 +330,7 @@ def _why_not_opened(port: str, fault: Exception) -> str:
             "add yourself to its group with 'sudo usermod -a -G dialout $USER' and log in again."
         )
     if number == errno.ENOENT or "FileNotFoundError" in text:
-        known = ", ".join(name for name, _ in list_ports())
-        there = f"the ports here are {known}" if known else "this computer has no serial port"
-        return f"The port {port} does not exist; {there}, and '{VIRTUAL}' needs no machine."
+        return _no_such_port(port)
     if number == errno.ECONNREFUSED or "Connection refused" in text:
         return f"Nothing listens at {port}; start it there or correct the address."
     return f"The port {port} cannot be opened: {text.rstrip('.')}."

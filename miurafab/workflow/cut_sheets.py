@@ -21,7 +21,7 @@ from miurafab.machine.keys import Keys
 from miurafab.machine.planning import JobPlan, SendOptions, plan_job
 from miurafab.machine.sender import StreamResult, stream_plan
 from miurafab.machine.trace_box import MOST_POINTER, frame_job
-from miurafab.machine.transport import VIRTUAL
+from miurafab.machine.transport import VIRTUAL, require_port
 from miurafab.options import (
     Flag,
     Several,
@@ -207,6 +207,7 @@ def cut(
             raise OptionError(None, f"'{name}' is not an option; did you mean 'port'")
         raise OptionError("port", "is missing; name the machine's, or 'virtual', which needs none")
     port = read_value("port", Text(), port)
+    require_port(port)
     chosen = None if sheets is None else read_value("sheets", Several(Whole(1)), sheets)
     prepared = prepare(
         job, machine=machine, material=material, out=out, options=options, unread=asked.unread

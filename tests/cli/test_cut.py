@@ -10,6 +10,8 @@ import pytest
 from command_line import sentence
 from problems import saddle_mesh
 
+import miurafab
+from miurafab.errors import PortError
 from miurafab.profiles import shipped_directory
 
 DESIGN = """
@@ -315,3 +317,12 @@ def test_a_frame_is_traced_at_each_machine_in_turn(job):
     for bench in (first, second):
         assert bench.device.beam_log == []
         bench.wire.close()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a device is a file on POSIX")
+def test_a_port_that_does_not_exist_is_said_before_anything_is_made(run, tmp_path):
+    done = run("cut", "hypar", "--facets", "100x100", "--port", "/dev/no-such-port")
+    assert "The port /dev/no-such-port does not exist" in sentence(done, 3)
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(PortError, match="no-such-port does not exist"):
+        miurafab.cut("hypar", "/dev/no-such-port", facets=(100, 100))

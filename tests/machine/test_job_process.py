@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import time
 from pathlib import Path
 
@@ -156,3 +157,21 @@ def test_a_process_that_cannot_start_is_told(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(sys, "path", [])
     with pytest.raises(MachineError, match=r"ended with code 1 \(.*\); it had not opened the port"):
         stream_apart(plan_job(SHORT, load_machine("grbl-laser-400")), "/dev/gone")
+
+
+def test_on_windows_the_sender_has_no_console_and_a_group_of_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The platform replaced: the constants of Windows (``winbase.h``)."""
+    started: list[int] = []
+
+    def popen(*words: object, creationflags: int, **pipes: object) -> None:
+        started.append(creationflags)
+        raise OSError("not started")
+
+    monkeypatch.setattr(subprocess, "CREATE_NO_WINDOW", 0x08000000, raising=False)
+    monkeypatch.setattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0x00000200, raising=False)
+    monkeypatch.setattr(subprocess, "Popen", popen)
+    with pytest.raises(OSError, match="not started"):
+        stream_apart(plan_job(SHORT, load_machine("grbl-laser-400")), "COM3")
+    assert started == [0x08000200]

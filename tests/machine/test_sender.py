@@ -427,8 +427,9 @@ def test_a_full_disk_is_told_before_anything_moves() -> None:
     assert wire.written == []
 
 
-def test_a_disk_that_fills_up_in_mid_job_stops_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("noun", ["journal", "transcript"])
+def test_a_disk_that_fills_up_in_mid_job_stops_it_only_for_the_journal(
+    noun: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from miurafab.machine.append_log import DurableFile
 
@@ -443,9 +444,15 @@ def test_a_disk_that_fills_up_in_mid_job_stops_it(
 
     monkeypatch.setattr(DurableFile, "append", full)
     wire = FakeWire(new_device())
-    with pytest.raises(MachineError, match=r"can no longer be written: No space.*beam off"):
-        send(zigzag(200), wire, journal_path=tmp_path / "j")
-    assert_dark_after_reset(wire)
+    files = {f"{noun}_path": tmp_path / noun}
+    if noun == "journal":
+        with pytest.raises(MachineError, match=r"can no longer be written: No space.*beam off"):
+            send(zigzag(200), wire, **files)
+        assert_dark_after_reset(wire)
+    else:
+        (finding,) = send(zigzag(200), wire, **files).findings
+        assert finding.code == "records"
+        assert "can no longer be written: No space left" in finding.sentence
 
 
 def test_a_banner_is_needed_but_may_be_asked_for() -> None:
