@@ -65,6 +65,8 @@ if TYPE_CHECKING:
     from miurafab.workflow.calibrate import Calibration as Calibration
     from miurafab.workflow.calibrate import add_material as add_material
     from miurafab.workflow.calibrate import calibrate as calibrate
+    from miurafab.workflow.check_job import JobCheck as JobCheck
+    from miurafab.workflow.check_job import check_job as check_job
     from miurafab.workflow.convert import Conversion as Conversion
     from miurafab.workflow.convert import convert as convert
     from miurafab.workflow.cut_sheets import CutOptions as CutOptions

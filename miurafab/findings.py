@@ -112,6 +112,14 @@ RULES = {
     "nothing-burnt": Rule("warning", "a job that burns nothing"),
     "pauses": Rule("note", "a program that waits for a person (`M0`)"),
     "relative": Rule("note", "relative moves (`G91`)"),
+    # A job directory, checked (miurafab.workflow.check_job)
+    "job-file": Rule(
+        "refusal", "a file of a job that is missing, has changed, or is unknown to it"
+    ),
+    "job-version": Rule("note", "a job that another version of miurafab made"),
+    "layout": Rule("refusal", "a layout whose patches or tabs are not those of the pattern"),
+    "stroke": Rule("refusal", "a stroke that is not of the pattern, missing, or made too often"),
+    "not-proven": Rule("note", "what `check` could not prove"),
     # A job that is previewed (miurafab.workflow.preview)
     "assumed-machine": Rule("note", "no machine is named, so a common machine is assumed"),
     "pattern-changed": Rule("warning", "the pattern of the job has changed since"),

@@ -1,4 +1,4 @@
-"""``miurafab check``: recompute every invariant of a pattern from its file alone."""
+"""``miurafab check``: recompute every invariant of a pattern, or prove a job, from files alone."""
 
 from __future__ import annotations
 
@@ -10,20 +10,28 @@ from miurafab.cli.console import Console
 from miurafab.cli.declared import argument
 from miurafab.errors import DONE, NO
 
-EXAMPLES = ("miurafab check hypar.fold", "miurafab check hypar.fold --json")
+EXAMPLES = (
+    "miurafab check hypar.fold",
+    "miurafab check hypar.fold --json",
+    "miurafab check jobs/hypar",
+)
 
 
 def check(
-    file: Annotated[Path, argument("FILE", "The pattern, a FOLD file.")],
+    thing: Annotated[Path, argument("THING", "The pattern, a FOLD file, or a job directory.")],
     /,
     *,
     console: Console = Console(),
 ) -> int:
-    """Recompute every invariant of a pattern from its file.
+    """Recompute every invariant of a pattern, or prove a job, from files alone.
 
-    Exits with 1 if an invariant does not hold.
+    A job's files are compared with the sums of its manifest, and each burnt stroke is traced back
+    to a crease, tab fold, outline, hole or label of the pattern. Exits with 1 if something does not
+    hold.
     """
-    result = miurafab.check(file)
+    if thing.is_dir():
+        return _check_job(thing, console)
+    result = miurafab.check(thing)
     report = result.report()
 
     def show() -> None:
@@ -32,4 +40,17 @@ def check(
         console.findings(result.findings)
 
     console.answer(report, show)
+    return DONE if result.valid else NO
+
+
+def _check_job(folder: Path, console: Console) -> int:
+    result = miurafab.check_job(folder)
+
+    def show() -> None:
+        facts: dict[str, object] = {"status": result.report()["status"], "files": result.files}
+        facts |= {f"{kind} strokes": number for kind, number in result.traced.items()}
+        console.facts(facts)
+        console.findings(result.findings)
+
+    console.answer(result.report(), show)
     return DONE if result.valid else NO

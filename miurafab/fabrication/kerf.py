@@ -54,7 +54,9 @@ def bridged(ring: Floats, count: int, gap: float) -> list[Floats]:
     ring. There are fewer bridges than asked for only if fewer sides can bear one; a ring that could
     have only one stays whole.
     """
-    side = np.linalg.norm(np.diff(ring, axis=0), axis=1)
+    # Of places equal up to rounding the first is taken, so that rounding decides nothing.
+    length = np.linalg.norm(np.diff(ring, axis=0), axis=1)
+    side = np.round(length, 3)
     able = np.flatnonzero(side >= 3 * gap)
     count = min(count, len(able))
     if count < 2:
@@ -67,9 +69,9 @@ def bridged(ring: Floats, count: int, gap: float) -> list[Floats]:
         off = np.abs(middle[able] - target)
         off = np.minimum(off, side.sum() - off)
         off[np.isin(able, chosen)] = np.inf
-        chosen.append(int(able[np.argmin(off)]))
+        chosen.append(int(able[np.argmin(np.round(off, 3))]))
     at = np.sort(chosen)
-    way = (ring[at + 1] - ring[at]) / side[at, None] * (gap / 2)
+    way = (ring[at + 1] - ring[at]) / length[at, None] * (gap / 2)
     centre = (ring[at + 1] + ring[at]) / 2
     before, after = centre - way, centre + way
     corners = ring[:-1]

@@ -104,7 +104,8 @@ def place_texts(
     for patch, name in enumerate(names):
         faces = np.flatnonzero(face_patch == patch)
         far = np.linalg.norm(spots.centre[faces] - spots.centre[faces].mean(axis=0), axis=1)
-        face = int(faces[np.lexsort((far, -np.round(height[faces], 3)))[0]])
+        # Of places equal up to rounding the first is taken, so that rounding decides nothing.
+        face = int(faces[np.lexsort((np.round(far, 3), -np.round(height[faces], 3)))[0]])
         if height[face] < NAME_MM[0]:
             left_out += 1
             continue

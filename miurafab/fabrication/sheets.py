@@ -18,23 +18,22 @@ import shapely
 
 from miurafab.display import Shown
 from miurafab.fabrication.borders import OpenBorder, open_borders
-from miurafab.fabrication.labels import Lettering, place_texts
 from miurafab.fabrication.layout_findings import layout_findings
-from miurafab.fabrication.nesting import Nesting, Problem, Ring, Slot, nest, turned
+from miurafab.fabrication.nesting import Nesting, Problem, Ring, nest, turned
 from miurafab.fabrication.open_ring import opened
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_frame import (
     DIGITS,
-    FramedPatches,
     Patch,
     copied,
     frame_patches,
 )
 from miurafab.fabrication.partition.patch_outline import OutlinedPatches
+from miurafab.fabrication.placing import motion_of, texts_of
 from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
 from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.stock import LaidStock, lay_stock
-from miurafab.fabrication.strokes import Blank, RigidTransform, sheet_strokes
+from miurafab.fabrication.strokes import Blank, sheet_strokes
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats
@@ -221,9 +220,7 @@ def lay_out(
     """
     options = options or LayoutOptions()
     pattern = opened(pattern, options)
-    material = _with_own_tabs(material, options)
-    if machine.tool.kind != "laser":
-        material = replace(material, kerf_mm=0.0)  # only a beam takes material away
+    material = worked(material, machine, options)
     stock = lay_stock(options, machine.bed, material.grain)
     framed = frame_patches(pattern, stock, material, options)
     outlined = framed.outlined
@@ -236,8 +233,8 @@ def lay_out(
         )
     )
     sheets, placements = _sheets(nesting, patches, stock)
-    motion = _motion(patches, placements, nesting.slots)
-    lettering = _lettering(pattern, framed, patches, motion)
+    motion = motion_of(patches, placements, np.array([slot.sheet for slot in nesting.slots]))
+    lettering = texts_of(pattern, outlined, framed.numbers, patches, motion)
     drawn = sheet_strokes(
         pattern,
         outlined,
@@ -272,26 +269,6 @@ def lay_out(
     )
 
 
-def _lettering(
-    pattern: CreasePattern,
-    framed: FramedPatches,
-    patches: tuple[Patch, ...],
-    motion: RigidTransform,
-) -> Lettering:
-    """The texts of all copies, upright on their sheets."""
-    outlined, count = framed.outlined, len(framed.patches)
-    turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
-    texts, left_out, unmarked = [], 0, 0
-    for first in range(0, len(patches), count):
-        names = [patch.label for patch in patches[first : first + count]]
-        own = turns[first : first + count]
-        found = place_texts(pattern, outlined.face_patch, names, outlined.tabs, framed.numbers, own)
-        texts += [replace(text, patch=text.patch + first) for text in found.texts]
-        left_out += found.left_out
-        unmarked += found.unmarked
-    return Lettering(texts, left_out, unmarked)
-
-
 def _with_passes(sheet: Sheet, front: Toolpath, back: Toolpath | None) -> Sheet:
     made = [front] if back is None else [back, front]
     return replace(
@@ -301,7 +278,8 @@ def _with_passes(sheet: Sheet, front: Toolpath, back: Toolpath | None) -> Sheet:
     )
 
 
-def _with_own_tabs(material: Material, options: LayoutOptions) -> Material:
+def worked(material: Material, machine: MachineProfile, options: LayoutOptions) -> Material:
+    """``material`` with the tabs of ``options``, and with a kerf only under a beam."""
     rule = material.tabs
     if options.tab_height_mm is not None:
         rule = replace(rule, height_mm=options.tab_height_mm)
@@ -309,7 +287,8 @@ def _with_own_tabs(material: Material, options: LayoutOptions) -> Material:
         rule = replace(rule, inset_mm=options.tab_inset_mm)
     if options.tab_angle is not None:
         rule = replace(rule, max_angle=options.tab_angle)
-    return replace(material, tabs=rule)
+    kerf = material.kerf_mm if machine.tool.kind == "laser" else 0.0
+    return replace(material, tabs=rule, kerf_mm=kerf)
 
 
 def _kinds(nesting: Nesting) -> list[int]:
@@ -348,23 +327,6 @@ def _sheets(
         for number, (kind, placed) in enumerate(zip(kinds, on_sheet, strict=True), start=1)
     )
     return sheets, placements
-
-
-def _motion(
-    patches: tuple[Patch, ...], placements: list[Placement], slots: tuple[Slot, ...]
-) -> RigidTransform:
-    """The motion of each patch from the pattern to its sheet."""
-    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    moved = np.array(
-        [
-            placement.from_patch(patch.from_pattern(corners + np.array(patch.origin_mm)))
-            for patch, placement in zip(patches, placements, strict=True)
-        ]
-    )
-    matrix = np.stack([moved[:, 1] - moved[:, 0], moved[:, 2] - moved[:, 0]], axis=2)
-    origins = np.array([patch.origin_mm for patch in patches])
-    shift = moved[:, 0] - np.einsum("nij,nj->ni", matrix, origins)
-    return RigidTransform(matrix, shift, np.array([slot.sheet for slot in slots]))
 
 
 def _totals(

@@ -67,6 +67,7 @@ __all__ = [
     "percent",
     "read_options",
     "read_value",
+    "written_options",
 ]
 
 _KEY = "miurafab.option"
@@ -237,6 +238,19 @@ def _made(cls: type[T], inside: Mapping[str, Any], base: T | None = None) -> T:
         elif isinstance(hints[entry.name], type) and is_dataclass(hints[entry.name]):
             values[entry.name] = _made(hints[entry.name], inside)
     return cls(**(values if base is None else vars(base) | values))
+
+
+def written_options(value: Any) -> dict[str, Any]:
+    """The options of ``value`` that are not the defaults, as :func:`read_options` takes them."""
+    found: dict[str, Any] = {}
+    for entry in fields(value):
+        inside = getattr(value, entry.name)
+        if _KEY not in entry.metadata:
+            found |= written_options(inside) if is_dataclass(inside) else {}
+        elif inside != entry.default:
+            kind: Kind = entry.metadata[_KEY][0]
+            found[outside(entry.name)] = inside if isinstance(inside, bool) else kind.show(inside)
+    return found
 
 
 def read_value(name: str, kind: Kind, value: object) -> Any:

@@ -41,9 +41,11 @@ from miurafab.profiles import (
     read_toml,
 )
 from miurafab.profiles.material import KERF
+from miurafab.profiles.shipped import Kind
 from miurafab.workflow.dry_run import dry_run
 from miurafab.workflow.job_directory import JobDirectory, write_text
 from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
+from miurafab.workflow.manifest import write_manifest
 
 CHOICES = "calibration.json"
 GUIDE = "calibration.pdf"
@@ -152,6 +154,11 @@ def calibrate(
         )
         digest = hashlib.sha256(coupon.encode("utf-8")).hexdigest()
         write_text(staging / LAYOUT, write_layout(layout, _COUPON, digest))
+        profiles: dict[Kind, Path] = {
+            "firmware_profiles": machine_file,
+            "materials": material_file,
+        }
+        write_manifest(staging, (), {}, profiles)
     made = JobDirectory(directory, layout, profile, stock.max_power, (job,), (timed,))
     return Calibration(made, sheet)
 

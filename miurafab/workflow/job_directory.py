@@ -15,7 +15,7 @@ from pathlib import Path
 from miurafab.display import Shown
 from miurafab.errors import InputError, LayoutError
 from miurafab.fabrication.layout import read_layout
-from miurafab.fabrication.sheets import Layout
+from miurafab.fabrication.sheets import Layout, Sheet
 from miurafab.files import AnyPath, as_path
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
@@ -98,7 +98,44 @@ def read_job(directory: AnyPath, *, unread: bool = False) -> JobDirectory:
     >>> len(mf.read_job("jobs/plane").dry_runs)
     1
     """
-    directory = as_path(directory, "The job directory")
+    written = read_written(as_path(directory, "The job directory"))
+    dry_runs = (
+        dry_run(
+            name,
+            job,
+            written.machine,
+            (sheet.width_mm, sheet.height_mm),
+            written.most_power,
+            unread=unread,
+        )
+        for (name, sheet), job in zip(written.passes, written.jobs, strict=True)
+    )
+    return JobDirectory(
+        written.directory,
+        written.layout,
+        written.machine,
+        written.most_power,
+        written.jobs,
+        tuple(dry_runs),
+    )
+
+
+@dataclass(frozen=True)
+class WrittenJob:
+    """A job as it stands in its ``directory``, before anything is judged: ``passes`` are the names
+    of the programs, each with its sheet, and ``jobs`` the programs.
+    """
+
+    directory: Path
+    layout: Layout
+    machine: MachineProfile
+    most_power: float
+    passes: tuple[tuple[str, Sheet], ...]
+    jobs: tuple[Job, ...]
+
+
+def read_written(directory: Path) -> WrittenJob:
+    """The job in ``directory``. Raises :class:`~miurafab.errors.InputError` if it is not whole."""
     path = directory / LAYOUT
     if not path.is_file():
         raise InputError(
@@ -110,18 +147,14 @@ def read_job(directory: AnyPath, *, unread: bool = False) -> JobDirectory:
         raise InputError(f"{path}: {fault}") from None
     machine = job_machine(layout.machine, directory)
     most_power = job_material(layout.material, directory).max_power
-    made = [(name, sheet) for sheet in layout.sheets for name in sheet.passes]
+    passes = tuple((name, sheet) for sheet in layout.sheets for name in sheet.passes)
     jobs = []
-    for name, _ in made:
+    for name, _ in passes:
         file = directory / f"{name}{machine.job_suffix}"
         if not file.is_file():
             raise InputError(f"{file} is missing; make the job again with 'miurafab sheets'.")
         jobs.append(read_gcode(file))
-    dry_runs = (
-        dry_run(name, job, machine, (sheet.width_mm, sheet.height_mm), most_power, unread=unread)
-        for (name, sheet), job in zip(made, jobs, strict=True)
-    )
-    return JobDirectory(directory, layout, machine, most_power, tuple(jobs), tuple(dry_runs))
+    return WrittenJob(directory, layout, machine, most_power, passes, tuple(jobs))
 
 
 def write_text(path: Path, text: str) -> None:

@@ -18,6 +18,7 @@ from miurafab.errors import InputError
 from miurafab.profiles import MachineProfile, Material, load_machine, load_material
 from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.drawings import ENDINGS, PICTURE
+from miurafab.workflow.manifest import MANIFEST
 
 LAYOUT = "layout.json"
 GUIDES = ("assembly.pdf", "calibration.pdf", "calibration.json")
@@ -92,7 +93,7 @@ def _earlier(directory: Path) -> tuple[set[str], set[str]]:
         for name in sheets
         for ending in (".nc", ".plt", ".svg", *ENDINGS)
     }
-    return drawn | {LAYOUT, PICTURE, *GUIDES}, copies
+    return drawn | {LAYOUT, MANIFEST, PICTURE, *GUIDES}, copies
 
 
 def _put_in_place(staging: Path, directory: Path, drawn: set[str], copies: set[str]) -> None:

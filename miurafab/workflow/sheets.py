@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import reprlib
 import shutil
 from collections.abc import Callable, Collection, Mapping
@@ -19,7 +18,7 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import DrawnLayout, lay_out
 from miurafab.files import AnyPath, as_path
 from miurafab.gcode.job import Job
-from miurafab.options import read_options
+from miurafab.options import read_options, written_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
@@ -35,11 +34,13 @@ from miurafab.profiles import (
     load_material,
     read_toml,
 )
+from miurafab.profiles.shipped import Kind
 from miurafab.workflow.design import read_layout_table
 from miurafab.workflow.drawings import drawings, read_formats
 from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run
 from miurafab.workflow.job_directory import GUIDE, JobDirectory, write_text
 from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
+from miurafab.workflow.manifest import sha256, write_manifest
 from miurafab.workflow.patterns import PatternLike, as_pattern
 from miurafab.workflow.picture import first_sheet
 
@@ -73,6 +74,8 @@ class SheetJob(Shown):
         The files of the profiles.
     pattern_file : Path, optional
         The FOLD file of the pattern, None where the pattern has none or was opened.
+    options : LayoutOptions
+        How the pattern was laid out.
     opened : bool
         Whether the pattern was opened for the job.
     """
@@ -86,6 +89,7 @@ class SheetJob(Shown):
     machine_file: Path
     material_file: Path
     pattern_file: Path | None
+    options: LayoutOptions
     opened: bool = False
 
     @property
@@ -151,8 +155,14 @@ class SheetJob(Shown):
             guide = assembly_guide(layout, self.pattern, machine, self.material, self.name)
             (staging / GUIDE).write_bytes(guide)
             used = self._put_pattern(folder, staging)
-            digest = hashlib.sha256(used.read_bytes()).hexdigest()
+            digest = sha256(used)
             write_text(staging / LAYOUT, write_layout(layout, used.name, digest))
+            besides = [] if used.parent == staging else [used]
+            profiles: dict[Kind, Path] = {
+                "firmware_profiles": self.machine_file,
+                "materials": self.material_file,
+            }
+            write_manifest(staging, besides, written_options(self.options), profiles)
         tell(1.0, "done")
         return JobDirectory(folder, layout, machine, self.most_power, self.jobs, self.dry_runs)
 
@@ -292,6 +302,7 @@ def make_job(
         machine_file,
         material_file,
         kept,
+        options or LayoutOptions(),
         opened,
     )
 

@@ -82,7 +82,7 @@ def outline_patches(
     tight = np.zeros(len(around), dtype=bool)
     while True:
         tabs, unusual, untabbed = choose_tabs(pattern, face_patch, material, options, tight)
-        outlines, standing = _outlines(pattern, face_patch, around, tabs)
+        outlines, standing = rings_of(pattern, face_patch, around, tabs)
         outgrown = [
             bool(unusual[own].any()) and space.turn(rings[0]) is None
             for rings, own in zip(outlines, standing, strict=True)
@@ -94,7 +94,7 @@ def outline_patches(
     untabbed = np.sort(np.concatenate([untabbed, tabs.edge[~kept]]))
     tabs = tabs.take(kept)
 
-    outlines, standing = _outlines(pattern, face_patch, around, tabs)
+    outlines, standing = rings_of(pattern, face_patch, around, tabs)
     lines = cut_lines(outlines, material.kerf_mm)
     order = np.argsort(face_patch, kind="stable")
     faces = np.split(order, np.flatnonzero(np.diff(face_patch[order])) + 1)
@@ -104,7 +104,7 @@ def outline_patches(
     return OutlinedPatches(patches, face_patch, tabs, untabbed)
 
 
-def _outlines(
+def rings_of(
     pattern: CreasePattern, face_patch: Ints, around: list[Boundary], tabs: TabRegions
 ) -> tuple[list[list[Floats]], list[Ints]]:
     """The rings of each patch, and its tabs in order along them."""

@@ -1,0 +1,81 @@
+"""``manifest.json``: what belongs to a job, each file with its SHA-256.
+
+The schema is ``miurafab-job/1``: ``tool`` (name and version), ``options`` (as a person writes them,
+those that are not the defaults), ``files`` {name: sha256} and ``profiles`` {file: sha256}, the
+machine and the material that the job was made with. It does not name itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from miurafab.errors import InputError
+from miurafab.files import read_bytes, read_text
+from miurafab.profiles.shipped import Kind
+from miurafab.version import __version__
+
+MANIFEST = "manifest.json"
+SCHEMA = "miurafab-job/1"
+TOOL = f"miurafab {__version__}"
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a ``manifest.json`` says."""
+
+    tool: str
+    options: Mapping[str, Any]
+    files: Mapping[str, str]
+    profiles: Mapping[str, str]
+
+
+def write_manifest(
+    staging: Path,
+    besides: Iterable[Path],
+    options: Mapping[str, Any],
+    profiles: Mapping[Kind, Path],
+) -> None:
+    """Write the manifest of the files in ``staging`` and of those ``besides`` that the job uses
+    where they are.
+    """
+    files = {path.name: path for path in (*staging.iterdir(), *besides)}
+    document = {
+        "schema": SCHEMA,
+        "tool": TOOL,
+        "options": dict(options),
+        "files": {name: sha256(files[name]) for name in sorted(files)},
+        "profiles": {f"{kind}/{path.name}": sha256(path) for kind, path in profiles.items()},
+    }
+    text = json.dumps(document, indent=1) + "\n"
+    (staging / MANIFEST).write_text(text, encoding="utf-8", newline="\n")
+
+
+def read_manifest(directory: Path) -> Manifest:
+    """The manifest of a job. Raises :class:`~miurafab.errors.InputError` if it cannot be read."""
+    path = directory / MANIFEST
+    try:
+        document = json.loads(read_text(path, InputError, "a manifest"))
+        if document["schema"] != SCHEMA:
+            raise InputError(
+                f"{path} has the schema {document['schema']!r}; this version reads '{SCHEMA}'."
+            )
+        tables = (document[name] for name in ("options", "files", "profiles"))
+        options, files, profiles = map(dict, tables)
+        for name in files:
+            if Path(name).name != name:
+                raise InputError(f"{path} names '{name}', which is not the name of a file.")
+        return Manifest(str(document["tool"]), options, files, profiles)
+    except (ValueError, KeyError, TypeError, RecursionError) as fault:
+        raise InputError(
+            f"{path} is not a manifest that 'miurafab sheets' wrote: {fault!r}; make the job again."
+        ) from None
+
+
+def sha256(path: Path) -> str:
+    """The SHA-256 of the file ``path``, in hexadecimal digits."""
+    return hashlib.sha256(read_bytes(path, InputError)).hexdigest()
