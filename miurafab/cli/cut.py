@@ -331,6 +331,10 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
             "estimated_s": float(each.estimated_s),
             "seconds": each.result.seconds,
             "refused_lines": len(each.result.errors),
+            "refusals": [
+                {"line": refused.line.number, "text": str(refused)}
+                for refused in each.result.errors
+            ],
             "findings": findings_json(each.findings),
         }
         for each in done
@@ -353,6 +357,8 @@ def _report(console: Console, prepared: Prepared, done: tuple[CutSheet, ...], po
             ],
         )
         for each in done:
+            for refused in each.result.errors:
+                console.line(f"{each.name}, {refused}")
             console.findings(each.findings)
 
     console.answer(answer, show)

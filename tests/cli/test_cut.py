@@ -326,3 +326,14 @@ def test_a_port_that_does_not_exist_is_said_before_anything_is_made(run, tmp_pat
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(PortError, match="no-such-port does not exist"):
         miurafab.cut("hypar", "/dev/no-such-port", facets=(100, 100))
+
+
+def test_check_mode_lists_every_line_that_the_controller_refuses(run, tmp_path):
+    (tmp_path / "own.nc").write_text("G21\nG90\nM4 S0\nM6\nG0 X1\nG1 X9 S100 F600\nM62 P1\nM5\n")
+    done = run("cut", "own.nc", "--check-mode", "--port", "virtual")
+    assert done.returncode == 1
+    for line in ("own, line 4 ('M6')", "own, line 7 ('M62P1')"):
+        assert f"{line}: " in done.stdout
+    done = run("cut", "own.nc", "--check-mode", "--port", "virtual", "--json")
+    (sheet,) = json.loads(done.stdout)["sheets"]
+    assert [refused["line"] for refused in sheet["refusals"]] == [4, 7]
