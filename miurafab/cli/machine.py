@@ -18,10 +18,11 @@ from miurafab.profiles.machine import Controller
 
 if TYPE_CHECKING:
     from miurafab.grbl.events import StatusReport
+    from miurafab.machine.actions import LineOptions
 
 PORT = "A serial device, a pyserial URL (socket://HOST:PORT), or 'virtual'."
 
-_BAUD = declared(Controller)["baud"]
+_BAUD, _WAIT = (declared(Controller)[name] for name in ("baud", "wait"))
 
 
 @Parameter(name="*")
@@ -31,6 +32,12 @@ class Line:
 
     port: Annotated[str, option(Text("PORT"), PORT)]
     baud: Annotated[int, option(_BAUD.kind, _BAUD.help)] = _BAUD.default
+    wait: Annotated[float, option(_WAIT.kind, _WAIT.help)] = _WAIT.default
+
+    @property
+    def options(self) -> LineOptions:
+        """The options of a conversation."""
+        return {"baud": self.baud, "wait": self.wait}
 
 
 def list_(*, console: Console = Console()) -> int:
@@ -49,7 +56,7 @@ def info(*, line: Line, console: Console = Console()) -> int:
     """Say what the controller is and what state it is in."""
     from miurafab.machine import actions
 
-    console.answer(asdict(actions.machine_info(line.port, baud=line.baud)))
+    console.answer(asdict(actions.machine_info(line.port, **line.options)))
     return DONE
 
 
@@ -58,7 +65,7 @@ def settings(*, line: Line, console: Console = Console()) -> int:
     from miurafab.grbl.codes import setting_codes
     from miurafab.machine import actions
 
-    texts = actions.read_settings(line.port, baud=line.baud).texts
+    texts = actions.read_settings(line.port, **line.options).texts
     codes = setting_codes()
     rows = [
         (f"${number}", text, codes[number].unit, codes[number].name)
@@ -83,7 +90,7 @@ def backup(
     """Save the controller's settings to a file, as '$$' prints them."""
     from miurafab.machine import actions
 
-    read = actions.read_settings(line.port, baud=line.baud)
+    read = actions.read_settings(line.port, **line.options)
     file.write_text(read.dump(), encoding="ascii", newline="\n")
     console.answer({"file": str(file), "settings": len(read.texts)})
     return DONE
@@ -99,7 +106,7 @@ def restore(
     """Write the settings of a saved file that differ, and read them back."""
     from miurafab.machine import actions
 
-    changed = actions.write_settings(line.port, actions.read_dump(file), baud=line.baud)
+    changed = actions.write_settings(line.port, actions.read_dump(file), **line.options)
     console.answer(
         {"changed": {f"${number}": text for number, text in changed.items()}},
         lambda: (
@@ -115,14 +122,14 @@ def home(*, line: Line, console: Console = Console()) -> int:
     """Run the homing cycle."""
     from miurafab.machine import actions
 
-    return _answer_state(console, actions.home(line.port, baud=line.baud))
+    return _answer_state(console, actions.home(line.port, **line.options))
 
 
 def unlock(*, line: Line, console: Console = Console()) -> int:
     """Unlock the controller after an alarm, without homing."""
     from miurafab.machine import actions
 
-    return _answer_state(console, actions.unlock(line.port, baud=line.baud))
+    return _answer_state(console, actions.unlock(line.port, **line.options))
 
 
 def jog(
@@ -139,7 +146,7 @@ def jog(
     """Move the machine with the beam off."""
     from miurafab.machine import actions
 
-    report = actions.jog(line.port, x=x, y=y, feed_mm_min=speed, absolute=to, baud=line.baud)
+    report = actions.jog(line.port, x=x, y=y, feed_mm_min=speed, absolute=to, **line.options)
     return _answer_state(console, report)
 
 
@@ -194,7 +201,7 @@ def talk(*, line: Line, console: Console = Console()) -> int:
 
     said: list[str] = []
     tell = said.append if console.wants_json else console.line
-    actions.talk(line.port, sys.stdin, tell, baud=line.baud)
+    actions.talk(line.port, sys.stdin, tell, **line.options)
     if console.wants_json:
         console.answer({"said": said})
     return DONE

@@ -42,7 +42,8 @@ _SETTING = re.compile(r"\$(\d+)=([^()]*?)(?: *\(.*\))?")
 
 
 def parse_reply(text: str) -> Event:
-    """The event of a line, which has no line end; never raises."""
+    """The event of a line, which has no line end; never raises. Blanks at its end say nothing."""
+    text = text.rstrip(" \t")
     if text == "ok":
         return Ok()
     for form, read in _FORMS:

@@ -21,6 +21,7 @@ from miurafab.machine.modes import ask_modes
 from miurafab.machine.session import HOMING_S, Session
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import open_port
+from miurafab.profiles.machine import BAUD, WAIT_S
 
 _POLL_S = 0.1
 
@@ -49,9 +50,12 @@ class MachineInfo:
 
 
 class LineOptions(TypedDict, total=False):
-    """``baud``, and the ``settings`` of the controller in memory if the port is ``virtual``."""
+    """``baud``, the seconds to ``wait`` for the start of the board, and the ``settings`` of the
+    controller in memory if the port is ``virtual``.
+    """
 
     baud: int
+    wait: float
     settings: Mapping[int, float] | None
 
 
@@ -71,12 +75,13 @@ def conversation(
     :meth:`~miurafab.machine.session.Session.greet` raises.
     """
     with signals or StopSignals() as signals:
-        transport = open_port(port, **line)
+        patience = line.get("wait", WAIT_S)
+        transport = open_port(port, line.get("baud", BAUD), line.get("settings"))
         signals.at_once = transport.blocks
         session = Session(transport, Connection(), check=signals.check)
         at_risk = False
         try:
-            session.greet()
+            session.greet(patience)
             at_risk = moves
             yield session
             at_risk = False

@@ -42,7 +42,16 @@ _WAS_ARMED = Finding("armed", "The job ended with the laser armed, so the contro
 
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # between status queries while the last moves are made
+_MOST_ON_A_NETWORK = 256
+"""Bytes: two lines of a raster at least; a reset behind 1,023 bytes was unheeded for 2.2 s by
+grblHAL's own simulator."""
 _KEY_S = 0.01  # between two reads of the keyboard, if there is one
+
+
+def _most_in_flight(context: JobContext) -> int:
+    """The bytes that may be unanswered; few over a network, where a reset queues behind them."""
+    most = context.plan.machine.controller.rx_bytes
+    return min(most, _MOST_ON_A_NETWORK) if "://" in context.transport.name else most
 
 
 class GrblDriver(StreamDriver):
@@ -53,7 +62,10 @@ class GrblDriver(StreamDriver):
         plan, controller = context.plan, context.plan.machine.controller
         self._patience = math.inf if isinstance(context.keys, NoKeys) else _KEY_S
         self._session = Session(
-            context.transport, Connection(controller.rx_bytes), context.transcript, context.check
+            context.transport,
+            Connection(_most_in_flight(context)),
+            context.transcript,
+            context.check,
         )
         self._streamer = Streamer(
             self._session.connection,
@@ -79,7 +91,7 @@ class GrblDriver(StreamDriver):
     def prepare(self) -> tuple[Finding, ...]:
         """See :class:`StreamDriver`."""
         plan, session = self.plan, self._session
-        session.greet()
+        session.greet(plan.wait)
         if obeys_overrides(plan.machine.dialect):
             for order in OVERRIDES_OFF:
                 session.write(session.connection.send_realtime(order))

@@ -22,12 +22,13 @@ from miurafab.errors import ControllerError, MiurafabError, PortError
 from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
 from miurafab.machine.judge_job import longest_line
-from miurafab.machine.session import ANSWER_S, BANNER_S, HOMING_S
+from miurafab.machine.session import ANSWER_S, HOMING_S
 from miurafab.machine.stream_driver import JobContext, StreamDriver
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
 from miurafab.marlin.connection import EMERGENCY, MarlinConnection
 from miurafab.marlin.replies import Killed, MarlinError, MarlinOk, Reply, Started
+from miurafab.profiles.machine import WAIT_S
 
 WAS_HALTED = "the controller was halted (M112) with the laser off; reset it before it is used again"
 NOT_CONFIRMED = (
@@ -83,7 +84,7 @@ class MarlinDriver(StreamDriver):
     def prepare(self) -> tuple[Finding, ...]:
         """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         plan, wire = self.plan, self._wire
-        wire.greet()
+        wire.greet(plan.wait)
         said = wire.send(SendLine(0, b"M115"))
         if plan.options.home:
             self.at_risk = True
@@ -141,13 +142,14 @@ class MarlinWire:
         if self._transcript is not None:
             self._transcript.sent(self.now(), data)
 
-    def greet(self) -> None:
+    def greet(self, patience: float = WAIT_S) -> None:
         """Wait until the controller has started, if the opening of the port resets it, and set the
         count.
 
-        Raises :class:`~miurafab.errors.PortError` if nothing that speaks Marlin answers.
+        It may take ``patience`` seconds to start. Raises :class:`~miurafab.errors.PortError` if
+        nothing that speaks Marlin answers.
         """
-        end = self.now() + BANNER_S
+        end = self.now() + patience
         started = False
         while not started and self.now() < end:
             started = any(isinstance(reply, Started) for reply in self.receive(end - self.now()))

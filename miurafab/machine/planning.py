@@ -13,9 +13,11 @@ from miurafab.gcode.program import Program
 from miurafab.machine.judge_job import JudgedJob, judge_job
 from miurafab.machine.preflight import raise_findings, require_known
 from miurafab.machine.resume import Resumption
-from miurafab.options import Flag, Pair, Several, Text, check_options, length, option
+from miurafab.options import Flag, Pair, Several, Text, check_options, declared, length, option
 from miurafab.profiles import MachineProfile
+from miurafab.profiles.machine import Controller
 
+_WAIT = declared(Controller)["wait"]
 AtPause = Literal["wait", "go on", "stop"]
 _NO_CHECK_MODE = ("marlin", "hpgl")
 
@@ -31,6 +33,9 @@ class SendOptions:
         Pair(length(-math.inf), "X,Y", "0,0 or 10mm,5mm"),
         "Position of the head in the job's coordinates; 0,0 is the job's origin.",
         group="Start",
+    )
+    wait: float | None = option(
+        _WAIT.kind, _WAIT.help, None, group="Start", default_text="as the machine's profile says"
     )
     check_mode: bool = option(
         Flag(), "Let the controller read the job without moving ($C).", False, group="Safety"
@@ -67,6 +72,12 @@ class JobPlan:
     resumption: Resumption | None
     forced: tuple[Finding, ...]
     at_pause: AtPause = "stop"
+
+    @property
+    def wait(self) -> float:
+        """The seconds that the board may take to start."""
+        asked = self.options.wait
+        return self.machine.controller.wait if asked is None else asked
 
     def with_head_at(self, at: tuple[float, float] | None) -> JobPlan:
         """The same for a head that stands ``at`` (X, Y in mm)."""

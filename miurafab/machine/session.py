@@ -23,10 +23,8 @@ from miurafab.grbl.streamer import alarm_words, error_words
 from miurafab.machine.progress import AS_WRITTEN, Overrides
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
+from miurafab.profiles.machine import WAIT_S
 
-BANNER_S = 2.5
-"""The longest time until the banner of a board that resets when its port opens (boot loader: 1 to
-2 s)."""
 ANSWER_S = 3.0
 """The longest time until a working controller answers a question."""
 HOMING_S = 180.0
@@ -244,15 +242,16 @@ class Session:
 
     # Beginning and end
 
-    def greet(self) -> None:
+    def greet(self, patience: float = WAIT_S) -> None:
         """Wait for the controller's banner, or cause it, and learn whether it is locked.
 
-        A board that does not reset when its port opens is asked for its state. If it is at work,
+        A board may take ``patience`` seconds to start after its port is opened. One that does not
+        reset then is asked for its state. If it is at work,
         :class:`~miurafab.errors.ControllerError` says so and nothing is disturbed; else a soft
         reset (which keeps the position) causes the banner. Raises
         :class:`~miurafab.errors.PortError` if nothing that speaks GRBL answers.
         """
-        banner = self._wait_banner(BANNER_S)
+        banner = self._wait_banner(patience)
         if banner is None:
             report = self._fresh_status(1.0)
             if report is not None and report.state in _BUSY:
@@ -262,11 +261,12 @@ class Session:
                 )
             self._asked_at = None
             self.write(self.connection.send_realtime(SOFT_RESET))
-            banner = self._wait_banner(BANNER_S)
+            banner = self._wait_banner(patience)
         if banner is None:
             raise PortError(
                 f"Nothing that speaks GRBL answers at {self.name}; check the port, the baud rate "
-                "of the machine profile and the machine's power."
+                "of the machine profile and the machine's power, and give a slow board more time "
+                f"(`wait` is {patience:g} s)."
             )
         self.wait_status()
 

@@ -30,6 +30,8 @@ from miurafab.profiles.table import Table, read_toml
 DIALECTS = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc", "marlin", "hpgl")
 BAUD = 115_200
 """The baud rate of nearly every GRBL board."""
+WAIT_S = 2.5
+"""The longest time until the banner of a common board (boot loader: 1 to 2 s)."""
 TOOLS = ("laser", "pen", "knife")
 STREAMING = ("character-counting", "send-response")
 FLOW_CONTROL = ("none", "xon-xoff", "rts-cts")
@@ -127,6 +129,11 @@ class Controller:
     baud: int = option(Whole(300, 4_000_000), "Speed of the serial port in baud.", BAUD)
     streaming: str = option(
         Choice(STREAMING), "How the sender keeps the receive buffer full.", STREAMING[0]
+    )
+    wait: float = option(
+        number(0.1, 120.0, unit=" s"),
+        "How many seconds the board may take to start after its port is opened.",
+        WAIT_S,
     )
     rx_bytes: int = option(Whole(16, 65_536), "Usable bytes of the receive buffer.", 128)
     line_chars: int = option(Whole(20, 4096), "Usable characters of a line.", 79)

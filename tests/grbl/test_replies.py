@@ -44,6 +44,7 @@ FULL = StatusReport(
     ("text", "event"),
     [
         ("ok", Ok()),
+        ("ok \t", Ok()),
         ("error:20", Error(20, "20")),
         ("error: Bad number format", Error(None, "Bad number format")),
         ("ALARM:3", Alarm(3, "3")),
@@ -88,7 +89,7 @@ def test_each_form(text: str, event: Event) -> None:
     [
         "",
         "ook",
-        "ok ",
+        " ok",
         "okok",
         "OK",
         "xok",

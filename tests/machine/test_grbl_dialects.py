@@ -139,3 +139,14 @@ def test_keys_that_a_firmware_does_not_know_are_not_sent(machine: MachineProfile
     sent = sum(byte >= 0x80 for byte in wire.bytes_written)
     # Three more set every override back before the job.
     assert sent == (0 if machine.dialect == "grbl-0.9" else 3 + 4)
+
+
+@pytest.mark.parametrize(("port", "most"), [("socket://laser:23", 256), ("/dev/ttyUSB0", 1023)])
+def test_over_a_network_a_reset_waits_behind_few_bytes(port: str, most: int) -> None:
+    machine = load_machine("grblhal-laser-600")
+    text = "M4 S0\n" + "".join(f"G1 X{n % 200} S500 F3000\n" for n in range(1, 300)) + "M5\n"
+    wire, seen = new_wire(machine), []
+    wire.name = port
+    plan = plan_job(Job("job.nc", text), machine)
+    deliver(plan, wire, StopSignals(), on_progress=lambda now: seen.append(now.in_flight))
+    assert most - 40 < max(seen) <= most

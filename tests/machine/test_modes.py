@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from wires import FakeWire
 
-from miurafab.errors import ControllerError
+from miurafab.errors import ControllerError, PortError
 from miurafab.gcode.job import Job
 from miurafab.machine.modes import SET
 from miurafab.machine.planning import SendOptions, plan_job
@@ -124,3 +125,35 @@ def test_a_controller_that_knows_no_such_question_is_still_set() -> None:
     plan = plan_job(Job("job.nc", UNSAID), MACHINE)
     assert deliver(plan, Terse(device), StopSignals()).findings == ()
     assert device.position[:2] == pytest.approx((20, 10))
+
+
+def late(seconds: float) -> FakeWire:
+    """A board whose boot loader takes ``seconds`` after its port is opened, deaf meanwhile."""
+
+    class Late(FakeWire):
+        def write(self, data: bytes) -> None:
+            if self.device.now >= seconds:
+                super().write(data)
+
+        def read(self, timeout: float) -> bytes:
+            data = super().read(timeout)
+            if self.device.now >= seconds:
+                said, self.held = self.held + data, b""
+                return said
+            self.held += data
+            return b""
+
+    wire = Late(controller())
+    wire.held = b""
+    return wire
+
+
+def test_a_board_that_starts_late_is_waited_for() -> None:
+    job = Job("job.nc", UNSAID)
+    with pytest.raises(PortError, match=r"Nothing that speaks GRBL .*'wait' is 2\.5 s"):
+        deliver(plan_job(job, MACHINE), late(8.0), StopSignals())
+    wire = late(8.0)
+    deliver(plan_job(job, MACHINE, SendOptions(wait=10.0)), wire, StopSignals())
+    assert wire.device.position[:2] == pytest.approx((20, 10))
+    slow = replace(MACHINE, controller=replace(MACHINE.controller, wait=10.0))
+    deliver(plan_job(job, slow), late(8.0), StopSignals())
