@@ -131,7 +131,7 @@ class Controller:
         Choice(STREAMING), "How the sender keeps the receive buffer full.", STREAMING[0]
     )
     wait: float = option(
-        number(0.1, 120.0, unit=" s"),
+        number(0.1, 120.0),
         "How many seconds the board may take to start after its port is opened.",
         WAIT_S,
     )
