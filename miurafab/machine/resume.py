@@ -8,8 +8,9 @@ moves are short, each segment may be the rest of a different move. So, counting 
 many moves on the controller as its ``$12`` gives it, at least one.
 
 At the other end, the machine may have burnt lines past the last acknowledged line: as many as the
-receive buffer holds and, if the sender itself died, as many as the wire carries in the time that
-the journal may be behind. The strokes between the two ends may be burnt twice.
+receive buffer holds. If the sender itself died, the journal may be behind, and the machine may have
+taken as many more as the wire carries in that time, and no more than it makes then and holds. The
+strokes between the two ends may be burnt twice.
 
 The rest of the job keeps the line numbers of the whole. A preamble in place of its first lines
 restores the state: a dark move to the start of the stroke, then units, distance mode, plane, feed,
@@ -30,7 +31,7 @@ from miurafab.gcode.execution import Jog, OffsetsChanged, Probe, Store, execute
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.parser import ModalState, ReaderRules, parse_block
-from miurafab.gcode.program import Program, strokes
+from miurafab.gcode.program import RAPID, Program, strokes
 from miurafab.gcode.reading import read_program
 from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST, NO_MOTION
 from miurafab.machine.journal import JournalRun, job_digest
@@ -44,6 +45,8 @@ JOURNAL_LAG_S = 1.0
 """The largest delay of the journal on the disk when the sender dies: a quarter of a second until
 the record, a quarter until the disk, doubled for a slow disk."""
 
+_MOST_OVERRIDE = 2.0
+"""GRBL 1.1's largest feed override (``config.h``): a key may have been pressed in that time."""
 _REAL_MOVE_MM = 0.05  # a shorter line may round to no step and take no place in the planner
 _MOTION_WORDS = {0: "G0", 1: "G1", 2: "G2", 3: "G3"}
 
@@ -156,15 +159,40 @@ def _reach(
         behind = int(np.searchsorted(moving, run.line, side="right")) - moves_back(machine, run)
         if behind >= 0:
             certain = max(certain, int(moving[behind]))
-        unseen = machine.controller.rx_bytes
-        if run.ended is None:
-            unseen += round(JOURNAL_LAG_S * machine.controller.baud / 10)
         taken = max(run.line, run.from_line - 1)
         at = int(np.searchsorted(program.line_number, taken, side="right"))
-        held = np.cumsum(program.line_bytes[at:]) <= unseen
-        more = program.line_number[at:][held]
-        possible = max(possible, int(more[-1]) if len(more) else taken)
+        if run.ended is None:
+            at = min(_carried(program, machine, at), _begun(program, machine, run, at))
+        received = np.cumsum(program.line_bytes[at:]) <= machine.controller.rx_bytes
+        at += int(np.count_nonzero(received))
+        possible = max(possible, taken, *program.line_number[at - 1 : at].tolist())
     return certain, possible
+
+
+def _carried(program: Program, machine: MachineProfile, at: int) -> int:
+    """Up to before which line sent (by its place) the wire can have carried what the journal does
+    not tell, if it tells of the lines before ``at``.
+    """
+    unseen = JOURNAL_LAG_S * machine.controller.baud / 10
+    return at + int(np.count_nonzero(np.cumsum(program.line_bytes[at:]) <= unseen))
+
+
+def _begun(program: Program, machine: MachineProfile, run: JournalRun, at: int) -> int:
+    """... up to before which line the machine can have taken lines in that time: those that it has
+    made, each as fast as its feed under the largest override or the axes' rates allow, and as many
+    moves as it holds.
+    """
+    step = np.abs(program.end - program.start)
+    feed = np.linalg.norm(step, axis=1) / np.maximum(_MOST_OVERRIDE * program.feed_mm_min, 1e-9)
+    rapid = (step[:, :2] / np.array(machine.motion.max_rate_mm_min)).max(axis=1)
+    seconds = 60 * np.where(program.motion == RAPID, rapid, feed)
+    of_line = np.bincount(program.line, seconds, minlength=int(program.line_number[-1]) + 1)
+    made = np.cumsum(of_line[program.line_number[at:]]) <= JOURNAL_LAG_S
+    at += int(np.count_nonzero(made))
+    moved = np.bincount(program.line, program.lengths, minlength=len(of_line))
+    ahead = np.flatnonzero(moved[program.line_number[at:]] > _REAL_MOVE_MM)
+    held = moves_back(machine, run)
+    return at + int(ahead[held]) if len(ahead) > held else len(program.line_number)
 
 
 def _rest(job: Job, line: int) -> tuple[Job, int]:

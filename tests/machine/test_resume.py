@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from dataclasses import replace
 from functools import cache
@@ -142,6 +143,61 @@ def test_a_fault_after_every_stroke(style: str, tmp_path: Path) -> None:
     for index, end in enumerate(stroke_ends(style)):
         for kind in KINDS if index % 10 == 0 else (KINDS[index % 6],):
             check(job, [(kind, end + 0.001)], tmp_path)
+
+
+class Killed(BaseException):
+    """The sender is killed: it says no last word, neither to the wire nor to the journal."""
+
+
+def killed(job: Job, at: float, lag: float, journal: Path) -> FakeWire:
+    """A run whose sender is killed ``at`` s, with a journal that is ``lag`` s behind."""
+
+    def before_call(call: int) -> None:
+        if wire.device.now >= at:
+            raise Killed
+
+    wire = FakeWire(new_device(), before_call=before_call)
+    with pytest.raises(Killed):
+        run(job, wire, journal)
+    wire.device.advance(5.0)  # the controller makes what it has
+    lines = journal.read_text().splitlines(keepends=True)
+    records = [json.loads(line) if line.strip() else {} for line in lines]
+    last = max((record.get("seconds", 0.0) for record in records), default=0.0)
+    known = [
+        line
+        for line, record in zip(lines, records, strict=True)
+        if "ended" not in record and record.get("seconds", 0.0) <= last - lag
+    ]
+    journal.write_text("".join(known))
+    return wire
+
+
+@pytest.mark.parametrize("style", ["absolute", "relative"])
+@given(at=st.floats(0.5, 11.0), lag=st.sampled_from([0.0, 0.3, 0.7]))
+@settings(max_examples=6, phases=[Phase.generate])
+def test_what_a_killed_sender_left_is_stated(style: str, at: float, lag: float) -> None:
+    job = dashes(style)
+    with TemporaryDirectory() as folder:
+        journal = Path(folder) / "journal"
+        wire = killed(job, at, lag, journal)
+        rest = resume(job, MACHINE, read_journal(journal))
+        again = FakeWire(new_device())
+        run(job, again, journal, rest)
+    counts = burnt(job, [wire.device.beam_log, again.device.beam_log])
+    assert all(counts[n] for n in range(STROKES)), rest
+    twice = {n % 1000 for n, c in counts.items() if c > 1 or n >= 1000}
+    assert twice <= set(range(rest.stroke, rest.new_stroke)), rest
+
+
+def test_what_is_stated_after_a_kill_is_what_the_machine_can_have_made() -> None:
+    """80 strokes of 10 mm at 3000 mm/min, cut down after the 30th: not all that a wire carries."""
+    text = "M4 S0\n" + "".join(f"G0 X5 Y{n}\nG1 X15 S500 F3000\n" for n in range(80)) + "M5\n"
+    job = Job("dashes.nc", text)
+    left = JournalRun(job.name, job_digest(job), MACHINE.name, "p", 162, taken=61, line=61)
+    rest = resume(job, MACHINE, [left])
+    assert rest.stroke == 19
+    # In a second at most 7 strokes of 0.1 s, with rapids; 21 moves held, and 128 bytes.
+    assert 30 + 5 + 10 <= rest.new_stroke <= 30 + 7 + 11 + 6
 
 
 def test_a_resumed_job_is_interrupted_again(tmp_path: Path) -> None:
