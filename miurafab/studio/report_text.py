@@ -49,6 +49,9 @@ def pattern_lines(report: Mapping[str, Any]) -> list[dict[str, str]]:
     if report.get("facets") is not None:
         vertices = report.get("vertices") or 0
         lines.append(ReportLine("Facets", f"{report['facets']:,}", f"{vertices:,} vertices"))
+    if report.get("pieces", 1) > 1:
+        seams = f"{length_text(report['seam_mm'])} of seams"
+        lines.append(ReportLine("Pieces", f"{report['pieces']:,}", seams))
     if report.get("seconds") is not None:
         lines.append(ReportLine("Computed in", f"{report['seconds']:.1f} s"))
     return [asdict(line) for line in lines]
@@ -113,7 +116,7 @@ def layout_lines(totals: Mapping[str, Any]) -> list[dict[str, str]]:
     if totals["patches"] > 1 or on_seams:
         lines.append(ReportLine("Seams", length_text(totals["seam_mm"]), f"{on_seams:,} tabs"))
     if totals["border_tabs"]:
-        lines.append(ReportLine("Open borders", "", f"{totals['border_tabs']:,} tabs"))
+        lines.append(ReportLine("On open borders", f"{totals['border_tabs']:,} tabs"))
     lines += [
         ReportLine("Cut", length_text(totals["cut_mm"])),
         ReportLine("Creases", length_text(totals["perforated_mm"]), "perforated or scored"),

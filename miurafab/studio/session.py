@@ -233,6 +233,7 @@ class Bench:
             "status": report["status"],
             "headline": headline(report["status"], opened=opened),
             "advice": self._plain(report["advice"]),
+            "seams": bool(report.get("seam_mm")),
             "lines": pattern_lines(report),
             "findings": self._findings(part),
             "files": self._put_down(task.id, part["files"]),

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from piece_problems import gores
 from PIL import Image
 from problems import regular
 from small_jobs import LASER, dashes, write_folder, write_nc
@@ -18,6 +19,7 @@ from small_jobs import LASER, dashes, write_folder, write_nc
 from miurafab.errors import InputError
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.workflow.dry_run import LAYERS, dry_run
 from miurafab.workflow.page import Slider, page_text, write_page
 from miurafab.workflow.preview import Preview, preview
@@ -225,3 +227,14 @@ def test_a_browser_draws_both_views(job, tmp_path):
     assert 'data-ready="sheets fold"' in dom
     assert "data-fault" not in dom
     assert "0:1" in dom.split('id="clock"')[1][:60]
+
+
+def test_seams_are_a_kind_of_their_own_with_the_length_of_one_side():
+    pattern = gores()
+    fold = data_of(page_text("gores", None, pattern))["fold"]
+    letters = np.array(fold["assignments"])[unpack(fold["kinds"], "u1")]
+    assert set(np.flatnonzero(letters == "S")) == set(pattern.seams.ravel())
+    rest = letters != "S"
+    assert (letters[rest] == pattern.edges_assignment[rest]).all()
+    seam = edge_lengths(pattern.vertices_coords, pattern.edges_vertices[pattern.seams[:, 0]])
+    assert fold["lengths"][fold["assignments"].index("S")] == pytest.approx(seam.sum(), abs=1e-3)

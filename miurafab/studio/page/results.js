@@ -41,12 +41,17 @@ export function showPattern(pattern) {
     byId("space").hidden = !hasWebGl;
     byId("no-space").hidden = hasWebGl;
     if (hasWebGl) load(byId("space"), "src", files.page);
+    byId("seam-key").hidden = !pattern.seams;
     load(byId("flat"), "src", files.picture);
     byId("flat-link").href = files.picture;
   }
   byId("figures").replaceChildren(...terms(pattern.lines));
   byId("pattern-command").textContent = pattern.command;
 }
+
+byId("flat").addEventListener("load", ({ target }) => {
+  byId("pattern-views").classList.toggle("wide", target.naturalWidth > 1.5 * target.naturalHeight);
+});
 
 export function showJob(job, pattern) {
   const ready = Boolean(pattern?.files.fold);

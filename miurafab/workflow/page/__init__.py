@@ -29,6 +29,8 @@ from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_t
 from miurafab.workflow.preview import Preview
 
 _SCRIPTS = ("viewer.js", "sheets.js", "fold.js", "page.js")
+_SEAM = "S"
+"""What the page calls a border that is glued to another."""
 _STEPS = 65535
 
 
@@ -152,10 +154,14 @@ def _sheet(preview: Preview, sheet: SheetPreview) -> dict[str, Any]:
 
 
 def _fold(pattern: CreasePattern, motion: Floats | None, slider: Slider) -> dict[str, Any]:
-    assignments = [letter for letter in ASSIGNMENTS if np.any(pattern.edges_assignment == letter)]
-    kinds = np.array([assignments.index(letter) for letter in pattern.edges_assignment.tolist()])
+    letters = pattern.edges_assignment.copy()
+    if pattern.seams is not None:
+        letters[pattern.seams] = _SEAM
+    assignments = [letter for letter in (*ASSIGNMENTS, _SEAM) if np.any(letters == letter)]
+    kinds = np.array([assignments.index(letter) for letter in letters.tolist()])
     ends = pattern.vertices_coords[pattern.edges_vertices]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    lengths[letters == _SEAM] /= 2  # each seam has two sides
     triangles, owners = triangulate(pattern.faces_vertices, pattern.vertices_coords)
     flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
     forms = [_form("Flat", flat[None], flat=True)]

@@ -47,6 +47,7 @@ const CREASES = {
   U: { name: "Unassigned", colour: "--crease-flat", width: 0.55 },
   C: { name: "Cut", colour: "#cc79a7", width: 0.8 },
   J: { name: "Join", colour: "--crease-flat", width: 0.55 },
+  S: { name: "Seam", colour: "#009e73", width: 1 },
 };
 const THICKEST = 2.2;
 const RAMP = ["#4575b4", "#abd9e9", "#ffffbf", "#fdae61", "#d73027"];
