@@ -34,10 +34,19 @@ class Line:
     baud: Annotated[int, option(_BAUD.kind, _BAUD.help)] = _BAUD.default
     wait: Annotated[float, option(_WAIT.kind, _WAIT.help)] = _WAIT.default
 
-    @property
-    def options(self) -> LineOptions:
-        """The options of a conversation."""
-        return {"baud": self.baud, "wait": self.wait}
+    def options(self, console: Console) -> LineOptions:
+        """The options of a conversation; ``console`` says if the opening of the port reset the
+        board, and what that undid.
+        """
+
+        def tell() -> None:
+            console.note(
+                f"The opening of {self.port} restarted the board: an unlocking, an origin set with "
+                "G92 and a position that was not homed are forgotten, and will be by the next "
+                "command too; 'miurafab cut --home' homes and cuts in one conversation."
+            )
+
+        return {"baud": self.baud, "wait": self.wait, "on_restart": tell}
 
 
 def list_(*, console: Console = Console()) -> int:
@@ -56,7 +65,7 @@ def info(*, line: Line, console: Console = Console()) -> int:
     """Say what the controller is and what state it is in."""
     from miurafab.machine import actions
 
-    console.answer(asdict(actions.machine_info(line.port, **line.options)))
+    console.answer(asdict(actions.machine_info(line.port, **line.options(console))))
     return DONE
 
 
@@ -65,7 +74,7 @@ def settings(*, line: Line, console: Console = Console()) -> int:
     from miurafab.grbl.codes import setting_codes
     from miurafab.machine import actions
 
-    texts = actions.read_settings(line.port, **line.options).texts
+    texts = actions.read_settings(line.port, **line.options(console)).texts
     codes = setting_codes()
     rows = [
         (f"${number}", text, codes[number].unit, codes[number].name)
@@ -90,7 +99,7 @@ def backup(
     """Save the controller's settings to a file, as '$$' prints them."""
     from miurafab.machine import actions
 
-    read = actions.read_settings(line.port, **line.options)
+    read = actions.read_settings(line.port, **line.options(console))
     file.write_text(read.dump(), encoding="ascii", newline="\n")
     console.answer({"file": str(file), "settings": len(read.texts)})
     return DONE
@@ -106,7 +115,7 @@ def restore(
     """Write the settings of a saved file that differ, and read them back."""
     from miurafab.machine import actions
 
-    changed = actions.write_settings(line.port, actions.read_dump(file), **line.options)
+    changed = actions.write_settings(line.port, actions.read_dump(file), **line.options(console))
     console.answer(
         {"changed": {f"${number}": text for number, text in changed.items()}},
         lambda: (
@@ -122,14 +131,14 @@ def home(*, line: Line, console: Console = Console()) -> int:
     """Run the homing cycle."""
     from miurafab.machine import actions
 
-    return _answer_state(console, actions.home(line.port, **line.options))
+    return _answer_state(console, actions.home(line.port, **line.options(console)))
 
 
 def unlock(*, line: Line, console: Console = Console()) -> int:
     """Unlock the controller after an alarm, without homing."""
     from miurafab.machine import actions
 
-    return _answer_state(console, actions.unlock(line.port, **line.options))
+    return _answer_state(console, actions.unlock(line.port, **line.options(console)))
 
 
 def jog(
@@ -146,7 +155,9 @@ def jog(
     """Move the machine with the beam off."""
     from miurafab.machine import actions
 
-    report = actions.jog(line.port, x=x, y=y, feed_mm_min=speed, absolute=to, **line.options)
+    report = actions.jog(
+        line.port, x=x, y=y, feed_mm_min=speed, absolute=to, **line.options(console)
+    )
     return _answer_state(console, report)
 
 
@@ -201,7 +212,7 @@ def talk(*, line: Line, console: Console = Console()) -> int:
 
     said: list[str] = []
     tell = said.append if console.wants_json else console.line
-    actions.talk(line.port, sys.stdin, tell, **line.options)
+    actions.talk(line.port, sys.stdin, tell, **line.options(console))
     if console.wants_json:
         console.answer({"said": said})
     return DONE

@@ -50,12 +50,14 @@ class MachineInfo:
 
 
 class LineOptions(TypedDict, total=False):
-    """``baud``, the seconds to ``wait`` for the start of the board, and the ``settings`` of the
-    controller in memory if the port is ``virtual``.
+    """``baud``, the seconds to ``wait`` for the start of the board, the ``settings`` of the
+    controller in memory if the port is ``virtual``, and ``on_restart``, which is called if the
+    opening of the port reset the board.
     """
 
     baud: int
     wait: float
+    on_restart: Callable[[], None]
     settings: Mapping[int, float] | None
 
 
@@ -82,6 +84,8 @@ def conversation(
         at_risk = False
         try:
             session.greet(patience)
+            if session.restarted and transport.blocks and "on_restart" in line:
+                line["on_restart"]()
             at_risk = moves
             yield session
             at_risk = False

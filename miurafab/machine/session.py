@@ -42,7 +42,8 @@ class Session:
     """A conversation over ``transport``; mutable, for one thread.
 
     ``check`` is called before every read: it raises the exception that should interrupt the
-    conversation. ``on_data`` is called with the bytes as they arrive.
+    conversation. ``on_data`` is called with the bytes as they arrive. ``restarted``: the opening of
+    the port reset the board.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class Session:
     ) -> None:
         self.connection = connection
         self.banner = Banner("", "")
+        self.restarted = False
         self.status: StatusReport | None = None
         self.work_offset: tuple[float, ...] | None = None
         self.overrides = AS_WRITTEN
@@ -252,6 +254,7 @@ class Session:
         :class:`~miurafab.errors.PortError` if nothing that speaks GRBL answers.
         """
         banner = self._wait_banner(patience)
+        self.restarted = banner is not None
         if banner is None:
             report = self._fresh_status(1.0)
             if report is not None and report.state in _BUSY:

@@ -14,6 +14,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Protocol
 
 import serial
@@ -313,6 +314,20 @@ def list_ports() -> list[tuple[str, str]]:
     return sorted((port.device, port.description or "") for port in ports)
 
 
+def _holder(port: str) -> str:
+    """Who has ``port``, as far as the system tells (Linux: the open files in ``/proc``)."""
+    device = os.path.realpath(port)
+    for link in Path("/proc").glob("[1-9]*/fd/*"):
+        process = link.parent.parent
+        try:
+            if os.path.realpath(link) == device and process.name != str(os.getpid()):
+                words = (process / "cmdline").read_bytes().decode("utf-8", "replace").split("\0")
+                return f", process {process.name} ({' '.join(words).strip()[:100]})"
+        except OSError:  # it has ended, or belongs to somebody else
+            continue
+    return ""
+
+
 def _no_such_port(port: str) -> str:
     known = ", ".join(name for name, _ in list_ports())
     there = f"the ports here are {known}" if known else "this computer has no serial port"
@@ -323,7 +338,10 @@ def _why_not_opened(port: str, fault: Exception) -> str:
     number = getattr(fault, "errno", None)
     text = str(fault)
     if number in (errno.EAGAIN, errno.EWOULDBLOCK, errno.EBUSY) or "lock port" in text:
-        return f"The port {port} is in use by another program; close that program first."
+        return (
+            f"The port {port} is in use by another program{_holder(port)}; do it there, or close "
+            "that program first."
+        )
     if number == errno.EACCES or "Access is denied" in text:
         return (
             f"The port {port} may not be opened by this user, or another program has it; on Linux "

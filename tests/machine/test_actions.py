@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from wires import FakeWire
 
 from miurafab.errors import ControllerError, InputError, PortError, ProfileError
 from miurafab.grbl.settings import Settings
 from miurafab.machine import actions
 from miurafab.machine.transport import open_port
 from miurafab.profiles import load_machine
-from miurafab.simulate.grbl.controller import virtual_settings
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 LASER = virtual_settings(load_machine("grbl-laser-400"))
 
@@ -99,3 +100,34 @@ def test_homing_and_unlocking() -> None:
 def test_a_port_that_cannot_be_opened_says_why(port: str, sentence: str) -> None:
     with pytest.raises(PortError, match=sentence):
         open_port(port, 115_200)
+
+
+@pytest.mark.parametrize("resets", [True, False])
+def test_a_board_that_its_port_resets_is_told(
+    resets: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And what a command did holds for the next one where it does not: unlock, then jog."""
+    device = VirtualGrbl({22: 1, 24: 500, 25: 3000})
+    device.advance(0.1)
+    device.take_output()
+
+    class Board(FakeWire):
+        blocks = True
+
+        def close(self) -> None:
+            if resets:
+                device.power_cycle()
+
+    if resets:
+        device.power_cycle()
+    monkeypatch.setattr(actions, "open_port", lambda *line: Board(device))
+    told: list[int] = []
+    state = actions.unlock("p", on_restart=lambda: told.append(1)).state
+    assert state == "Idle"
+    if resets:
+        with pytest.raises(ControllerError, match="locked after an alarm or before homing"):
+            actions.jog("p", x=3.0, on_restart=lambda: told.append(1))
+    else:
+        assert actions.jog("p", x=3.0, on_restart=lambda: told.append(1)).state == "Idle"
+        assert device.position[0] == pytest.approx(3.0)
+    assert told == ([1, 1] if resets else [])

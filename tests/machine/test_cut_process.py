@@ -211,7 +211,7 @@ def test_a_second_command_on_the_same_port_is_refused(nc: Path, tmp_path: Path) 
     count = len(bench.bytes_came)
     said = words(bench.finish(second))
     assert second.returncode == 3
-    assert said.startswith(f"The port {bench.wire.address} is in use by another program; ")
+    assert said.startswith(f"The port {bench.wire.address} is in use by another program, process ")
     assert len(bench.bytes_came) > count
     assert b"\x18" not in bench.bytes_came
     assert process.poll() is None

@@ -97,7 +97,7 @@ def test_a_port_in_use_is_refused_and_the_job_goes_on(bench: Bench) -> None:
         second = subprocess.run(
             [sys.executable, "-c", code, bench.wire.address], capture_output=True, text=True
         )
-        assert "is in use by another program" in second.stderr
+        assert f"is in use by another program, process {process.pid} (" in second.stderr
         count = bench.bytes_came.count(b"\n")
         bench.run(lambda: bench.bytes_came.count(b"\n") > count + 5)
         assert process.poll() is None
