@@ -117,7 +117,7 @@ class GrblDriver(StreamDriver):
         if plan.options.at is not None:
             session.command("G92X{:.3f}Y{:.3f}".format(*plan.options.at))
         if plan.program is not None:
-            travel = check_travel(plan.program, settings, job_offset(session))
+            travel = check_travel(plan.program, settings, job_offset(session), homed=plan.homed)
             forced += raise_findings(travel, plan.options.force, ControllerError)
         forced += tuple(modes.findings())
         if plan.options.check_mode:

@@ -126,6 +126,15 @@ def longest_line(machine: MachineProfile) -> int:
     return machine.controller.line_chars - (FRAME if machine.dialect == "marlin" else 0)
 
 
+def fits_bed(program: Program | None, machine: MachineProfile) -> bool:
+    """Whether some origin puts all moves of ``program`` on the bed."""
+    if program is None or not len(program):
+        return False
+    extent = np.ptp(program.end[:, :2], axis=0)
+    size = np.array([machine.bed.width_mm, machine.bed.height_mm])
+    return bool((extent <= size + TOLERANCE_MM).all())
+
+
 def first_outside(ends: Floats, low: Floats, high: Floats) -> tuple[int, int] | None:
     """The index of the first of ``ends`` (n, 2) outside the box and the number of all, or None."""
     outside = ((ends < low - TOLERANCE_MM) | (ends > high + TOLERANCE_MM)).any(axis=1)

@@ -10,7 +10,7 @@ from miurafab.errors import GcodeError, InputError
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
-from miurafab.machine.judge_job import JudgedJob, judge_job
+from miurafab.machine.judge_job import JudgedJob, fits_bed, judge_job
 from miurafab.machine.preflight import raise_findings, require_known
 from miurafab.machine.resume import Resumption
 from miurafab.options import Flag, Pair, Several, Text, check_options, declared, length, option
@@ -19,6 +19,7 @@ from miurafab.profiles.machine import Controller
 
 _WAIT = declared(Controller)["wait"]
 AtPause = Literal["wait", "go on", "stop"]
+_HAS_OFFSETS = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc")
 _NO_CHECK_MODE = ("marlin", "hpgl")
 
 
@@ -61,7 +62,8 @@ class JobPlan:
     ``program`` is None where it could not be read and that was forced or is left to check mode;
     ``forced`` are the refusals that were overridden. ``at_pause`` is what is done where the program
     waits for a person (``M0``): a person at the keys goes on (``wait``), the job goes on by itself
-    (``go on``), or it ends, since nobody is there (``stop``).
+    (``go on``), or it ends, since nobody is there (``stop``). With ``homed`` the job may lie
+    anywhere within the machine's travel, from the origin that the controller tells.
     """
 
     job: Job
@@ -72,6 +74,7 @@ class JobPlan:
     resumption: Resumption | None
     forced: tuple[Finding, ...]
     at_pause: AtPause = "stop"
+    homed: bool = False
 
     @property
     def wait(self) -> float:
@@ -129,6 +132,11 @@ def plan_job(
         judged = judge_job(job, machine, most_power=most_power)
     # In check mode the controller itself is asked what it thinks of every line.
     passed = {"m3", "program"} if options.check_mode else {"m3"} if options.allow_m3 else set()
+    homed = options.home and machine.dialect in _HAS_OFFSETS and fits_bed(judged.program, machine)
+    if homed:  # the controller then says where the job's origin is, and whether all of it is there
+        passed.add("bounds")
     findings = [finding for finding in judged.findings if finding.code not in passed]
     forced = raise_findings(findings, options.force, GcodeError)
-    return JobPlan(job, machine, judged.lines, judged.program, options, resumption, forced)
+    return JobPlan(
+        job, machine, judged.lines, judged.program, options, resumption, forced, homed=homed
+    )

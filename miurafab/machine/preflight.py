@@ -104,13 +104,18 @@ def check_build(job: Job, machine: MachineProfile, flags: str) -> Iterator[Findi
 
 
 def check_travel(
-    program: Program, settings: Settings, work_offset: tuple[float, ...] | None
+    program: Program,
+    settings: Settings,
+    work_offset: tuple[float, ...] | None,
+    *,
+    homed: bool = False,
 ) -> Iterator[Finding]:
-    """The check ``travel``: with soft limits, GRBL's machine coordinates run from -travel to 0
-    (``limits.c``). ``work_offset`` is what the controller adds to the job's coordinates.
+    """The check ``travel``: with soft limits, or once it is ``homed``, GRBL's machine coordinates
+    run from -travel to 0 (``limits.c``). ``work_offset`` is what the controller adds to the job's
+    coordinates.
     """
     values = settings.values
-    if not values.get(20) or not len(program):
+    if not (values.get(20) or homed) or not len(program):
         return
     offset = np.array((work_offset or (0.0, 0.0))[:2])
     travel = np.array([values.get(130, np.inf), values.get(131, np.inf)])
@@ -123,7 +128,7 @@ def check_travel(
         yield Finding(
             "travel",
             f"{in_line(program.name, line, count)} would move the machine to X{x:.3f} Y{y:.3f} in "
-            "its own coordinates, past its soft limits ($20); home it and set the work origin so "
-            "that the sheet lies within the travel.",
+            "its own coordinates, past its soft limits ($20) or its travel ($130, $131); home it "
+            "and set the work origin so that the sheet lies within the travel.",
             f"{program.name}:{line}",
         )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from wires import FakeWire
 
-from miurafab.errors import ControllerError, PortError
+from miurafab.errors import ControllerError, GcodeError, PortError
 from miurafab.gcode.job import Job
 from miurafab.machine.modes import SET
 from miurafab.machine.planning import SendOptions, plan_job
@@ -157,3 +157,20 @@ def test_a_board_that_starts_late_is_waited_for() -> None:
     assert wire.device.position[:2] == pytest.approx((20, 10))
     slow = replace(MACHINE, controller=replace(MACHINE.controller, wait=10.0))
     deliver(plan_job(job, slow), late(8.0), StopSignals())
+
+
+NEGATIVE = "G21\nG90\nM4 S0\nG0 X-50 Y-50\nG1 X-10 S500 F3000\nG1 Y-10\nM5\nG0 X0 Y0\n"
+
+
+def test_a_job_in_the_negative_quadrant_is_placed_by_a_homed_machine() -> None:
+    """After homing GRBL stands near 0 of its machine coordinates, which run from -400 to 0."""
+    with pytest.raises(GcodeError, match="off the bed"):
+        plan_job(Job("job.nc", NEGATIVE), MACHINE)
+    device = controller(offset="G10L2P1X0Y0", s22=1, s24=500, s25=3000)
+    _, box = cut(device, NEGATIVE, home=True)
+    np.testing.assert_allclose(box, [-50, -50, -10, -10], atol=0.06)
+    beyond = controller(offset="G10L2P1X-360Y0", s22=1, s24=500, s25=3000)
+    with pytest.raises(ControllerError, match=r"X-410\.000 Y-50\.000 in its own .*'force' travel"):
+        cut(beyond, NEGATIVE, home=True)
+    with pytest.raises(GcodeError, match="off the bed"):  # it fits nowhere
+        plan_job(Job("job.nc", NEGATIVE + "G0 X380\n"), MACHINE, SendOptions(home=True))
