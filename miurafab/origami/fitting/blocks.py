@@ -68,6 +68,47 @@ def kawasaki(points: Floats, charts: QuadCharts) -> Block:
     )
 
 
+def folds(points: Floats, charts: QuadCharts) -> Block:
+    """The fold angle at each of the :attr:`QuadCharts.neighbouring_facets` (f, g), in (-pi, pi].
+
+    With n_f and n_g the normals and e the direction of the crease, f to its left:
+    rho = atan2(s, c), s = (n_f x n_g) . e, c = n_f . n_g, so that
+
+        (s^2 + c^2) d rho = c ds - s dc.
+
+    With N the area vector of a facet, its normal changes by that part of dN / |N| that is
+    perpendicular to it; N = (p2 - p0) x (p3 - p1).
+    """
+    faces = charts.faces_vertices
+    p = points[faces]
+    a, b = p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]
+    vector = np.cross(a, b)
+    size = np.linalg.norm(vector, axis=1)
+    normal = vector / size[:, None]
+    f, g = charts.neighbouring_facets.T
+    beside = faces[f, 1] == faces[g, 0]
+    ends = np.stack([np.where(beside, faces[f, 1], faces[f, 3]), faces[f, 2]], axis=1)
+    along = points[ends[:, 1]] - points[ends[:, 0]]
+    length = np.linalg.norm(along, axis=1)[:, None]
+    e, n, m = along / length, normal[f], normal[g]
+    both = np.cross(n, m)
+    c, s = (np.einsum("nk,nk->n", *pair)[:, None] for pair in ((n, m), (both, e)))
+    whole = c**2 + s**2
+    parts = []
+    for one, own, change in (
+        (f, n, c * np.cross(m, e) - s * m),
+        (g, m, c * np.cross(e, n) - s * n),
+    ):
+        change = change - own * np.einsum("nk,nk->n", own, change)[:, None]
+        change = change / whole / size[one][:, None]
+        by_a, by_b = np.cross(b[one], change), np.cross(change, a[one])
+        parts += [-by_a, -by_b, by_a, by_b]
+    turn = c * (both - s * e) / whole / length
+    vertices = np.concatenate([faces[f], faces[g], ends], axis=1)
+    rho = np.arctan2(s[:, 0], c[:, 0])
+    return rho, vertices, np.stack([*parts, -turn, turn], axis=1)
+
+
 def stacked(blocks: list[Block], size: int) -> tuple[Floats, sparse.csr_array]:
     """The values (n,) of all ``blocks`` and their Jacobian (n, ``size``)."""
     columns, widths = [], []

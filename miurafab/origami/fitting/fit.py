@@ -29,7 +29,8 @@ from miurafab.surfaces.tube import TubeSurface
 TRIED = 3
 """The starts that are brought to fair sheets, for each number of pieces."""
 LARGE = 900
-"""A sheet of more facets is brought to the end from the likeliest start alone, if it is clean."""
+"""A sheet of more facets is brought to the end from the likeliest start alone, if that one will
+do."""
 PIECES = (1, 2, 3, 4)
 PIECES_ROUND = (1, 2, 6, 8, 12)
 """The numbers of pieces that ``auto`` tries, on a sheet and all round an axis."""
@@ -178,8 +179,7 @@ class _FitSearch:
             self._tell(start)
             shaken = start.shaken(request.seed) if request.seed else start
             yield from polished(request, shaken, self._check_time)
-            clean = self.best is not None and not self.best.rank[0]
-            if self._settled() or (large and clean):
+            if self._settled() or (large and self._one_will_do()):
                 return
 
     def _tell(self, start: Start) -> None:

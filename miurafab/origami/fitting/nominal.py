@@ -88,15 +88,23 @@ def rim_of_domain(
     return Rim(together, nominal.centres[together], np.concatenate(outward))
 
 
-def rim_around(surface: TargetSurface, charts: QuadCharts, nominal: Nominal, rows: int) -> Rim:
-    """The rim across v of a lattice of ``rows`` rows of cells that repeats itself after two rows.
-
-    The first row of cells stands for the side of least v, the second for the other.
+def rim_of_repeated(
+    surface: TargetSurface,
+    charts: QuadCharts,
+    nominal: Nominal,
+    cells: tuple[int, int],
+    axis: int,
+    last: int,
+) -> Rim:
+    """The rim across the parameter ``axis`` of a lattice that repeats itself along it: the cells 0
+    along it stand for the side where the parameter is least, and the cells ``last`` for the other.
     """
-    step = np.array([0.0, surface.domain.height / rows / 2])
-    facets = np.flatnonzero(np.isin(charts.cells[:, 1], (0, 1)))
+    d = surface.domain
+    step = np.array([d.width / cells[0], d.height / cells[1]])[axis] / 2 * np.eye(2)[axis]
+    place = charts.cells[:, axis]
+    facets = np.flatnonzero((place == 0) | (place == last))
     uv = nominal.parameters[facets]
-    sign = np.where(charts.cells[facets, 1] == 0, -1.0, 1.0)[:, None]
+    sign = np.where(place[facets] == 0, -1.0, 1.0)[:, None]
     outward = sign * unit(surface.point(uv + step) - surface.point(uv - step))
     return Rim(facets, nominal.centres[facets], outward)
 

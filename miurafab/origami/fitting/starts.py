@@ -28,7 +28,7 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.cylinder import cylinder_on
-from miurafab.origami.fitting.nominal import Follow, Nominal, Rim, rim_around, rim_of_domain
+from miurafab.origami.fitting.nominal import Follow, Nominal, Rim, rim_of_domain, rim_of_repeated
 from miurafab.origami.fitting.outlined import OutlinedLattice, angles_of
 from miurafab.origami.fitting.reduction import Unknowns, about_z
 from miurafab.origami.fitting.request import FitRequest
@@ -240,7 +240,9 @@ def ring(
     nominal = Nominal.of(surface, unknowns.charts, *cells)
     rim = rim_of_domain(surface, unknowns.charts, nominal, cells, axes=(0,))
     if not surface.closed:
-        rim = rim.with_also(rim_around(surface, unknowns.charts, nominal, rows))
+        rim = rim.with_also(
+            rim_of_repeated(surface, unknowns.charts, nominal, cells, 1, (rows - 1) % 2)
+        )
     x = (made.vertices @ about_z((beta - surface.angle) / 2).T).ravel()
     return Start("ring", surface, "u", corrugation, cells, unknowns, x, made.steepest, rim, bands)
 
@@ -265,6 +267,10 @@ def gores(
     swapped = Swapped(surface)
     nominal = Nominal.of(swapped, unknowns.charts, *cells)
     rim = rim_of_domain(swapped, unknowns.charts, nominal, cells, axes=(1,))
+    if not surface.closed:
+        rim = rim.with_also(
+            rim_of_repeated(swapped, unknowns.charts, nominal, cells, 0, around - 1)
+        )
     x = grid[:, :around].ravel()
     return Start("gores", swapped, "v", corrugation, cells, unknowns, x, made.steepest, rim, count)
 

@@ -59,7 +59,7 @@ def assert_good(result: FitResult, middle: float) -> None:
 
 @pytest.mark.parametrize("name", ["bump", "ellipsoid", "pill"])
 def test_a_named_surface_comes_whole_with_corners_that_fold(name: str) -> None:
-    assert_good(sheet(name, (16, 16), 1), 0.6)
+    assert_good(sheet(name, (16, 16), 1), 0.3)
 
 
 def test_a_zone_of_the_sphere_is_no_drum() -> None:
@@ -67,7 +67,7 @@ def test_a_zone_of_the_sphere_is_no_drum() -> None:
     assert result.pattern is not None
     means = facet_means(result.pattern.folded_coords, result.pattern.faces_vertices)
     radius = np.linalg.norm(means, axis=1) / result.pattern.scale
-    assert np.abs(radius - 1).max() < 0.012
+    assert np.abs(radius - 1).max() < 0.008
     latitude = np.degrees(np.arcsin(means[:, 2] / np.linalg.norm(means, axis=1)))
     assert latitude.max() > 56
     assert latitude.min() < -56
@@ -76,7 +76,7 @@ def test_a_zone_of_the_sphere_is_no_drum() -> None:
 @pytest.mark.parametrize("pieces", [2, 8])
 def test_a_globe_in_pieces_closes_along_its_seams(pieces: int) -> None:
     result = sheet("ellipsoid", (16, 32), pieces, latitude="80deg", angle="360deg")
-    assert_good(result, 0.5)
+    assert_good(result, 0.3)
     pattern = result.pattern
     assert pattern is not None
     assert int(pattern.pieces.max()) + 1 == pieces
@@ -88,6 +88,16 @@ def test_a_globe_in_pieces_closes_along_its_seams(pieces: int) -> None:
     assert np.abs(ends[0] - mates).max() < 1e-9
     # gores meet along meridians of 16 edges, bands along the equator of 32
     assert len(pattern.seams) == (8 * 16 if pieces == 8 else 32)
+
+
+@pytest.mark.parametrize(("rows", "pieces"), [(9, 1), (8, 4)])
+def test_a_part_of_a_turn_ends_at_the_two_borders_of_that_part(rows: int, pieces: int) -> None:
+    result = sheet("pill", (8, rows), pieces, angle=120)
+    assert result.pattern is not None
+    x, y, _ = facet_means(result.pattern.folded_coords, result.pattern.faces_vertices).T
+    turn = np.degrees(np.arctan2(y, x))
+    step = 120 / (8 if pieces == 4 else rows)
+    assert (-turn.min(), turn.max()) == pytest.approx((60 - step / 2,) * 2, abs=step / 4)
 
 
 def test_pieces_are_cut_where_asked() -> None:

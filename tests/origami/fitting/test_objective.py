@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from miurafab.geometry.quads import QuadCharts
-from miurafab.origami.fitting.blocks import stacked
+from miurafab.origami.fitting.blocks import folds, stacked
 from miurafab.origami.fitting.nominal import Nominal, Rim, chains_of
-from miurafab.origami.fitting.objective import FairObjective
+from miurafab.origami.fitting.objective import FairObjective, Weights
 from miurafab.origami.fitting.score import bow_ties
 from miurafab.origami.fitting.seed import Corrugation, seed
 from miurafab.surfaces.catalogue import make_surface
@@ -36,6 +36,49 @@ def test_gradients_are_those_of_central_differences(term: str) -> None:
         assert np.abs(jacobian @ move.ravel() - slope).max() < 1e-6 * max(1, np.abs(slope).max())
         active += int((values != 0).any())
     assert active >= 2
+
+
+@pytest.mark.parametrize("kept", [(1, 2), (2, 1)])
+@pytest.mark.parametrize("turned", [20.0, 100.0, 179.0, 181.0, 200.0])
+def test_a_fold_past_180_degrees_reads_as_more(kept: tuple[int, int], turned: float) -> None:
+    """Two squares and the line between them, about which the second is turned."""
+    charts = QuadCharts.of_cells(np.ones(kept, dtype=bool))
+    flat = np.pad(charts.lattice.astype(float), ((0, 0), (0, 1)))
+    # seen along the crease, with the first square to its left, the second turns up
+    across, along = (flat[:, :1], 1) if kept == (1, 2) else (flat[:, 1:2], 0)
+    away = np.maximum(across - 1, 0)
+    out, up = np.eye(3)[1 - along], np.array([0.0, 0.0, -1.0])
+
+    def at(angle: float) -> np.ndarray:
+        return flat - away * out + away * (np.cos(angle) * out + np.sin(angle) * up)
+
+    angle, step = np.radians(turned), 1e-6
+    rho, vertices, rows = folds(at(angle), charts)
+    assert np.cos(rho - angle) == pytest.approx(1) or np.cos(rho + angle) == pytest.approx(1)
+    _, jacobian = stacked([(rho, vertices, rows)], flat.size)
+    speed = (at(angle + step) - at(angle - step)).ravel() / (2 * step)
+    assert abs(jacobian @ speed) == pytest.approx(1.0, abs=1e-6)
+    objective = FairObjective.of(SURFACE, charts, kept[::-1], at(1.0))
+    w = Weights()
+    values = [float(np.abs(value).sum()) for value, _, _ in objective._folds(at(angle))]
+    assert values == pytest.approx(
+        [
+            w.folds * max(0.0, w.least_fold - angle),
+            w.folds * max(0.0, angle - w.greatest_fold),
+            w.closed * max(0.0, angle - w.closed_fold),
+        ],
+        abs=1e-9,
+    )
+
+
+def test_folds_have_the_sense_of_a_miura_tessellation() -> None:
+    assert (np.sign(folds(START, CHARTS)[0]) == OBJECTIVE.sense).all()
+    # a few folds that the start presses past 180 degrees do not change the sense of any
+    pressed = START.copy()
+    pressed[CHARTS.faces_vertices[20, 2]] -= [0.0, 0.0, 1.0]
+    other = FairObjective.of(SURFACE, CHARTS, CELLS, pressed)
+    assert not (np.sign(folds(pressed, CHARTS)[0]) == OBJECTIVE.sense).all()
+    assert (other.sense == OBJECTIVE.sense).all()
 
 
 def test_the_distance_is_to_the_tangent_plane() -> None:
