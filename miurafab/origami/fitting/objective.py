@@ -104,8 +104,9 @@ class FairObjective:
 
     ``followers`` (K, k) are the vertices whose means follow the target, ``places`` (K, 3) where
     they belong, ``feet`` (K, 2) the parameters of the nearest points to start from. ``area`` (F,)
-    is A of each facet, ``sense`` (P,) the sign that each fold is to have. ``aspect`` is the greatest ratio of two sides, ``kawasaki`` the greatest
-    |a0 + a2 - pi| in radians; None is no limit.
+    is A of each facet, ``sense`` (P,) the sign that each fold is to have. ``aspect`` is the
+    greatest ratio of two sides, ``kawasaki`` the greatest |a0 + a2 - pi| in radians; None is no
+    limit.
     """
 
     surface: TargetSurface
@@ -259,8 +260,8 @@ class FairObjective:
 
 
 def sense_of_folds(points: Floats, charts: QuadCharts) -> Floats:
-    """(P,) 1 or -1, the sign of the fold between each two neighbouring facets in a Miura tessellation
-    of the same hand as ``points`` (V, 3).
+    """(P,) 1 or -1, the sign of each fold in a Miura tessellation of the same hand as ``points``
+    (V, 3).
 
     All folds between two rows have one sign and those of the next two the other; along the rows and
     along the columns the signs of the other folds alternate. The hand is that of most folds.
@@ -272,7 +273,7 @@ def sense_of_folds(points: Floats, charts: QuadCharts) -> Floats:
     sense = 1.0 - 2 * ((row + column * beside) % 2)
     for kind in (beside, ~beside):
         sense[kind] *= np.sign((np.sign(rho) * sense)[kind].sum() + 0.5)
-    return sense
+    return np.asarray(sense)
 
 
 def _hinge(weight: float, over: Floats, vertices: Ints, gradient: Floats) -> Block:
