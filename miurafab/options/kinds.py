@@ -284,10 +284,8 @@ class Several(Kind):
         return f"{self.kind.metavar},..."
 
     def read(self, value: object) -> Any:
-        if isinstance(value, str):
-            parts: list[object] = [*value.split(",")]
-        else:
-            parts = list(value) if isinstance(value, Iterable) else [value]
+        listed = isinstance(value, str | Iterable)
+        parts = comma_parts(value) if listed else [value]
         return self.collect(_part(self.kind, part, value) for part in parts)
 
     @property
@@ -300,6 +298,15 @@ class Several(Kind):
 
     def show(self, inside: Any) -> str:
         return ",".join(self.kind.show(part) for part in inside)
+
+
+def comma_parts(value: object) -> list[Any]:
+    """The parts of text with commas between, or of a sequence. Raises ``TypeError`` for else."""
+    if isinstance(value, str):
+        return [part.strip() for part in value.split(",")]
+    if not isinstance(value, Iterable):
+        raise TypeError(f"{value!r} is no list")
+    return list(value)
 
 
 def distinct(values: Iterable[Any]) -> tuple[Any, ...]:

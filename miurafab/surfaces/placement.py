@@ -14,6 +14,7 @@ import numpy as np
 
 from miurafab.errors import UnitError
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.options.kinds import comma_parts
 from miurafab.surfaces.parameterise import locate
 from miurafab.surfaces.surface import Domain
 from miurafab.units import parse_length
@@ -55,9 +56,7 @@ class Region:
         """
         example = "write u0,u1,v0,v1 such as 0.1,0.9,0.2,0.8 or 10mm,90mm,2cm,8cm"
         try:
-            # What is no list raises the TypeError that is the answer.
-            parts = value.split(",") if isinstance(value, str) else list(value)  # type: ignore[call-overload]
-            words = [str(part).strip() for part in parts]
+            words = [str(part).strip() for part in comma_parts(value)]
             u0, u1, v0, v1 = values = [parse_length(word) for word in words]
         except (TypeError, ValueError, UnitError):
             raise ValueError(f"is '{value}'; {example}") from None

@@ -17,8 +17,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from miurafab.display import Shown
-from miurafab.files import AnyPath
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
 from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate
@@ -32,6 +30,7 @@ from miurafab.origami.energy.path import (
     towards,
     trace,
 )
+from miurafab.origami.energy.result import EnergyResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +53,7 @@ class StableState:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class EnergyCurve(Shown):
+class EnergyCurve(EnergyResult):
     """The energy along ``path``, with its barrier and stable states.
 
     Attributes
@@ -97,53 +96,21 @@ class EnergyCurve(Shown):
         """Whether a barrier lies between two stable states."""
         return self.barrier > 0 and len(self.stable) > 1
 
-    def save(self, path: AnyPath, *, title: str = "") -> None:
-        """Write a plot (``.png``, ``.svg``) or a table (``.csv``), by the ending of ``path``.
+    def _table(self) -> str:
+        from miurafab.origami.energy.plot import energy_table
 
-        Raises
-        ------
-        InputError
-            For another ending, and for a folder that does not exist.
-        """
-        from miurafab.origami.energy.plot import energy_plot, energy_table
-        from miurafab.origami.plotting import write_result
+        return energy_table(self)
 
-        write_result(
-            path,
-            "The energy",
-            lambda: energy_table(self),
-            lambda kind: energy_plot(self, kind, title),
-        )
+    def _draw(self, axes: Axes, title: str) -> None:
+        from miurafab.origami.energy.plot import draw_energy
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the energy over the driven fold angle with matplotlib.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw. The default is a new figure.
-
-        Returns
-        -------
-        matplotlib Axes
-        """
-        from miurafab.origami.energy.plot import SIZE, draw_energy
-        from miurafab.origami.plotting import shown
-
-        axes = shown(SIZE, ax)
-        draw_energy(self, axes)
-        return axes
+        draw_energy(self, axes, title)
 
     def _summary(self) -> str:
         said = "rigid" if self.rigid else "bistable" if self.bistable else "one stable state"
         unit = self.path.model.unit_joule
         barrier = f"{self.barrier * (unit or 1.0):.3g} {'k_f L' if unit is None else 'J'}"
         return f"{said}, barrier {barrier}, {len(self.path.drives)} steps"
-
-    def _picture(self) -> str:
-        from miurafab.origami.energy.plot import energy_plot
-
-        return energy_plot(self, "svg", "").decode("utf-8")
 
     def _facts(self) -> Mapping[str, object]:
         report = self.report()

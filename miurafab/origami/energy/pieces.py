@@ -10,14 +10,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from miurafab.display import Shown
 from miurafab.errors import InputError
-from miurafab.files import AnyPath
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, Paper, sheet_model
 from miurafab.origami.energy.curve import EnergyCurve, energy_curve
 from miurafab.origami.energy.path import Progress
+from miurafab.origami.energy.result import EnergyResult
 from miurafab.origami.piece import Piece, pieces_of
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PieceEnergies(Shown):
+class PieceEnergies(EnergyResult):
     """The energy curves of the pieces of a pattern.
 
     Attributes
@@ -55,50 +54,18 @@ class PieceEnergies(Shown):
         """Whether every piece folds without bending."""
         return all(curve.rigid for _, curve in self.moving)
 
-    def save(self, path: AnyPath, *, title: str = "") -> None:
-        """Write a plot (``.png``, ``.svg``) or a table (``.csv``), by the ending of ``path``.
+    def _table(self) -> str:
+        from miurafab.origami.energy.plot import pieces_table
 
-        Raises
-        ------
-        InputError
-            For another ending, and for a folder that does not exist.
-        """
-        from miurafab.origami.energy.plot import pieces_plot, pieces_table
-        from miurafab.origami.plotting import write_result
+        return pieces_table(self.moving)
 
-        write_result(
-            path,
-            "The energy",
-            lambda: pieces_table(self.moving),
-            lambda kind: pieces_plot(self.moving, kind, title),
-        )
+    def _draw(self, axes: Axes, title: str) -> None:
+        from miurafab.origami.energy.plot import draw_pieces
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the energy of every piece over its driven fold angle with matplotlib.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            Where to draw. The default is a new figure.
-
-        Returns
-        -------
-        matplotlib Axes
-        """
-        from miurafab.origami.energy.plot import SIZE, draw_pieces
-        from miurafab.origami.plotting import shown
-
-        axes = shown(SIZE, ax)
-        draw_pieces(self.moving, axes)
-        return axes
+        draw_pieces(self.moving, axes, title)
 
     def _summary(self) -> str:
         return f"{len(self.curves)} pieces, {self.verdict()}"
-
-    def _picture(self) -> str:
-        from miurafab.origami.energy.plot import pieces_plot
-
-        return pieces_plot(self.moving, "svg", "").decode("utf-8")
 
     def _facts(self) -> Mapping[str, object]:
         return {

@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from miurafab.origami.energy.curve import EnergyCurve
-from miurafab.origami.plotting import BLUE, GREEN, ORANGE, picture_bytes, without_frame
+from miurafab.origami.plotting import BLUE, GREEN, ORANGE, without_frame
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-SIZE = (6.4, 4.0)
 
 Pieces = Sequence[tuple[int, EnergyCurve]]
 """The curves of pieces, by the number of the piece."""
@@ -47,16 +45,6 @@ def _rows(curve: EnergyCurve) -> list[str]:
         ",".join([str(step), *(repr(float(value)) for value in values)])
         for step, values in enumerate(zip(*columns, strict=True))
     ]
-
-
-def energy_plot(curve: EnergyCurve, kind: str, title: str) -> bytes:
-    """The plot as a picture, ``kind`` png or svg; the same bytes for the same curve."""
-    return picture_bytes(lambda axes: draw_energy(curve, axes[0], title), kind, SIZE)
-
-
-def pieces_plot(curves: Pieces, kind: str, title: str) -> bytes:
-    """The plot of all pieces as a picture, ``kind`` png or svg."""
-    return picture_bytes(lambda axes: draw_pieces(curves, axes[0], title), kind, SIZE)
 
 
 def draw_energy(curve: EnergyCurve, axes: Axes, title: str = "") -> None:

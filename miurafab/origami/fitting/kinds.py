@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
-from typing import Any
 
 from miurafab.errors import UnitError
 from miurafab.options import Kind
+from miurafab.options.kinds import comma_parts
 from miurafab.units import parse_angle
 
 
@@ -90,7 +89,7 @@ class Poles(Kind):
 
     def read(self, value: object) -> tuple[float, ...]:
         try:
-            numbers = tuple(float(part) for part in _parts(value))
+            numbers = tuple(float(part) for part in comma_parts(value))
         except (TypeError, ValueError):
             raise ValueError(
                 f"is {value!r}; write six numbers with commas between, such as 0,0,-50,0,0,50"
@@ -117,7 +116,7 @@ class CutColumns(Kind):
 
     def read(self, value: object) -> tuple[int, ...]:
         try:
-            columns = tuple(int(str(part)) for part in _parts(value))
+            columns = tuple(int(str(part)) for part in comma_parts(value))
         except (TypeError, ValueError):
             raise ValueError(
                 f"is {value!r}; write column numbers with commas between, such as 8,16"
@@ -133,12 +132,3 @@ class CutColumns(Kind):
 
     def show(self, inside: tuple[int, ...]) -> str:
         return ",".join(map(str, inside))
-
-
-def _parts(value: object) -> list[Any]:
-    """The parts of text with commas, or of a sequence. Raises ``TypeError`` for anything else."""
-    if isinstance(value, str):
-        return list(value.split(","))
-    if not isinstance(value, Iterable):
-        raise TypeError
-    return list(value)
