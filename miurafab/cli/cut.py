@@ -16,6 +16,7 @@ from miurafab.cli.machine import PORT
 from miurafab.errors import DONE, MACHINE_FAILED, NO, WAITING, InputError, MachineError, OptionError
 from miurafab.findings import findings_json
 from miurafab.options import File, Flag, Text, Whole, read_options
+from miurafab.profiles.own import own_defaults
 
 if TYPE_CHECKING:
     from miurafab.machine.signals import StopSignals
@@ -90,9 +91,12 @@ def cut(
     options of a fit are for a target or a design.
     """
     options, fitting = _read(given, rigid)
+    if not port and not dry_run and (own := own_defaults().port):
+        port = [own]
     if not port and not dry_run:
         raise InputError(
-            "Name the machine's `port` ('virtual' needs no machine), or ask for `dry_run`."
+            "Name the machine's `port` ('virtual' needs no machine; 'miurafab use' names it once), "
+            "or ask for `dry_run`."
         )
     from miurafab.machine.transport import require_port
     from miurafab.workflow.cut import prepare

@@ -78,9 +78,9 @@ def _list_or_show(
     if name is not None:
         console.answer(asdict(load(name)))
         return DONE
-    from miurafab.profiles import shipped_names
+    from miurafab.profiles import known_names
 
-    titles = {stem: load(stem).title for stem in shipped_names(kind)}
+    titles = {stem: load(stem).title for stem in known_names(kind)}
     console.answer(
         {kind: [{"name": stem, "title": title} for stem, title in titles.items()]},
         lambda: console.rows(("name", "title"), list(titles.items())),

@@ -36,6 +36,7 @@ from miurafab.cli import (
     studio,
     surfaces,
     tradeoff,
+    use,
     virtual,
 )
 from miurafab.cli.console import Screen
@@ -89,6 +90,7 @@ COMMANDS: Mapping[str, Command] = {
         profiles.MATERIALS_ACTIONS,
         profiles.MATERIALS_HELP,
     ),
+    "use": Command(MACHINES, use.use, use.EXAMPLES),
     "virtual": Command(MACHINES, virtual.virtual, virtual.EXAMPLES),
     "studio": Command(MORE, studio.studio, studio.EXAMPLES),
     "doctor": Command(MORE, doctor.doctor, doctor.EXAMPLES),

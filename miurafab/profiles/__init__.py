@@ -7,6 +7,7 @@ from miurafab.profiles.shipped import (
     DEFAULT_MATERIAL,
     find_file,
     find_profile,
+    known_names,
     shipped_directory,
     shipped_names,
 )
@@ -23,6 +24,7 @@ __all__ = [
     "Table",
     "find_file",
     "find_profile",
+    "known_names",
     "load_machine",
     "load_material",
     "read_machine",

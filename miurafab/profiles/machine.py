@@ -189,9 +189,11 @@ class MachineProfile(Shown):
         return round(tool.s_min + fraction * (tool.s_max - tool.s_min)) if fraction > 0 else 0
 
 
-def read_machine(machine: MachineProfile | AnyPath) -> MachineProfile:
-    """``machine`` itself, or the profile that it names (:func:`load_machine`)."""
-    return machine if isinstance(machine, MachineProfile) else load_machine(machine)
+def read_machine(machine: MachineProfile | AnyPath | None) -> MachineProfile:
+    """``machine`` itself, or the profile that it names; for None the default machine."""
+    if isinstance(machine, MachineProfile):
+        return machine
+    return load_machine(find_profile("firmware_profiles", None) if machine is None else machine)
 
 
 def load_machine(name: AnyPath) -> MachineProfile:

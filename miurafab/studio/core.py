@@ -30,10 +30,12 @@ from miurafab.origami.fitting.request import DEFAULT_FACETS, DEFAULT_SIZE_MM, FA
 from miurafab.profiles import (
     DEFAULT_MACHINE,
     DEFAULT_MATERIAL,
+    find_profile,
+    known_names,
     load_machine,
     load_material,
-    shipped_names,
 )
+from miurafab.profiles.shipped import Kind
 from miurafab.studio.form import by_label, filled
 from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
@@ -121,21 +123,26 @@ def _catalogue() -> dict[str, Any]:
         "surfaces": [_surface(entry) for entry in CATALOGUE.values()],
         "machines": [
             {"name": name, "title": load_machine(name).title}
-            for name in shipped_names("firmware_profiles")
+            for name in known_names("firmware_profiles")
         ],
         "materials": [
-            {"name": name, "title": load_material(name).title}
-            for name in shipped_names("materials")
+            {"name": name, "title": load_material(name).title} for name in known_names("materials")
         ],
         "file_suffixes": (*MESH_SUFFIXES, PATTERN_SUFFIX),
         "file_limit": FILE_LIMIT,
         "defaults": {
             "facets": FACETS.show(DEFAULT_FACETS),
             "size": f"{DEFAULT_SIZE_MM:g}mm",
-            "machine": DEFAULT_MACHINE,
-            "material": DEFAULT_MATERIAL,
+            "machine": _default("firmware_profiles", DEFAULT_MACHINE),
+            "material": _default("materials", DEFAULT_MATERIAL),
         },
     }
+
+
+def _default(kind: Kind, usual: str) -> str:
+    """The person's own default, if it is known by its name: the page chooses by name."""
+    own = find_profile(kind, None).stem
+    return own if own in known_names(kind) else usual
 
 
 def _surface(entry: NamedSurface) -> dict[str, Any]:

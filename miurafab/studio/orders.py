@@ -15,7 +15,7 @@ from typing import Any
 from miurafab.errors import InputError, TargetError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.options import Declared, Flag, Whole, read_options
-from miurafab.profiles import shipped_names
+from miurafab.profiles import known_names
 from miurafab.studio.form import FIT, LAYOUT
 from miurafab.studio.recipe import Value
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface
@@ -84,8 +84,8 @@ def read_layout(body: bytes) -> LayoutOrder:
     Raises :class:`~miurafab.errors.InputError`.
     """
     order = _read(body, ("machine", "material", "options"))
-    machine = _listed("machine", order.get("machine"), shipped_names("firmware_profiles"))
-    material = _listed("material", order.get("material"), shipped_names("materials"))
+    machine = _listed("machine", order.get("machine"), known_names("firmware_profiles"))
+    material = _listed("material", order.get("material"), known_names("materials"))
     options = _options(order.get("options", {}), LAYOUT)
     read_options(LayoutOptions, options)
     return LayoutOrder(machine, material, options)

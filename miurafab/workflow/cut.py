@@ -16,7 +16,7 @@ from miurafab.errors import OptionError
 from miurafab.files import AnyPath, as_path
 from miurafab.findings import Finding, refusals
 from miurafab.gcode.job import Job
-from miurafab.profiles import DEFAULT_MACHINE, MachineProfile, read_machine
+from miurafab.profiles import MachineProfile, read_machine
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 from miurafab.workflow.preview import assumed_machine, named_machine
 
@@ -156,7 +156,7 @@ def _from_value(
     directory = as_path(out or JOBS / name, "The job directory")
     machine = wanted.machine if machine is None else machine
     if result.pattern is None or result.status != "converged":
-        profile = read_machine(machine or DEFAULT_MACHINE)
+        profile = read_machine(machine)
         return Prepared(name, profile, (), (), report=result.report(), refused=result.findings)
     directory.mkdir(parents=True, exist_ok=True)
     file = directory / f"{name}.fold"
@@ -188,7 +188,7 @@ def _from_pattern(
     options: LayoutOptions | None = None,
 ) -> Prepared:
     if faults:
-        profile = read_machine(DEFAULT_MACHINE if machine is None else machine)
+        profile = read_machine(machine)
         return Prepared(name, profile, (), (), report=report, refused=faults)
     from miurafab.workflow.sheets import make_job
 

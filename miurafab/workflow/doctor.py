@@ -14,7 +14,7 @@ from typing import Any
 from miurafab.display import Shown
 from miurafab.errors import ProfileError
 from miurafab.machine.transport import list_ports
-from miurafab.profiles import load_machine, load_material, shipped_names
+from miurafab.profiles import known_names, load_machine, load_material
 from miurafab.version import __version__
 
 ROOM_NEEDED_MB = 100
@@ -115,12 +115,12 @@ def _trouble(device: str) -> str | None:
 
 def _profile_problems() -> list[str]:
     problems = []
-    for name in shipped_names("firmware_profiles"):
+    for name in known_names("firmware_profiles"):
         try:
             load_machine(name)
         except ProfileError as fault:
             problems.append(str(fault))
-    for name in shipped_names("materials"):
+    for name in known_names("materials"):
         try:
             load_material(name)
         except ProfileError as fault:

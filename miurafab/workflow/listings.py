@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from miurafab.profiles import load_machine, load_material, shipped_names
+from miurafab.profiles import known_names, load_machine, load_material
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface
 
 
@@ -41,7 +41,7 @@ def list_machines() -> dict[str, str]:
     >>> "grbl-laser-400" in mf.list_machines()
     True
     """
-    return {name: load_machine(name).title for name in shipped_names("firmware_profiles")}
+    return {name: load_machine(name).title for name in known_names("firmware_profiles")}
 
 
 def list_materials() -> dict[str, str]:
@@ -58,4 +58,4 @@ def list_materials() -> dict[str, str]:
     >>> "card-250" in mf.list_materials()
     True
     """
-    return {name: load_material(name).title for name in shipped_names("materials")}
+    return {name: load_material(name).title for name in known_names("materials")}

@@ -20,7 +20,7 @@ from miurafab.gcode.job import Job
 from miurafab.grbl.settings import parse_dump
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.profiles import DEFAULT_MACHINE, MachineProfile, load_machine, read_machine
+from miurafab.profiles import MachineProfile, read_machine
 from miurafab.workflow.dry_run import (
     SheetPreview,
     clock_text,
@@ -337,8 +337,8 @@ def _made_for(
 
 
 def assumed_machine(path: Path) -> MachineProfile:
-    """The machine assumed for a file that names none: a cutter for HPGL, else a common laser."""
-    return load_machine(_ASSUMED_CUTTER if path.suffix.lower() == ".plt" else DEFAULT_MACHINE)
+    """The machine assumed for a file that names none: a cutter for HPGL, else the default."""
+    return read_machine(_ASSUMED_CUTTER if path.suffix.lower() == ".plt" else None)
 
 
 def _pattern(path: Path, layout: _Layout, findings: list[Finding]) -> CreasePattern | None:

@@ -62,6 +62,7 @@ def _command(arguments, folder, expected):
         contextlib.redirect_stdout(shown),
         contextlib.redirect_stderr(told),
         mock.patch.object(sys, "argv", ["miurafab", *arguments]),
+        mock.patch.dict(os.environ, XDG_CONFIG_HOME=str(folder / "configuration")),
         mock.patch.object(sys, "stdin", io.StringIO()),
     ):
         try:

@@ -1,0 +1,78 @@
+"""``miurafab use``: own defaults and own profiles, by name."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+from command_line import sentence
+
+import miurafab
+from miurafab.profiles import shipped_directory
+from miurafab.profiles.own import OwnDefaults, configuration_folder, own_defaults
+
+
+@pytest.fixture(autouse=True)
+def configuration(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "own"))
+    return tmp_path / "own" / "miurafab"
+
+
+def test_without_a_file_there_are_none_and_the_usual_profiles_hold(configuration):
+    assert configuration_folder() == configuration
+    assert own_defaults() == OwnDefaults()
+
+
+def test_they_hold_where_none_is_named(run, tmp_path, configuration):
+    done = run("use", "grbl-co2-k40", "paper-100", "virtual", "--json")
+    assert json.loads(done.stdout)["port"] == "virtual"
+    run("fit", "plane", "--facets", "4x4", "--size", "40mm", "-o", "p.fold")
+    run("sheets", "p.fold", "-o", "job")
+    layout = json.loads((tmp_path / "job" / "layout.json").read_text())
+    assert (layout["machine"], layout["material"]) == ("grbl-co2-k40", "paper-100")
+    done = run("cut", "job", "--json")
+    assert json.loads(done.stdout)["port"] == "virtual"
+    assert json.loads(run("use", "--forget", "--json").stdout)["machine"] is None
+    assert "'miurafab use' names it once" in sentence(run("cut", "job"), 2)
+
+
+def test_a_machine_alone_leaves_the_rest(run):
+    run("use", "grbl-co2-k40", "paper-100", "virtual")
+    run("use", "grbl-laser-400")
+    assert own_defaults() == OwnDefaults("grbl-laser-400", "paper-100", "virtual")
+
+
+def test_what_is_not_known_is_not_taken(run):
+    assert "did you mean 'grbl-laser-400'" in sentence(run("use", "grbl-laser-40"), 2)
+    assert "is not a known material" in sentence(run("use", "grbl-laser-400", "cheese"), 2)
+    assert own_defaults() == OwnDefaults()
+
+
+def test_own_profiles_are_known_by_their_names_and_travel_with_the_job(
+    run, tmp_path, configuration
+):
+    (configuration / "machines").mkdir(parents=True)
+    own = configuration / "machines" / "my-laser.toml"
+    shutil.copy(shipped_directory("firmware_profiles") / "grbl-co2-k40.toml", own)
+    assert miurafab.load_machine("my-laser").bed.width_mm == 300
+    assert "my-laser" in miurafab.list_machines()
+    assert "my-laser" in run("profiles").stdout
+    run("use", "my-laser")
+    run("fit", "plane", "--facets", "4x4", "--size", "40mm", "-o", "p.fold")
+    run("sheets", "p.fold", "-o", "job")
+    assert (tmp_path / "job" / "my-laser.toml").read_bytes() == own.read_bytes()
+
+
+def test_a_file_with_a_typing_error_is_told(run, configuration):
+    configuration.mkdir(parents=True)
+    (configuration / "defaults.toml").write_text('machin = "grbl-laser-400"\n')
+    assert "'machin'" in sentence(run("use"), 2)
+
+
+def test_a_file_is_found_from_any_folder(run, tmp_path):
+    (tmp_path / "my.toml").write_bytes(
+        (shipped_directory("firmware_profiles") / "grbl-co2-k40.toml").read_bytes()
+    )
+    run("use", "my.toml")
+    assert own_defaults().machine == str(tmp_path / "my.toml")
