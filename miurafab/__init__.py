@@ -87,6 +87,7 @@ if TYPE_CHECKING:
     from miurafab.workflow.listings import list_machines as list_machines
     from miurafab.workflow.listings import list_materials as list_materials
     from miurafab.workflow.listings import list_surfaces as list_surfaces
+    from miurafab.workflow.own_machine import add_machine as add_machine
     from miurafab.workflow.patterns import check as check
     from miurafab.workflow.preview import Preview as Preview
     from miurafab.workflow.preview import preview as preview

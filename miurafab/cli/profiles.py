@@ -11,9 +11,11 @@ import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option
 from miurafab.errors import DONE
-from miurafab.options import File, Text
+from miurafab.options import File, Text, declared
+from miurafab.profiles.machine import Controller
 from miurafab.profiles.material import KERF
 
+_BAUD = declared(Controller)["baud"]
 NameArgument = Annotated[
     str | None, argument("NAME", "A shipped name or a TOML file; without it, all are listed.")
 ]
@@ -29,6 +31,42 @@ def profiles(name: NameArgument = None, /, *, console: Console = Console()) -> i
 def show_material(name: NameArgument = None, /, *, console: Console = Console()) -> int:
     """List the materials, or show and validate one."""
     return _list_or_show(console, "materials", miurafab.load_material, name)
+
+
+def add_machine(
+    name: Annotated[str, argument("NAME", "The new machine, known by this name from then on.")],
+    /,
+    *,
+    port: Annotated[str | None, option(Text("PORT"), "The port of the board.")] = None,
+    settings: Annotated[
+        Path | None, option(File("FILE"), "What '$$' printed, in place of a port.")
+    ] = None,
+    like: Annotated[
+        str | None,
+        option(
+            Text("MACHINE"),
+            "The profile that gives what settings do not tell.",
+            default_text="the default machine",
+        ),
+    ] = None,
+    title: Annotated[str | None, option(Text(), "The machine's title in lists.")] = None,
+    baud: Annotated[
+        int | None,
+        option(
+            _BAUD.kind, "Speed of the port in baud.", default_text="as the profile like it says"
+        ),
+    ] = None,
+    console: Console = Console(),
+) -> int:
+    """Write a machine profile of your own from the settings of the board."""
+    path, made = miurafab.add_machine(
+        name, port=port, settings=settings, like=like, title=title, baud=baud
+    )
+    console.answer(
+        {"file": str(path), "machine": asdict(made)},
+        lambda: console.line(f"Wrote {path}. 'miurafab use {name}' makes it the default."),
+    )
+    return DONE
 
 
 def add_material(
@@ -57,6 +95,11 @@ def add_material(
     return DONE
 
 
+PROFILES_HELP = "List the machine profiles, show and validate one, or add one from a board."
+PROFILES_ACTIONS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {
+    "show": (profiles, ("miurafab profiles show grbl-laser-400",)),
+    "add": (add_machine, ("miurafab profiles add my-laser --port /dev/ttyUSB0",)),
+}
 MATERIALS_HELP = "List the materials, show and validate one, or add one from a calibration."
 MATERIALS_EXAMPLES = ("miurafab materials", "miurafab materials card-250")
 MATERIALS_ACTIONS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {

@@ -82,7 +82,13 @@ COMMANDS: Mapping[str, Command] = {
     "cut": Command(MAKE, cut.cut, cut.EXAMPLES),
     "calibrate": Command(MAKE, calibrate.calibrate, calibrate.EXAMPLES),
     "machine": Command(MACHINES, None, actions=machine.ACTIONS, help=machine.HELP),
-    "profiles": Command(MACHINES, profiles.profiles, profiles.PROFILES_EXAMPLES),
+    "profiles": Command(
+        MACHINES,
+        profiles.profiles,
+        profiles.PROFILES_EXAMPLES,
+        profiles.PROFILES_ACTIONS,
+        profiles.PROFILES_HELP,
+    ),
     "materials": Command(
         MACHINES,
         profiles.show_material,

@@ -8,8 +8,10 @@ file, the key and the nearest key that exists, never a line ignored in silence.
 from __future__ import annotations
 
 import difflib
+import json
+import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,6 +21,7 @@ from miurafab.options import Kind, read_options
 from miurafab.units import parse_length
 
 _REQUIRED: Any = object()
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 T = TypeVar("T")
 
 
@@ -28,6 +31,25 @@ def read_toml(path: Path, error: type[InputError] = ProfileError) -> dict[str, A
         return tomllib.loads(read_bytes(path, error).decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
         raise error(f"{path} is not valid TOML: {fault}.") from None
+
+
+def toml_text(values: Mapping[str, Any], heads: tuple[str, ...] = ()) -> str:
+    """``values`` as TOML: what stands by itself first, then the tables below."""
+    lines = [
+        f"{_toml_key(key)} = {json.dumps(value, ensure_ascii=False)}\n"
+        for key, value in values.items()
+        if not isinstance(value, dict)
+    ]
+    head = f"[{'.'.join(heads)}]\n" if heads and lines else ""
+    parts = [head + "".join(lines)] if lines else []
+    for key, value in values.items():
+        if isinstance(value, dict):
+            parts.append(toml_text(value, (*heads, key)))
+    return "\n".join(part for part in parts if part)
+
+
+def _toml_key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else json.dumps(key)
 
 
 class Table:

@@ -42,6 +42,7 @@ from miurafab.profiles import (
 )
 from miurafab.profiles.material import KERF
 from miurafab.profiles.shipped import Kind
+from miurafab.profiles.table import toml_text
 from miurafab.workflow.dry_run import dry_run
 from miurafab.workflow.job_directory import JobDirectory, write_text
 from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
@@ -239,7 +240,7 @@ def add_material(
         if value is not None
     )
     head = f"# {choices['material']} calibrated on {choices['machine']}: {said}.\n"
-    write_text(path, head + _toml(values))
+    write_text(path, head + toml_text(values))
     try:
         material = load_material(path)
         _drawable(material)
@@ -304,18 +305,3 @@ def _drawable(material: Material) -> None:
             f"With a kerf of {material.kerf_mm:g} mm, dashes of {material.perforation.cut_mm:g} mm "
             f"cannot be drawn; choose a cell with dashes of at least {least:g} mm."
         )
-
-
-def _toml(values: Mapping[str, Any], heads: tuple[str, ...] = ()) -> str:
-    """``values`` as TOML: what stands by itself first, then the tables below."""
-    lines = [
-        f"{key} = {json.dumps(value, ensure_ascii=False)}\n"
-        for key, value in values.items()
-        if not isinstance(value, dict)
-    ]
-    head = f"[{'.'.join(heads)}]\n" if heads and lines else ""
-    parts = [head + "".join(lines)] if lines else []
-    for key, value in values.items():
-        if isinstance(value, dict):
-            parts.append(_toml(value, (*heads, key)))
-    return "\n".join(part for part in parts if part)

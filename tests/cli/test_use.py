@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shutil
 
@@ -76,3 +77,39 @@ def test_a_file_is_found_from_any_folder(run, tmp_path):
     )
     run("use", "my.toml")
     assert own_defaults().machine == str(tmp_path / "my.toml")
+
+
+def test_a_machine_of_ones_own_is_made_from_its_board(run, tmp_path, configuration):
+    """The virtual board is set up as the firmware comes: 200 mm of travel at 500 mm/min."""
+    done = run("profiles", "add", "mine", "--port", "virtual", "--json")
+    made = json.loads(done.stdout)
+    assert made["file"] == str(configuration / "machines" / "mine.toml")
+    own = miurafab.load_machine("mine")
+    assert (own.bed.width_mm, own.bed.height_mm) == (200, 200)
+    assert own.motion.max_rate_mm_min == (500, 500)
+    assert own.motion.acceleration_mm_s2 == (10, 10)
+    assert own.settings[32] == 1, "a laser needs laser mode, which the stock firmware has not"
+    assert "exists already" in sentence(run("profiles", "add", "mine", "--port", "virtual"), 2)
+    assert run("use", "mine").returncode == 0
+    assert miurafab.profiles.read_machine(None) == own
+
+
+def test_a_dump_makes_the_same_machine(run, tmp_path):
+    assert run("machine", "backup", "saved.txt", "--port", "virtual").returncode == 0
+    run("profiles", "add", "one", "--port", "virtual")
+    run("profiles", "add", "two", "--settings", "saved.txt", "--title", "one, like grbl-laser-400")
+    one, two = (miurafab.load_machine(name) for name in ("one", "two"))
+    assert dataclasses.replace(two, name="one") == one
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("my laser", "--port", "virtual"), "'my laser' cannot name a machine"),
+        (("mine",), "Give the --port of the board, or a file of its --settings"),
+        (("mine", "--settings", "gone.txt"), "gone.txt"),
+    ],
+)
+def test_what_makes_no_machine_is_told(run, configuration, arguments, complaint):
+    assert complaint in sentence(run("profiles", "add", *arguments), 2)
+    assert not (configuration / "machines" / "mine.toml").exists()

@@ -1,0 +1,126 @@
+"""A machine profile of one's own, from the settings of the board itself.
+
+The nearest profile gives what ``$$`` does not tell (the tool, the buffers). The settings replace
+what they tell: rates ``$110`` ``$111``, accelerations ``$120`` ``$121``, junction ``$11``,
+travel ``$130`` ``$131``, S range ``$30`` ``$31``, laser mode ``$32`` (gnea/grbl 1.1,
+``doc/markdown/settings.md``).
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from miurafab.errors import InputError, ProfileError
+from miurafab.files import AnyPath, as_path
+from miurafab.grbl.settings import Settings
+from miurafab.machine.actions import read_dump, read_settings
+from miurafab.profiles import MachineProfile, find_profile, load_machine, read_toml
+from miurafab.profiles.shipped import own_directory
+from miurafab.profiles.table import toml_text
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
+_PLACES = {
+    130: ("bed", "width", "{:g}mm"),
+    131: ("bed", "height", "{:g}mm"),
+    110: ("motion", "max_rate_x", "{:g}mm/min"),
+    111: ("motion", "max_rate_y", "{:g}mm/min"),
+    120: ("motion", "acceleration_x", None),
+    121: ("motion", "acceleration_y", None),
+    11: ("motion", "junction_deviation", "{:g}mm"),
+}
+_ASKED_FOR = (11, 30, 31, 32, 110, 111, 120, 121, 130, 131)
+"""The settings that a job relies on; the profile then requires them."""
+
+
+def add_machine(
+    name: str,
+    *,
+    port: str | None = None,
+    settings: AnyPath | None = None,
+    like: AnyPath | None = None,
+    title: str | None = None,
+    baud: int | None = None,
+) -> tuple[Path, MachineProfile]:
+    """Write a machine profile into the configuration folder, where it is known by its name.
+
+    Parameters
+    ----------
+    name : str
+        What the machine is called. A profile is not overwritten.
+    port : str, optional
+        The port of the board, whose settings are read; or else
+    settings : str or os.PathLike, optional
+        A file with what ``$$`` printed.
+    like : str or os.PathLike, optional
+        The profile that gives what settings do not tell; the default machine without it.
+    title : str, optional
+        What lists call the machine.
+    baud : int, optional
+        The speed of the port, as the profile ``like`` says without it.
+
+    Returns
+    -------
+    (Path, MachineProfile)
+
+    Raises
+    ------
+    InputError
+        For a name that cannot be one or is taken, and if neither or both sources are given.
+    ProfileError
+        Where the settings do not make a machine.
+    MachineError
+        If the board cannot be asked.
+
+    Examples
+    --------
+    >>> import miurafab as mf
+    >>> path, machine = mf.add_machine("my-laser", port="virtual", like="grbl-laser-400")
+    >>> machine.tool.s_max
+    1000
+    """
+    if not _NAME.fullmatch(name):
+        raise InputError(f"'{name}' cannot name a machine; use letters, digits, '-' and '_'.")
+    path = own_directory("firmware_profiles") / f"{name}.toml"
+    if path.exists():
+        raise InputError(f"{path} exists already; choose another name or remove it.")
+    if (port is None) == (settings is None):
+        raise InputError("Give the `port` of the board, or a file of its `settings`.")
+    base = find_profile("firmware_profiles", like)
+    values = read_toml(base)
+    if port is None:
+        assert settings is not None
+        file = as_path(settings, "The settings")
+        found, source = read_dump(file), file.name
+    else:
+        speed = load_machine(base).controller.baud if baud is None else baud
+        found, source = read_settings(port, baud=speed), port
+        values.setdefault("controller", {})["baud"] = speed
+    _take(values, found)
+    values["title"] = title or f"{name}, like {base.stem}"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    head = f"# From the settings of the board ({source}); the rest is that of {base.stem}.\n"
+    path.write_text(head + toml_text(values), encoding="utf-8", newline="\n")
+    try:
+        return path, load_machine(path)
+    except ProfileError:
+        path.unlink()
+        raise
+
+
+def _take(values: dict[str, Any], found: Settings) -> None:
+    """Put what the settings tell into the ``values`` of a profile."""
+    told = found.values
+    for number, (table, key, form) in _PLACES.items():
+        if number in told:
+            value = told[number]
+            values.setdefault(table, {})[key] = value if form is None else form.format(value)
+    tool = values["tool"]
+    for number, key in ((30, "s_max"), (31, "s_min")):
+        if number in told:
+            tool[key] = round(told[number])
+    required = values.setdefault("settings", {})
+    required |= {f"${number}": told[number] for number in _ASKED_FOR if number in told}
+    if tool.get("kind") == "laser" and told.get(32) == 0:
+        required["$32"] = 1  # a laser burns along its travels without it, so `cut` asks for it
