@@ -15,7 +15,7 @@ from miurafab.origami.verify import EXACT
 from miurafab.workflow.dry_run import clock_text, length_text
 
 HEADLINES = {
-    "converged": "The sheet fits and folds from one flat piece.",
+    "converged": "The sheet fits and folds from flat paper.",
     "infeasible": "The sheet folds, but not within what was asked.",
     "stalled": "No sheet was found.",
     "invalid": "This pattern has faults.",
