@@ -42,7 +42,7 @@ from miurafab.studio.messages import HttpRequest, Response, answer, made_file, o
 from miurafab.studio.orders import read_fit, read_layout, read_source
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
-from miurafab.surfaces.mesh_files import MESH_SUFFIXES
+from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED
 from miurafab.workflow.design import can_close
 
 PAGE = "studio.html"
@@ -128,7 +128,7 @@ def _catalogue() -> dict[str, Any]:
         "materials": [
             {"name": name, "title": load_material(name).title} for name in known_names("materials")
         ],
-        "file_suffixes": (*MESH_SUFFIXES, PATTERN_SUFFIX),
+        "file_suffixes": (*MESH_SUFFIXES, PACKED, PATTERN_SUFFIX),
         "file_limit": FILE_LIMIT,
         "defaults": {
             "facets": FACETS.show(DEFAULT_FACETS),

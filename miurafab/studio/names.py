@@ -14,14 +14,22 @@ def safe_stem(name: str) -> str:
 
     The result is never empty, begins with a letter or digit, and names no device of Windows.
     """
-    base = re.split(r"[/\\]", name)[-1]
-    stem = unicodedata.normalize("NFKD", base.rpartition(".")[0] or base)
+    base, suffix = _parted(name)
+    stem = unicodedata.normalize("NFKD", base or suffix)
     plain = stem.encode("ascii", "ignore").decode("ascii")
     words = re.sub(r"[^A-Za-z0-9._-]+", "-", plain)[:_LONGEST].strip("-._")
     return f"file-{words}".strip("-") if not words or _DEVICES.fullmatch(words) else words
 
 
 def suffix_of(name: str) -> str:
-    """The ending of ``name`` with its dot, in lower case; empty if it has none."""
-    _, dot, ending = re.split(r"[/\\]", name)[-1].rpartition(".")
-    return f".{ending.lower()}" if dot else ""
+    """The ending of ``name`` with its dot, in lower case; empty if it has none.
+
+    The ending of a compressed file is that of its content too, ``.stl.gz``.
+    """
+    return _parted(name)[1].lower()
+
+
+def _parted(name: str) -> tuple[str, str]:
+    base = re.split(r"[/\\]", name)[-1]
+    found = re.search(r"(\.[^.]*\.gz|\.[^.]*)\Z", base, re.IGNORECASE)
+    return (base[: found.start()], found[0]) if found else (base, "")

@@ -30,7 +30,7 @@ from miurafab.studio.messages import HttpRequest, Response, refusal
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.worker import Process
 from miurafab.surfaces.catalogue import make_surface, parse_target
-from miurafab.surfaces.mesh_files import MESH_SUFFIXES
+from miurafab.surfaces.mesh_files import mesh_suffix
 from miurafab.workflow.design import design
 
 _IDLE_S = 60.0
@@ -83,7 +83,7 @@ def _put_on(bench: Bench, thing: str) -> dict[str, Any]:
         found = find_file("patterns", thing, error=TargetError)
         source = bench.add_own(found, "design")
         return {"source": source.id, "machine": wanted.machine, "material": wanted.material}
-    if suffix in (*MESH_SUFFIXES, PATTERN_SUFFIX):
+    if suffix == PATTERN_SUFFIX or mesh_suffix(path):
         if not path.is_file():
             error = PatternError if suffix == PATTERN_SUFFIX else TargetError
             raise error(f"{path} does not exist.")

@@ -22,7 +22,7 @@ from miurafab.studio.orders import FitOrder, LayoutOrder
 from miurafab.studio.report_text import headline, layout_lines, pattern_lines
 from miurafab.studio.work import Order
 from miurafab.studio.worker import News, Running
-from miurafab.surfaces.mesh_files import MESH_SUFFIXES
+from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED, mesh_suffix
 
 PATTERN_SUFFIX, DESIGN_SUFFIX = ".fold", ".toml"
 _KEPT = 8
@@ -94,8 +94,8 @@ class Bench:
         """Keep an uploaded file. Raises :class:`~miurafab.errors.InputError`."""
         suffix = suffix_of(name)
         kind = "pattern" if suffix == PATTERN_SUFFIX else "mesh"
-        if kind == "mesh" and suffix not in MESH_SUFFIXES:
-            known = ", ".join((*MESH_SUFFIXES, PATTERN_SUFFIX))
+        if kind == "mesh" and not mesh_suffix(Path(f"mesh{suffix}")):
+            known = ", ".join((*MESH_SUFFIXES, PACKED, PATTERN_SUFFIX))
             raise InputError(f"'{name[-60:]}' cannot be opened here; known files are {known}.")
         if not content:
             raise InputError(f"'{name[-60:]}' is empty.")

@@ -26,6 +26,8 @@ from miurafab.surfaces.mesh_formats import read_3mf, read_off, read_ply_strips
 
 STEP_SUFFIXES = (".step", ".stp")
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", *STEP_SUFFIXES)
+PACKED = ".gz"
+"""The ending of a compressed file, after that of its content."""
 
 FROM_POINTS = (
     "make a triangle mesh of it (MeshLab, CloudCompare and Open3D do) or a height map on a regular "
@@ -42,7 +44,7 @@ _COARSE_MM, _ANGLE = 1.0, 0.1
 
 def mesh_suffix(path: Path) -> str:
     """The ending of ``path`` that says its format, without ``.gz``; empty for no mesh file."""
-    name = path.name.lower().removesuffix(".gz")
+    name = path.name.lower().removesuffix(PACKED)
     suffix = Path(name).suffix
     return suffix if suffix in MESH_SUFFIXES else ""
 
@@ -59,7 +61,7 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str]:
         raise TargetError(f"{path} is not a mesh file; known are {known}, each also with .gz.")
     content = read_bytes(path, TargetError)
     sha256 = hashlib.sha256(content).hexdigest()
-    if path.suffix.lower() == ".gz":
+    if path.suffix.lower() == PACKED:
         content = _unpacked(content, path)
     try:
         vertices, faces = _triangles(content, suffix, str(path))

@@ -1,5 +1,6 @@
 """The studio without a socket: every address, what is shown, one thing at a time, bad files."""
 
+import gzip
 import html.parser
 import io
 import json
@@ -289,10 +290,18 @@ def test_a_pattern_of_the_browser_reads_no_other_file(done, tmp_path):
     assert "secret" not in json.dumps(done.state())
 
 
-@pytest.mark.parametrize("name", ["x.toml", "x.nc", "x", "", "x.stl.exe", "%00.py"])
+@pytest.mark.parametrize(
+    "name", ["x.toml", "x.nc", "x", "", "x.stl.exe", "%00.py", "x.gz", "x.exe.gz", "x.fold.gz"]
+)
 def test_other_files_are_not_taken(asked, name):
     assert "known files are" in sentence(asked.upload(name, b"content"))
     assert asked.state()["sources"] == []
+
+
+def test_a_compressed_mesh_is_one(asked):
+    asked.upload("My Saddle.OBJ.gz", gzip.compress(saddle_obj()))
+    (source,) = asked.state()["sources"]
+    assert (source["kind"], source["name"]) == ("mesh", "My-Saddle.obj.gz")
 
 
 def test_an_empty_file_is_none(asked):

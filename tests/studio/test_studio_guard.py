@@ -112,6 +112,8 @@ def test_any_name_becomes_harmless(name):
         ("Sättel.obj", "Sattel", ".obj"),
         ("con.stl", "file-con", ".stl"),
         ("lpt1.old.stl", "file-lpt1.old", ".stl"),
+        ("scan.STL.gz", "scan", ".stl.gz"),
+        ("scan.gz", "scan", ".gz"),
         ("", "file", ""),
         ("..", "file", "."),
         ("鞍.fold", "file", ".fold"),
