@@ -27,9 +27,9 @@ from miurafab.surfaces.surface import (
     Domain,
     closest_parameters,
     nearest_parameters,
+    normal_to,
     patch_tiles,
     tangents,
-    unit,
 )
 
 SAMPLES = (17, 33, 65)
@@ -41,7 +41,7 @@ TOLERANCE = 1e-5
 MARGIN = 0.1
 """A function is also sampled this part of the domain beyond it, where it has values there."""
 
-_DIGITS = 9
+_DIGITS = 12
 _DEGENERATE = 1e-7
 
 
@@ -84,8 +84,7 @@ class SampledSurface:
 
     def normal(self, uv: Floats) -> Floats:
         """(..., 3) unit normals."""
-        along, across = tangents(self, uv)
-        return unit(np.cross(along, across))
+        return normal_to(*tangents(self, uv))
 
     def closest_point(self, points: Floats) -> Floats:
         """(n, 3) nearest points of the spline to ``points`` (n, 3)."""
@@ -152,7 +151,7 @@ def through(points: Floats, span: Domain, domain: Domain | None = None) -> Sampl
 
 
 def rounded(points: Floats) -> Floats:
-    """``points`` (..., 3) to nine digits of their extent, which are short to write."""
+    """``points`` (..., 3) to twelve digits of their extent: what is beyond them is rounding."""
     size = _diagonal(points)
     return np.round(points, _DIGITS - math.ceil(math.log10(size))) if size > 0 else points
 

@@ -96,8 +96,7 @@ class ParametricSurface:
         return self.position(uv[..., 0], uv[..., 1])
 
     def normal(self, uv: Floats) -> Floats:
-        along, across = tangents(self, uv)
-        return unit(np.cross(along, across))
+        return normal_to(*tangents(self, uv))
 
     def closest_point(self, points: Floats) -> Floats:
         return self.point(closest_parameters(self, points, self.samples))
@@ -139,6 +138,11 @@ class Swapped:
 def unit(vectors: Floats) -> Floats:
     """(..., 3) vectors scaled to length one."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def normal_to(along: Floats, across: Floats) -> Floats:
+    """(..., 3) the unit normal to two tangents (..., 3), with which they are right-handed."""
+    return unit(np.cross(along, across))
 
 
 def _steps(domain: Domain) -> tuple[Floats, Floats]:

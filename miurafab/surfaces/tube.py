@@ -27,7 +27,7 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
 from miurafab.surfaces.harmonic import CylinderMap, cylinder_map
 from miurafab.surfaces.smoothing import continued, smooth
-from miurafab.surfaces.surface import Domain, ParametricSurface, tangents, unit
+from miurafab.surfaces.surface import Domain, ParametricSurface, normal_to, tangents
 from miurafab.surfaces.tube_figures import TubeFigures, figures
 
 NARROWING = 0.5
@@ -105,8 +105,7 @@ class TubeSurface:
         return _round(self.spline, self.domain.width, uv)
 
     def normal(self, uv: Floats) -> Floats:
-        along, across = tangents(self, uv)
-        return unit(np.cross(along, across))
+        return normal_to(*tangents(self, uv))
 
     def closest_point(self, points: Floats) -> Floats:
         return closest_on_mesh(points, self.triangles)

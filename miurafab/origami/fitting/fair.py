@@ -27,13 +27,13 @@ from miurafab.geometry.arrays import Floats
 from miurafab.geometry.sparse import SymmetricSolver
 from miurafab.origami.fitting.objective import FairObjective
 from miurafab.origami.fitting.reduction import Unknowns
-from miurafab.origami.fitting.solver import Constraints
+from miurafab.origami.fitting.solver import Constraints, longest_move
 
 PENALTY = 1e5
 """rho."""
 STEPS = 30
 CAP = 0.25
-"""The largest move of a coordinate in one step, in mean edge lengths."""
+"""The largest move of a vertex in one step, in mean edge lengths."""
 CORRECTIONS = 2
 AT_REST = 2e-2
 """A full step that lowers the objective by a smaller part is the last."""
@@ -136,14 +136,14 @@ def _step(
     factor = solver.factor(normal)
     slope = jacobian.T @ state.residuals + state.rho * (onto @ state.values)
     step = -factor.solve(slope)
-    longest = float(np.abs(step).max())
+    longest = longest_move(step)
     if not np.isfinite(longest):
         return None
     step *= min(1.0, cap / longest) if longest > 0 else 1.0
     reached = state.x + step
     for _ in range(CORRECTIONS):
         back = -factor.solve(state.rho * (onto @ constraints(reached)[0]))
-        if not float(np.abs(back).max()) <= min(longest, cap):
+        if not longest_move(back) <= min(longest, cap):
             break
         reached = reached + back
     following = at(reached, state.feet)

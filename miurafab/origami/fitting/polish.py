@@ -26,7 +26,7 @@ from miurafab.origami.fitting.solver import Projection, project
 from miurafab.origami.fitting.starts import Start
 
 STEP_CAP = 0.25
-"""The largest move of a coordinate in one step of the projection, in mean edge lengths."""
+"""The largest move of a vertex in one step of the projection, in mean edge lengths."""
 EASING = ((1e3, 8),)
 """The penalties before the full one, with their steps."""
 LEGS = ((PENALTY, 8), (PENALTY, 14))
@@ -149,6 +149,7 @@ def _projected(request: FitRequest, start: Start, x: Floats, bounds: Bounds | No
         x,
         inequalities=None if bounds is None else unknowns.of_unknowns(bounds),
         cap=STEP_CAP * unknowns.length,
+        dimension=3,
     )
 
 

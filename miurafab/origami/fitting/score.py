@@ -2,19 +2,24 @@
 
 The score is the largest of these parts, and less is better. At 1 each is as good as asked:
 
-deviation   the largest distance of a follower from the target, over 0.5 % of the diagonal
-rim         how far a border facet lies inside or beyond its place, over 1 % of the diagonal
+deviation   the largest distance of a follower from the target, over 0.5 % of the size
+rim         how far a border facet lies inside or beyond its place, over 1 % of the size
 sectors     the larger of 45 deg - least and greatest - 135 deg, over 7 degrees
 bad         the share of corners outside 45..135 deg, over 10 %
 folds       the largest fold angle over 178 deg
 area        the 95th over the 5th percentile of the areas of facets, over 20
 edges       0.05 of the mean edge over the shortest edge
 
+The size is the root of 12 times the mean of the squares of the distances of the vertices from their
+middle. It is the diagonal of a rectangle, and of the box around a sphere; unlike the box's, it does
+not hang on how the sheet is turned.
+
 Facets that cross, overlap or are not convex are faults and no matter of degree.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -59,7 +64,7 @@ def score(charts: QuadCharts, points: Floats, rim: Rim, deviation: float) -> Sco
     reach, and ``deviation`` the largest distance of its followers.
     """
     faces = charts.faces_vertices
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    size = math.sqrt(12 * float(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))
     corners = points[faces]
     ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     sectors = np.degrees(angle_between(ahead, behind))
@@ -78,8 +83,8 @@ def score(charts: QuadCharts, points: Floats, rim: Rim, deviation: float) -> Sco
         off = np.where(across > 0, across, -across * rim.overhang)
     spread = np.percentile(area, 95) / max(float(np.percentile(area, 5)), 1e-300)
     return Score(
-        deviation=100 * deviation / diagonal / 0.5,
-        rim=100 * float(off.max()) / diagonal,
+        deviation=100 * deviation / size / 0.5,
+        rim=100 * float(off.max()) / size,
         sectors=float(outside.max()) / 7,
         bad=100 * float((outside > 0.1).mean()) / 10,
         folds=float(folds.max(initial=0.0)) / 178,

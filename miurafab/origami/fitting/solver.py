@@ -91,11 +91,13 @@ def project(
     inequalities: Constraints | None = None,
     tolerance: float = 1e-13,
     cap: float = np.inf,
+    dimension: int = 1,
     max_iterations: int = 60,
 ) -> Projection:
     """Move ``x`` onto c(x) = 0, g(x) >= 0 until max|c| and max(-g) are at most ``tolerance``.
 
-    No coordinate moves by more than ``cap`` in a step. Failure is a result: ``reason`` says why.
+    ``x`` are points of so many coordinates as ``dimension`` says. No point moves by more than
+    ``cap`` in a step. Failure is a result: ``reason`` says why.
     """
     state = _Rows.at(constraints, inequalities, x, None)
     residual, best, since_best = state.residual, state.residual, 0
@@ -125,7 +127,7 @@ def project(
         step = None if mu is None else -(jacobian.T @ mu)
         if mu is None or step is None or not np.isfinite(step).all():
             return ended(iteration, False, "the linear system became singular")
-        last_step = float(np.abs(step).max())
+        last_step = longest_move(step, dimension)
         trial = x + step * min(1.0, cap / last_step) if last_step > 0 else x
         following = _Rows.at(constraints, inequalities, trial, state.kept(mu))
         if not np.isfinite(following.residual):
@@ -138,6 +140,13 @@ def project(
     else:
         return ended(max_iterations, residual <= tolerance, "the iterations ran out")
     return ended(iteration + 1, residual <= tolerance, "the residual stalled")
+
+
+def longest_move(step: Floats, dimension: int = 3) -> float:
+    """How far the point moves that ``step`` (n,) moves most. Like the length of a vector, and
+    unlike its largest coordinate, that does not hang on how the axes lie.
+    """
+    return float(np.linalg.norm(step.reshape(-1, dimension), axis=1).max(initial=0.0))
 
 
 @dataclass(frozen=True, eq=False)
