@@ -2,27 +2,35 @@
 
 A ``.csv`` or ``.txt`` file has one point a line, two numbers: r and z of a revolution, y and z of a
 cylinder. A ``.dxf`` drawing has the profile as its longest curve in the plane: a polyline, a spline
-or an arc, flattened to a thousandth of its size. The file of a pattern holds the points.
+or an arc, flattened to a thousandth of its size. So does an ``.svg`` drawing, in its user units
+and with its axis at x = 0; fontTools reads the data of its paths. The file of a pattern holds the
+points.
 """
 
 from __future__ import annotations
 
 import io
 import re
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 from ezdxf import path as curves
 from ezdxf.filemanagement import read
 from ezdxf.lldxf.const import DXFError
+from fontTools.pens.recordingPen import RecordingPen
+from fontTools.svgLib.path import parse_path
 
 from miurafab.errors import TargetError
 from miurafab.files import read_bytes, read_text
 from miurafab.geometry.arrays import Floats
 
-PROFILE_SUFFIXES = (".csv", ".txt", ".dxf")
+PROFILE_SUFFIXES = (".csv", ".txt", ".dxf", ".svg")
 
 _DRAWN = "LWPOLYLINE POLYLINE SPLINE ARC ELLIPSE LINE"
+_CURVES = ("path", "polyline", "polygon", "line")
+_HIDDEN = ("defs", "clipPath", "mask", "marker", "symbol", "pattern")
 _FLAT = 1e-3
 _SEPARATORS = re.compile(r"[,;\s]+")
 
@@ -37,8 +45,8 @@ def read_profile(path: Path) -> list[list[float]]:
     if suffix not in PROFILE_SUFFIXES:
         known = ", ".join(PROFILE_SUFFIXES)
         raise TargetError(f"The profile {path} is not a file of points; known are {known}.")
-    if suffix == ".dxf":
-        return _longest_curve(path)
+    if suffix in _DRAWINGS:
+        return _longest(path, _DRAWINGS[suffix](path))
     points: list[list[float]] = []
     text = read_text(path, TargetError, "a list of points")
     for number, line in enumerate(text.splitlines(), 1):
@@ -65,23 +73,98 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def _longest_curve(path: Path) -> list[list[float]]:
+def _of_dxf(path: Path) -> Iterator[curves.Path]:
     content = read_bytes(path, TargetError)
     try:
         drawing = read(io.StringIO(content.decode("utf-8", "replace").replace("\r\n", "\n")))
     except (DXFError, OSError, ValueError) as fault:
         reason = " ".join(str(fault).split()).rstrip(".")
         raise TargetError(f"{path} cannot be read as a DXF drawing: {reason}.") from None
-    found: list[Floats] = []
     for entity in drawing.modelspace().query(_DRAWN):
-        curve = curves.make_path(entity)
+        yield curves.make_path(entity)
+
+
+def _of_svg(path: Path) -> Iterator[curves.Path]:
+    """The parts of all paths, polylines, polygons and lines, with the second axis upwards."""
+    text = read_text(path, TargetError, "an SVG drawing")
+    try:
+        root = ElementTree.fromstring(text)
+        for element in _untransformed(root, path):
+            pen = RecordingPen()
+            parse_path(_path_data(element), pen)
+            yield from _drawn(pen.value)
+    except (ElementTree.ParseError, ValueError, IndexError, KeyError) as fault:
+        reason = " ".join(str(fault).split()).rstrip(".")
+        raise TargetError(f"{path} cannot be read as an SVG drawing: {reason}.") from None
+
+
+def _untransformed(element: ElementTree.Element, path: Path) -> Iterator[ElementTree.Element]:
+    """The elements in ``element`` that draw curves. Raises for one that is moved by an attribute:
+    how far it lies from the axis would be lost."""
+    tag = element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+    if tag in _HIDDEN:
+        return
+    inside = [found for child in element for found in _untransformed(child, path)]
+    if tag in _CURVES:
+        inside.append(element)
+    if inside and element.get("transform"):
+        raise TargetError(
+            f"{path}: '{element.get('id', tag)}' is moved by a transform; apply it to the points "
+            "in your drawing program, or ungroup it."
+        )
+    yield from inside
+
+
+def _path_data(element: ElementTree.Element) -> str:
+    """What the element draws, as the data of a path."""
+    tag = element.tag.rpartition("}")[2]
+    if tag == "path":
+        return element.get("d", "")
+    if tag == "line":
+        x1, y1, x2, y2 = (element.get(name, "0") for name in ("x1", "y1", "x2", "y2"))
+        return f"M {x1} {y1} L {x2} {y2}"
+    points = element.get("points", "")
+    return f"M {points}{' Z' if tag == 'polygon' else ''}" if points.strip() else ""
+
+
+def _drawn(strokes: Iterable[tuple[str, tuple[tuple[float, float], ...]]]) -> Iterator[curves.Path]:
+    """The curves of a pen's ``strokes``."""
+    curve: curves.Path | None = None
+    for stroke, places in strokes:
+        points = [(x, -y) for x, y in places]
+        if stroke == "moveTo":
+            curve = curves.Path(points[0])
+        elif curve is None:
+            continue
+        elif stroke == "lineTo":
+            curve.line_to(points[0])
+        elif stroke == "curveTo":
+            curve.curve4_to(points[2], points[0], points[1])
+        elif stroke == "qCurveTo":
+            curve.curve3_to(points[1], points[0])
+        else:
+            if stroke == "closePath":
+                curve.close()
+            yield curve
+            curve = None
+
+
+def _longest(path: Path, found: Iterable[curves.Path]) -> list[list[float]]:
+    """The points of the longest of the curves, flattened."""
+    flattened: list[Floats] = []
+    for curve in found:
         ends = np.array([[p.x, p.y] for p in curve.control_vertices()])
+        if len(ends) < 2:
+            continue
         flat = _FLAT * max(float(np.ptp(ends, axis=0).max()), 1e-12)
         points = np.array([[p.x, p.y] for p in curve.flattening(flat)])
         apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 0
-        found.append(points[np.concatenate([[True], apart])])
-    if not found:
+        flattened.append(points[np.concatenate([[True], apart])])
+    if not flattened:
         raise TargetError(f"{path} holds no polyline, spline or arc to be a profile.")
-    longest = max(found, key=lambda p: float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()))
+    longest = max(flattened, key=lambda p: float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()))
     points_list: list[list[float]] = longest.tolist()
     return points_list
+
+
+_DRAWINGS: dict[str, Callable[[Path], Iterator[curves.Path]]] = {".dxf": _of_dxf, ".svg": _of_svg}

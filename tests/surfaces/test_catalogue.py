@@ -171,8 +171,12 @@ def test_a_profile_is_read_from_a_list_and_from_a_drawing(tmp_path: Path) -> Non
     drawing.modelspace().add_line((0, 0), (0, 20))
     drawing.modelspace().add_lwpolyline(points)
     drawing.saveas(tmp_path / "goblet.dxf")
+    (tmp_path / "goblet.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg"><defs><path d="M0 0 900 0"/></defs>'
+        '<line x2="20"/><polyline points="40,0 60,-40 50,-90 65,-130"/></svg>'
+    )
     given = make_surface("revolution", {"profile": points})[0]
-    for name in ("goblet.csv", "goblet.dxf"):
+    for name in ("goblet.csv", "goblet.dxf", "goblet.svg"):
         request = design(f"revolution:profile={tmp_path / name}").request
         assert request.target["parameters"]["profile"] == points
         uv = given.domain.lattice(5, 5)
@@ -183,11 +187,19 @@ def test_a_profile_is_read_from_a_list_and_from_a_drawing(tmp_path: Path) -> Non
     assert design(tmp_path / "goblet.toml").request.target["parameters"]["profile"] == points
 
 
-def test_an_arc_of_a_drawing_is_flattened_to_a_thousandth_of_its_size(tmp_path: Path) -> None:
-    drawing = ezdxf.new()
-    drawing.modelspace().add_arc((50, 0), 30, 90, 270)
-    drawing.saveas(tmp_path / "arc.dxf")
-    points = np.array(read_profile(tmp_path / "arc.dxf"))
+@pytest.mark.parametrize("suffix", ["dxf", "svg"])
+def test_an_arc_of_a_drawing_is_flattened_to_a_thousandth_of_its_size(
+    tmp_path: Path, suffix: str
+) -> None:
+    path = tmp_path / f"arc.{suffix}"
+    if suffix == "dxf":
+        drawing = ezdxf.new()
+        drawing.modelspace().add_arc((50, 0), 30, 90, 270)
+        drawing.saveas(path)
+    else:
+        path.write_text('<svg><path d="M 50 -30 A 30 30 0 0 0 50 30"/></svg>')
+    points = np.array(read_profile(path))
+    assert np.ptp(points, axis=0) == pytest.approx([30, 60], rel=1e-3)
     middle = (points[1:] + points[:-1]) / 2
     assert np.abs(np.hypot(points[:, 0] - 50, points[:, 1]) - 30).max() < 0.02
     assert np.abs(np.hypot(middle[:, 0] - 50, middle[:, 1]) - 30).max() < 2e-3 * 60
@@ -200,7 +212,15 @@ def test_an_arc_of_a_drawing_is_flattened_to_a_thousandth_of_its_size(tmp_path: 
         ("p.csv", "1,2,3\n", "line 1 is '1,2,3'"),
         ("p.csv", "", "two or more"),
         ("p.dxf", "Dear Sir or Madam", "cannot be read as a DXF drawing"),
-        ("p.png", "", "not a file of points; known are .csv, .txt, .dxf"),
+        ("p.png", "", "not a file of points; known are .csv, .txt, .dxf, .svg"),
+        ("p.svg", "<svg><path", "cannot be read as an SVG drawing"),
+        ("p.svg", "<svg><path d='M 1 x'/></svg>", "cannot be read as an SVG drawing"),
+        ("p.svg", "<svg/>", "holds no polyline, spline or arc"),
+        (
+            "p.svg",
+            "<svg><g id='a' transform='scale(2)'><path d='M1 1 2 2'/></g></svg>",
+            "'a' is moved by",
+        ),
     ],
 )
 def test_a_file_without_a_profile_is_refused(
