@@ -37,7 +37,7 @@ def _check(meaning: str) -> Rule:
 RULES = {
     # A target
     "mesh-unit": Rule("warning", "a mesh whose size suggests a unit that is not the millimetre"),
-    "filled-holes": Rule("note", "holes of a mesh that were filled"),
+    "filled-holes": Rule("note", "holes of a mesh that were filled or kept"),
     "welded": Rule("note", "borders of a mesh that were joined over small gaps"),
     "pieces-left-out": Rule("warning", "separate pieces of a mesh that are left out"),
     "plate": Rule("note", "a thin plate whose skin or middle is the target"),
@@ -56,6 +56,7 @@ RULES = {
     "facet-shape": Rule("refusal", "facets that break a limit on angles or proportions"),
     "flat-foldable": Rule("refusal", "a sheet less flat-foldable than asked"),
     "smaller-part": Rule("warning", "a sheet on a smaller part of the mesh's rectangle"),
+    "whole-facets": Rule("note", "whole facets at the border, since a cut leaves short edges"),
     "far-from-target": Rule("warning", "a mid-surface that lies far from the target"),
     # A pattern, checked (miurafab.origami.verify)
     "no-target": Rule("note", "distances left out, since the target is missing or has changed"),

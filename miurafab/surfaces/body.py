@@ -90,7 +90,7 @@ def goes_round(mesh: PreparedMesh, holes: Holes) -> bool:
     """
     if mesh.topology.kind == "sphere":
         return True
-    if mesh.topology.kind != "tube" or holes == "all":
+    if mesh.topology.kind != "tube" or holes != "small":
         return False
     if mesh.topology.lengths[1] <= SMALL_HOLE * mesh.topology.lengths[0]:
         return False

@@ -48,8 +48,9 @@ from miurafab.surfaces.preparation import (
     prepare,
     refuse_other_than_a_disk,
 )
+from miurafab.surfaces.refine import refine
 from miurafab.surfaces.smoothing import Smoothed, continued, smooth
-from miurafab.surfaces.surface import Domain, tangents, unit
+from miurafab.surfaces.surface import Domain, normal_to, tangents
 from miurafab.surfaces.topology import classify
 from miurafab.surfaces.tube import TubeSurface
 
@@ -68,6 +69,11 @@ has at most 40 x 40 spans."""
 
 LAID_FLAT = 40_000
 
+LONGEST = 0.06
+"""Edges are halved down to this part of the root of the area before the mesh is laid flat. The
+spline goes through vertices, and over a long triangle it would go where it likes: half a pipe of
+24 pairs of triangles was missed by 3.8 % of its diagonal, and is by 0.04 %."""
+
 FEWEST = 4
 """A rectangle with fewer vertices of the mesh is refused."""
 
@@ -82,10 +88,10 @@ _ROUGH_SPANS = 24
 class MeshChart:
     """A mesh laid flat.
 
-    ``vertices`` (V, 3) and ``faces`` (F, 3) are the mesh, simplified if it is large, with its holes
-    filled; the first ``known`` of the vertices are the mesh's own. ``flat`` (V, 2) is the layout;
-    ``rough`` marks a noisy scan. ``whole`` are the vertices and triangles of the mesh as it is, for
-    distances.
+    ``vertices`` (V, 3) and ``faces`` (F, 3) are the mesh, simplified if it is large and its long
+    edges halved, with its holes filled; the first ``known`` of the vertices are the mesh's own, and
+    the triangles from ``real`` on fill holes. ``flat`` (V, 2) is the layout; ``rough`` marks a
+    noisy scan. ``whole`` are the vertices and triangles of the mesh as it is, for distances.
     ``reading`` is what a description keeps of how the mesh was read, such as its ``origin``.
     """
 
@@ -93,6 +99,7 @@ class MeshChart:
     faces: Ints
     whole: tuple[Floats, Ints]
     known: int
+    real: int
     flat: Floats
     rough: bool
     name: str
@@ -103,6 +110,11 @@ class MeshChart:
         """(T, 3, 3) the triangles of the mesh, without those that fill holes."""
         vertices, faces = self.whole
         return vertices[faces]
+
+    @property
+    def filling(self) -> Floats:
+        """(n, 3, 3) the triangles that fill holes."""
+        return self.vertices[self.faces[self.real :]]
 
     def surface(self, placement: GridPlacement, stiffness: float = 0.0) -> MeshSurface:
         """The target over ``placement``; the spline is as stiff as the data ask, or ``stiffness``.
@@ -172,11 +184,11 @@ class MeshSurface:
         return continued(self.spline, uv)
 
     def normal(self, uv: Floats) -> Floats:
-        along, across = tangents(self, uv)
-        return unit(np.cross(along, across))
+        return normal_to(*tangents(self, uv))
 
     def closest_point(self, points: Floats) -> Floats:
-        return closest_on_mesh(points, self.triangles)
+        """The points nearest to ``points`` of the mesh and what fills its holes."""
+        return closest_on_mesh(points, np.concatenate([self.triangles, self.layout.filling]))
 
     def nearest(self, points: Floats) -> Floats:
         return closest_on_mesh(points, self.triangles)
@@ -314,9 +326,13 @@ def _placement(layout: MeshChart, region: Region | None, rotate: float | None) -
             raise TargetError(f"{layout.name}: no rectangle fits into the mesh at this `rotate`.")
         return GridPlacement(rotate, domain)
     candidates = placements(layout.vertices, layout.flat, layout.faces)
-    if not candidates:
-        raise TargetError(f"{layout.name}: no rectangle fits into the mesh; it is too narrow.")
-    return candidates[0][1]
+    # a rectangle of lattice points may reach a little over a ragged border
+    for part in (1.0, 0.95, 0.9):
+        for _, candidate in candidates:
+            shrunk = candidate.shrunk(part)
+            if covered(turned(layout.flat, shrunk.angle), layout.faces, shrunk.domain):
+                return shrunk
+    raise TargetError(f"{layout.name}: no rectangle fits into the mesh; it is too narrow.")
 
 
 def _placed_before(place: Mapping[str, Any], name: str) -> tuple[GridPlacement, float]:
@@ -342,7 +358,9 @@ def _laid(mesh: PreparedMesh, holes: Holes) -> tuple[MeshChart, tuple[Finding, .
     whole = mesh.vertices, mesh.faces
     topology = mesh.topology
     vertices, faces = decimated(*whole, LAID_FLAT) if len(mesh.faces) > LARGE else whole
-    if len(faces) < len(mesh.faces):
+    area = float(doubled_areas(vertices, faces).sum()) / 2
+    vertices, faces = refine(vertices, faces, LONGEST * math.sqrt(area))
+    if len(faces) != len(mesh.faces):
         topology = classify(vertices, faces)
     known, real = len(vertices), len(faces)
     vertices, faces, filled = fill_holes(vertices, faces, topology, name, holes)
@@ -355,7 +373,8 @@ def _laid(mesh: PreparedMesh, holes: Holes) -> tuple[MeshChart, tuple[Finding, .
         even = np.asarray(smoothed.spline(flat), dtype=np.float64)
         if doubled_areas(even, faces).min() > 1e-6 * np.median(doubled_areas(even, faces)):
             flat = flatten(even, faces)
-    return MeshChart(vertices, faces, whole, known, flat, rough, name, mesh.reading), findings
+    chart = MeshChart(vertices, faces, whole, known, real, flat, rough, name, mesh.reading)
+    return chart, findings
 
 
 def _smoothed(points: Floats, flat: Floats, faces: Ints) -> Smoothed:

@@ -25,7 +25,8 @@ SMALL_HOLE = 0.15
 LEAST_PIECE = 1 / 3
 """A largest piece with less than this part of the area is no answer to what the user gave."""
 
-Holes = Literal["small", "all"]
+Holes = Literal["small", "all", "keep"]
+"""Which holes are filled: small ones, all, or small ones while large ones stay windows."""
 
 
 def clean(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
@@ -146,21 +147,34 @@ def fill_holes(
 ) -> tuple[Floats, Ints, tuple[Finding, ...]]:
     """The mesh with its small holes closed, or ``all``, each by a fan around its middle.
 
-    Raises :class:`~miurafab.errors.TargetError` for a hole that is too large to be filled unasked.
+    Raises :class:`~miurafab.errors.TargetError` for a hole that is too large to be filled or kept
+    unasked.
     """
     outer, *rest = topology.lengths
-    if rest and rest[0] > SMALL_HOLE * outer and holes == "small":
+    large = [length for length in rest if length > SMALL_HOLE * outer]
+    if large and holes == "small":
         raise TargetError(
-            f"{name} has a hole {rest[0] / math.pi:.3g} mm across, too large to be filled unasked "
-            f"(it has {len(rest)} in all); `holes` all fills it, or cut the mesh to a part without."
+            f"{name} has a hole {large[0] / math.pi:.3g} mm across, too large to be filled unasked "
+            f"(it has {len(rest)} in all); `holes` keep cuts the sheet along it, `holes` all fills "
+            "it."
         )
-    for loop in topology.loops[1:]:
+    kept = len(large) if holes == "keep" else 0
+    for loop in topology.loops[1 + kept :]:
         vertices, faces = _filled(vertices, faces, loop)
-    if not rest:
+    done = []
+    if kept:
+        done.append(f"{_count(kept, 'large hole')} kept open, and the sheet ends there")
+    if filled := len(rest) - kept:
+        kind = "hole" if holes == "all" and large else "small hole"
+        done.append(f"{_count(filled, kind)} filled")
+    if not done:
         return vertices, faces, ()
-    kind = "small hole" if rest[0] <= SMALL_HOLE * outer else "hole"
-    done = f"{len(rest)} {kind}{'s were' if len(rest) > 1 else ' was'} filled"
-    return vertices, faces, (Finding("filled-holes", f"{name}: {done}.", name),)
+    sentence = f"{name}: {' and '.join(done)} (`holes` chooses)."
+    return vertices, faces, (Finding("filled-holes", sentence, name),)
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}s were" if number > 1 else f"{number} {what} was"
 
 
 def _filled(vertices: Floats, faces: Ints, loop: Ints) -> tuple[Floats, Ints]:

@@ -35,7 +35,7 @@ from miurafab.surfaces.mesh_repair import even_triangles
 from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.placement import turned
 from miurafab.surfaces.smoothing import continued, smooth
-from miurafab.surfaces.surface import Domain, gauss_newton, unit
+from miurafab.surfaces.surface import Domain, gauss_newton, normal_to, unit
 
 LEAST_SHARE = 0.05
 """A cell with a smaller part inside the outline is not kept."""
@@ -85,7 +85,7 @@ class WholeMesh:
         return continued(self.spline, self._in_layout(uv))
 
     def normal(self, uv: Floats) -> Floats:
-        return unit(np.cross(*self.tangents(uv)))
+        return normal_to(*self.tangents(uv))
 
     def tangents(self, uv: Floats) -> tuple[Floats, Floats]:
         """dS/du and dS/dv at ``uv`` (..., 2) from the derivatives of the spline."""
@@ -100,10 +100,12 @@ class WholeMesh:
         return turned(uv, -self.angle)
 
     def closest_point(self, points: Floats) -> Floats:
-        """(n, 3) the points of the mesh nearest to ``points`` (n, 3), and beyond the outline those
-        of the spline."""
+        """(n, 3) the points of the mesh and what fills its holes nearest to ``points`` (n, 3), and
+        beyond the outline those of the spline.
+        """
         feet = self.feet(points)
-        closest = closest_on_mesh(points, self.triangles)
+        filled = np.concatenate([self.triangles, self.layout.filling])
+        closest = closest_on_mesh(points, filled)
         beyond = self.outline.signed_distance(feet) < 0
         closest[beyond] = self.point(feet[beyond])
         return closest

@@ -102,13 +102,17 @@ def prepare(
 def refuse_other_than_a_disk(mesh: PreparedMesh) -> None:
     """Raise :class:`~miurafab.errors.TargetError` for a kind that no sheet with one border is."""
     name, kind = mesh.name, mesh.topology.kind
+    thick = f" and is no thin plate ({mesh.why_no_plate})" if mesh.why_no_plate else ""
+    if kind == "handles":
+        raise TargetError(
+            f"{name} has a handle, as a ring and a cup have,{thick} and so has neither one border "
+            "nor two poles; cut it through at the handle, or to the part that is meant."
+        )
     if not mesh.topology.loops:
         raise TargetError(
-            f"{name} is closed and no thin plate: {mesh.why_no_plate}; cut it open so that it is a "
-            "sheet with one border."
+            f"{name} is closed{thick}, and `region` and `rotate` are for meshes that lie flat; "
+            "leave them out, and it is covered all round."
         )
-    if kind == "handles":
-        raise TargetError(f"{name} has a handle; it cannot be laid flat. Cut it open.")
 
 
 def _outwards(vertices: Floats, faces: Ints) -> Ints:

@@ -109,6 +109,8 @@ def test_a_layout_that_lies_over_itself_is_refused() -> None:
         [np.stack([i, i + 60, i + 61], axis=1), np.stack([i, i + 61, i + 1], axis=1)]
     )
     vertices = np.column_stack([flat, np.tile(0.5 * turn, 2)])
-    chart = MeshChart(vertices, faces, (vertices, faces), len(vertices), flat, False, "ramp.obj")
+    chart = MeshChart(
+        vertices, faces, (vertices, faces), len(vertices), len(faces), flat, False, "ramp.obj"
+    )
     with pytest.raises(TargetError, match=r"ramp\.obj: its outline crosses itself"):
         whole_mesh(chart)

@@ -209,6 +209,13 @@ class _FitSearch:
         if place := best.attempt.place:
             sentence = f"On the whole target no clean sheet was found; this one has {place}."
             findings.append(Finding("smaller-part", sentence))
+        if self.request.edge == "trim" and best.pattern.target.get("edge") == "whole":
+            sentence = (
+                "A cut along the outline would leave edges shorter than the `min_edge` of "
+                f"{self.request.min_edge_mm:.3g} mm, so the sheet ends with whole facets; lower "
+                "`min_edge`, or ask for fewer `facets` or a larger `size`."
+            )
+            findings.append(Finding("whole-facets", sentence))
         if best.score.deviation > FAR:
             sentence = "The mid-surface lies far from the target; ask for more `facets`."
             findings.append(Finding("far-from-target", sentence))

@@ -167,7 +167,8 @@ class FitOptions(Shown):
     )
     holes: Holes = option(
         Choice(get_args(Holes)),
-        "The holes of the mesh to fill: small (up to 15 % of the border's length) or all.",
+        "The holes of the mesh: fill small ones (up to 15 % of the border's length) and refuse "
+        "large ones, fill all, or fill small ones and keep large ones as windows in the sheet.",
         "small",
         group="Mesh targets",
     )

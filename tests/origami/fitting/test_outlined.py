@@ -122,7 +122,10 @@ def test_whole_facets_serve_where_a_cut_would_leave_short_edges(petal: MeshSurfa
     common = {"facets": (8, 8), "surface": petal, "polish": "off"}
     cut = fit(FitRequest(**common)).pattern
     whole = fit(FitRequest(**common, edge="whole")).pattern
-    asked = fit(FitRequest(**common, min_edge_mm=9.0)).pattern
+    found = fit(FitRequest(**common, min_edge_mm=9.0))
+    asked = found.pattern
+    (said,) = [finding for finding in found.findings if finding.code == "whole-facets"]
+    assert "`min_edge` of 9 mm" in said.sentence
     assert cut is not None
     assert whole is not None
     assert asked is not None
