@@ -15,6 +15,7 @@ import numpy as np
 
 from miurafab.display import Shown
 from miurafab.findings import Finding, findings_json, refusals
+from miurafab.geometry.arrays import Floats
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami import invariants
 from miurafab.origami.coverage import coverage
@@ -190,6 +191,27 @@ def _measured(
     return measured if surface is None else with_distances(measured, pattern, surface)
 
 
+def with_nearness(
+    measured: Measurements,
+    pattern: CreasePattern,
+    surface: TargetSurface,
+    tiles: Floats | None = None,
+) -> Measurements:
+    """``measured`` with the distances both ways between ``pattern`` and ``surface``, in mm.
+
+    ``tiles`` are those of the surface, where they are at hand.
+    """
+    found = nearness(pattern, surface, surface.tiles() if tiles is None else tiles)
+    return replace(
+        measured,
+        sheet_to_target_mm=found.sheet_to_target,
+        target_to_sheet_mm=found.target_to_sheet,
+        hausdorff_mm=found.hausdorff,
+        hausdorff_relative=found.hausdorff / found.diagonal,
+        hausdorff_midsurface_mm=found.means_to_target,
+    )
+
+
 def with_distances(
     measured: Measurements, pattern: CreasePattern, surface: TargetSurface
 ) -> Measurements:
@@ -198,16 +220,13 @@ def with_distances(
     """
     assert pattern.folded_coords is not None
     tiles = surface.tiles()
-    found, cover = nearness(pattern, surface, tiles), coverage(pattern, tiles)
+    if measured.hausdorff_mm is None:
+        measured = with_nearness(measured, pattern, surface, tiles)
+    cover = coverage(pattern, tiles)
     a, b, c = pattern.folded_coords[triangulate(pattern.faces_vertices)[0]].transpose(1, 0, 2)
     paper = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
     return replace(
         measured,
-        sheet_to_target_mm=found.sheet_to_target,
-        target_to_sheet_mm=found.target_to_sheet,
-        hausdorff_mm=found.hausdorff,
-        hausdorff_relative=found.hausdorff / found.diagonal,
-        hausdorff_midsurface_mm=found.means_to_target,
         coverage=cover.covered,
         overhang=cover.overhang,
         area_ratio=paper / (cover.area * pattern.scale**2),

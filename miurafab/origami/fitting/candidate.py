@@ -23,7 +23,14 @@ from miurafab.origami.fitting.result import Attempt
 from miurafab.origami.fitting.score import GOOD, Score, score
 from miurafab.origami.fitting.starts import Start
 from miurafab.origami.unfold import unfold_charts
-from miurafab.origami.verify import DEGENERATE, EXACT, Measurements, measure, with_distances
+from miurafab.origami.verify import (
+    DEGENERATE,
+    EXACT,
+    Measurements,
+    measure,
+    with_distances,
+    with_nearness,
+)
 from miurafab.surfaces.outline import WholeMesh
 from miurafab.surfaces.surface import Swapped, TargetSurface
 
@@ -42,20 +49,24 @@ class Candidate:
     score: Score
     faults: tuple[Finding, ...]
     deviation_mm: float
+    closeness: Closeness
     polished: bool = False
     active_bounds: Mapping[str, int] = field(default_factory=dict)
 
     def with_distances(self) -> Measurements:
         """The measurements with the distances to the target."""
-        if self.measurements.hausdorff_mm is not None:
+        if self.measurements.coverage is not None:
             return self.measurements
         return with_distances(self.measurements, self.pattern, self.surface)
 
     @property
-    def rank(self) -> tuple[int, int, float]:
-        """Faults of the sheet itself, limits missed, then the score; less is better."""
+    def rank(self) -> tuple[int, int, float, float]:
+        """Faults of the sheet itself, limits missed, how far those on distances are missed, then
+        the score; less is better.
+        """
         limits_missed = sum(fault.code in LIMIT_FAULTS for fault in self.faults)
-        return len(self.faults) - limits_missed, limits_missed, self.score.total
+        beyond = max(1.0, self.closeness.factor)
+        return len(self.faults) - limits_missed, limits_missed, beyond, self.score.total
 
     @property
     def good(self) -> bool:
@@ -77,11 +88,14 @@ def candidate(
     pattern = pattern.scaled(scale)
     # the distances take long; while the search goes on only a limit on them needs them
     limited = request.max_distance_mm is not None
-    measured = measure(pattern, unturned(start.surface) if limited else None)
+    measured = measure(pattern)
+    if limited:
+        measured = with_nearness(measured, pattern, unturned(start.surface))
     deviation = deviation_of(start, request.follow, charts, points)
     points_of_rim = start.unknowns.vertices(x)
     marks = score(start.unknowns.charts, points_of_rim, start.rim, deviation)
-    faults = tuple(_faults(request, start, pattern, measured, deviation * scale, scale, x, marks))
+    closeness = Closeness.of(request, measured, deviation * scale)
+    faults = tuple(_faults(request, start, pattern, measured, closeness, scale, x, marks))
     residual = max(measured.max_planarity or 0.0, measured.max_developability or 0.0)
     attempt = Attempt(
         start.way,
@@ -97,7 +111,7 @@ def candidate(
     )
     surface = unturned(start.surface)
     return Candidate(
-        attempt, surface, pattern, measured, marks, faults, deviation * scale, polished
+        attempt, surface, pattern, measured, marks, faults, deviation * scale, closeness, polished
     )
 
 
@@ -140,7 +154,7 @@ def _faults(
     start: Start,
     pattern: CreasePattern,
     measured: Measurements,
-    deviation: float,
+    closeness: Closeness,
     scale: float,
     x: Floats,
     marks: Score,
@@ -178,7 +192,7 @@ def _faults(
             f"The shortest edge is {measured.min_edge_mm:.3g} mm, under the {least:.3g} mm asked "
             "for; ask for fewer `facets` or a larger `size`.",
         )
-    yield from Closeness.of(request, measured, deviation).faults(request.follow)
+    yield from closeness.faults(request.follow)
     # the shortest edge and Kawasaki's residual are measured from the pattern
     asked = replace(request, min_edge_mm=None, flat_foldable=None)
     shape = limits(asked, start.unknowns, scale)

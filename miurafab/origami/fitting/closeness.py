@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from miurafab.findings import Finding
+from miurafab.geometry.hausdorff import WITHIN
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.origami.verify import Measurements
 
@@ -27,8 +28,12 @@ class Closeness:
     def of(
         cls, asked: FitOptions, measured: Measurements | None, deviation_mm: float | None
     ) -> Closeness:
-        """The distances of a sheet; infinite where it was not measured."""
-        hausdorff = None if measured is None else measured.hausdorff_mm
+        """The distances of a sheet; infinite where it was not measured. The Hausdorff distance is
+        the most that it can be, where it is known to ``WITHIN``.
+        """
+        hausdorff = None
+        if measured is not None and measured.hausdorff_mm is not None:
+            hausdorff = measured.hausdorff_mm * (1 + WITHIN)
         return cls(
             float("inf") if deviation_mm is None else deviation_mm,
             float("inf") if hausdorff is None else hausdorff,
@@ -46,9 +51,18 @@ class Closeness:
         return [(part, distance, limit) for part, distance, limit in both if limit is not None]
 
     @property
+    def factors(self) -> dict[str, float]:
+        """Each distance over its limit, by the name of the limit."""
+        both = (
+            ("max_deviation", self.deviation, self.max_deviation),
+            ("max_distance", self.hausdorff, self.max_distance),
+        )
+        return {name: distance / limit for name, distance, limit in both if limit is not None}
+
+    @property
     def factor(self) -> float:
         """The largest distance over its limit; 0 without a limit."""
-        return max((distance / limit for _, distance, limit in self.pairs), default=0.0)
+        return max(self.factors.values(), default=0.0)
 
     def faults(self, follow: str) -> Iterator[Finding]:
         """A finding for each limit that is not met; ``follow`` is what lies on the target."""

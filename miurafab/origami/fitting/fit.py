@@ -13,6 +13,7 @@ what to change.
 from __future__ import annotations
 
 import itertools
+import math
 import time
 from collections.abc import Callable, Iterator
 
@@ -21,6 +22,7 @@ from miurafab.origami.fitting.candidate import Candidate
 from miurafab.origami.fitting.polish import plain, polished
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.result import INTERRUPTED, TIME_RAN_OUT, Attempt, FitResult
+from miurafab.origami.fitting.score import ENOUGH, GOOD
 from miurafab.origami.fitting.search import coarsest
 from miurafab.origami.fitting.starts import STEEP, Start, direct, starts_elsewhere, starts_for
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
@@ -38,8 +40,8 @@ MORE_GORES = (0, 2, 4)
 """What ``auto`` adds to the number of gores that the map of a body asks for."""
 PATIENCE = 25.0
 """Seconds of processor time for 400 facets, after which no new start is begun."""
-ENOUGH = 2.0
-"""With a clean sheet of this score or less, more pieces are not tried."""
+TOO_FAR = 1.2
+"""A size whose first sheets miss a limit on the distance by this factor is too coarse."""
 FAR = 4.0
 """The plain search goes on while the deviation is over this many times that of a good sheet."""
 
@@ -61,22 +63,34 @@ def fit(
     with status ``interrupted``; ``KeyboardInterrupt`` is raised only if there is none.
     """
     if request.search:
-        return coarsest(request, lambda size: _FitSearch(size, None).result(), on_progress)
+
+        def at(size: FitRequest) -> FitResult:
+            return _FitSearch(size, None, ends_at=ENOUGH).result()
+
+        return coarsest(request, at, on_progress)
     return _FitSearch(request, on_progress).result()
 
 
 class _FitSearch:
-    """One search at one number of facets; holds what was made and the best sheet so far."""
+    """One search at one number of facets; holds what was made and the best sheet so far.
+
+    A sheet without faults whose score is at most ``ends_at`` ends it.
+    """
 
     def __init__(
-        self, request: FitRequest, on_progress: Callable[[float, str], None] | None
+        self,
+        request: FitRequest,
+        on_progress: Callable[[float, str], None] | None,
+        ends_at: float = GOOD,
     ) -> None:
         self.request = request
+        self.ends_at = ends_at
         self.on_progress = on_progress
         self.started = time.perf_counter()
         self.began = time.process_time()
         self.made: list[Attempt] = []
         self.best: Candidate | None = None
+        self.nearest = math.inf
 
     def result(self) -> FitResult:
         """Run to the end, the time limit or Ctrl-C."""
@@ -86,6 +100,7 @@ class _FitSearch:
                 self.made.append(outcome if isinstance(outcome, Attempt) else outcome.attempt)
                 if isinstance(outcome, Attempt):
                     continue
+                self.nearest = min(self.nearest, outcome.closeness.factor)
                 if self.best is None or outcome.rank < self.best.rank:
                     self.best = outcome
         except _TimeUp:
@@ -118,7 +133,7 @@ class _FitSearch:
 
     def _direct(self) -> Iterator[Candidate | Attempt]:
         """The closed forms on a cylinder; the best of them is polished if it is not good."""
-        best: tuple[tuple[int, int, float], Start] | None = None
+        best: tuple[tuple[int, int, float, float], Start] | None = None
         for start in direct(self.request):
             made = plain(self.request, start)
             yield made
@@ -149,7 +164,7 @@ class _FitSearch:
         best = self.best
         if best is not None and self.request.polish == "off":
             return not best.faults and best.score.deviation <= FAR
-        if best is not None and best.good:
+        if best is not None and not best.faults and best.score.total <= self.ends_at:
             return True
         facets = self.request.columns * self.request.rows
         return time.process_time() - self.began > PATIENCE * max(1.0, facets / 400)
@@ -179,8 +194,12 @@ class _FitSearch:
             self._tell(start)
             shaken = start.shaken(request.seed) if request.seed else start
             yield from polished(request, shaken, self._check_time)
-            if self._settled() or (large and self._one_will_do()):
+            if self._settled() or (large and self._one_will_do()) or self._too_far():
                 return
+
+    def _too_far(self) -> bool:
+        """Whether a search of sizes is to go on to the next, since no start will mend this one."""
+        return self.ends_at > GOOD and self.nearest > TOO_FAR
 
     def _tell(self, start: Start) -> None:
         self._check_time()

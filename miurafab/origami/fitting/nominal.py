@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -19,13 +19,15 @@ Follow = Literal["middle", "top", "bottom"]
 class Rim:
     """The border that the facets ``facets`` (k,) are to reach: ``places`` (k, 3), and the unit
     directions ``outward`` (k, 3) across the border. ``overhang`` weighs a facet beyond its place
-    against one that has retreated: 0 where the sheet is trimmed afterwards.
+    against one that has retreated: 0 where the sheet is trimmed afterwards. ``sides`` (s, 2) are
+    the ends of the sides on the border, none where the sheet is trimmed.
     """
 
     facets: Ints
     places: Floats
     outward: Floats
     overhang: float = 1.0
+    sides: Ints = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
 
     def with_also(self, other: Rim) -> Rim:
         """Both rims, with the overhang of this one."""
@@ -34,6 +36,7 @@ class Rim:
             np.concatenate([self.places, other.places]),
             np.concatenate([self.outward, other.outward]),
             self.overhang,
+            np.concatenate([self.sides, other.sides]),
         )
 
 
@@ -73,7 +76,7 @@ def rim_of_domain(
     parameters ``axes``. A side between two facets is no rim.
     """
     half = np.array([surface.domain.width / cells[0], surface.domain.height / cells[1]]) / 2
-    facets, outward = [], []
+    facets, outward, sides = [], [], []
     for axis, sign, corners in SIDES:
         if axis not in axes:
             continue
@@ -83,9 +86,11 @@ def rim_of_domain(
         step = sign * half * np.eye(2)[axis]
         uv = nominal.parameters[chosen]
         facets.append(chosen)
+        sides.append(charts.faces_vertices[chosen][:, corners])
         outward.append(unit(surface.point(uv + step) - surface.point(uv - step)))
     together = np.concatenate(facets)
-    return Rim(together, nominal.centres[together], np.concatenate(outward))
+    places = nominal.centres[together]
+    return Rim(together, places, np.concatenate(outward), sides=np.concatenate(sides))
 
 
 def rim_of_repeated(
@@ -104,9 +109,12 @@ def rim_of_repeated(
     place = charts.cells[:, axis]
     facets = np.flatnonzero((place == 0) | (place == last))
     uv = nominal.parameters[facets]
-    sign = np.where(place[facets] == 0, -1.0, 1.0)[:, None]
-    outward = sign * unit(surface.point(uv + step) - surface.point(uv - step))
-    return Rim(facets, nominal.centres[facets], outward)
+    first = place[facets, None] == 0
+    outward = np.where(first, -1, 1) * unit(surface.point(uv + step) - surface.point(uv - step))
+    corners = charts.faces_vertices[facets]
+    below, above = (corners[:, SIDES[2 * axis + k][2]] for k in (0, 1))
+    sides = np.where(first, below, above)
+    return Rim(facets, nominal.centres[facets], outward, sides=sides)
 
 
 def chains_of(charts: QuadCharts, corners: Floats) -> tuple[Ints, Floats]:

@@ -12,6 +12,7 @@ folds       how far a fold lies outside 60..150 deg      each crease, radians
 closed      how far a fold lies over 172 deg             each crease, radians
 edges       max(0, 0.2 - l / L)                          each edge
 convexity   max(0, 4k - h) / 4                           each facet and diagonal
+reach       max(0, d - limit) / L                        each vertex, where the distance has a limit
 fairness    (X_a - 2 X_b + X_c) - (S_a - 2 S_b + S_c)    over L, at stride 2 along i and along j
 
 with b the outward direction in the target across its border and p the place of the border, and
@@ -30,7 +31,8 @@ its facets pass through each other. On a globe to 85 degrees in 6, 8 and 12 gore
 distance is 0.52, 0.51 and 0.37 % of the diagonal with 3.0 on cosines without a sense, and the 6
 gores cross themselves; it is 0.16, 0.13 and 0.07 % with these weights.
 
-The limits that a user gives replace or join the hinges: shortest edge, sectors, aspect, Kawasaki.
+The limits that a user gives replace or join the hinges: shortest edge, sectors, aspect, Kawasaki,
+and the distance of vertices from the target (:mod:`~miurafab.origami.fitting.reach`).
 """
 
 from __future__ import annotations
@@ -63,6 +65,7 @@ from miurafab.origami.fitting.nominal import (
     feet_of,
     rim_of_domain,
 )
+from miurafab.origami.fitting.reach import Reach
 from miurafab.surfaces.surface import TargetSurface
 
 INACTIVE = 1e-30
@@ -88,6 +91,7 @@ class Weights:
     closed: float = 4.0
     edges: float = 8.0
     convexity: float = 10.0
+    reach: float = 30.0
     fairness: float = 0.3
     least_sector: float = math.radians(45)
     greatest_sector: float = math.radians(135)
@@ -105,8 +109,8 @@ class FairObjective:
     ``followers`` (K, k) are the vertices whose means follow the target, ``places`` (K, 3) where
     they belong, ``feet`` (K, 2) the parameters of the nearest points to start from. ``area`` (F,)
     is A of each facet, ``sense`` (P,) the sign that each fold is to have. ``aspect`` is the
-    greatest ratio of two sides, ``kawasaki`` the greatest |a0 + a2 - pi| in radians; None is no
-    limit.
+    greatest ratio of two sides, ``kawasaki`` the greatest |a0 + a2 - pi| in radians, ``reach`` the
+    greatest distance; None is no limit.
     """
 
     surface: TargetSurface
@@ -122,6 +126,7 @@ class FairObjective:
     weights: Weights = field(default_factory=Weights)
     aspect: float | None = None
     kawasaki: float | None = None
+    reach: Reach | None = None
 
     @classmethod
     def of(
@@ -136,11 +141,14 @@ class FairObjective:
         weights: Weights | None = None,
         aspect: float | None = None,
         kawasaki: float | None = None,
+        reach: float | None = None,
     ) -> FairObjective:
         """The objective of the sheet ``start`` (V, 3) over ``charts``, which are cells of a lattice
         of ``cells`` columns and rows. ``rim`` is that of the domain where it is not given.
         """
         nominal = Nominal.of(surface, charts, *cells)
+        if rim is None:
+            rim = rim_of_domain(surface, charts, nominal, cells)
         corners = start[charts.faces_vertices]
         area = np.linalg.norm(
             np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1
@@ -163,12 +171,13 @@ class FairObjective:
             followers,
             places,
             feet,
-            rim_of_domain(surface, charts, nominal, cells) if rim is None else rim,
+            rim,
             np.maximum(area, LEAST_AREA * np.median(area)),
             sense_of_folds(start, charts),
             weights or Weights(),
             aspect,
             kawasaki,
+            None if reach is None else Reach.of(surface, charts, cells, rim, reach),
         )
 
     def __call__(self, points: Floats, feet: Floats) -> tuple[Floats, sparse.csr_array, Floats]:
@@ -207,6 +216,8 @@ class FairObjective:
         if self.aspect is not None:
             ratio, sides, rows = side_ratios(points, faces, self.aspect)
             yield _hinge(w.edges, -ratio / self.length, sides, -rows / self.length)
+        for over, near, rows in () if self.reach is None else self.reach.over(points):
+            yield _hinge(w.reach, over / self.length, near, rows / self.length)
         if self.kawasaki is not None:
             residual, spokes, rows = kawasaki(points, self.charts)
             for sign in (1.0, -1.0):

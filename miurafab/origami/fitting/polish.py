@@ -15,6 +15,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.fitting.candidate import Candidate, candidate, turned_follow
 from miurafab.origami.fitting.fair import PENALTY, fairest
@@ -36,10 +38,14 @@ FEW = 2000
 MORE = 40
 SCALINGS = 4
 """The most rounds within limits, each at the scale that the last round left."""
-SHAPE_FAULTS = ("min-edge", "facet-shape", "flat-foldable")
-"""The faults of a sheet that misses a limit on edges, corners or Kawasaki's condition."""
+SHAPE_FAULTS = ("min-edge", "max-distance", "facet-shape", "flat-foldable")
+"""The faults of a sheet that misses a limit on edges, corners, Kawasaki's condition, or reach."""
 BOUND_MARGIN = 2e-3
 """The limits are tightened by this part, since the scale of the sheet still changes."""
+GAIN = 0.75
+"""A round that leaves more than this part of what a sheet lies too far is the last."""
+REACH_MARGIN = 0.03
+"""The limit on the distance is tightened by this part: it is a hinge and no inequality."""
 
 
 def plain(request: FitRequest, start: Start) -> Candidate | Attempt:
@@ -55,9 +61,9 @@ def polished(
 ) -> Iterator[Candidate | Attempt]:
     """The fair sheets of ``start``, each better than the one before unless it crosses itself.
 
-    The first round leaves the limits on edges, corners and Kawasaki's condition out. Where it
-    misses one of them, the next rounds go on from there within the limits, at the scale that the
-    last round left. ``on_step`` is called before each step, and may end the search by an exception.
+    The first round leaves all limits but that on the distance out. Where it misses one of them, the
+    next rounds go on from there within the limits, at the scale that the last round left.
+    ``on_step`` is called before each step, and may end the search by an exception.
     """
     unknowns = start.unknowns
     unlimited = replace(
@@ -70,14 +76,16 @@ def polished(
     )
     constraints = unknowns.constraints(request.exactly_flat_foldable)
     tick = _ticking(on_step)
-    x, iterations, scale = start.x, 0, 1.0
+    x, iterations, scale = start.x, 0, _scale_of(request, start)
+    excess = np.inf
+    aim = (1 - REACH_MARGIN) * (request.max_distance_mm or np.inf)
     for number in range(1 + SCALINGS):
         asked = request if number else unlimited
         bounds = limits(asked, unknowns, scale, BOUND_MARGIN)
-        objective = _objective(asked, start, x, bounds)
+        objective = _objective(asked, start, x, bounds, aim / scale)
         last: Candidate | None = None
         feet = objective.feet
-        for penalty, steps in LEGS if number else (*EASING, *LEGS):
+        for penalty, steps in LEGS[:1] if number else (*EASING, *LEGS):
             if (penalty, steps) == LEGS[-1] and len(x) < FEW:
                 steps = MORE
             sheet = fairest(
@@ -102,22 +110,41 @@ def polished(
             if bounds.any:
                 last = replace(last, active_bounds=bounds.count(solution.active))
             yield last
-            if sheet.steps < steps:
+            if sheet.steps < steps or _too_far(last):
                 break
-        limited = limits(request, unknowns, scale).any
+        limited = limits(request, unknowns, scale).any or request.max_distance_mm is not None
         if last is None or not limited or (number and not last.faults):
             return
         if number == 0 and not any(fault.code in SHAPE_FAULTS for fault in last.faults):
             return
         scale = last.pattern.scale
+        if _too_far(last):
+            # a hinge gives way a little, so the next round aims shorter by as much
+            far = last.closeness.factors["max_distance"]
+            aim *= (1 - REACH_MARGIN / 2) / far
+            if number > 1 and far - 1 > GAIN * excess:
+                return
+            excess = far - 1
+
+
+def _too_far(sheet: Candidate) -> bool:
+    return any(fault.code == "max-distance" for fault in sheet.faults)
 
 
 def _ticking(on_step: Callable[[], None] | None) -> Callable[[int, float], None] | None:
     return None if on_step is None else lambda _number, _value: on_step()
 
 
-def _objective(request: FitRequest, start: Start, x: Floats, bounds: Bounds) -> FairObjective:
-    """The fair objective with the limits ``bounds`` as hinges."""
+def _scale_of(request: FitRequest, start: Start) -> float:
+    """The scale that brings the seed to the size asked for."""
+    size = float(np.ptp(start.unknowns.whole(start.x)[1], axis=0).max())
+    return 1.0 if request.size_mm is None else request.size_mm / size
+
+
+def _objective(
+    request: FitRequest, start: Start, x: Floats, bounds: Bounds, reach: float
+) -> FairObjective:
+    """The fair objective with the limits ``bounds`` as hinges, and ``reach`` on the distance."""
     weights = Weights()
     if bounds.min_edge is not None:
         shortest = max(weights.shortest_edge, bounds.min_edge / start.unknowns.length)
@@ -139,6 +166,7 @@ def _objective(request: FitRequest, start: Start, x: Floats, bounds: Bounds) -> 
         weights=weights,
         aspect=bounds.aspect,
         kawasaki=bounds.kawasaki,
+        reach=reach if np.isfinite(reach) else None,
     )
 
 

@@ -32,6 +32,8 @@ from miurafab.origami.fitting.nominal import Rim
 
 GOOD = 1.0
 """A sheet with this score or less is as good as asked, and ends the search."""
+ENOUGH = 2.0
+"""With a clean sheet of this score or less, more pieces and coarser sheets are not tried."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,11 @@ class Score:
     def total(self) -> float:
         """The largest part."""
         return max(float(getattr(self, f.name)) for f in fields(self) if f.name != "bow_ties")
+
+    @property
+    def form(self) -> float:
+        """The largest part that is no matter of where the sheet lies."""
+        return max(self.sectors, self.bad, self.folds, self.area, self.edges)
 
     def report(self) -> dict[str, float]:
         """The parts and the total, for the fit report."""

@@ -42,6 +42,9 @@ STRETCHES = ((1.3, 1.3), (1.6, 1.3), (1.15, 1.6), (1.3, 1.6), (2.0, 1.3))
 """The stretches along and across the rows. Strong curvature along the rows needs more stretch along
 them; strong twist needs less along and more across.
 """
+SHALLOW = (1.05, 1.17)
+"""The stretches tried first where the distance of the whole sheet has a limit: a corrugation of
+0.6 by 0.6, just high enough for folds of 60 degrees."""
 GENTLE = math.radians(50)
 STEEP = math.radians(66)
 """A slide under ``GENTLE`` gave a clean sheet on every target that was tried, one over ``STEEP`` on
@@ -308,7 +311,8 @@ def corrugations_of(request: FitRequest) -> list[Corrugation]:
     if request.amplitude is not None and request.zigzag is not None:
         return [Corrugation(request.amplitude, request.zigzag)]
     corrugations = []
-    for along, across in STRETCHES:
+    near = request.max_distance_mm is not None
+    for along, across in (SHALLOW, *STRETCHES) if near else STRETCHES:
         usual = Corrugation.from_stretches(along, across)
         amplitude = usual.amplitude if request.amplitude is None else request.amplitude
         if request.zigzag is not None:
