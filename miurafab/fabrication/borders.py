@@ -85,23 +85,28 @@ def open_borders(pattern: CreasePattern) -> tuple[OpenBorder, ...]:
     )
 
 
-def chosen_edges(pattern: CreasePattern, chosen: Chosen) -> Ints:
-    """The pattern edges of the ``chosen`` open borders.
+def chosen(pattern: CreasePattern, which: Chosen, option: str) -> tuple[OpenBorder, ...]:
+    """The open borders that the ``option`` names by ``which``.
 
     Raises :class:`~miurafab.errors.LayoutError` for a border that is not there.
     """
-    borders = open_borders(pattern) if chosen else ()
-    if chosen == "all":
-        chosen = tuple(range(1, len(borders) + 1))
-    for number in chosen:
+    borders = open_borders(pattern) if which else ()
+    if which == "all":
+        return borders
+    for number in which:
         if number > len(borders):
             there = f"has {len(borders)}" if borders else "has none"
             raise LayoutError(
-                f"`border_tabs` names open border {number}, but the shell {there}; give all, or "
+                f"`{option}` names open border {number}, but the shell {there}; give all, or "
                 "numbers of the report on the layout."
             )
-    edges = [edge for number in chosen for edge in borders[number - 1].edges]
-    return np.array(sorted(edges), dtype=np.int64)
+    return tuple(borders[number - 1] for number in which)
+
+
+def chosen_edges(pattern: CreasePattern, which: Chosen) -> Ints:
+    """The pattern edges of the open borders that bear tabs."""
+    borders = chosen(pattern, which, "border_tabs")
+    return np.array(sorted(e for border in borders for e in border.edges), dtype=np.int64)
 
 
 def open_tabs(pattern: CreasePattern, edges: Ints, material: Material) -> TabRegions:

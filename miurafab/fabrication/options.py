@@ -187,6 +187,14 @@ class LayoutOptions(Shown):
         group="Tabs",
         page="more",
     )
+    caps: Chosen = option(
+        Borders(),
+        "Close open borders by a cap, a piece of its own: all, or the numbers that the report "
+        "gives; those that stay open are numbered anew.",
+        (),
+        group="Patches",
+        page="more",
+    )
     border_tabs: Chosen = option(
         Borders(),
         "Tabs on open borders, to fix the shell to a base or a frame: all, or the numbers that the "

@@ -18,6 +18,7 @@ import shapely
 
 from miurafab.display import Shown
 from miurafab.fabrication.borders import OpenBorder, open_borders
+from miurafab.fabrication.caps import capped
 from miurafab.fabrication.layout_findings import layout_findings
 from miurafab.fabrication.nesting import Nesting, Problem, Ring, nest, turned
 from miurafab.fabrication.open_ring import opened
@@ -219,7 +220,7 @@ def lay_out(
     pattern or the material lacks what an option asks for.
     """
     options = options or LayoutOptions()
-    pattern = opened(pattern, options)
+    pattern = capped(opened(pattern, options), options)
     material = worked(material, machine, options)
     stock = lay_stock(options, machine.bed, material.grain)
     framed = frame_patches(pattern, stock, material, options)

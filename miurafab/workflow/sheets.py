@@ -47,8 +47,8 @@ from miurafab.workflow.picture import first_sheet
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-OPENED = "-opened"
-"""What the name of a pattern that was opened for the job ends in."""
+OPENED, CAPPED = "-opened", "-capped"
+"""What the name of a pattern that was opened for the job, or got caps, ends in."""
 Progress = Callable[[float, str], None]
 
 
@@ -73,11 +73,11 @@ class SheetJob(Shown):
     machine_file, material_file : Path
         The files of the profiles.
     pattern_file : Path, optional
-        The FOLD file of the pattern, None where the pattern has none or was opened.
+        The FOLD file of the pattern, None where the pattern has none or was changed.
     options : LayoutOptions
         How the pattern was laid out.
     opened : bool
-        Whether the pattern was opened for the job.
+        Whether the pattern was opened or capped for the job.
     """
 
     name: str
@@ -169,7 +169,8 @@ class SheetJob(Shown):
     def _put_pattern(self, folder: Path, staging: Path) -> Path:
         """The file of the pattern, which is put into ``staging`` unless it is in ``folder``."""
         if self.pattern_file is None:
-            file = staging / f"{self.name}{OPENED if self.opened else ''}.fold"
+            capped = CAPPED if self.opened and self.options.caps else ""
+            file = staging / f"{self.name}{capped or (OPENED if self.opened else '')}.fold"
             write_fold(self.pattern, file, self.name)
             return file
         file = staging / self.pattern_file.name

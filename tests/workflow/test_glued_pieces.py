@@ -32,6 +32,7 @@ def fitted_globe():
 CASES = {
     "gores": (gores, {}),
     "gores in patches": (gores, {"max_patch": (110, 75), "tab_side": "upper"}),
+    "capped": (gores, {"caps": "all"}),
     "two pieces": (two_pieces, {"tab_side": "alternate"}),
     "trimmed": (trimmed, {"max_patch": (90, 60)}),
     "trimmed pieces": (two_trimmed_pieces, {"full_facet": True}),
