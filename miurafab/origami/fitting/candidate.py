@@ -22,6 +22,7 @@ from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.result import Attempt
 from miurafab.origami.fitting.score import GOOD, Score, score
 from miurafab.origami.fitting.starts import Start
+from miurafab.origami.invariants import exactness
 from miurafab.origami.unfold import unfold_charts
 from miurafab.origami.verify import (
     DEGENERATE,
@@ -165,7 +166,7 @@ def _faults(
         measured.max_developability or 0.0,
         measured.max_isometry or 0.0,
     )
-    if residual > EXACT:
+    if residual > exactness(pattern):
         sentence = f"A residual of {residual:.1e} is left; ask for fewer `facets`."
         yield Finding("residual", sentence)
     if measured.self_intersections:

@@ -83,12 +83,14 @@ def fairest(
     *,
     steps: int = STEPS,
     penalty: float = PENALTY,
+    solver: SymmetricSolver | None = None,
     on_step: Callable[[int, float], None] | None = None,
 ) -> FairSheet:
     """Minimise ``objective`` from ``x`` (n,), near which ``constraints`` hold, with the nearest
     points near the parameters ``feet`` (K, 2).
 
-    ``on_step`` gets the number and the objective of each step.
+    A ``solver`` keeps the order of elimination from one call to the next. ``on_step`` gets the
+    number and the objective of each step.
     """
 
     def at(x: Floats, feet: Floats) -> _State:
@@ -97,7 +99,7 @@ def fairest(
         return _State(penalty, x, residuals, unknowns.by_unknowns(jacobian), feet, values, gradient)
 
     least, damping, most = DAMPING
-    solver = SymmetricSolver()
+    solver = solver or SymmetricSolver()
     state = at(x, feet)
     taken = resting = 0
     while taken < steps:

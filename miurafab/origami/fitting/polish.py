@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from miurafab.geometry.arrays import Floats
+from miurafab.geometry.sparse import SymmetricSolver
 from miurafab.origami.fitting.candidate import Candidate, candidate, turned_follow
 from miurafab.origami.fitting.fair import PENALTY, fairest
 from miurafab.origami.fitting.inequalities import Bounds, limits
@@ -75,7 +76,7 @@ def polished(
         flat_foldable=0.0 if request.exactly_flat_foldable else None,
     )
     constraints = unknowns.constraints(request.exactly_flat_foldable)
-    tick = _ticking(on_step)
+    tick, solver = _ticking(on_step), SymmetricSolver()
     x, iterations, scale = start.x, 0, _scale_of(request, start)
     excess = np.inf
     aim = (1 - REACH_MARGIN) * (request.max_distance_mm or np.inf)
@@ -96,6 +97,7 @@ def polished(
                 feet,
                 steps=steps,
                 penalty=penalty,
+                solver=solver,
                 on_step=tick,
             )
             x, feet = sheet.x, sheet.feet
