@@ -42,18 +42,26 @@ class SymmetricSolver:
         self._pattern = sparse.csc_array((0, 0))
         self._plan = FrontalPlan(self._pattern)
 
+    @property
+    def size(self) -> int:
+        """The rows of the matrices that are expected."""
+        return int(self._pattern.shape[0])
+
+    def expect(self, pattern: sparse.csc_array) -> None:
+        """Plan for matrices whose entries are among those of ``pattern``."""
+        self._pattern = _ones(pattern)
+        self._plan = FrontalPlan(self._pattern)
+
     def factor(self, matrix: sparse.csc_array) -> Factor:
         """The factor of ``matrix``, which stores both triangles, with sorted indices.
 
         Raises ``RuntimeError`` where the matrix is not positive definite.
         """
         if matrix.shape != self._pattern.shape:
-            self._pattern = _ones(matrix)
-            self._plan = FrontalPlan(self._pattern)
+            self.expect(matrix)
         numbers = self._filled_up(matrix)
         if numbers is None:
-            self._pattern = _ones(self._pattern + _ones(matrix))
-            self._plan = FrontalPlan(self._pattern)
+            self.expect(self._pattern + _ones(matrix))
             numbers = self._filled_up(matrix)
             assert numbers is not None
         return self._plan.factor(numbers)

@@ -60,6 +60,11 @@ class GramFactor:
 
     def renew(self, jacobian: sparse.csr_array) -> bool:
         """Factor J J^T; False where the matrix is singular to the last digit."""
+        if self._solver.size != jacobian.shape[0]:
+            # a product of ones has every entry that any J may give, so it is planned once
+            ones = jacobian.copy()
+            ones.data = np.ones(ones.nnz)
+            self._solver.expect((ones @ ones.T.tocsr()).tocsc())
         gram = (jacobian @ jacobian.T.tocsr()).tocsc()
         gram.setdiag(gram.diagonal() * (1 + REGULARISATION) + 1e-300)
         gram.sort_indices()
