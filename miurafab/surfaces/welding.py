@@ -84,8 +84,6 @@ def _split(vertices: Floats, faces: Ints, reach: float) -> tuple[Ints, int, floa
     open_sides = np.flatnonzero(uses[inverse.reshape(-1)] == 1)
     if not len(open_sides):
         return faces, 0, 0.0
-    # one side of a triangle in each round
-    open_sides = open_sides[np.unique(open_sides // 3, return_index=True)[1]]
     rim = np.unique(_border(faces))
     start, end = vertices[sides[open_sides, 0]], vertices[sides[open_sides, 1]]
     along = end - start
@@ -101,8 +99,10 @@ def _split(vertices: Floats, faces: Ints, reach: float) -> tuple[Ints, int, floa
     on = inside & (gap <= reach)
     if not on.any():
         return faces, 0, 0.0
-    new, dropped = [], []
-    for n in np.unique(side[on]).tolist():
+    new, dropped, welded = [], [], 0
+    split = np.unique(side[on])
+    # one side of a triangle in each round
+    for n in split[np.unique(open_sides[split] // 3, return_index=True)[1]].tolist():
         here = np.flatnonzero(on & (side == n))
         between = vertex[here[np.argsort(part[here])]].tolist()
         triangle, corner = divmod(int(open_sides[n]), 3)
@@ -110,9 +110,10 @@ def _split(vertices: Floats, faces: Ints, reach: float) -> tuple[Ints, int, floa
         path = [a, *between, b]
         new += [[p, q, c] for p, q in pairwise(path)]
         dropped.append(triangle)
+        welded += len(between)
     kept = np.delete(faces, dropped, axis=0)
     return (
         np.concatenate([kept, np.array(new, dtype=np.int64)]),
-        int(on.sum()),
+        welded,
         float(gap[on].max()),
     )
