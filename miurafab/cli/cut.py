@@ -101,8 +101,8 @@ def cut(
     from miurafab.machine.transport import require_port
     from miurafab.workflow.cut import prepare
 
-    for each in port or ():
-        require_port(each)
+    if port:
+        require_port(*port)
     with console.progress("preparing") as progress:
         prepared = prepare(
             thing,

@@ -296,16 +296,16 @@ def open_port(
     return SerialTransport(port, baud)
 
 
-def require_port(port: str) -> None:
-    """Raise :class:`~miurafab.errors.PortError` for a device that this computer does not have.
+def require_port(*ports: str) -> None:
+    """Raise :class:`~miurafab.errors.PortError` if this computer has none of the ``ports``.
 
     Nothing is opened, so a board is not reset. On Windows, where a device is no file, and for a
     URL, only opening the port tells.
     """
-    if port == VIRTUAL or "://" in port or os.name != "posix":
-        return
-    if not os.path.exists(port):  # noqa: PTH110 - a device may be a dangling link of udev
-        raise PortError(_no_such_port(port))
+    if os.name == "posix" and not any(
+        port == VIRTUAL or "://" in port or Path(port).exists() for port in ports
+    ):
+        raise PortError(_no_such_port(ports[0]))
 
 
 def list_ports() -> list[tuple[str, str]]:

@@ -179,11 +179,12 @@ def test_a_disk_that_fills_up(nc: Path) -> None:
 
     more = {"preexec_fn": limit, "env": os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}}
     process = bench.cut(nc, "--at", "0,0", **more)
-    said = words(bench.finish(process, 60))
-    assert process.returncode == 3
+    said = " ".join(bench.finish(process, 60).split())
+    # The journal is short. The transcript, which holds every byte, is told and costs no sheet.
+    assert process.returncode == 0
+    assert "warning (records): The transcript" in said
     assert "can no longer be written: File too large" in said
-    assert said.endswith(RESET)
-    assert bench.commands.count(b"\x18") == 1
+    assert bench.commands.count(b"\x18") == 0
     bench.assert_dark_from(bench.came[-1][1])
     end(bench)
 
