@@ -12,7 +12,6 @@ what to change.
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -29,7 +28,8 @@ from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
 from miurafab.surfaces.tube import TubeSurface
 
 TRIED = 3
-"""The starts that are brought to fair sheets, for each number of pieces."""
+"""The starts that are brought to fair sheets, for each number of pieces. Where the number of pieces
+is asked for, more are tried until one will do: the globe in two pieces needs its fourth."""
 LARGE = 900
 """A sheet of more facets is brought to the end from the likeliest start alone, if that one will
 do."""
@@ -190,7 +190,12 @@ class _FitSearch:
         if starts and request.timeout is not None and self.best is None:
             yield plain(request, starts[0])
         large = request.columns * request.rows > LARGE
-        for start in itertools.islice(starts, TRIED):
+        pieces = self._pieces()
+        # of pieces whose number is asked for there are no more to try
+        last = len(pieces) == 1 and pieces[0] > 1
+        for number, start in enumerate(starts):
+            if number >= TRIED and not (last and not self._one_will_do()):
+                return
             self._tell(start)
             shaken = start.shaken(request.seed) if request.seed else start
             yield from polished(request, shaken, self._check_time)
