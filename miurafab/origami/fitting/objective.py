@@ -29,7 +29,9 @@ degrees: then its facets have passed through each other. Near a pole the paper i
 must close; a heavy weight on ``folds`` lifts the sheet off the target there, and without ``closed``
 its facets pass through each other. On a globe to 85 degrees in 6, 8 and 12 gores of 24 rows the
 distance is 0.52, 0.51 and 0.37 % of the diagonal with 3.0 on cosines without a sense, and the 6
-gores cross themselves; it is 0.16, 0.13 and 0.07 % with these weights.
+gores cross themselves; it is 0.25, 0.23 and 0.18 % with these weights. Bands and pieces of a sheet
+have half of the weight. The named surfaces take a tenth less paper with 1.0 than with 0.5. With
+2.0 they take a quarter less, and corners of the candlestick reach 40 degrees.
 
 The limits that a user gives replace or join the hinges: shortest edge, sectors, aspect, Kawasaki,
 and the distance of vertices from the target (:mod:`~miurafab.origami.fitting.reach`).
@@ -87,7 +89,7 @@ class Weights:
     place: float = 0.05
     rim: float = 4.0
     sectors: float = 6.0
-    folds: float = 0.5
+    folds: float = 1.0
     closed: float = 4.0
     edges: float = 8.0
     convexity: float = 10.0
@@ -100,6 +102,11 @@ class Weights:
     closed_fold: float = math.radians(172)
     shortest_edge: float = 0.2
     convex: float = 0.2
+
+    @classmethod
+    def of(cls, charts: QuadCharts) -> Weights:
+        """Those of one piece, or of several, which may crowd at poles: their folds may close."""
+        return cls(folds=0.5) if charts.pieces.max() > 0 else cls()
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +181,7 @@ class FairObjective:
             rim,
             np.maximum(area, LEAST_AREA * np.median(area)),
             sense_of_folds(start, charts),
-            weights or Weights(),
+            weights or Weights.of(charts),
             aspect,
             kawasaki,
             None if reach is None else Reach.of(surface, charts, cells, rim, reach),
