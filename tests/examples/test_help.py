@@ -23,8 +23,8 @@ PREPARED = [
 NO_SWITCHES = "miurafab machine home"
 """The virtual machine has no homing switches: it refuses, exit code 3."""
 
-OF_OTHERS = {"--best", "--no-package-lock"}
-"""Options of other programs that pages name."""
+OF_OTHERS = {"--best", "--no-package-lock", "--round", "--glue"}
+"""Options of other programs, and of benchmarks, that pages name."""
 
 
 @pytest.fixture(scope="session")

@@ -88,7 +88,7 @@ def test_from_a_surface_to_sheets_by_keyboard(page):
     page.press("Enter")
     page.until("!document.getElementById('pattern').hidden")
     page.idle()
-    assert "from one flat piece" in page.text("headline")
+    assert "folds from flat paper" in page.text("headline")
     command = "miurafab fit vase:angle=100 --facets 12x12 --size 200mm -o vase.fold"
     assert page.text("pattern-command") == command
     assert "Flat facets" in page.text("figures")

@@ -198,8 +198,10 @@ def test_a_long_fit_blocks_nothing_and_ends_with_the_studio(start, how):
     program = start()
     page = Page(program.address)
     page.post("fit", {"target": {"surface": "sphere"}, "options": {"facets": "300x300"}})
-    (worker,) = children(program.process)
     started = time.monotonic()
+    while not (workers := children(program.process)):
+        assert time.monotonic() - started < 5
+    (worker,) = workers
     assert json.loads(page.get("state"))["task"]["running"]
     assert page.ask("POST", "fit", {"target": {"surface": "plane"}})[0] == 400
     assert time.monotonic() - started < 5

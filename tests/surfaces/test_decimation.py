@@ -73,7 +73,7 @@ def test_a_large_mesh_is_laid_flat_simplified_and_measured_whole(monkeypatch):
     monkeypatch.setattr(mesh, "LARGE", 3000)
     monkeypatch.setattr(mesh, "LAID_FLAT", 1500)
     after = mesh.mesh_surface(vertices, faces)
-    assert len(after.layout.faces) <= 1600
+    assert len(after.layout.faces) <= 1.25 * 1500  # the longest edges are halved again
     assert len(after.triangles) == len(before.triangles)
     assert after.domain.width == pytest.approx(before.domain.width, rel=0.03)
     points = after.point(after.domain.lattice(9, 9).reshape(-1, 2))

@@ -237,7 +237,7 @@ def test_the_penalty_formulation_gives_the_same_energy():
     for state in range(highest + 1):
         energy, points = minimum_by_penalty(model, 1e6, stencil, path.drives[state], points)
         assert energy == pytest.approx(path.energies[state], rel=1e-6, abs=1e-15)
-    assert path.energies[highest] > 1e-9
+    assert path.energies[highest] > 1e-10
     stiff = folding_path(pattern, 24).energies[highest]
     assert stiff == pytest.approx(energy, rel=1e-2)
     assert stiff > energy
