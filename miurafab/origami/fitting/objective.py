@@ -29,7 +29,7 @@ degrees: then its facets have passed through each other. Near a pole the paper i
 must close; a heavy weight on ``folds`` lifts the sheet off the target there, and without ``closed``
 its facets pass through each other. On a globe to 85 degrees in 6, 8 and 12 gores of 24 rows the
 distance is 0.52, 0.51 and 0.37 % of the diagonal with 3.0 on cosines without a sense, and the 6
-gores cross themselves; it is 0.16, 0.13 and 0.07 % with 0.5 on signed folds, the weight of several
+gores cross themselves; it is 0.12, 0.13 and 0.08 % with 0.5 on signed folds, the weight of several
 pieces. The named surfaces, in one piece, take a tenth less paper with 1.0. With 2.0 they take a
 quarter less, and corners of the candlestick reach 40 degrees.
 
