@@ -13,7 +13,16 @@ from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, MaterialOption, argument, option, split, takes
 from miurafab.cli.fit import RigidOption, fit_options
 from miurafab.cli.machine import PORT
-from miurafab.errors import DONE, MACHINE_FAILED, NO, WAITING, InputError, MachineError, OptionError
+from miurafab.errors import (
+    DONE,
+    MACHINE_FAILED,
+    NO,
+    WAITING,
+    InputError,
+    MachineError,
+    OptionError,
+    PersonNeeded,
+)
 from miurafab.findings import findings_json
 from miurafab.options import File, Flag, Text, Whole, read_options
 from miurafab.profiles.own import own_defaults
@@ -149,15 +158,14 @@ def _stream(
     from miurafab.workflow.dry_run import clock_text
 
     def before(number: int, count: int) -> None:
-        console.note(f"Sheet {number} of {count}: {_put_in(prepared, number)}, press Enter.")
-        sys.stdin.readline()
+        _wait(console, f"Sheet {number} of {count}: {_put_in(prepared, number)}, press Enter.")
 
     def after_frame(number: int) -> None:
-        if asks and port != "virtual":
-            console.note(f"That is the frame of sheet {number}; Enter cuts, Ctrl-C does not.")
-            sys.stdin.readline()
+        if waits:
+            _wait(console, f"That is the frame of sheet {number}; Enter cuts, Ctrl-C does not.")
 
-    asks = sys.stdin.isatty() or bool(pause)
+    attended = sys.stdin.isatty()
+    waits = pause if pause is not None else port != "virtual" and attended
 
     with _hint_at_resume(console, prepared), console.progress("cutting") as bar:
 
@@ -177,7 +185,7 @@ def _stream(
                 options=options,
                 keys=keys,
                 pause=pause,
-                before_sheet=before if asks else None,
+                before_sheet=before if attended or pause else None,
                 after_frame=after_frame,
                 on_resume=lambda finding: console.note(finding.sentence),
                 on_progress=show_progress,
@@ -290,6 +298,13 @@ def _hint_at_resume(console: Console, prepared: Prepared) -> Iterator[None]:
                 "X,Y, the position of the head then."
             )
         raise
+
+
+def _wait(console: Console, request: str) -> None:
+    """Ask for Enter; the end of the input is nobody's."""
+    console.note(request)
+    if not sys.stdin.readline():
+        raise PersonNeeded("Nobody pressed Enter, and the input has ended; nothing more was cut.")
 
 
 def _put_in(prepared: Prepared, number: int) -> str:

@@ -317,17 +317,15 @@ def _no_laser_mode(machine: MachineProfile) -> Iterator[Finding]:
 def _constant_beam(job: Job, machine: MachineProfile) -> Iterator[Finding]:
     if machine.tool.kind != "laser":
         return
-    for match in _M3_ANYWHERE.finditer(job.text):
-        number, line = _line_at(job.text, match.start())
-        if _M3.search(_code(line)):
-            yield _in_line(
-                "m3",
-                job.name,
-                number,
-                "arms the laser with M3, which keeps the beam on, standing still, if the link to "
-                "the machine is lost; use M4, or allow M3 explicitly and stay beside the machine.",
-            )
-            return
+    number = _first_line(job, _M3_ANYWHERE, _M3)
+    if number is not None:
+        yield _in_line(
+            "m3",
+            job.name,
+            number,
+            "arms the laser with M3, which keeps the beam on, standing still, if the link to the "
+            "machine is lost; use M4, or allow M3 explicitly and stay beside the machine.",
+        )
 
 
 def _armed_at_the_end(job: Job) -> Iterator[Finding]:
@@ -356,24 +354,27 @@ def _characters(job: Job) -> Iterator[Finding]:
 
 
 def _relative_moves(job: Job) -> Iterator[Finding]:
-    for match in _RELATIVE_ANYWHERE.finditer(job.text):
-        number, line = _line_at(job.text, match.start())
-        if _RELATIVE.search(_code(line)):
-            yield _in_line(
-                "relative",
-                job.name,
-                number,
-                "begins relative moves (G91); they are posted where the wire is too slow for "
-                "absolute moves.",
-            )
-            return
+    number = _first_line(job, _RELATIVE_ANYWHERE, _RELATIVE)
+    if number is not None:
+        yield _in_line(
+            "relative",
+            job.name,
+            number,
+            "begins relative moves (G91); they are posted where the wire is too slow for absolute "
+            "moves.",
+        )
 
 
 def line_of_mist(job: Job) -> int | None:
     """The first line with M7, if there is one."""
-    for match in _MIST_ANYWHERE.finditer(job.text):
+    return _first_line(job, _MIST_ANYWHERE, _MIST)
+
+
+def _first_line(job: Job, anywhere: re.Pattern[str], word: re.Pattern[str]) -> int | None:
+    """The first line whose code holds ``word``; matches of ``anywhere`` are where to look."""
+    for match in anywhere.finditer(job.text):
         number, line = _line_at(job.text, match.start())
-        if _MIST.search(_code(line)):
+        if word.search(_code(line)):
             return number
     return None
 

@@ -34,6 +34,7 @@ from miurafab.gcode.parser import ModalState, ReaderRules, parse_block
 from miurafab.gcode.program import RAPID, Program, strokes
 from miurafab.gcode.reading import read_program
 from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST, NO_MOTION
+from miurafab.geometry.arrays import Ints
 from miurafab.machine.journal import JournalRun, job_digest
 from miurafab.profiles import MachineProfile
 
@@ -150,19 +151,19 @@ def _reach(
 
     Only the last cut from the beginning and what resumed it count: before that was other material.
     """
-    moved = np.bincount(program.line, program.lengths)
-    moving = np.flatnonzero(moved > _REAL_MOVE_MM)
+    moving = np.flatnonzero(np.bincount(program.line, program.lengths) > _REAL_MOVE_MM)
     certain, possible = 1, 0
     for run in runs:
         if run.from_line <= 1:
             certain, possible = 1, 0
-        behind = int(np.searchsorted(moving, run.line, side="right")) - moves_back(machine, run)
+        held = moves_back(machine, run)
+        behind = int(np.searchsorted(moving, run.line, side="right")) - held
         if behind >= 0:
             certain = max(certain, int(moving[behind]))
         taken = max(run.line, run.from_line - 1)
         at = int(np.searchsorted(program.line_number, taken, side="right"))
         if run.ended is None:
-            at = min(_carried(program, machine, at), _begun(program, machine, run, at))
+            at = min(_carried(program, machine, at), _begun(program, machine, moving, held, at))
         received = np.cumsum(program.line_bytes[at:]) <= machine.controller.rx_bytes
         at += int(np.count_nonzero(received))
         possible = max(possible, taken, *program.line_number[at - 1 : at].tolist())
@@ -177,10 +178,10 @@ def _carried(program: Program, machine: MachineProfile, at: int) -> int:
     return at + int(np.count_nonzero(np.cumsum(program.line_bytes[at:]) <= unseen))
 
 
-def _begun(program: Program, machine: MachineProfile, run: JournalRun, at: int) -> int:
+def _begun(program: Program, machine: MachineProfile, moving: Ints, held: int, at: int) -> int:
     """... up to before which line the machine can have taken lines in that time: those that it has
     made, each as fast as its feed under the largest override or the axes' rates allow, and as many
-    moves as it holds.
+    of the ``moving`` lines as it has ``held``.
     """
     step = np.abs(program.end - program.start)
     feed = np.linalg.norm(step, axis=1) / np.maximum(_MOST_OVERRIDE * program.feed_mm_min, 1e-9)
@@ -189,9 +190,7 @@ def _begun(program: Program, machine: MachineProfile, run: JournalRun, at: int) 
     of_line = np.bincount(program.line, seconds, minlength=int(program.line_number[-1]) + 1)
     made = np.cumsum(of_line[program.line_number[at:]]) <= JOURNAL_LAG_S
     at += int(np.count_nonzero(made))
-    moved = np.bincount(program.line, program.lengths, minlength=len(of_line))
-    ahead = np.flatnonzero(moved[program.line_number[at:]] > _REAL_MOVE_MM)
-    held = moves_back(machine, run)
+    ahead = np.flatnonzero(np.isin(program.line_number[at:], moving))
     return at + int(ahead[held]) if len(ahead) > held else len(program.line_number)
 
 

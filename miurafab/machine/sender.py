@@ -118,6 +118,6 @@ def deliver(
         except MiurafabError as error:
             signals.hold()
             driver.end(error)
-        except BaseException:
+        except BaseException:  # a defect or an exit: no signal may tear the making safe at its end
             signals.hold()
             raise

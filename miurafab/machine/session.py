@@ -18,6 +18,7 @@ from miurafab.errors import ControllerError, PortError
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.connection import FEED_HOLD, SOFT_RESET, STATUS_QUERY, Connection
 from miurafab.grbl.events import Alarm, Banner, Error, Event, Ok, Setting, StatusReport
+from miurafab.grbl.settings import Settings
 from miurafab.grbl.states import State
 from miurafab.grbl.streamer import alarm_words, error_words
 from miurafab.machine.progress import AS_WRITTEN, Overrides
@@ -125,7 +126,8 @@ class Session:
                 self.overrides = AS_WRITTEN
                 self._asked_at = None
             elif isinstance(event, Setting) and event.number == _REPORT_INCHES:
-                self._report_in(_MM_PER_INCH if event.text.strip() not in ("0", "0.0") else 1.0)
+                inches = Settings.from_events((event,)).values.get(_REPORT_INCHES)
+                self._report_in(_MM_PER_INCH if inches else 1.0)
         return events
 
     def _report_in(self, mm_per_unit: float) -> None:

@@ -8,13 +8,12 @@ is named. The folder is ``$XDG_CONFIG_HOME/miurafab``, ``~/.config/miurafab`` wi
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 from miurafab.options import Text
-from miurafab.profiles.table import Table, read_toml
+from miurafab.profiles.table import Table, read_toml, toml_text
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ def write_defaults(defaults: OwnDefaults) -> Path:
     """Write ``defaults`` in place of those before; returns the file."""
     path = defaults_file()
     values = {each.name: getattr(defaults, each.name) for each in fields(OwnDefaults)}
-    text = "".join(f"{k} = {json.dumps(v)}\n" for k, v in values.items() if v is not None)
+    text = toml_text({name: value for name, value in values.items() if value is not None})
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_suffix(".new")
     new.write_text(text, encoding="utf-8", newline="\n")

@@ -17,6 +17,7 @@ from math import ceil, sqrt
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from miurafab.geometry.arrays import Bools, Floats
@@ -51,6 +52,14 @@ class Domain:
         u = np.linspace(self.u0, self.u1, columns)
         v = np.linspace(self.v0, self.v1, rows)
         return np.stack(np.meshgrid(u, v), axis=-1)
+
+    def cell(self, cells: tuple[int, int]) -> Floats:
+        """(2,) the sides of one of ``cells`` columns and rows."""
+        return np.array([self.width / cells[0], self.height / cells[1]])
+
+    def at(self, places: ArrayLike, cells: tuple[int, int]) -> Floats:
+        """(..., 2) the parameters of ``places`` (..., 2), counted in ``cells`` columns and rows."""
+        return np.array([self.u0, self.v0]) + np.asarray(places) * self.cell(cells)
 
 
 class TargetSurface(Protocol):

@@ -30,7 +30,8 @@ _PLACES = {
     121: ("motion", "acceleration_y", None),
     11: ("motion", "junction_deviation", "{:g}mm"),
 }
-_ASKED_FOR = (11, 30, 31, 32, 110, 111, 120, 121, 130, 131)
+_S_RANGE = {30: "s_max", 31: "s_min"}
+_ASKED_FOR = sorted((*_PLACES, *_S_RANGE, 32))
 """The settings that a job relies on; the profile then requires them."""
 
 
@@ -117,7 +118,7 @@ def _take(values: dict[str, Any], found: Settings) -> None:
             value = told[number]
             values.setdefault(table, {})[key] = value if form is None else form.format(value)
     tool = values["tool"]
-    for number, key in ((30, "s_max"), (31, "s_min")):
+    for number, key in _S_RANGE.items():
         if number in told:
             tool[key] = round(told[number])
     required = values.setdefault("settings", {})

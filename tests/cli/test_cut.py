@@ -1,5 +1,6 @@
 """``miurafab sheets`` and ``miurafab cut``: the main job, and every way in which it is refused."""
 
+import io
 import json
 import os
 import signal
@@ -337,3 +338,11 @@ def test_check_mode_lists_every_line_that_the_controller_refuses(run, tmp_path):
     done = run("cut", "own.nc", "--check-mode", "--port", "virtual", "--json")
     (sheet,) = json.loads(done.stdout)["sheets"]
     assert [refused["line"] for refused in sheet["refusals"]] == [4, 7]
+
+
+def test_the_end_of_the_input_is_no_person(run, three_sheets, monkeypatch):
+    """It said nothing about fresh material, so sheet 2 is not burnt onto sheet 1."""
+    monkeypatch.setattr(sys, "stdin", io.StringIO(""))
+    done = run("cut", "job", "--port", "virtual", "--pause", "--quiet")
+    assert "Nobody pressed Enter" in sentence(done, 5)
+    assert [path.name for path in three_sheets.glob("*.journal")] == ["sheet-01.journal"]

@@ -11,9 +11,11 @@ from wires import FakeWire
 
 from miurafab.errors import ControllerError, GcodeError, PortError
 from miurafab.gcode.job import Job
+from miurafab.grbl.connection import Connection
 from miurafab.machine.modes import SET
 from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import StreamResult, deliver
+from miurafab.machine.session import Session
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.trace_box import frame_job
 from miurafab.profiles import load_machine
@@ -174,3 +176,17 @@ def test_a_job_in_the_negative_quadrant_is_placed_by_a_homed_machine() -> None:
         cut(beyond, NEGATIVE, home=True)
     with pytest.raises(GcodeError, match="off the bed"):  # it fits nowhere
         plan_job(Job("job.nc", NEGATIVE + "G0 X380\n"), MACHINE, SendOptions(home=True))
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"), [("0", 1.0), ("0.000", 1.0), ("1", 25.4), ("1.000", 25.4)]
+)
+def test_the_unit_of_reports_is_a_number_however_it_is_written(text: str, unit: float) -> None:
+    class Written(FakeWire):
+        def read(self, timeout: float) -> bytes:
+            return super().read(timeout).replace(b"$13=0\r", f"$13={text}\r".encode())
+
+    session = Session(Written(controller()), Connection())
+    session.greet()
+    session.ask("$$")
+    assert session.mm_per_unit == unit

@@ -53,12 +53,10 @@ class Nominal:
     @classmethod
     def of(cls, surface: TargetSurface, charts: QuadCharts, columns: int, rows: int) -> Nominal:
         """The cells of ``charts`` in a lattice of ``columns`` x ``rows`` cells on ``surface``."""
-        d = surface.domain
-        step = np.array([d.width / columns, d.height / rows])
+        at, cells = surface.domain.at, (columns, rows)
         corner = charts.cells[:, None, :] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
-        origin = np.array([d.u0, d.v0])
-        centres = origin + (charts.cells + 0.5) * step
-        return cls(surface.point(origin + corner * step), surface.point(centres), centres)
+        centres = at(charts.cells + 0.5, cells)
+        return cls(surface.point(at(corner, cells)), surface.point(centres), centres)
 
 
 SIDES = ((0, -1, (0, 3)), (0, 1, (1, 2)), (1, -1, (0, 1)), (1, 1, (3, 2)))
@@ -75,7 +73,7 @@ def rim_of_domain(
     """The rim of the cells at the border of a lattice of ``cells`` columns and rows, across the
     parameters ``axes``. A side between two facets is no rim.
     """
-    half = np.array([surface.domain.width / cells[0], surface.domain.height / cells[1]]) / 2
+    half = surface.domain.cell(cells) / 2
     facets, outward, sides = [], [], []
     for axis, sign, corners in SIDES:
         if axis not in axes:
@@ -104,8 +102,7 @@ def rim_of_repeated(
     """The rim across the parameter ``axis`` of a lattice that repeats itself along it: the cells 0
     along it stand for the side where the parameter is least, and the cells ``last`` for the other.
     """
-    d = surface.domain
-    step = np.array([d.width / cells[0], d.height / cells[1]])[axis] / 2 * np.eye(2)[axis]
+    step = surface.domain.cell(cells)[axis] / 2 * np.eye(2)[axis]
     place = charts.cells[:, axis]
     facets = np.flatnonzero((place == 0) | (place == last))
     uv = nominal.parameters[facets]

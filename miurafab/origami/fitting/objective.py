@@ -165,9 +165,7 @@ class FairObjective:
         else:
             level = 1 if follow == "top" else 0
             followers = np.flatnonzero(charts.lattice[:, 1] % 2 == level)[:, None]
-            d = surface.domain
-            step = np.array([d.width / cells[0], d.height / cells[1]])
-            feet = np.array([d.u0, d.v0]) + charts.lattice[followers[:, 0]] * step
+            feet = surface.domain.at(charts.lattice[followers[:, 0]], cells)
             feet = feet_of(surface, start[followers[:, 0]], feet, steps=10)
             places = surface.point(feet)
         return cls(

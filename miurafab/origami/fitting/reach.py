@@ -57,8 +57,8 @@ class Reach:
         """Of the sheet over ``charts``, cells of a lattice of ``cells`` columns and rows, with the
         sides of ``rim`` for its border.
         """
-        d, lattice = surface.domain, charts.lattice
-        feet = np.array([d.u0, d.v0]) + lattice * [d.width / cells[0], d.height / cells[1]]
+        lattice = charts.lattice
+        feet = surface.domain.at(lattice, cells)
         border = np.unique(rim.sides)
         by_u = lattice[rim.sides[:, 0], 1] == lattice[rim.sides[:, 1], 1]
         on_u, on_v = (np.isin(border, rim.sides[chosen]) for chosen in (by_u, ~by_u))

@@ -135,7 +135,7 @@ class _Metric:
         corrugation: Corrugation,
         fans: bool,
     ) -> _Metric:
-        du, dv = surface.domain.width / cells[0], surface.domain.height / cells[1]
+        du, dv = surface.domain.cell(cells)
         along, across = tangents(surface, uv)
         speed_v = np.linalg.norm(across, axis=-1)
         t = unit(along)
