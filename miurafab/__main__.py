@@ -1,7 +1,7 @@
 """The program: the command line, and the local web page that one of its commands starts.
 
 The rooms ``cli`` and ``studio`` do not know each other; here, above both, they meet. Also what
-``python -m miurafab`` runs.
+``python -m miurafab`` runs (``python -P -m miurafab`` where the working directory is not trusted).
 
 OpenBLAS works in one thread here. The dense matrices of this package are small, and more threads
 cost more than they bring: on two busy cores a layout took twice and a folding motion three times as

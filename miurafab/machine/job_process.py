@@ -27,6 +27,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO, Unpack
 
+from miurafab.child import python_command
 from miurafab.errors import JobStopped, MachineError, MiurafabError
 from miurafab.machine.dialects import make_safe, open_machine
 from miurafab.machine.keys import Keys, NoKeys
@@ -107,9 +108,8 @@ class _Sender:
         self.death = ""
         self._messages: queue.SimpleQueue[_Message] = queue.SimpleQueue()
         self._complaints = b""
-        code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import main; main()"
         self._process = subprocess.Popen(
-            [sys.executable, "-c", code],
+            python_command(__name__),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -5,7 +5,8 @@ computer can reach it, too. Against them:
 
 - the ``Host`` must be this server's; otherwise another site has pointed its own name here (DNS
   rebinding);
-- every address begins with a key of 192 random bits, which only the printed address contains;
+- every address begins with a key of 192 random bits, which only the printed address contains. The
+  browser gets it without a command line (:mod:`~miurafab.studio.door`);
 - a request that changes anything (POST) must have this page's ``Origin``, and repeat the key in a
   header, which neither a form nor another site can send;
 - a body must state its length, and the length has a limit.
@@ -14,6 +15,7 @@ computer can reach it, too. Against them:
 from __future__ import annotations
 
 import hmac
+import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -32,6 +34,11 @@ ORDER_LIMIT = 2**16
 UPLOAD = "upload"
 
 
+def new_key() -> str:
+    """A key of 192 random bits, in letters that an address may hold."""
+    return secrets.token_urlsafe(24)
+
+
 @dataclass(frozen=True)
 class Guard:
     """Lets requests in to the server at ``port`` whose addresses begin with ``key``."""
@@ -48,14 +55,18 @@ class Guard:
     def _hosts(self) -> tuple[str, ...]:
         return tuple(f"{name}:{self.port}" for name in (ADDRESS, "localhost"))
 
+    def is_named(self, headers: Mapping[str, str]) -> bool:
+        """Whether the request is for this server by a name of its own."""
+        return headers.get("host", "").lower() in self._hosts
+
     def route(self, path: str) -> str | None:
         """The part of ``path`` after the key, without its query; None if the key is wrong."""
         first, slash, rest = path.partition("?")[0].removeprefix("/").partition("/")
-        return rest if slash and _same(first, self.key) else None
+        return rest if slash and same_key(first, self.key) else None
 
     def refuse(self, method: str, path: str, headers: Mapping[str, str]) -> Response | None:
         """The refusal of the request, or None to let it in. Names of ``headers`` are lower case."""
-        if headers.get("host", "").lower() not in self._hosts:
+        if not self.is_named(headers):
             return refusal(421, f"This server answers to {self._hosts[0]} only.")
         if method not in ("GET", "HEAD", "POST"):
             return refusal(405, f"This server does not answer the method {method[:16]!r}.")
@@ -67,7 +78,7 @@ class Guard:
     def _refuse_post(self, route: str, headers: Mapping[str, str]) -> Response | None:
         if headers.get("origin", "").lower() not in {f"http://{host}" for host in self._hosts}:
             return refusal(403, "The request does not come from the studio's own page.")
-        if not _same(headers.get(TOKEN_HEADER, ""), self.key):
+        if not same_key(headers.get(TOKEN_HEADER, ""), self.key):
             return refusal(403, "The request does not carry the studio's key; reload the page.")
         length = headers.get("content-length", "")
         if "transfer-encoding" in headers or not (length.isascii() and length.isdigit()):
@@ -78,6 +89,6 @@ class Guard:
         return None
 
 
-def _same(given: str, wanted: str) -> bool:
+def same_key(given: str, wanted: str) -> bool:
     """Compare in a time that does not depend on where the texts differ."""
     return hmac.compare_digest(given.encode("utf-8", "surrogateescape"), wanted.encode("ascii"))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 import shutil
 import socket
 import sys
@@ -25,7 +24,8 @@ from miurafab.errors import InputError, PatternError, PortError, TargetError
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import find_file
 from miurafab.studio.core import Studio
-from miurafab.studio.guard import ADDRESS, Guard
+from miurafab.studio.door import Door
+from miurafab.studio.guard import ADDRESS, Guard, new_key
 from miurafab.studio.messages import HttpRequest, Response, refusal
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.worker import Process
@@ -64,13 +64,15 @@ def serve(
         at_end.callback(signals.hold)
         server = _Server(port, signals.check)
         at_end.callback(server.server_close)
-        guard = Guard(server.server_port, secrets.token_urlsafe(24))
+        guard = Guard(server.server_port, new_key())
         server.studio = Studio(bench, guard, first)
         if thing is not None and first is not None and first.get("open"):
             bench.open(first["source"])
         announce(guard.address)
         if open_browser:
-            threading.Thread(target=webbrowser.open, args=(guard.address,), daemon=True).start()
+            server.door = Door(guard, folder)
+            page = server.door.file.as_uri()
+            threading.Thread(target=webbrowser.open, args=(page,), daemon=True).start()
         server.serve_forever(poll_interval=0.1)
 
 
@@ -100,6 +102,7 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
     allow_reuse_address = os.name == "posix"  # elsewhere other servers could share the port
     studio: Studio
+    door: Door | None = None
 
     def __init__(self, port: int, check: Callable[[], None]) -> None:
         self.lock = threading.Lock()
@@ -149,7 +152,11 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self) -> None:
         headers = {name.lower(): value for name, value in self.headers.items()}
-        studio = self.server.studio
+        studio, door = self.server.studio, self.server.door
+        opened = None if door is None else door.answer(self.command, self.path, headers)
+        if opened is not None:
+            self._send(opened)
+            return
         refused = studio.guard.refuse(self.command, self.path, headers)
         if refused is not None:
             self.close_connection = True  # its body, if any, is not read

@@ -15,18 +15,14 @@ import signal
 import subprocess
 import sys
 import threading
-from pathlib import Path
 from typing import IO, Any, Protocol
 
+from miurafab.child import python_command
 from miurafab.errors import MiurafabError
 from miurafab.studio.work import Order, carry_out, failure, order_from
 from miurafab.workflow.json_text import json_text
 
 News = dict[str, Any]
-
-_COMMAND = (
-    "import sys; sys.path.insert(0, sys.argv[1]); from miurafab.studio.worker import main; main()"
-)
 
 
 class Running(Protocol):
@@ -43,11 +39,10 @@ class Process:
     """An order that a process of its own carries out."""
 
     def __init__(self, order: Order) -> None:
-        root = str(Path(__file__).resolve().parents[2])
         self._news: queue.SimpleQueue[News] = queue.SimpleQueue()
         self._last = ""
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _COMMAND, root],
+            python_command(__name__),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

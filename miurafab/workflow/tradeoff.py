@@ -19,6 +19,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from miurafab.child import safe_path
 from miurafab.errors import InputError, OptionError
 from miurafab.options import Text, Whole, Written, declared, option, read_options
 from miurafab.options.documented import described
@@ -203,7 +204,7 @@ def _run(jobs: list[Job], workers: int, cluster: str | None) -> Iterator[Sample]
         count = min(workers, len(jobs))
         with ProcessPoolExecutor(count, mp_context=context, initializer=_ignore_ctrl_c) as pool:
             try:
-                with _deaf_children():
+                with _deaf_children(), safe_path():
                     running = [pool.submit(sample, job) for job in jobs]
                 for done in as_completed(running):
                     yield done.result()
