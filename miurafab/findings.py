@@ -123,6 +123,7 @@ RULES = {
     "not-proven": Rule("note", "what `check` could not prove"),
     # A job that is previewed (miurafab.workflow.preview)
     "assumed-machine": Rule("note", "no machine is named, so a common machine is assumed"),
+    "edited": _check("a job whose files are not those that were made"),
     "pattern-changed": Rule("warning", "the pattern of the job has changed since"),
     "pattern-missing": Rule("note", "the pattern of the job is not there"),
     # The controller, before a line of the job is sent (miurafab.machine.preflight)

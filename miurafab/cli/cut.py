@@ -251,9 +251,10 @@ def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -
     from miurafab.workflow.dry_run import clock_text, readiness
 
     require_known(options.send.force)
-    findings = [finding for sheet in prepared.dry_runs for finding in sheet.findings]
+    of_sheets = (finding for sheet in prepared.dry_runs for finding in sheet.findings)
+    findings = [*prepared.edits, *of_sheets]
     passed = options.send.force | ({"m3"} if options.send.allow_m3 else set())
-    status = readiness(prepared.dry_runs, passed)
+    status = readiness(findings, passed)
     answer = {
         "status": status,
         "job": prepared.name,

@@ -56,6 +56,11 @@ class Prepared:
         """The material's ``max_power``, 1 where no material is known."""
         return 1.0 if self.directory is None else self.directory.most_power
 
+    @property
+    def edits(self) -> tuple[Finding, ...]:
+        """Which files of a job directory are not as they were made."""
+        return () if self.directory is None else self.directory.edits
+
 
 def prepare(
     thing: object,

@@ -188,10 +188,10 @@ def dry_run(
     )
 
 
-def readiness(sheets: Iterable[SheetPreview], forced: AbstractSet[str] = frozenset()) -> str:
-    """``ready``, or ``refused`` for a refusal of a sheet whose code is not ``forced``."""
-    found = (finding for sheet in sheets for finding in refusals(sheet.findings))
-    return "refused" if any(finding.code not in forced for finding in found) else "ready"
+def readiness(findings: Iterable[Finding], forced: AbstractSet[str] = frozenset()) -> str:
+    """``ready``, or ``refused`` for a refusal whose code is not ``forced``."""
+    stops = any(finding.code not in forced for finding in refusals(findings))
+    return "refused" if stops else "ready"
 
 
 def read_gcode(path: Path) -> Job:

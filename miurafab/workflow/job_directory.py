@@ -22,6 +22,7 @@ from miurafab.gcode.job import Job
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run, read_gcode
 from miurafab.workflow.job_files import LAYOUT, job_machine, job_material
+from miurafab.workflow.manifest import edits
 from miurafab.workflow.picture import first_sheet
 
 GUIDE = "assembly.pdf"
@@ -45,6 +46,8 @@ class JobDirectory(Shown):
         The G-code of each sheet, in the order in which they are made.
     dry_runs : tuple of SheetPreview
         What each job does and how long it takes.
+    edits : tuple of Finding
+        Which files are not as they were made.
     """
 
     path: Path
@@ -53,11 +56,13 @@ class JobDirectory(Shown):
     most_power: float
     jobs: tuple[Job, ...]
     dry_runs: tuple[SheetPreview, ...]
+    edits: tuple[Finding, ...] = ()
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """The findings on the layout and then on each sheet."""
-        return (*self.layout.findings, *(f for sheet in self.dry_runs for f in sheet.findings))
+        """The findings on the files, on the layout and then on each sheet."""
+        sheets = (found for sheet in self.dry_runs for found in sheet.findings)
+        return (*self.edits, *self.layout.findings, *sheets)
 
     def _summary(self) -> str:
         return f"{self.path}: {self.layout._summary()}"
@@ -117,6 +122,7 @@ def read_job(directory: AnyPath, *, unread: bool = False) -> JobDirectory:
         written.most_power,
         written.jobs,
         tuple(dry_runs),
+        edits(written.directory, (LAYOUT, *(job.name for job in written.jobs))),
     )
 
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from miurafab.errors import InputError
 from miurafab.files import read_bytes, read_text
+from miurafab.findings import Finding
 from miurafab.profiles.shipped import Kind
 from miurafab.version import __version__
 
@@ -74,6 +75,31 @@ def read_manifest(directory: Path) -> Manifest:
         raise InputError(
             f"{path} is not a manifest that 'miurafab sheets' wrote: {fault!r}; make the job again."
         ) from None
+
+
+def edits(folder: Path, names: Iterable[str]) -> tuple[Finding, ...]:
+    """The findings ``edited``: which files of the job in ``folder``, of those ``names`` and of its
+    profiles, are not as the manifest says.
+    """
+    if not (folder / MANIFEST).is_file():
+        says = f"{folder} holds no {MANIFEST}, so nothing tells whether its files are as made."
+        return (Finding("edited", says, MANIFEST),)
+    told = read_manifest(folder).files
+    wanted = sorted({*names, *(name for name in told if name.endswith(".toml"))})
+    return tuple(
+        Finding("edited", f"{name} {how} since the job was made; make the job again.", name)
+        for name in wanted
+        if (how := _edit(folder / name, told.get(name)))
+    )
+
+
+def _edit(path: Path, digest: str | None) -> str:
+    """What was done to the file ``path`` since its ``digest`` was taken, empty for nothing."""
+    if digest is None:
+        return "was added"
+    if not path.is_file():
+        return "was removed"
+    return "" if sha256(path) == digest else "has changed"
 
 
 def sha256(path: Path) -> str:

@@ -29,7 +29,8 @@ from miurafab.workflow.dry_run import (
     read_gcode,
     readiness,
 )
-from miurafab.workflow.job_files import job_machine, job_material
+from miurafab.workflow.job_files import LAYOUT, job_machine, job_material
+from miurafab.workflow.manifest import edits
 
 if TYPE_CHECKING:
     from miurafab.workflow.job_directory import JobDirectory
@@ -115,8 +116,9 @@ class Preview(Shown):
 
     def as_dict(self) -> dict[str, Any]:
         """The JSON answer of ``preview``."""
+        of_sheets = (finding for sheet in self.sheets for finding in sheet.findings)
         return {
-            "status": readiness(self.sheets),
+            "status": readiness([*self.findings, *of_sheets]),
             "job": self.name,
             "machine": self.machine.name,
             "seconds": round(self.seconds, 3),
@@ -179,10 +181,10 @@ def preview(
             f"{path} is a pattern and no job; make a job with 'miurafab sheets {path} -o JOB', "
             "then preview JOB."
         )
-    layout = _read_layout(path / "layout.json") if path.is_dir() else None
+    layout = _read_layout(path / LAYOUT) if path.is_dir() else None
     files = _job_files(path, layout)
     jobs = [read_gcode(file) for file in files]
-    findings: list[Finding] = []
+    findings = [*edits(path, (LAYOUT, *(file.name for file in files)))] if layout else []
     if profile is None:
         profile = _made_for(path, layout, jobs[0], findings)
     if settings is not None:
@@ -216,6 +218,7 @@ def _of_value(job: object, machine: MachineProfile | None, settings: AnyPath | N
         )
     name = job.name if isinstance(job, SheetJob) else job.path.resolve().name
     pattern = job.pattern if isinstance(job, SheetJob) else None
+    edited = job.edits if isinstance(job, JobDirectory) else ()
     dry_runs = job.dry_runs
     if machine is not None or settings is not None:
         profile = machine or job.machine
@@ -227,7 +230,7 @@ def _of_value(job: object, machine: MachineProfile | None, settings: AnyPath | N
         )
     else:
         profile = job.machine
-    return Preview(name, profile, dry_runs, pattern, ())
+    return Preview(name, profile, dry_runs, pattern, edited)
 
 
 def with_settings(machine: MachineProfile, dump: Path) -> MachineProfile:

@@ -7,13 +7,15 @@ goes on, and which were never begun.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from miurafab.errors import InputError
+from miurafab.errors import GcodeError, InputError
 from miurafab.gcode.job import Job
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import JobPlan, plan_job
+from miurafab.machine.preflight import raise_findings, require_known
 from miurafab.machine.resume import resume
 from miurafab.workflow.cut import Prepared
 
@@ -41,9 +43,12 @@ def plan_sheets(
     With ``options.resume`` finished sheets are left out and interrupted sheets are resumed. Raises
     :class:`~miurafab.errors.InputError` for a sheet that cannot be sent.
     """
+    chosen = chosen_sheets(prepared, sheets)
+    require_known(options.send.force)
+    edits = raise_findings(prepared.edits, options.send.force, GcodeError)
     plans: list[tuple[int, JobPlan]] = []
     begun = False
-    for number in chosen_sheets(prepared, sheets):
+    for number in chosen:
         job = prepared.jobs[number - 1]
         resumption = None
         if options.resume:
@@ -62,7 +67,7 @@ def plan_sheets(
             most_power=prepared.most_power,
             judged=prepared.dry_runs[number - 1].judged,
         )
-        plans.append((number, plan))
+        plans.append((number, replace(plan, forced=edits + plan.forced)))
     if options.resume and not (begun and plans):
         raise InputError(
             f"No sheet of {prepared.name} was interrupted, by the journals beside it; leave "

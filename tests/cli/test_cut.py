@@ -10,6 +10,7 @@ import sys
 import pytest
 from command_line import sentence
 from problems import saddle_mesh
+from sealing import seal
 
 import miurafab
 from miurafab.errors import PortError
@@ -218,6 +219,7 @@ def three_sheets(job):
     (job / "layout.json").write_text(json.dumps(layout))
     for n in (2, 3):
         (job / f"sheet-0{n}.nc").write_bytes((job / "sheet-01.nc").read_bytes())
+    seal(job)
     return job
 
 

@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+from sealing import seal
 
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.posting import post
@@ -82,4 +83,5 @@ def write_folder(folder: Path, pattern=None, names=("sheet-01", "sheet-02")) -> 
         ],
     }
     (folder / "layout.json").write_text(json.dumps(layout))
+    seal(folder)
     return folder

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from sealing import seal
 from small_jobs import dashes, known_toolpath, write_nc
 
 import miurafab
@@ -33,6 +34,7 @@ def folder(pattern, tmp_path):
         layout["sheets"].append({**first, "name": f"sheet-0{n}", "placements": []})
         (path / f"sheet-0{n}.nc").write_bytes((path / "sheet-01.nc").read_bytes())
     (path / "layout.json").write_text(json.dumps(layout))
+    seal(path)
     return path
 
 
@@ -71,6 +73,7 @@ def test_a_further_sheet_is_told_where_the_head_was_left(folder):
     for name in ("sheet-01", "sheet-02"):
         file = folder / f"{name}.nc"
         file.write_text(file.read_text() + "G0 X7 Y9\n", newline="\n")
+    seal(folder)
     prepared = prepare(str(folder))
     cut_prepared(prepared, port="virtual", options=CutOptions(send=SendOptions(at=(3.0, 4.0))))
     for name, where in (("sheet-01", "X3.000Y4.000"), ("sheet-02", "X7.000Y9.000")):
@@ -94,6 +97,7 @@ def test_only_what_was_interrupted_or_never_begun_is_resumed(folder):
 def test_what_the_material_does_not_take_is_found(folder):
     file = folder / "sheet-01.nc"
     file.write_text(file.read_text() + "M4 S950\nG1 X9 F600\nM5\n", newline="\n")
+    seal(folder)
     prepared = prepare(str(folder))
     (finding,) = [each for sheet in prepared.dry_runs for each in sheet.findings]
     assert (finding.code, finding.where.split(":")[0]) == ("material", "sheet-01.nc")
@@ -101,6 +105,23 @@ def test_what_the_material_does_not_take_is_found(folder):
     assert miurafab.preview(folder).sheets[0].findings == (finding,)
     with pytest.raises(GcodeError, match="S900"):
         cut_prepared(prepared, port="virtual")
+
+
+def test_an_edited_job_is_cut_only_if_that_is_forced(folder):
+    file = folder / "sheet-02.nc"
+    file.write_text(file.read_text() + "G0 X7 Y9\n", newline="\n")
+    prepared = prepare(str(folder))
+    (found,) = prepared.edits
+    assert (found.code, found.where) == ("edited", "sheet-02.nc")
+    assert miurafab.preview(folder).as_dict()["status"] == "refused"
+    assert miurafab.preview(prepared.directory).as_dict()["status"] == "refused"
+    with pytest.raises(GcodeError, match=r"sheet-02\.nc has changed .*'force' edited overrides"):
+        cut_prepared(prepared, port="virtual")
+    options = CutOptions(send=SendOptions(force=frozenset({"edited"})))
+    done = cut_prepared(prepared, port="virtual", sheets=[1], options=options)
+    assert [each.code for each in done[0].findings] == ["edited"]
+    (folder / "manifest.json").unlink()
+    assert "holds no manifest" in prepare(str(folder)).edits[0].sentence
 
 
 def test_a_frame_burns_nothing(tmp_path):
