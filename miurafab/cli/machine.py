@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 PORT = "A serial device, a pyserial URL (socket://HOST:PORT), or 'virtual'."
 
-_BAUD, _WAIT = (declared(Controller)[name] for name in ("baud", "wait"))
+_BAUD, _WAIT, _RESET = (declared(Controller)[name] for name in ("baud", "wait", "reset"))
 
 
 @Parameter(name="*")
@@ -33,6 +33,7 @@ class Line:
     port: Annotated[str, option(Text("PORT"), PORT)]
     baud: Annotated[int, option(_BAUD.kind, _BAUD.help)] = _BAUD.default
     wait: Annotated[float, option(_WAIT.kind, _WAIT.help)] = _WAIT.default
+    reset: Annotated[bool, option(_RESET.kind, _RESET.help)] = _RESET.default
 
     def options(self, console: Console) -> LineOptions:
         """The options of a conversation; ``console`` says if the opening of the port reset the
@@ -42,11 +43,17 @@ class Line:
         def tell() -> None:
             console.note(
                 f"The opening of {self.port} restarted the board: an unlocking, an origin set with "
-                "G92 and a position that was not homed are forgotten, and will be by the next "
-                "command too; 'miurafab cut --home' homes and cuts in one conversation."
+                "G92 and a position that was not homed are forgotten. A board that every opening "
+                "restarts forgets what this command did too; 'miurafab cut --home' homes and cuts "
+                "in one conversation."
             )
 
-        return {"baud": self.baud, "wait": self.wait, "on_restart": tell}
+        return {
+            "baud": self.baud,
+            "wait": self.wait,
+            "reset": self.reset,
+            "on_restart": tell,
+        }
 
 
 def list_(*, console: Console = Console()) -> int:

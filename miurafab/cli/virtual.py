@@ -8,7 +8,7 @@ from typing import Annotated
 from miurafab.cli.console import Console
 from miurafab.cli.declared import option
 from miurafab.errors import DONE, InputError
-from miurafab.options import File, Flag, Text, number
+from miurafab.options import Choice, File, Flag, Text, number
 from miurafab.simulate.faults import KINDS, parse_faults
 
 EXAMPLES = (
@@ -36,8 +36,16 @@ def virtual(
     beam_log: Annotated[
         Path | None, option(File(), "Write what the beam burns to this CSV file.")
     ] = None,
-    keep_running: Annotated[
-        bool, option(Flag(), "Do not reset when a sender opens the port, as most boards do.")
+    reset_on_open: Annotated[
+        str,
+        option(
+            Choice(("edge", "always", "never")),
+            "When the opening of the port resets the controller: at an edge of the line DTR, as on "
+            "most boards (a sender that leaves the line up makes none), always, or never.",
+        ),
+    ] = "edge",
+    silent_greeting: Annotated[
+        bool, option(Flag(), "Say no banner at a start, as some boards do.")
     ] = False,
     fault: Annotated[
         list[str] | None,
@@ -68,7 +76,8 @@ def virtual(
         settings=settings,
         speed=speed,
         beam_log=beam_log,
-        reset_on_open=not keep_running,
+        reset_on_open=reset_on_open,
+        greets=not silent_greeting,
         faults=parse_faults(fault or ()),
         announce=announce,
     )

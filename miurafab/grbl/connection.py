@@ -36,6 +36,7 @@ from miurafab.wire.line_reader import LineReader
 
 SOFT_RESET = b"\x18"
 STATUS_QUERY = b"?"
+PROBE = b"$I\n"
 FEED_HOLD = b"!"
 
 _WRITES_EEPROM = re.compile(
@@ -118,6 +119,21 @@ class Connection:
             raise ProtocolMisuse(f"cannot send {byte!r}: the wire is closed")
         self._enter(Input.RESET if byte == SOFT_RESET else Input.REALTIME)
         return byte
+
+    def probe(self) -> bytes:
+        """The question that stands for a banner, for the wire; it is not entered in the books.
+
+        Its answer is a :class:`~miurafab.grbl.events.Version` and then the first ``ok`` of all.
+        Raises :class:`ProtocolMisuse` in a state that needs no proof, or a reset.
+        """
+        if Input.PROBE not in TRANSITIONS[self.state]:
+            raise ProtocolMisuse(f"cannot send {PROBE!r} in {self.state.name}")
+        self._enter(Input.PROBE)
+        return PROBE
+
+    def prove(self) -> None:
+        """The answer to :meth:`probe` has come: the controller holds no line."""
+        self._enter(Input.PROVEN)
 
     # Receiving
 

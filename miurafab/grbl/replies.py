@@ -127,7 +127,7 @@ def _bracket(match: re.Match[str]) -> Event | None:
         flags, *numbers = body.split(",")
         planner_blocks, rx_bytes = ([int(n) for n in numbers[:2]] + [None, None])[:2]
         return Options(flags, planner_blocks, rx_bytes)
-    return None
+    return Version(tag, body) if tag[0].isdigit() else None  # GRBL 0.9: [0.9j.20160303:]
 
 
 _FORMS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], Event | None]], ...] = (

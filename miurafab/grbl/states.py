@@ -25,6 +25,10 @@ The table keeps three rules, which its tests check for every state and input:
 * motion may be sent only from GREETED and READY. From ALARMED, UNSYNCED or LOCKED only a person's
   unlock, homing or reset leads back there: nothing here unlocks or resends by itself.
 
+A banner proves that all buffers are empty. Where none comes (a board that the opening of its port
+does not reset, a board that never greets), a question proves it: the controller says that it is at
+rest, and answers ``$I`` before it answers anything else (PROBE, then PROVEN).
+
 A second banner right after the first (two resets in a row) leaves GREETED unchanged. In LOCKED a
 banner leads back to GREETED, because no motion can be in flight there.
 """
@@ -66,18 +70,24 @@ class Input(Enum):
     SYSTEM = auto()  # any other $ line
     RESET = auto()  # 0x18
     REALTIME = auto()  # any other realtime byte
+    PROBE = auto()  # the question that stands for a banner
+    PROVEN = auto()  # its answer was the first one, and whole
 
 
-SENT = frozenset({Input.MOTION, Input.SYSTEM, Input.RESET, Input.REALTIME})
+SENT = frozenset(
+    {Input.MOTION, Input.SYSTEM, Input.RESET, Input.REALTIME, Input.PROBE, Input.PROVEN}
+)
 """The inputs of the sender; a state refuses those that it does not list."""
 
 _S, _I = State, Input
 
 
 def _row(stay: State, changes: dict[Input, State], *refused: Input) -> dict[Input, State]:
-    """All inputs lead to ``stay``, except ``changes``, the ``refused``, RESET and END."""
+    """All inputs lead to ``stay``, except ``changes``, the ``refused``, RESET and END; PROBE and
+    PROVEN are refused where ``changes`` do not have them.
+    """
     common = {_I.RESET: _S.RESETTING, _I.END: _S.CLOSED}
-    row = dict.fromkeys(Input, stay) | common | changes
+    row = dict.fromkeys(set(Input) - {_I.PROBE, _I.PROVEN}, stay) | common | changes
     return {item: state for item, state in row.items() if item not in refused}
 
 
@@ -87,7 +97,13 @@ TRANSITIONS = MappingProxyType(
     {
         _S.OPENING: _row(
             _S.OPENING,
-            {_I.BANNER: _S.GREETED, _I.ALARM: _S.ALARMED, _I.SLEEP: _S.ALARMED},
+            {
+                _I.BANNER: _S.GREETED,
+                _I.ALARM: _S.ALARMED,
+                _I.SLEEP: _S.ALARMED,
+                _I.PROBE: _S.OPENING,
+                _I.PROVEN: _S.READY,
+            },
             *_NO_LINES,
         ),
         _S.GREETED: _row(
@@ -125,7 +141,11 @@ TRANSITIONS = MappingProxyType(
         ),
         _S.ALARMED: _row(_S.ALARMED, {_I.BANNER: _S.GREETED}, *_NO_LINES),
         _S.UNSYNCED: _row(_S.UNSYNCED, {_I.ALARM: _S.ALARMED}, *_NO_LINES),
-        _S.RESETTING: _row(_S.RESETTING, {_I.BANNER: _S.GREETED}, *_NO_LINES),
+        _S.RESETTING: _row(
+            _S.RESETTING,
+            {_I.BANNER: _S.GREETED, _I.PROBE: _S.RESETTING, _I.PROVEN: _S.READY},
+            *_NO_LINES,
+        ),
         _S.CLOSED: _row(_S.CLOSED, {}, *SENT),
     }
 )

@@ -50,13 +50,14 @@ class MachineInfo:
 
 
 class LineOptions(TypedDict, total=False):
-    """``baud``, the seconds to ``wait`` for the start of the board, the ``settings`` of the
-    controller in memory if the port is ``virtual``, and ``on_restart``, which is called if the
-    opening of the port reset the board.
+    """``baud``, the seconds to ``wait`` for the start of the board, whether to ``reset`` it even if
+    it is at rest, the ``settings`` of the controller in memory if the port is ``virtual``, and
+    ``on_restart``, which is called if the opening of the port reset the board.
     """
 
     baud: int
     wait: float
+    reset: bool
     on_restart: Callable[[], None]
     settings: Mapping[int, float] | None
 
@@ -83,7 +84,7 @@ def conversation(
         session = Session(transport, Connection(), check=signals.check)
         at_risk = False
         try:
-            session.greet(patience)
+            session.greet(patience, reset=line.get("reset", False))
             if session.restarted and transport.blocks and "on_restart" in line:
                 line["on_restart"]()
             at_risk = moves

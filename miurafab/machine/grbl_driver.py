@@ -19,6 +19,7 @@ from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Error, Ok, Options, StatusReport
 from miurafab.grbl.settings import Settings
 from miurafab.grbl.streamer import LineRefused, Streamer
+from miurafab.machine.greeting import ANSWER_S
 from miurafab.machine.keys import HOLD, OVERRIDES_OFF, RESUME, NoKeys, obeys_overrides
 from miurafab.machine.modes import ask_modes, job_offset, set_modes
 from miurafab.machine.preflight import (
@@ -29,7 +30,7 @@ from miurafab.machine.preflight import (
     raise_findings,
 )
 from miurafab.machine.progress import JobAborted
-from miurafab.machine.session import ANSWER_S, Session
+from miurafab.machine.session import Session
 from miurafab.machine.stream_driver import JobContext, StreamDriver
 
 WAS_RESET = "the controller was reset and reports the beam off"
@@ -91,7 +92,7 @@ class GrblDriver(StreamDriver):
     def prepare(self) -> tuple[Finding, ...]:
         """See :class:`StreamDriver`."""
         plan, session = self.plan, self._session
-        session.greet(plan.wait)
+        session.greet(plan.wait, reset=plan.reset)
         if obeys_overrides(plan.machine.dialect):
             for order in OVERRIDES_OFF:
                 session.write(session.connection.send_realtime(order))
@@ -100,7 +101,9 @@ class GrblDriver(StreamDriver):
             session.home()
             self.at_risk = False
         forced = raise_findings(
-            check_status(session.wait_status()), plan.options.force, ControllerError
+            check_status(session.wait_status(), restarted=session.restarted),
+            plan.options.force,
+            ControllerError,
         )
         findings: list[Finding] = []
         options = (event for event in session.command("$I") if isinstance(event, Options))

@@ -21,8 +21,9 @@ from collections.abc import Callable, Iterator
 from miurafab.errors import ControllerError, MiurafabError, PortError
 from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
+from miurafab.machine.greeting import ANSWER_S
 from miurafab.machine.judge_job import longest_line
-from miurafab.machine.session import ANSWER_S, HOMING_S
+from miurafab.machine.session import HOMING_S
 from miurafab.machine.stream_driver import JobContext, StreamDriver
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport

@@ -4,7 +4,9 @@ A program means what it says only in known modes: ``X10`` is 254 mm in inches, a
 with another work offset. A controller need not begin in the modes that GRBL has after power-up. It
 runs its startup blocks (``$N0``, ``$N1``) after each reset, and a person may have typed something.
 So the sender asks for the modes (``$G``), the offsets (``$#``) and the startup blocks (``$N``), and
-sets every mode that a program may leave unsaid (:data:`SET`).
+sets every mode that a program may leave unsaid (:data:`SET`). A controller that was not reset also
+keeps motion mode, feed and power from its last program; those go back to what they are at power-up
+(``G0``, ``F0``, ``S0``), so that no line burns that the dry run saw dark.
 
 Sources: gnea/grbl 1.1, ``report.c`` (the answers), ``gcode.c`` (the modal groups); NIST RS274/NGC,
 table 4.
@@ -12,6 +14,7 @@ table 4.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -30,14 +33,17 @@ _MEANS = {
     "G93": "inverse time feed",
     "G95": "feed per turn",
     "G51": "scaled coordinates",
+    "G43.1": "a tool length offset",
     "M3": "the spindle or beam armed",
     "M4": "the spindle or beam armed",
     "M7": "mist on",
     "M8": "air or coolant on",
 } | {f"G{n}": f"the work offset G{n}" for n in (55, 56, 57, 58, 59, "59.1", "59.2", "59.3")}
 """The modes that a job does not begin in."""
-_BACK = {"G51": "G50", "M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
+_BACK = {"G51": "G50", "G43.1": "G49", "M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
 """What ends those that :data:`SET` does not end."""
+_MOTION = re.compile(r"G(?:[1-3]|5(?:\.\d)?|33|38\.\d|73|8\d(?:\.\d)?)")
+_VALUE = re.compile(r"[FS](?!0*\.?0*$).*")
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,16 @@ class ControllerModes:
     @property
     def way_out(self) -> str:
         """What ends the modes that :data:`SET` does not end."""
-        return "".join(dict.fromkeys(_BACK[word] for word in self.modes if word in _BACK))
+        return "".join(dict.fromkeys(filter(None, map(_back, self.modes))))
+
+
+def _back(word: str) -> str:
+    """What ends the mode or clears the value of ``word``, nothing if that is as at power-up."""
+    if _MOTION.fullmatch(word):
+        return "G0"
+    if _VALUE.fullmatch(word):
+        return f"{word[0]}0"
+    return _BACK.get(word, "")
 
 
 def ask_modes(session: Session) -> ControllerModes:

@@ -17,7 +17,7 @@ from miurafab.options import Flag, Pair, Several, Text, check_options, declared,
 from miurafab.profiles import MachineProfile
 from miurafab.profiles.machine import Controller
 
-_WAIT = declared(Controller)["wait"]
+_WAIT, _RESET = (declared(Controller)[name] for name in ("wait", "reset"))
 AtPause = Literal["wait", "go on", "stop"]
 _HAS_OFFSETS = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc")
 _NO_CHECK_MODE = ("marlin", "hpgl")
@@ -38,6 +38,7 @@ class SendOptions:
     wait: float | None = option(
         _WAIT.kind, _WAIT.help, None, group="Start", default_text="as the machine's profile says"
     )
+    reset: bool = option(_RESET.kind, _RESET.help, False, group="Start")
     check_mode: bool = option(
         Flag(), "Let the controller read the job without moving ($C).", False, group="Safety"
     )
@@ -81,6 +82,11 @@ class JobPlan:
         """The seconds that the board may take to start."""
         asked = self.options.wait
         return self.machine.controller.wait if asked is None else asked
+
+    @property
+    def reset(self) -> bool:
+        """Whether the controller is reset even if it is at rest."""
+        return self.options.reset or self.machine.controller.reset
 
     def with_head_at(self, at: tuple[float, float] | None) -> JobPlan:
         """The same for a head that stands ``at`` (X, Y in mm)."""

@@ -53,9 +53,15 @@ def require_known(force: frozenset[str]) -> None:
         raise InputError(f"'{code}' is a {rule.severity} and stops nothing; leave it out.")
 
 
-def check_status(status: StatusReport) -> Iterator[Finding]:
-    """The checks ``idle`` and ``beam``."""
-    if status.state != "Idle":
+def check_status(status: StatusReport, *, restarted: bool = False) -> Iterator[Finding]:
+    """The checks ``idle`` and ``beam``; ``restarted``: the opening of the port reset the board."""
+    if status.state == "Alarm" and restarted:
+        yield Finding(
+            "idle",
+            "The opening of the port restarted the board, which is locked until it is homed; an "
+            "unlocking by another command is forgotten, so `home` it in the same conversation.",
+        )
+    elif status.state != "Idle":
         yield Finding(
             "idle",
             f"The controller is in state {status.state}, not Idle; wait until it is done, or look "

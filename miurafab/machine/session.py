@@ -5,9 +5,9 @@ agree, and adds time. Every wait has a limit, and silence is an error with a sen
 those of the wire's own clock, so a session with a controller in memory takes no real second.
 
 Stopping must always work. :meth:`Session.stop` puts a soft reset on the wire before anything else
-and repeats it until a banner proves that the controller heard it (a controller that writes its
-EEPROM is deaf for a moment). Then it asks for a status report, since only the controller can say
-that the beam is off.
+and repeats it until a banner, or the same proof, says that the controller heard it (a controller
+that writes its EEPROM is deaf for a moment). Then it asks for a status report, since only the
+controller can say that the beam is off.
 """
 
 from __future__ import annotations
@@ -21,22 +21,19 @@ from miurafab.grbl.events import Alarm, Banner, Error, Event, Ok, Setting, Statu
 from miurafab.grbl.settings import Settings
 from miurafab.grbl.states import State
 from miurafab.grbl.streamer import alarm_words, error_words
+from miurafab.machine.greeting import ANSWER_S, RESET_S, greet, restarts
 from miurafab.machine.progress import AS_WRITTEN, Overrides
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
 from miurafab.profiles.machine import WAIT_S
 
-ANSWER_S = 3.0
-"""The longest time until a working controller answers a question."""
 HOMING_S = 180.0
 """The longest time of homing; GRBL answers nothing meanwhile, not even a status query."""
-_RESET_S = 0.8  # from a soft reset to its banner
 _RESETS = 3
 _HOLD_S = 1.0  # to come to rest from full speed before the reset that ends a refused job
 _ASK_AGAIN_S = 1.0  # a status query that noise swallowed is asked again
 _REPORT_INCHES = 13  # GRBL's setting: positions are reported in inches
 _MM_PER_INCH = 25.4
-_BUSY = ("Run", "Jog", "Home", "Hold", "Door")
 
 
 class Session:
@@ -44,7 +41,7 @@ class Session:
 
     ``check`` is called before every read: it raises the exception that should interrupt the
     conversation. ``on_data`` is called with the bytes as they arrive. ``restarted``: the opening of
-    the port reset the board.
+    the port reset the board. ``banner`` is what it greeted with, or what its ``$I`` says.
     """
 
     def __init__(
@@ -154,6 +151,10 @@ class Session:
         self.write(self.connection.send_realtime(STATUS_QUERY))
         return True
 
+    def forget_query(self) -> None:
+        """A status query that is unanswered will not be answered: the controller was reset."""
+        self._asked_at = None
+
     @property
     def awaits_status(self) -> bool:
         """Whether a status query is unanswered."""
@@ -166,7 +167,7 @@ class Session:
 
         Raises :class:`~miurafab.errors.ControllerError` after ``timeout`` seconds of silence.
         """
-        report = self._fresh_status(timeout)
+        report = self.fresh_status(timeout)
         if report is None:
             raise ControllerError(
                 f"The controller at {self.name} did not answer a status query within "
@@ -174,7 +175,8 @@ class Session:
             )
         return report
 
-    def _fresh_status(self, timeout: float) -> StatusReport | None:
+    def fresh_status(self, timeout: float) -> StatusReport | None:
+        """As :meth:`wait_status`, but None for silence."""
         end = self.now() + timeout
         asked = False
         while self.now() < end:
@@ -246,36 +248,12 @@ class Session:
 
     # Beginning and end
 
-    def greet(self, patience: float = WAIT_S) -> None:
-        """Wait for the controller's banner, or cause it, and learn whether it is locked.
+    def greet(self, patience: float = WAIT_S, *, reset: bool = False) -> None:
+        """See :func:`~miurafab.machine.greeting.greet`."""
+        greet(self, patience, reset=reset)
 
-        A board may take ``patience`` seconds to start after its port is opened. One that does not
-        reset then is asked for its state. If it is at work,
-        :class:`~miurafab.errors.ControllerError` says so and nothing is disturbed; else a soft
-        reset (which keeps the position) causes the banner. Raises
-        :class:`~miurafab.errors.PortError` if nothing that speaks GRBL answers.
-        """
-        banner = self._wait_banner(patience)
-        self.restarted = banner is not None
-        if banner is None:
-            report = self._fresh_status(1.0)
-            if report is not None and report.state in _BUSY:
-                raise ControllerError(
-                    f"The controller at {self.name} is at work ({report.state}) on something it "
-                    "was sent before; wait until it is done, or reset it."
-                )
-            self._asked_at = None
-            self.write(self.connection.send_realtime(SOFT_RESET))
-            banner = self._wait_banner(patience)
-        if banner is None:
-            raise PortError(
-                f"Nothing that speaks GRBL answers at {self.name}; check the port, the baud rate "
-                "of the machine profile and the machine's power, and give a slow board more time "
-                f"(`wait` is {patience:g} s)."
-            )
-        self.wait_status()
-
-    def _wait_banner(self, timeout: float) -> Banner | None:
+    def wait_banner(self, timeout: float) -> Banner | None:
+        """The next banner within ``timeout`` seconds, or None."""
         end = self.now() + timeout
         while self.now() < end:
             for event in self.receive(end - self.now()):
@@ -293,11 +271,11 @@ class Session:
         try:
             for _ in range(_RESETS):
                 self._reset_now(hold_first)
-                if self._wait_banner(_RESET_S) is not None:
+                if restarts(self, RESET_S):
                     break
             else:
                 return False
-            report = self._fresh_status(ANSWER_S)
+            report = self.fresh_status(ANSWER_S)
         except PortError:
             return False
         return report is not None and report.beam_off
@@ -314,8 +292,8 @@ class Session:
             end = self.now() + _HOLD_S
             at_rest = False
             while not at_rest and self.now() < end:
-                report = self._fresh_status(end - self.now())
-                at_rest = report is not None and _at_rest(report)
+                report = self.fresh_status(end - self.now())
+                at_rest = report is not None and _stands(report)
         except PortError:
             return False
         return self.stop()
@@ -326,7 +304,7 @@ class Session:
         data = self.connection.send_realtime(FEED_HOLD) if hold_first else b""
         data += self.connection.send_realtime(SOFT_RESET)
         self._transport.write_now(data)
-        self._asked_at = None
+        self.forget_query()
         if self._transcript is not None:
             self._transcript.sent(self.now(), data)
 
@@ -335,7 +313,7 @@ class Session:
         self._transport.close()
 
 
-def _at_rest(report: StatusReport) -> bool:
+def _stands(report: StatusReport) -> bool:
     """Whether the axes stand: not running, and a feed hold has come to its end (``Hold:0``)."""
     if report.state == "Hold":
         return report.substate == 0

@@ -4,12 +4,23 @@ A transport moves bytes and tells the time by its own clock, no more. There are 
 port or pyserial URL in real time, and a controller in memory, whose time passes only while
 somebody reads. Whoever holds a transport cannot tell them apart, so what is tested against
 the one holds for the other.
+
+Most boards are reset by the rising edge of DTR, the line that says that a computer is there.
+
+* POSIX systems raise DTR when a port is opened, and lower it when the last program closes it, if
+  the flag HUPCL is set (termios(3)). So the flag is cleared once a port is open: the line stays up
+  at the close, and the next opening makes no edge. The first opening after the board was plugged in
+  does.
+* Windows lowers DTR at each close. So a port is opened with DTR and RTS low (pyserial sets them
+  before it opens), and they are raised only if the board says nothing: a board with USB of its own
+  may send only to a computer that is there.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import math
 import os
 import sys
 import time
@@ -36,6 +47,8 @@ if sys.platform != "win32":
 
     _FAULTS += (termios.error,)
 
+_LOWERS_LINES = os.name == "nt"  # at the close of a port
+_QUIET_S = 0.7  # from the opening to the raising of the lines; a running board answers in 0.1 s
 _SLICE = 0.005  # s; how late a key is seen, and pyserial on Windows cannot be interrupted within
 _WRITE_TIMEOUT = 1.0  # s; far beyond the 90 ms that a full 1024-byte buffer takes at 115200 baud
 _INSTANT = 1e-6  # s; the least that a virtual clock moves, far above its rounding
@@ -101,10 +114,30 @@ class SerialTransport:
                 exclusive=True,
                 xonxoff=flow_control == "xon-xoff",
                 rtscts=flow_control == "rts-cts",
+                do_not_open=True,
             )
+            self._quiet_until = math.inf
+            if _LOWERS_LINES and flow_control == "none" and "://" not in port:
+                self._serial.dtr = self._serial.rts = False
+                self._quiet_until = self.now() + _QUIET_S
+            self._serial.open()
         except (serial.SerialException, OSError, ValueError) as fault:
             raise PortError(_why_not_opened(port, fault)) from None
+        self._keep_lines()
         self._reduce_latency()
+
+    def _keep_lines(self) -> None:
+        """Leave DTR up when the port is closed, so that the next opening makes no edge."""
+        if isinstance(self._serial, serial.Serial) and sys.platform != "win32":
+            with contextlib.suppress(*_FAULTS):  # a port that has no lines
+                attributes = termios.tcgetattr(self._serial.fileno())
+                attributes[2] &= ~termios.HUPCL
+                termios.tcsetattr(self._serial.fileno(), termios.TCSANOW, attributes)
+
+    def _raise_lines(self) -> None:
+        """The board said nothing: it may wait for the lines, or be reset by them."""
+        self._quiet_until = math.inf
+        self._serial.dtr = self._serial.rts = True
 
     def _reduce_latency(self) -> None:
         """Ask the driver to hand over each byte at once (FTDI chips else collect for 16 ms)."""
@@ -149,6 +182,10 @@ class SerialTransport:
         with self._gone():
             while True:
                 data: bytes = self._serial.read(max(1, self._serial.in_waiting))
+                if data:
+                    self._quiet_until = math.inf
+                elif self.now() >= self._quiet_until:
+                    self._raise_lines()
                 if data or self.now() >= end:
                     return data
 

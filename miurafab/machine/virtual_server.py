@@ -1,9 +1,11 @@
 """The virtual controller behind a real port: a practice laser for any sender.
 
 It is served over a pseudo-terminal (whose path a sender opens like a USB port) or over TCP, in
-real time or a multiple of it. The controller goes on living when a sender closes the port, and
-with ``reset_on_open`` it is reset when one opens it, as the DTR line resets most boards: that is
-when a sender sees the banner.
+real time or a multiple of it. The controller goes on living when a sender closes the port. Like
+most boards it is reset by the rising edge of the line DTR, and then says its banner. A
+pseudo-terminal has no such line, so it is modelled: the kernel raises DTR when a port is opened,
+and lowers it when the last program closes it with HUPCL set (Linux, ``tty_port.c``). Over TCP,
+where a serial server opens its port for each sender, each opening is an edge.
 
 What the beam did is written to the beam log as it happens, one segment a line::
 
@@ -52,6 +54,10 @@ class Wire(Protocol):
     def wait(self, timeout: float) -> tuple[bytes, bool]:
         """The bytes that arrive within ``timeout`` seconds, and whether a sender just opened."""
 
+    @property
+    def edge(self) -> bool:
+        """Whether the last opening raised DTR, which was low before."""
+
     def write(self, data: bytes) -> None:
         """Send to the sender; without one the bytes are lost, as on a serial line."""
 
@@ -78,11 +84,16 @@ class PtyWire:
 
     def plug(self) -> None:
         """See :class:`Wire`."""
+        import termios
         import tty
 
         self._plugged = True
         self._master, sender_side = os.openpty()
         tty.setraw(sender_side)
+        attributes = termios.tcgetattr(sender_side)
+        attributes[2] |= termios.HUPCL  # as a serial port has it, and a pseudo-terminal has not
+        termios.tcsetattr(sender_side, termios.TCSANOW, attributes)
+        self._line_up = self.edge = False
         self.address = os.ttyname(sender_side)
         # Only while no one holds the other side open does the kernel tell when somebody does.
         os.close(sender_side)
@@ -98,6 +109,10 @@ class PtyWire:
             return b"", False
         flags = dict(self._poll.poll(timeout * 1000)).get(self._master, 0)
         was_open, self._open = self._open, not flags & select.POLLHUP
+        if was_open and not self._open:
+            self._line_up = not self._hangs_up()
+        elif self._open and not was_open:
+            self.edge, self._line_up = not self._line_up, True
         data = b""
         if flags & select.POLLIN:
             with contextlib.suppress(OSError):
@@ -105,6 +120,12 @@ class PtyWire:
         if not self._open and not data:
             time.sleep(timeout)  # poll returns at once while the other side is closed
         return data, self._open and not was_open
+
+    def _hangs_up(self) -> bool:
+        """Whether the sender left HUPCL set: the master sees the settings of the other side."""
+        import termios
+
+        return bool(termios.tcgetattr(self._master)[2] & termios.HUPCL)
 
     def write(self, data: bytes) -> None:
         """See :class:`Wire`."""
@@ -125,6 +146,8 @@ class PtyWire:
 
 class TcpWire:
     """A listening TCP socket at ``HOST:PORT`` (port 0: any free one), one sender at a time."""
+
+    edge = True
 
     def __init__(self, where: str) -> None:
         host, colon, port = where.rpartition(":")
@@ -183,21 +206,26 @@ class TcpWire:
         self._listener.close()
 
 
-def load_controller(source: str, faults: Iterable[Fault] = ()) -> Device:
+def load_controller(source: str, faults: Iterable[Fault] = (), *, greets: bool = True) -> Device:
     """The machine meant by ``stock``, a machine profile's name or file, or a ``$$`` dump's file.
 
-    A profile's answers as its dialect does, the others are GRBL 1.1h. Raises
-    :class:`~miurafab.errors.ProfileError` if ``source`` is none of them, or for a fault that only
-    a machine that speaks GRBL can have.
+    A profile's answers as its dialect does, the others are GRBL 1.1h. Without ``greets`` it says no
+    banner. Raises :class:`~miurafab.errors.ProfileError` if ``source`` is none of them, or for a
+    fault or a silence that only a machine that speaks GRBL can have.
     """
     path = Path(source)
     if source == STOCK:
-        return VirtualGrbl(baud=BAUD, faults=faults)
+        return VirtualGrbl(baud=BAUD, faults=faults, greets=greets)
     if path.is_file() and path.suffix != ".toml":
-        return VirtualGrbl(read_dump(path).values, baud=BAUD, faults=faults)
+        return VirtualGrbl(read_dump(path).values, baud=BAUD, faults=faults, greets=greets)
     machine = load_machine(source)
     if machine.dialect not in DIALECTS:
         device, faults = virtual_machine(machine), tuple(faults)
+        if not greets:
+            raise ProfileError(
+                f"{machine.name} speaks {machine.dialect}, and only machines that speak "
+                f"{', '.join(DIALECTS)} may be silent at a start; leave `silent_greeting` out."
+            )
         for fault in faults:
             if fault.kind in _GRBL_FAULTS:
                 raise ProfileError(
@@ -210,6 +238,7 @@ def load_controller(source: str, faults: Iterable[Fault] = ()) -> Device:
         baud=machine.controller.baud,
         dialect=machine.dialect,
         faults=faults,
+        greets=greets,
     )
 
 
@@ -228,7 +257,8 @@ def serve_virtual(
     settings: str = STOCK,
     speed: float = 1.0,
     beam_log: Path | None = None,
-    reset_on_open: bool = True,
+    reset_on_open: str = "edge",
+    greets: bool = True,
     faults: Iterable[Fault] = (),
     announce: Callable[[str], None] = print,
 ) -> Served:
@@ -236,15 +266,17 @@ def serve_virtual(
 
     Over TCP at ``tcp`` (``HOST:PORT``), else over a pseudo-terminal; ``announce`` is called with
     the address to open, and again if it is another after the cable was out. ``settings``: see
-    :func:`load_controller`. ``speed`` is virtual seconds a real second. With
-    ``reset_on_open`` the controller is switched off and on when a sender opens the port.
-    ``faults`` strike once each, in all. Raises :class:`~miurafab.errors.InputError` for an option
-    at fault, :class:`~miurafab.errors.PortError` for an address that is taken.
+    :func:`load_controller`, also for ``greets``. ``speed`` is virtual seconds a real second.
+    ``reset_on_open`` says when the opening of the port switches the controller off and on: at an
+    ``edge`` of DTR, ``always`` or ``never``. ``faults`` strike once each, in all. Raises
+    :class:`~miurafab.errors.InputError` for an option at fault,
+    :class:`~miurafab.errors.PortError` for an address that is taken.
     """
     if not 0 < speed < math.inf:
         raise InputError(f"A speed of {speed:g} does not run; give a positive number.")
-    device = load_controller(settings, faults)
-    reset_on_open = reset_on_open and device.resets_on_open
+    device = load_controller(settings, faults, greets=greets)
+    if not device.resets_on_open:
+        reset_on_open = "never"
     with contextlib.ExitStack() as at_end:
         log = _BeamLog(device, beam_log)
         at_end.callback(log.close)
@@ -254,7 +286,7 @@ def serve_virtual(
         signals.at_once = False
         announce(wire.address)
         with contextlib.suppress(KeyboardInterrupt):
-            _serve(device, wire, speed, log, signals.check, announce, reset_on_open=reset_on_open)
+            _serve(device, wire, speed, log, signals.check, announce, reset_on_open)
     return Served(device.now, log.seconds, device.lost_bytes)
 
 
@@ -265,11 +297,10 @@ def _serve(
     log: _BeamLog,
     check: Callable[[], None],
     announce: Callable[[str], None],
-    *,
-    reset_on_open: bool,
+    reset_on_open: str,
 ) -> None:
     start = time.monotonic()
-    boot_at = math.inf
+    booted_at = 0.0
     plugged = True
     while True:
         check()
@@ -277,16 +308,15 @@ def _serve(
         timeout = _TICK_S if upcoming is None else min(_TICK_S, upcoming / speed)
         data, opened = wire.wait(timeout)
         device.advance(max(0.0, (time.monotonic() - start) * speed - device.now))
-        if opened and reset_on_open:
-            boot_at = time.monotonic() + _BOOT_S
-        if time.monotonic() >= boot_at:
-            boot_at = math.inf
+        if opened and (reset_on_open == "always" or (reset_on_open == "edge" and wire.edge)):
             device.power_cycle()
-        if data:
-            device.receive(data)
-        output = device.take_output()
-        if output and boot_at == math.inf:
-            wire.write(output)
+            booted_at = time.monotonic() + _BOOT_S
+        if time.monotonic() >= booted_at:  # a board that boots hears nothing
+            if data:
+                device.receive(data)
+            output = device.take_output()
+            if output:
+                wire.write(output)
         if device.connected != plugged:
             plugged = device.connected
             _replug(wire, plugged, announce)

@@ -135,6 +135,11 @@ class Controller:
         "How many seconds the board may take to start after its port is opened.",
         WAIT_S,
     )
+    reset: bool = option(
+        Flag(),
+        "Reset the controller softly once its port is open, even if it is at rest.",
+        False,
+    )
     rx_bytes: int = option(Whole(16, 65_536), "Usable bytes of the receive buffer.", 128)
     line_chars: int = option(Whole(20, 4096), "Usable characters of a line.", 79)
     planner_blocks: int = option(Whole(1, 1024), "Moves that the planner holds.", 15)

@@ -51,6 +51,14 @@ def test_motion_is_sent_only_where_the_account_is_right() -> None:
     assert may_command == {GREETED, READY, LOCKED}
 
 
+def test_a_question_stands_for_a_banner_only_where_one_is_awaited() -> None:
+    for item in (Input.PROBE, Input.PROVEN):
+        assert {state for state in State if item in TRANSITIONS[state]} == {OPENING, RESETTING}
+    for state in (OPENING, RESETTING):
+        assert TRANSITIONS[state][Input.PROBE] is state
+        assert TRANSITIONS[state][Input.PROVEN] is READY
+
+
 def test_closed_is_final_and_the_end_always_closes() -> None:
     assert set(TRANSITIONS[State.CLOSED].values()) == {State.CLOSED}
     assert all(TRANSITIONS[state][Input.END] is State.CLOSED for state in State)

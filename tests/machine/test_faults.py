@@ -165,10 +165,13 @@ class Run:
             assert not kinds <= HARMLESS or stopped
             assert self.journal.ended == ("stopped" if stopped else "failed")
             if self.begun and not kinds & UNREACHABLE:
-                assert self.wire.commands.endswith(b"\x18")
+                assert self.wire.commands.replace(b"$I\n", b"").endswith(b"\x18")
         # Lines went out once each, in order; those taken are the first of them.
         lines = b"".join(line.data + b"\n" for line in LINES)
-        assert lines.startswith(sent.translate(None, REALTIME).partition(b"$#\n")[2])
+        job, _, after = sent.partition(b"$#\n")[2].partition(b"\x18")
+        assert lines.startswith(job.translate(None, REALTIME))
+        # After a reset nothing is sent but what proves it where no banner came.
+        assert not after.replace(b"$I\n", b"").translate(None, REALTIME)
         assert all(0 <= now.in_flight <= 128 for now in self.seen)
         assert [p.lines_acknowledged for p in self.seen] == sorted(
             p.lines_acknowledged for p in self.seen

@@ -455,14 +455,17 @@ def test_a_disk_that_fills_up_in_mid_job_stops_it_only_for_the_journal(
         assert "can no longer be written: No space left" in finding.sentence
 
 
-def test_a_banner_is_needed_but_may_be_asked_for() -> None:
-    """A board that stays awake when its port opens is reset by us."""
+@pytest.mark.parametrize("reset", [False, True])
+def test_a_board_that_rests_is_reset_only_if_asked(reset: bool) -> None:
+    """It stays awake when its port opens, and proves by ``$I`` that it holds nothing."""
     device = new_device()
     device.advance(0.1)
     assert BANNER in device.take_output()
     wire = FakeWire(device)
-    assert send(STOPPED, wire).lines == 65
-    assert wire.commands.startswith(b"\x18" + AS_WRITTEN + HANDSHAKE + b"G21\nG90\n")
+    plan = plan_job(STOPPED, MACHINE, SendOptions(reset=reset))
+    assert deliver(plan, wire, StopSignals()).lines == 65
+    first = b"\x18" if reset else b"$I\n"
+    assert wire.commands.startswith(first + AS_WRITTEN + HANDSHAKE + b"G21\nG90\n")
 
 
 def test_a_board_at_work_is_left_alone() -> None:
@@ -496,7 +499,9 @@ def test_a_machine_with_homing_is_homed_first_if_asked() -> None:
     job = Job("job.nc", "G90\nG53 G0 X-5\n")
     wire = FakeWire(new_device(**homing))
     force = frozenset({"bounds", "program"})
-    with pytest.raises(ControllerError, match=r"in state Alarm, not Idle.*'force' idle"):
+    with pytest.raises(
+        ControllerError, match=r"restarted the board, which is locked.*'force' idle"
+    ):
         send(job, wire, force=force)
     assert b"$X" not in wire.bytes_written
     assert b"$H" not in wire.bytes_written

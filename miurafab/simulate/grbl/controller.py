@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from miurafab.errors import ProfileError
 from miurafab.grbl.settings import profile_settings
@@ -61,7 +62,8 @@ class VirtualGrbl:
     number raises :class:`~miurafab.errors.ProfileError`. A byte takes ten bit times at ``baud``, in
     both directions; with None it takes no time. With ``homing_switches`` False, ``$H`` finds no
     switch. ``dialect`` is a name in :data:`~miurafab.simulate.grbl.dialect.DIALECTS`. Each of the
-    ``faults`` strikes once. At power-up the banner is in the output.
+    ``faults`` strikes once. At power-up the banner is in the output, unless ``greets`` is False, as
+    of some boards.
     """
 
     resets_on_open = True
@@ -73,14 +75,16 @@ class VirtualGrbl:
         baud: int | None = None,
         homing_switches: bool = True,
         dialect: str = "grbl-1.1",
+        greets: bool = True,
         faults: Iterable[Fault] = (),
     ) -> None:
         stored = FirmwareSettings()
         unknown = sorted(set(settings or {}) - set(stored.values))
         if unknown:
             raise ProfileError(f"${unknown[0]} is not a setting of GRBL 1.1.")
-        stored.write({10: DIALECTS[dialect].report_mask} | dict(settings or {}))
-        self._machine = Machine(stored, baud, homing_switches, DIALECTS[dialect])
+        spoken = DIALECTS[dialect] if greets else replace(DIALECTS[dialect], banner="")
+        stored.write({10: spoken.report_mask} | dict(settings or {}))
+        self._machine = Machine(stored, baud, homing_switches, spoken)
         self._seconds = 0.0
         self._frozen = False
         self._thaws_at: int | None = None

@@ -45,13 +45,14 @@ _1_1_BYTES = {
 class Dialect:
     """One firmware, as a sender sees it.
 
-    ``build_info`` are the lines of ``$I``; ``{}`` stands for the owner's note. ``rx_bytes``,
-    ``line_chars`` and ``planner_blocks`` are the usable sizes. ``realtime`` maps the command bytes
-    to commands; other bytes from 0x80 up are dropped or, with ``keeps_high_bytes``, go into the
-    line. ``errors`` and ``alarms`` map codes to words; None: plain numbers. ``settings`` maps the
-    settings that ``$$`` lists to their remarks; None: all settings of GRBL 1.1, without remarks.
-    ``report_mask`` is the default of $10. With ``deaf_writes``, bytes that arrive while a setting
-    is stored are lost. With ``program_flow``, ``$G`` reports M0 and writes rates with a point.
+    ``banner`` may be empty: nothing is said at a start. ``build_info`` are the lines of ``$I``;
+    ``{}`` stands for the owner's note. ``rx_bytes``, ``line_chars`` and ``planner_blocks`` are the
+    usable sizes. ``realtime`` maps the command bytes to commands; other bytes from 0x80 up are
+    dropped or, with ``keeps_high_bytes``, go into the line. ``errors`` and ``alarms`` map codes to
+    words; None: plain numbers. ``settings`` maps the settings that ``$$`` lists to their remarks;
+    None: all settings of GRBL 1.1, without remarks. ``report_mask`` is the default of $10. With
+    ``deaf_writes``, bytes that arrive while a setting is stored are lost. With ``program_flow``,
+    ``$G`` reports M0 and writes rates with a point.
     """
 
     banner: str

@@ -40,7 +40,8 @@ def number(value: float, decimals: int) -> str:
 
 def banner(machine: Machine) -> str:
     """The banner of a start."""
-    return f"\r\n{machine.dialect.banner}\r\n"
+    said = machine.dialect.banner
+    return f"\r\n{said}\r\n" if said else ""
 
 
 def message(machine: Machine, text: str) -> str:
