@@ -140,6 +140,9 @@ RULES = {
     "overrides": Rule("note", "a feed, a rapid rate or a power that a key changed while a job ran"),
     "records": Rule("warning", "a journal or a transcript that could not be finished"),
     "no-answer": Rule("note", "a cutter that answers nothing"),
+    "from-stroke": Rule("note", "a job that begins at a stroke of your choice"),
+    "head": Rule("note", "where the head stands in the job, and how far it moves from there"),
+    "aligned": Rule("note", "a job that was turned and shifted to where its sheet lies"),
     "resumed": Rule("note", "where an interrupted job goes on, and what may be burnt twice"),
 }
 """Every code, in the order of the work."""

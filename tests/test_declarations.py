@@ -19,6 +19,7 @@ from miurafab.fabrication.options import Borders, LayoutOptions
 from miurafab.options import (
     Choice,
     Declared,
+    Either,
     File,
     Flag,
     Kind,
@@ -70,6 +71,7 @@ def example(kind: Kind) -> str:
     return {
         Whole: lambda: str(max(kind.low, 3)),
         Choice: lambda: kind.names[-1],
+        Either: lambda: kind.choice.names[-1],
         Flag: lambda: "true",
         File: lambda: "stock.toml",
         FlatFoldability: lambda: "0.9deg",

@@ -126,7 +126,7 @@ def cut(
     if prepared.refused:
         return _refuse(console, prepared)
     if not port or dry_run:
-        return _report_dry_run(console, prepared, options)
+        return _report_dry_run(console, prepared, sheet, options)
     if len(port) > 1:
         return _share(console, prepared, port, sheet, options, pause)
     done = _stream(console, prepared, port[0], sheet, options, pause)
@@ -187,7 +187,7 @@ def _stream(
                 pause=pause,
                 before_sheet=before if attended or pause else None,
                 after_frame=after_frame,
-                on_resume=lambda finding: console.note(finding.sentence),
+                on_start=lambda finding: console.note(finding.sentence),
                 on_progress=show_progress,
             )
 
@@ -245,16 +245,18 @@ def _share(
     return WAITING if all(each.done or each.why == WAITS for each in outcome) else MACHINE_FAILED
 
 
-def _report_dry_run(console: Console, prepared: Prepared, options: CutOptions) -> int:
+def _report_dry_run(
+    console: Console, prepared: Prepared, sheet: list[int] | None, options: CutOptions
+) -> int:
     """Say what would be cut, and what the pre-flight checks find; no if they refuse it."""
     from miurafab.machine.preflight import require_known
-    from miurafab.workflow.dry_run import clock_text, readiness
+    from miurafab.workflow.dry_run import clock_text
+    from miurafab.workflow.sheet_plans import rehearsed
 
     require_known(options.send.force)
+    prepared, status, notes = rehearsed(prepared, sheet, options)
     of_sheets = (finding for sheet in prepared.dry_runs for finding in sheet.findings)
-    findings = [*prepared.edits, *of_sheets]
-    passed = options.send.force | ({"m3"} if options.send.allow_m3 else set())
-    status = readiness(findings, passed)
+    findings = [*notes, *prepared.edits, *of_sheets]
     answer = {
         "status": status,
         "job": prepared.name,

@@ -168,14 +168,14 @@ def _annotation(entry: Declared, group: Group) -> Any:
     if isinstance(entry.kind, Flag):
         return Annotated[bool | None, parameter]
     if isinstance(entry.kind, Several):  # --force a --force b is --force a,b
-        return Annotated[list[str] | None, parameter, Parameter(converter=_with_commas)]
+        return Annotated[list[str] | None, parameter, Parameter(converter=_joined(entry.kind))]
     if isinstance(entry.kind, Choice):
         return Annotated[str | None, parameter, Parameter(choices=entry.kind.names)]
     return Annotated[str | None, parameter]
 
 
-def _with_commas(type_: Any, tokens: Sequence[Token]) -> str:
-    return ",".join(token.value for token in tokens)
+def _joined(kind: Several) -> Callable[[Any, Sequence[Token]], str]:
+    return lambda type_, tokens: kind.separator.join(token.value for token in tokens)
 
 
 def split(given: Mapping[str, Any], cls: type) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -117,8 +117,8 @@ class GrblDriver(StreamDriver):
         forced += raise_findings(findings, plan.options.force, ControllerError)
         modes = ask_modes(session)
         set_modes(session, modes)
-        if plan.options.at is not None:
-            session.command("G92X{:.3f}Y{:.3f}".format(*plan.options.at))
+        if plan.at is not None:
+            session.command("G92X{:.3f}Y{:.3f}".format(*plan.at))
         if plan.program is not None:
             travel = check_travel(plan.program, settings, job_offset(session), homed=plan.homed)
             forced += raise_findings(travel, plan.options.force, ControllerError)

@@ -2,7 +2,8 @@
 
 The journal is a file of JSON objects, one a line; each run of a job appends its own. First a
 header: ``schema``, ``job``, ``sha256`` of the whole program's text, ``machine``, ``port``,
-``lines``, and ``from_line``, where the run began (1 unless it resumed another). Then, when the
+``lines``, and ``from_line``, where the run began (1 unless it resumed another, or, with
+``chosen``, a person left out what comes before). Then, when the
 controller has said so, ``{"blocks": n}``: it plans n moves ahead. Then, four times a second of
 the wire's clock at most, ``{"taken": n, "line": k, "seconds": t}``: n lines were acknowledged (or
 handed over, to a cutter that answers nothing), the last of them line k of the file. When a key
@@ -47,9 +48,10 @@ class Journal:
         lines: int,
         *,
         from_line: int = 1,
+        chosen: bool = False,
         sha256: str | None = None,
     ) -> None:
-        header = {
+        header: dict[str, Any] = {
             "schema": SCHEMA,
             "job": job.name,
             "sha256": sha256 or job_digest(job),
@@ -58,6 +60,8 @@ class Journal:
             "lines": lines,
             "from_line": from_line,
         }
+        if chosen:
+            header["chosen"] = True
         # The blank line parts this run from what a power loss may have torn.
         self._file = DurableFile(path, "journal", b"\n" + _record(header), append=True)
         self._count = 0
@@ -118,6 +122,7 @@ class JournalRun:
     port: str
     lines: int
     from_line: int = 1
+    chosen: bool = False
     blocks: int | None = None
     taken: int = 0
     line: int = 0

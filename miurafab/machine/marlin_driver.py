@@ -91,8 +91,8 @@ class MarlinDriver(StreamDriver):
             self.at_risk = True
             wire.send(SendLine(0, b"G28XY"), patience=HOMING_S)
             self.at_risk = False
-        if plan.options.at is not None:
-            wire.send(SendLine(0, b"G92X%.3fY%.3f" % plan.options.at))
+        if plan.at is not None:
+            wire.send(SendLine(0, b"G92X%.3fY%.3f" % plan.at))
         parser = any("EMERGENCY_PARSER:1" in reply.text for reply in said)
         return () if parser or plan.machine.tool.kind != "laser" else (_NO_PARSER,)
 

@@ -1,4 +1,6 @@
-"""Resuming an interrupted job at a stroke boundary, so that no stroke is left out.
+"""Beginning a job at a stroke boundary: where it was interrupted, or where a person says.
+
+A job that is resumed leaves no stroke out.
 
 An acknowledged line is planned, not burnt: the controller acknowledges a line when its move is in
 the planner. GRBL plans at most 15 moves and holds five segments of the moves before them; where
@@ -24,14 +26,15 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
+from numpy.typing import NDArray
 
-from miurafab.errors import GcodeError, InputError
+from miurafab.errors import GcodeError, InputError, OptionError
 from miurafab.findings import Finding
 from miurafab.gcode.execution import Jog, OffsetsChanged, Probe, Store, execute
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.parser import ModalState, ReaderRules, parse_block
-from miurafab.gcode.program import RAPID, Program, strokes
+from miurafab.gcode.program import RAPID, Program, Strokes, strokes
 from miurafab.gcode.reading import read_program
 from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST, NO_MOTION
 from miurafab.geometry.arrays import Ints
@@ -58,6 +61,7 @@ class Resumption:
 
     ``line`` is the first of the whole that is sent again, 1 if all of it is. Of the ``strokes``
     in all, those from ``stroke`` to before ``new_stroke`` (0-based) may be burnt a second time.
+    ``chosen``: a person chose the stroke, and those before it are left out.
     """
 
     job: Job
@@ -66,16 +70,21 @@ class Resumption:
     stroke: int
     new_stroke: int
     strokes: int
+    chosen: bool = False
 
     @property
     def finding(self) -> Finding:
-        """Where the job goes on, and what may be burnt twice."""
+        """Where the job goes on, and what may be burnt twice or is left out."""
+        place = f"{self.job.name}:{self.line}"
+        if self.chosen:
+            left = f"strokes 1 to {self.stroke} are" if self.stroke > 1 else "stroke 1 is"
+            says = f"{self.job.name} begins at stroke {self.stroke + 1} of {self.strokes}"
+            return Finding("from-stroke", f"{says} (line {self.line}); {left} left out.", place)
         start = f"{self.job.name} goes on at stroke {self.stroke + 1} of {self.strokes}"
         if self.new_stroke <= self.stroke:
             twice = "no stroke is burnt twice"
         else:
             twice = f"strokes {self.stroke + 1} to {self.new_stroke} may be burnt twice"
-        place = f"{self.job.name}:{self.line}"
         return Finding("resumed", f"{start} (line {self.line}); {twice}.", place)
 
 
@@ -97,15 +106,65 @@ def resume(job: Job, machine: MachineProfile, runs: Sequence[JournalRun]) -> Res
             f"Every stroke of {job.name} was burnt before it was interrupted; nothing is left."
         )
     # Where one operation follows another without a travel, the beam is on at the boundary.
-    while stroke and program.beam_on[burnt.first_move[stroke] - 1]:
+    while program.beam_on[burnt.first_move[stroke] - 1] and stroke > _left_out(runs, last):
         stroke -= 1
-    move = int(burnt.first_move[stroke])
-    line = int(program.line[move - 1]) + 1 if move else 1
-    rest, line = _rest(job, line)
+    rest, line = _rest(job, _line_of(program, burnt, stroke))
     if line == 1:
         stroke = 0
     new_stroke = int(np.searchsorted(first, possible, side="right"))
     return Resumption(rest, job_digest(job), line, stroke, max(stroke, new_stroke), len(burnt))
+
+
+def from_stroke(job: Job, machine: MachineProfile, number: int) -> Resumption | None:
+    """``job`` from its stroke ``number`` (from 1) on; None for the first, which is all of it.
+
+    Raises :class:`~miurafab.errors.InputError` for a number that it does not have, and for a job or
+    a machine that cannot begin there.
+    """
+    why = _no_modes(machine)
+    if why is not None:
+        raise InputError(
+            f"{machine.name} {why}, so {job.name} cannot begin in its middle; leave `from_stroke` "
+            "out."
+        )
+    program = read_program(job, machine)
+    burnt = strokes(program)
+    if number > len(burnt):
+        raise OptionError("from_stroke", f"is {number}; {job.name} has {len(burnt)} strokes")
+    if number == 1:
+        return None
+    begins = _line_of(program, burnt, number - 1)
+    rest, line = _rest(job, begins)
+    if line == 1:
+        raise OptionError(
+            "from_stroke",
+            f"is {number}; stroke {number} of {job.name} begins in line {begins}, before which "
+            "there is no room for the lines that prepare it; take a later stroke, or put blank "
+            "lines at the top of the file",
+        )
+    stroke = number - 1
+    return Resumption(rest, job_digest(job), line, stroke, stroke, len(burnt), chosen=True)
+
+
+def _left_out(runs: Sequence[JournalRun], last: NDArray[np.int32]) -> int:
+    """How many strokes, which end in the lines ``last``, the last cut of the ``runs`` left out."""
+    begun = [run.from_line for run in runs if run.chosen or run.from_line <= 1]
+    return int(np.searchsorted(last, begun[-1])) if begun else 0
+
+
+def _line_of(program: Program, burnt: Strokes, stroke: int) -> int:
+    """The first line to send for ``stroke``: that after the move before it."""
+    move = int(burnt.first_move[stroke])
+    return int(program.line[move - 1]) + 1 if move else 1
+
+
+def _no_modes(machine: MachineProfile) -> str | None:
+    """Why the modes in the middle of a job cannot be restored on ``machine``, if so."""
+    if machine.dialect in ("marlin", "hpgl"):
+        return f"speaks {machine.dialect}"
+    if machine.tool.kind != "laser" or machine.dialect == "grbl-0.9":
+        return "has no laser mode"
+    return None
 
 
 def _require_resumable(job: Job, machine: MachineProfile, run: JournalRun) -> None:
@@ -119,9 +178,7 @@ def _require_resumable(job: Job, machine: MachineProfile, run: JournalRun) -> No
     why = {
         "marlin": "loses its place when it is halted",
         "hpgl": "does not tell what it has cut",
-    }.get(machine.dialect)
-    if why is None and (machine.tool.kind != "laser" or machine.dialect == "grbl-0.9"):
-        why = "has no laser mode"
+    }.get(machine.dialect, _no_modes(machine))
     if why is not None:
         raise InputError(
             f"{machine.name} {why}, so {job.name} cannot be taken up in its middle "
@@ -154,8 +211,8 @@ def _reach(
     moving = np.flatnonzero(np.bincount(program.line, program.lengths) > _REAL_MOVE_MM)
     certain, possible = 1, 0
     for run in runs:
-        if run.from_line <= 1:
-            certain, possible = 1, 0
+        if run.chosen or run.from_line <= 1:
+            certain, possible = run.from_line, 0
         held = moves_back(machine, run)
         behind = int(np.searchsorted(moving, run.line, side="right")) - held
         if behind >= 0:

@@ -100,7 +100,8 @@ def deliver(
                 transport.name,
                 plan.lines,
                 from_line=rest.line if rest else 1,
-                sha256=rest.sha256 if rest else None,
+                chosen=rest is not None and rest.chosen,
+                sha256=plan.sha256,
             )
             at_end.callback(journal.close)
         driver = driver_of(

@@ -23,6 +23,7 @@ from typing import Any, Literal, TypeVar, get_type_hints
 from miurafab.errors import OptionError
 from miurafab.options.kinds import (
     Choice,
+    Either,
     File,
     Flag,
     Kind,
@@ -45,6 +46,7 @@ __all__ = [
     "REQUIRED",
     "Choice",
     "Declared",
+    "Either",
     "File",
     "Flag",
     "Kind",

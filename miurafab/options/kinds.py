@@ -193,6 +193,32 @@ class Choice(Kind):
 
 
 @dataclass(frozen=True)
+class Either(Kind):
+    """One of the names of ``choice``, or a value of ``kind``."""
+
+    choice: Choice
+    kind: Kind
+
+    @property
+    def metavar(self) -> str:
+        return f"{self.kind.metavar}|PLACE"
+
+    def read(self, value: object) -> Any:
+        named = isinstance(value, str) and value[:1].isalpha()
+        return self.choice.read(value) if named else self.kind.read(value)
+
+    def check(self, inside: Any) -> None:
+        (self.choice if isinstance(inside, str) else self.kind).check(inside)
+
+    def show(self, inside: Any) -> str:
+        return inside if isinstance(inside, str) else self.kind.show(inside)
+
+    @property
+    def accepts(self) -> str:
+        return f"{self.kind.metavar} or {self.choice.accepts}"
+
+
+@dataclass(frozen=True)
 class Flag(Kind):
     """Yes or no."""
 
@@ -271,21 +297,23 @@ class Pair(Kind):
 
 @dataclass(frozen=True)
 class Several(Kind):
-    """Any number of values of one ``kind``, with commas between or as a list.
+    """Any number of values of one ``kind``, with ``separator`` between or as a list.
 
     ``collect`` makes the value inside, such as :func:`distinct`.
     """
 
     kind: Kind
     collect: Callable[[Iterable[Any]], Any] = tuple
+    separator: str = ","
 
     @property
     def metavar(self) -> str:
-        return f"{self.kind.metavar},..."
+        return f"{self.kind.metavar}{self.separator}..."
 
     def read(self, value: object) -> Any:
-        listed = isinstance(value, str | Iterable)
-        parts = comma_parts(value) if listed else [value]
+        parts: Any = list(value) if isinstance(value, Iterable) else [value]
+        if isinstance(value, str):
+            parts = value.split(self.separator)
         return self.collect(_part(self.kind, part, value) for part in parts)
 
     @property
@@ -297,7 +325,7 @@ class Several(Kind):
             _check_part(self, part, inside)
 
     def show(self, inside: Any) -> str:
-        return ",".join(self.kind.show(part) for part in inside)
+        return self.separator.join(self.kind.show(part) for part in inside)
 
 
 def comma_parts(value: object) -> list[Any]:

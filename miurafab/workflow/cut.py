@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import os
 import reprlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from miurafab.errors import OptionError
+from miurafab.errors import InputError, OptionError
 from miurafab.files import AnyPath, as_path
 from miurafab.findings import Finding, refusals
 from miurafab.gcode.job import Job
@@ -25,6 +25,7 @@ from miurafab.workflow.preview import assumed_machine, named_machine
 if TYPE_CHECKING:
     from miurafab.fabrication.options import LayoutOptions
     from miurafab.origami.crease_pattern import CreasePattern
+    from miurafab.workflow.alignment import Aligned
     from miurafab.workflow.job_directory import JobDirectory
 
 Progress = Callable[[float, str], None]
@@ -39,7 +40,8 @@ class Prepared:
 
     ``folder`` is where the journals go. ``report`` is that of the fit or the check, None for what
     came as G-code or a job directory; ``refused`` are the findings of a fit that failed or a
-    pattern that is not valid, for which nothing will be cut.
+    pattern that is not valid, for which nothing will be cut. ``aligned`` says which sheet was
+    turned and shifted to where it lies (:func:`~miurafab.workflow.alignment.align`).
     """
 
     name: str
@@ -50,6 +52,7 @@ class Prepared:
     folder: Path | None = None
     report: dict[str, Any] | None = None
     refused: tuple[Finding, ...] = ()
+    aligned: Aligned | None = None
 
     @property
     def most_power(self) -> float:
@@ -60,6 +63,19 @@ class Prepared:
     def edits(self) -> tuple[Finding, ...]:
         """Which files of a job directory are not as they were made."""
         return () if self.directory is None else self.directory.edits
+
+    def chosen(self, sheets: Sequence[int] | None) -> list[int]:
+        """The numbers of the ``sheets`` (None: all); raises ``InputError`` for one that is
+        missing.
+        """
+        if self.refused:
+            why = " ".join(finding.sentence for finding in self.refused)
+            raise InputError(f"{self.name} cannot be cut: {why}")
+        chosen = list(sheets) if sheets else list(range(1, len(self.jobs) + 1))
+        for number in chosen:
+            if not 1 <= number <= len(self.jobs):
+                raise InputError(f"{self.name} has no sheet {number}; it has {len(self.jobs)}.")
+        return chosen
 
 
 def prepare(

@@ -7,6 +7,7 @@ each go beside it, and by its journal a sheet that was interrupted goes on.
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -18,17 +19,19 @@ from miurafab.files import AnyPath
 from miurafab.findings import Finding
 from miurafab.machine.job_process import stream_apart
 from miurafab.machine.keys import Keys
-from miurafab.machine.planning import JobPlan, SendOptions, plan_job
+from miurafab.machine.planning import JobPlan, SendOptions, head_at, plan_job
 from miurafab.machine.sender import StreamResult, stream_plan
 from miurafab.machine.trace_box import MOST_POINTER, frame_job
 from miurafab.machine.transport import VIRTUAL, require_port
 from miurafab.options import (
     Flag,
+    Pair,
     Several,
     Text,
     Whole,
     check_options,
     declared,
+    length,
     option,
     percent,
     read_options,
@@ -37,9 +40,10 @@ from miurafab.options import (
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.profiles import MachineProfile
+from miurafab.workflow.alignment import Mark, align
 from miurafab.workflow.cut import Prepared, prepare
 from miurafab.workflow.material_change import at_pause, needs_person
-from miurafab.workflow.sheet_plans import beside, chosen_sheets, journal_path, plan_sheets
+from miurafab.workflow.sheet_plans import beside, journal_path, plan_sheets, start_findings
 from miurafab.workflow.timeline import SheetProgress, placed
 
 
@@ -60,7 +64,8 @@ class CutSheet(Shown):
     result : StreamResult
         What the sender says after the cut.
     findings : tuple of Finding
-        What did not stop the job. The code ``resumed`` says where an interrupted sheet went on.
+        What did not stop the job. The codes ``resumed``, ``from-stroke``, ``aligned`` and ``head``
+        say where the sheet went on, began and lay.
     """
 
     name: str
@@ -89,6 +94,10 @@ class CutOptions(Shown):
         Whether to trace the box around each sheet first.
     pointer : float
         The beam power of the frame, as a fraction of full power.
+    from_stroke : int or None
+        The stroke, from 1, that the first sheet begins with.
+    align : tuple of pairs of points
+        Two marks of the one sheet: their position in the job, and where the head stands over them.
     virtual_speed : float or None
         How much faster than real time the virtual machine runs.
     """
@@ -109,10 +118,31 @@ class CutOptions(Shown):
         0.0,
         group="Start",
     )
+    from_stroke: int | None = option(
+        Whole(1),
+        "The stroke that the first sheet begins with, as the progress and the preview count them; "
+        "those before it are left out.",
+        group="Start",
+    )
+    align: tuple[Mark, ...] = option(
+        Several(
+            Pair(Pair(length(-math.inf), "X,Y"), "X,Y=X2,Y2", "10,10=12.3,9.8", "="), separator=";"
+        ),
+        "A mark of the sheet, X,Y in the job, and X2,Y2 where the head stands over it; give two, "
+        "and the sheet is cut where it lies.",
+        (),
+        group="Start",
+    )
     virtual_speed: float | None = None
 
     def __post_init__(self) -> None:
         check_options(self)
+        if self.align and isinstance(self.send.at, str):
+            raise OptionError(
+                "at",
+                f"is {self.send.at}, and `align` says where the sheet lies; give `at` as X,Y, in "
+                "the coordinates in which the marks were measured, or leave it out",
+            )
 
     @property
     def unread(self) -> bool:
@@ -136,7 +166,7 @@ def cut(
     keys: Keys | None = None,
     before_sheet: Callable[[int, int], None] | None = None,
     after_frame: Callable[[int], None] | None = None,
-    on_resume: Callable[[Finding], None] | None = None,
+    on_start: Callable[[Finding], None] | None = None,
     on_progress: Callable[[SheetProgress], None] | None = None,
     **options: Any,
 ) -> tuple[CutSheet, ...]:
@@ -168,9 +198,9 @@ def cut(
         a person must put in: it returns when the material is there.
     after_frame : callable, optional
         Called with the number of the sheet whose frame was traced.
-    on_resume : callable, optional
-        Called with a finding, before the port is opened, on what is burnt twice of a sheet that
-        goes on.
+    on_start : callable, optional
+        Called with a finding, before the port is opened, on where a sheet lies, where it begins or
+        goes on, and what of it is burnt twice or left out.
     on_progress : callable, optional
         Called with a :class:`SheetProgress`.
     {options}
@@ -221,7 +251,7 @@ def cut(
         keys=keys,
         before_sheet=before_sheet,
         after_frame=after_frame,
-        on_resume=on_resume,
+        on_start=on_start,
         on_progress=on_progress,
     )
 
@@ -239,7 +269,7 @@ def cut_prepared(
     keys: Keys | None = None,
     before_sheet: Callable[[int, int], None] | None = None,
     after_frame: Callable[[int], None] | None = None,
-    on_resume: Callable[[Finding], None] | None = None,
+    on_start: Callable[[Finding], None] | None = None,
     on_progress: Callable[[SheetProgress], None] | None = None,
 ) -> tuple[CutSheet, ...]:
     """Stream the sheets of ``prepared`` (or those numbered in ``sheets``, from 1) to ``port``.
@@ -250,9 +280,11 @@ def cut_prepared(
     :func:`~miurafab.machine.sender.stream_plan` raises.
     """
     done: list[CutSheet] = []
-    at = options.send.at
+    prepared = align(prepared, sheets, options.align)
+    plans = plan_sheets(prepared, sheets, options)
+    at = plans[0][1].at
     waits = needs_person(prepared, port, pause)
-    for number, plan in plan_sheets(prepared, sheets, options):
+    for number, plan in plans:
         further = bool(done) or (options.resume and plan.resumption is None)
         if further and waits:
             if before_sheet is not None:
@@ -263,16 +295,21 @@ def cut_prepared(
                     f"put it in; then go on with `sheet` {number}. Done: "
                     f"{', '.join(sheet.name for sheet in done)}."
                 )
-        if plan.resumption is not None and on_resume is not None:
-            on_resume(plan.resumption.finding)
+        placed_at = None if done else options.send.at
+        notes = start_findings(prepared, number, plan.resumption, placed_at)
+        if on_start is not None:
+            for each in notes:
+                on_start(each)
         if options.frame:
             head = replace(options.send, at=at)
-            frame(prepared, number, port=port, options=replace(options, send=head))
+            frame(prepared, number, port=port, options=replace(options, send=head, align=()))
             if after_frame is not None:
                 after_frame(number)
         send = partial(_stream(port), keys=keys, virtual_speed=options.virtual_speed)
         plan = replace(plan.with_head_at(at), at_pause=at_pause(waits, keys))
-        done.append(cut_sheet(prepared, number, plan, port, send, on_progress=on_progress))
+        done.append(
+            cut_sheet(prepared, number, plan, port, send, notes=notes, on_progress=on_progress)
+        )
         at = head_after(prepared, number, at)
     return tuple(done)
 
@@ -284,9 +321,13 @@ def cut_sheet(
     port: str,
     send: Callable[..., StreamResult],
     *,
+    notes: tuple[Finding, ...] = (),
     on_progress: Callable[[SheetProgress], None] | None = None,
 ) -> CutSheet:
-    """``send`` the ``plan`` of sheet ``number``, with its journal and transcript beside the job."""
+    """``send`` the ``plan`` of sheet ``number``, with its journal and transcript beside the job.
+
+    ``notes`` are the findings on where it begins and lies.
+    """
     job, expected = prepared.jobs[number - 1], prepared.dry_runs[number - 1]
     result = send(
         plan,
@@ -307,7 +348,7 @@ def cut_sheet(
         (
             *(found for found in expected.findings if found.severity != "refusal"),
             *result.findings,
-            *(() if plan.resumption is None else (plan.resumption.finding,)),
+            *notes,
         ),
     )
 
@@ -332,7 +373,8 @@ def frame(
     prepared: Prepared, number: int, *, port: str, options: CutOptions = DEFAULT_OPTIONS
 ) -> StreamResult:
     """Trace the box around what sheet ``number`` (from 1) burns, beam off or as a pointer."""
-    (number,) = chosen_sheets(prepared, [number])
+    (number,) = prepared.chosen([number])
+    prepared = align(prepared, [number], options.align)
     bounds = prepared.dry_runs[number - 1].bounds_mm
     name = prepared.jobs[number - 1].name
     if bounds is None:
@@ -342,8 +384,8 @@ def frame(
         bounds,
         prepared.machine,
         pointer=options.pointer,
-        back_to=options.send.at or (0.0, 0.0),
+        back_to=head_at(options.send.at or (0.0, 0.0), bounds, name),
     )
     start = replace(options.send, check_mode=False, allow_m3=False)
-    plan = plan_job(box, prepared.machine, start)
+    plan = plan_job(box, prepared.machine, start, box=bounds)
     return _stream(port)(plan, port, virtual_speed=options.virtual_speed)

@@ -16,7 +16,7 @@ from functools import partial
 from miurafab.errors import InputError, JobStopped, MiurafabError
 from miurafab.machine.job_process import stream_apart
 from miurafab.machine.journal import read_journal
-from miurafab.machine.planning import JobPlan
+from miurafab.machine.planning import Head, JobPlan
 from miurafab.machine.signals import StopSignals
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.cut_sheets import (
@@ -71,6 +71,11 @@ def share_sheets(
         raise InputError(
             "A frame is looked at before its sheet is cut, and machines that share sheets do not "
             "wait: first trace it at each with 'miurafab machine frame' and the same `port`."
+        )
+    if options.align:
+        raise InputError(
+            "A sheet that was moved lies at one machine, and `align` says where; name its `port` "
+            "alone."
         )
     twice = {port for port in ports if ports.count(port) > 1 and port != "virtual"}
     if twice:
@@ -130,7 +135,7 @@ class _Work:
 
     def at_machine(self, port: str) -> None:
         """Cut sheets at ``port`` until none is left, or the machine has failed."""
-        at = self._options.send.at
+        at: Head | None = None
         send = partial(
             stream_apart, signals=self._signals, virtual_speed=self._options.virtual_speed
         )
@@ -143,6 +148,7 @@ class _Work:
             if done and not self._material.is_in(number, port):
                 self._left.appendleft(number)
                 return
+            at = at if done else self._plans[number].at
             done = True
             name, why = self._prepared.dry_runs[number - 1].name, ""
             try:

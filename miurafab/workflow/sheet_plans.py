@@ -11,28 +11,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from miurafab.errors import GcodeError, InputError
+from miurafab.errors import GcodeError, InputError, OptionError
+from miurafab.findings import Finding
 from miurafab.gcode.job import Job
-from miurafab.machine.journal import read_journal
-from miurafab.machine.planning import JobPlan, plan_job
+from miurafab.machine.journal import job_digest, read_journal
+from miurafab.machine.planning import Head, JobPlan, head_at, passed_checks, plan_job
 from miurafab.machine.preflight import raise_findings, require_known
-from miurafab.machine.resume import resume
+from miurafab.machine.resume import Resumption, from_stroke, resume
+from miurafab.workflow.alignment import align
 from miurafab.workflow.cut import Prepared
+from miurafab.workflow.dry_run import readiness
 
 if TYPE_CHECKING:
     from miurafab.workflow.cut_sheets import CutOptions
-
-
-def chosen_sheets(prepared: Prepared, sheets: Sequence[int] | None) -> list[int]:
-    """The numbers of the ``sheets`` (None: all); raises ``InputError`` for one that is missing."""
-    if prepared.refused:
-        why = " ".join(finding.sentence for finding in prepared.refused)
-        raise InputError(f"{prepared.name} cannot be cut: {why}")
-    chosen = list(sheets) if sheets else list(range(1, len(prepared.jobs) + 1))
-    for number in chosen:
-        if not 1 <= number <= len(prepared.jobs):
-            raise InputError(f"{prepared.name} has no sheet {number}; it has {len(prepared.jobs)}.")
-    return chosen
 
 
 def plan_sheets(
@@ -40,17 +31,29 @@ def plan_sheets(
 ) -> list[tuple[int, JobPlan]]:
     """The plans of the ``sheets`` (None: all), each checked by itself.
 
-    With ``options.resume`` finished sheets are left out and interrupted sheets are resumed. Raises
+    With ``options.resume`` finished sheets are left out and interrupted sheets are resumed; with
+    ``options.from_stroke`` the first begins there. Raises
     :class:`~miurafab.errors.InputError` for a sheet that cannot be sent.
     """
-    chosen = chosen_sheets(prepared, sheets)
+    if options.resume and options.from_stroke is not None:
+        raise OptionError(
+            "from_stroke",
+            "says where to begin, and the journal says that for `resume`; ask for one",
+        )
+    chosen = prepared.chosen(sheets)
     require_known(options.send.force)
     edits = raise_findings(prepared.edits, options.send.force, GcodeError)
     plans: list[tuple[int, JobPlan]] = []
     begun = False
     for number in chosen:
-        job = prepared.jobs[number - 1]
-        resumption = None
+        job, expected = prepared.jobs[number - 1], prepared.dry_runs[number - 1]
+        aligned = prepared.aligned
+        if aligned is not None and aligned.number != number:
+            aligned = None
+        written = job if aligned is None else aligned.written
+        resumption: Resumption | None = None
+        if options.from_stroke is not None and not plans:
+            resumption = from_stroke(written, prepared.machine, options.from_stroke)
         if options.resume:
             path = journal_path(prepared, job)
             runs = read_journal(path) if path is not None and path.exists() else []
@@ -58,14 +61,18 @@ def plan_sheets(
             if runs and runs[-1].ended == "done":
                 continue
             if runs:
-                resumption = resume(job, prepared.machine, runs)
+                resumption = resume(written, prepared.machine, runs)
+        if resumption is not None and aligned is not None:
+            resumption = aligned.rest(resumption, prepared.machine)
         plan = plan_job(
             job,
             prepared.machine,
             options.send,
             resumption=resumption,
             most_power=prepared.most_power,
-            judged=prepared.dry_runs[number - 1].judged,
+            judged=expected.judged,
+            box=expected.bounds_mm,
+            sha256=job_digest(written),
         )
         plans.append((number, replace(plan, forced=edits + plan.forced)))
     if options.resume and not (begun and plans):
@@ -74,6 +81,53 @@ def plan_sheets(
             "`resume` out to cut."
         )
     return plans
+
+
+def start_findings(
+    prepared: Prepared, number: int, resumption: Resumption | None, at: Head | str | None
+) -> tuple[Finding, ...]:
+    """Where sheet ``number`` lies and begins, if the head is put ``at`` a place of it."""
+    found: list[Finding] = []
+    expected = prepared.dry_runs[number - 1]
+    if prepared.aligned is not None and prepared.aligned.number == number:
+        found.append(prepared.aligned.finding)
+    if isinstance(at, str) and expected.bounds_mm is not None:
+        head = head_at(at, expected.bounds_mm, expected.name)
+        ends = expected.program.end[:, :2]
+        (left, front), (right, back) = head - ends.min(axis=0), ends.max(axis=0) - head
+        found.append(
+            Finding(
+                "head",
+                f"The head stands at X{head[0]:.3f} Y{head[1]:.3f} of {expected.name}; from there "
+                f"it goes {max(0.0, left):.1f} mm to the left, {max(0.0, right):.1f} mm to the "
+                f"right, {max(0.0, front):.1f} mm to the front and {max(0.0, back):.1f} mm to the "
+                "back.",
+                expected.name,
+            )
+        )
+    if resumption is not None:
+        found.append(resumption.finding)
+    return tuple(found)
+
+
+def rehearsed(
+    prepared: Prepared, sheets: Sequence[int] | None, options: CutOptions
+) -> tuple[Prepared, str, tuple[Finding, ...]]:
+    """``prepared`` as :func:`~miurafab.workflow.cut_sheets.cut_prepared` would send it, ``ready``
+    or ``refused``, and where its first sheet would lie and begin; no refusal raises.
+    """
+    prepared = align(prepared, sheets, options.align)
+    first = prepared.chosen(sheets)[0]
+    resumption = None
+    if options.from_stroke is not None:
+        resumption = from_stroke(prepared.jobs[first - 1], prepared.machine, options.from_stroke)
+    send, machine = options.send, prepared.machine
+    ready = readiness(prepared.edits, send.force) == "ready" and all(
+        readiness(each.findings, send.force | passed_checks(send, machine, each.program)) == "ready"
+        for each in prepared.dry_runs
+    )
+    notes = start_findings(prepared, first, resumption, options.send.at)
+    return prepared, "ready" if ready else "refused", notes
 
 
 def can_go_on(prepared: Prepared) -> bool:
