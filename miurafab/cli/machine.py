@@ -17,8 +17,8 @@ from miurafab.options import Flag, Text, Whole, declared, feed, length, read_opt
 from miurafab.profiles.machine import Controller
 
 if TYPE_CHECKING:
-    from miurafab.grbl.events import StatusReport
     from miurafab.machine.actions import LineOptions
+    from miurafab.machine.known_controller import MachineState
 
 PORT = "A serial device, a pyserial URL (socket://HOST:PORT), or 'virtual'."
 
@@ -162,10 +162,10 @@ def jog(
     """Move the machine with the beam off."""
     from miurafab.machine import actions
 
-    report = actions.jog(
+    state = actions.jog(
         line.port, x=x, y=y, feed_mm_min=speed, absolute=to, **line.options(console)
     )
-    return _answer_state(console, report)
+    return _answer_state(console, state)
 
 
 def _frame_options() -> type:
@@ -241,12 +241,12 @@ ACTIONS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {
 """Each action with its examples."""
 
 
-def _answer_state(console: Console, report: StatusReport) -> int:
+def _answer_state(console: Console, state: MachineState) -> int:
     answer: dict[str, Any] = {
-        "state": report.state,
-        "machine_position": report.machine_position,
-        "work_position": report.work_position,
-        "beam_off": report.beam_off,
+        "state": state.state,
+        "machine_position": state.machine_position,
+        "work_position": state.position,
+        "beam_off": state.beam_off,
     }
     console.answer({name: value for name, value in answer.items() if value is not None})
     return DONE

@@ -1,7 +1,8 @@
 """Actions on a machine besides cutting: query it, home it, unlock it, move it.
 
-Each function opens the port, greets the controller, does one thing and closes the port. Those
-that move the machine reset it first on every way out but success, as the sender does.
+Each function is a session (:mod:`~miurafab.machine.machine_session`) with one action: it opens the
+port, greets the controller, does one thing and closes the port. The controller is reset first on
+every way out that leaves it moving or the beam on.
 """
 
 from __future__ import annotations
@@ -12,18 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict, Unpack
 
-from miurafab.errors import ControllerError, GcodeError, InputError, JobStopped, ProfileError
-from miurafab.gcode.job import Job
-from miurafab.grbl.connection import Connection
-from miurafab.grbl.events import Options, StatusReport, Version
+from miurafab.errors import ControllerError, GcodeError, JobStopped, ProfileError
 from miurafab.grbl.settings import Settings, parse_dump
-from miurafab.machine.modes import ask_modes
-from miurafab.machine.session import HOMING_S, Session
+from miurafab.machine.known_controller import MachineState
+from miurafab.machine.machine_session import MachineSession, require_way
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import open_port
 from miurafab.profiles.machine import BAUD, WAIT_S
-
-_POLL_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -66,48 +62,35 @@ class LineOptions(TypedDict, total=False):
 def conversation(
     port: str,
     *,
-    moves: bool = False,
     signals: StopSignals | None = None,
     **line: Unpack[LineOptions],
-) -> Iterator[Session]:
-    """A session with the controller at ``port``, greeted; closed at the end.
+) -> Iterator[MachineSession]:
+    """A session with the controller at ``port``, open; closed at the end.
 
-    With ``moves`` the controller is reset if the block ends by an exception. ``signals`` are
-    caught by the block, so that it can rule when they raise. Raises
+    ``signals`` are caught by the block, so that it can rule when they raise. Raises
     :class:`~miurafab.errors.JobStopped` for Ctrl-C, SIGTERM and SIGHUP, and what
     :meth:`~miurafab.machine.session.Session.greet` raises.
     """
     with signals or StopSignals() as signals:
-        patience = line.get("wait", WAIT_S)
         transport = open_port(port, line.get("baud", BAUD), line.get("settings"))
         signals.at_once = transport.blocks
-        session = Session(transport, Connection(), check=signals.check)
-        at_risk = False
+        session = MachineSession(transport, signals)
         try:
-            session.greet(patience, reset=line.get("reset", False))
-            if session.restarted and transport.blocks and "on_restart" in line:
+            session.open(line.get("wait", WAIT_S), reset=line.get("reset", False))
+            if session.conversation.restarted and transport.blocks and "on_restart" in line:
                 line["on_restart"]()
-            at_risk = moves
             yield session
-            at_risk = False
         except KeyboardInterrupt:
             raise JobStopped(f"Stopped by {signals.reason}.") from None
         finally:
-            signals.hold()
-            if at_risk:
-                session.stop()
             session.close()
 
 
 def machine_info(port: str, **line: Unpack[LineOptions]) -> MachineInfo:
     """The identity and state of the controller at ``port``; moves and changes nothing."""
     with conversation(port, **line) as session:
-        banner = session.banner
-        said = session.command("$I")
-        modes = ask_modes(session)
-        status = _state(session)
-        version = next((event for event in said if isinstance(event, Version)), None)
-        options = next((event for event in said if isinstance(event, Options)), None)
+        known, state = session.known, session.look()
+        banner, version, options = session.conversation.banner, known.version, known.options
         return MachineInfo(
             port=port,
             firmware=banner.firmware,
@@ -116,19 +99,21 @@ def machine_info(port: str, **line: Unpack[LineOptions]) -> MachineInfo:
             options=options.flags if options else None,
             planner_blocks=options.planner_blocks if options else None,
             rx_bytes=options.rx_bytes if options else None,
-            state=status.state,
-            position=session.position,
-            machine_position=status.machine_position,
-            beam_off=status.beam_off,
-            modes=" ".join(modes.modes),
-            startup_blocks=tuple(f"$N{n}={text}" for n, text in modes.startup.items() if text),
+            state=state.state,
+            position=state.position,
+            machine_position=state.machine_position,
+            beam_off=state.beam_off,
+            modes=" ".join(state.modes),
+            startup_blocks=tuple(
+                f"$N{n}={text}" for n, text in known.modes.startup.items() if text
+            ),
         )
 
 
 def read_settings(port: str, **line: Unpack[LineOptions]) -> Settings:
     """The settings that the controller reports (``$$``)."""
     with conversation(port, **line) as session:
-        return Settings.from_events(session.command("$$"))
+        return session.known.settings
 
 
 def read_dump(path: Path) -> Settings:
@@ -147,29 +132,27 @@ def write_settings(port: str, wanted: Settings, **line: Unpack[LineOptions]) -> 
     :class:`~miurafab.errors.ControllerError` for a setting that is refused or does not stick.
     """
     with conversation(port, **line) as session:
-        before = Settings.from_events(session.command("$$"))
+        before = session.known.settings
         differing = [n for n, text in wanted.texts.items() if before.texts.get(n) != text]
         for number in sorted(differing, key=lambda n: (n != 22, n)):
             session.command(f"${number}={wanted.texts[number]}")
-        after = Settings.from_events(session.command("$$"))
+        after = session.known.settings
     left = after.differences({n: v for n, v in wanted.values.items() if n in differing})
     if left:
         raise ControllerError(f"Not every setting was taken: {', '.join(map(str, left))}.")
     return {n: after.texts[n] for n in differing if n in after.texts}
 
 
-def unlock(port: str, **line: Unpack[LineOptions]) -> StatusReport:
+def unlock(port: str, **line: Unpack[LineOptions]) -> MachineState:
     """Unlock the controller after an alarm (``$X``); its position must still be right."""
     with conversation(port, **line) as session:
-        session.command("$X")
-        return _state(session)
+        return session.unlock()
 
 
-def home(port: str, **line: Unpack[LineOptions]) -> StatusReport:
+def home(port: str, **line: Unpack[LineOptions]) -> MachineState:
     """Run the homing cycle (``$H``) and wait for its end."""
-    with conversation(port, moves=True, **line) as session:
-        session.home()
-        return _state(session)
+    with conversation(port, **line) as session:
+        return session.home()
 
 
 def jog(
@@ -180,32 +163,11 @@ def jog(
     feed_mm_min: float = 1000.0,
     absolute: bool = False,
     **line: Unpack[LineOptions],
-) -> StatusReport:
-    """Move by ``x`` and ``y`` mm (``absolute``: to these work coordinates), beam off, and wait.
-
-    Raises :class:`~miurafab.errors.InputError` if neither is given,
-    :class:`~miurafab.errors.ControllerError` if the controller refuses, as for a target outside
-    its soft limits.
-    """
-    words = "".join(f"{a}{v:.3f}" for a, v in (("X", x), ("Y", y)) if v is not None)
-    if not words:
-        raise InputError("A jog needs a distance along X, along Y, or both.")
-    mode = "G90" if absolute else "G91"
-    with conversation(port, moves=True, **line) as session:
-        session.command(f"$J=G21{mode}{words}F{feed_mm_min:g}")
-        while True:
-            status = session.wait_status()
-            if status.state == "Idle":
-                return _state(session)
-            if status.state != "Jog":
-                raise ControllerError(f"The jog ended in state {status.state}.")
-            session.pause(_POLL_S)
-
-
-def _state(session: Session) -> StatusReport:
-    """The state, with positions in mm: ``$$`` tells the unit in which they are reported."""
-    session.ask("$$")
-    return session.wait_status()
+) -> MachineState:
+    """See :meth:`~miurafab.machine.machine_session.MachineSession.jog`."""
+    require_way(x, y)
+    with conversation(port, **line) as session:
+        return session.jog(x=x, y=y, feed_mm_min=feed_mm_min, absolute=absolute)
 
 
 def talk(
@@ -222,7 +184,7 @@ def talk(
     off.
     """
     signals = StopSignals()
-    with conversation(port, moves=True, signals=signals, **line) as session:
+    with conversation(port, signals=signals, **line) as session:
         heard = bytearray()
 
         def hear(data: bytes) -> None:
@@ -233,25 +195,13 @@ def talk(
                 if line.strip():
                     tell(line.decode("ascii", "backslashreplace").strip())
 
-        session.on_data = hear
+        session.conversation.on_data = hear
         for each in _awaited(lines, signals):
-            text = each.strip()
             try:
-                if text in _REALTIME:
-                    session.write(session.connection.send_realtime(_REALTIME[text]))
-                    session.pause(_POLL_S)
-                elif text:
-                    bare = next(Job("The console", text).send_lines(), None)
-                    if bare is not None:
-                        session.command(bare.data.decode("ascii"), HOMING_S)
+                session.say(each)
             except (ControllerError, GcodeError) as error:
                 tell(str(error))
-        status = session.wait_status()
-        while status.state in ("Run", "Jog") and not status.beam_on:
-            session.pause(_POLL_S)
-            status = session.wait_status()
-        if status.beam_on or status.state != "Idle":
-            session.stop()
+        session.settle()
 
 
 def _awaited(lines: Iterable[str], signals: StopSignals) -> Iterator[str]:
@@ -267,6 +217,3 @@ def _awaited(lines: Iterable[str], signals: StopSignals) -> Iterator[str]:
         if line is None:
             return
         yield line
-
-
-_REALTIME = {"?": b"?", "!": b"!", "~": b"~", "reset": b"\x18"}

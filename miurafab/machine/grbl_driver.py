@@ -15,13 +15,10 @@ import math
 from miurafab.errors import ControllerError, MiurafabError, PersonNeeded
 from miurafab.findings import Finding
 from miurafab.gcode.program import BEAM_M3, PAUSE
-from miurafab.grbl.connection import Connection
-from miurafab.grbl.events import Error, Ok, Options, StatusReport
-from miurafab.grbl.settings import Settings
+from miurafab.grbl.events import Error, Ok, StatusReport
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.greeting import ANSWER_S
-from miurafab.machine.keys import HOLD, OVERRIDES_OFF, RESUME, NoKeys, obeys_overrides
-from miurafab.machine.modes import ask_modes, job_offset, set_modes
+from miurafab.machine.keys import HOLD, RESUME, NoKeys
 from miurafab.machine.preflight import (
     check_build,
     check_settings,
@@ -30,7 +27,6 @@ from miurafab.machine.preflight import (
     raise_findings,
 )
 from miurafab.machine.progress import JobAborted
-from miurafab.machine.session import Session
 from miurafab.machine.stream_driver import JobContext, StreamDriver
 
 WAS_RESET = "the controller was reset and reports the beam off"
@@ -43,16 +39,7 @@ _WAS_ARMED = Finding("armed", "The job ended with the laser armed, so the contro
 
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # between status queries while the last moves are made
-_MOST_ON_A_NETWORK = 256
-"""Bytes: two lines of a raster at least; a reset behind 1,023 bytes was unheeded for 2.2 s by
-grblHAL's own simulator."""
 _KEY_S = 0.01  # between two reads of the keyboard, if there is one
-
-
-def _most_in_flight(context: JobContext) -> int:
-    """The bytes that may be unanswered; few over a network, where a reset queues behind them."""
-    most = context.plan.machine.controller.rx_bytes
-    return min(most, _MOST_ON_A_NETWORK) if "://" in context.transport.name else most
 
 
 class GrblDriver(StreamDriver):
@@ -62,12 +49,8 @@ class GrblDriver(StreamDriver):
         super().__init__(context)
         plan, controller = context.plan, context.plan.machine.controller
         self._patience = math.inf if isinstance(context.keys, NoKeys) else _KEY_S
-        self._session = Session(
-            context.transport,
-            Connection(_most_in_flight(context)),
-            context.transcript,
-            context.check,
-        )
+        self._session = context.conversation
+        self._known = context.known
         self._streamer = Streamer(
             self._session.connection,
             plan.job.name,
@@ -91,11 +74,9 @@ class GrblDriver(StreamDriver):
 
     def prepare(self) -> tuple[Finding, ...]:
         """See :class:`StreamDriver`."""
-        plan, session = self.plan, self._session
-        session.greet(plan.wait, reset=plan.reset)
-        if obeys_overrides(plan.machine.dialect):
-            for order in OVERRIDES_OFF:
-                session.write(session.connection.send_realtime(order))
+        plan, session, known = self.plan, self._session, self._known
+        known.open(plan.wait, reset=plan.reset)
+        known.clear_overrides()
         if plan.options.home:
             self.at_risk = True
             session.home()
@@ -105,28 +86,28 @@ class GrblDriver(StreamDriver):
             plan.options.force,
             ControllerError,
         )
+        known.refresh()
         findings: list[Finding] = []
-        options = (event for event in session.command("$I") if isinstance(event, Options))
-        for option in options:
-            if self.journal is not None and option.planner_blocks is not None:
-                self.journal.plans_ahead(option.planner_blocks)
+        options = known.options
+        if options is not None:
+            if self.journal is not None and options.planner_blocks is not None:
+                self.journal.plans_ahead(options.planner_blocks)
             if not plan.options.check_mode:
-                findings += check_build(plan.job, plan.machine, option.flags)
-        settings = Settings.from_events(session.command("$$"))
-        findings += check_settings(plan.machine, settings)
+                findings += check_build(plan.job, plan.machine, options.flags)
+        findings += check_settings(plan.machine, known.settings)
         forced += raise_findings(findings, plan.options.force, ControllerError)
-        modes = ask_modes(session)
-        set_modes(session, modes)
+        modes = known.set_modes()
         if plan.at is not None:
-            session.command("G92X{:.3f}Y{:.3f}".format(*plan.at))
+            known.set_position(*plan.at)
         if plan.program is not None:
-            travel = check_travel(plan.program, settings, job_offset(session), homed=plan.homed)
+            travel = check_travel(
+                plan.program, known.settings, known.job_offset(), homed=plan.homed
+            )
             forced += raise_findings(travel, plan.options.force, ControllerError)
-        forced += tuple(modes.findings())
         if plan.options.check_mode:
             self.at_risk = True
             session.command("$C")
-        return forced
+        return forced + modes
 
     def stream(self) -> None:
         """See :class:`StreamDriver`."""

@@ -35,6 +35,10 @@ OVERRIDES_OFF = (b"\x90", b"\x95", b"\x99")
 still override them, and some keep them over a reset (grblHAL, ``$676``)."""
 
 
+JOG_CANCEL = b"\x85"
+"""Ends a jog at once (GRBL 1.1 ``config.h``); nothing else obeys it."""
+
+
 def obeys_overrides(dialect: str) -> bool:
     """Whether a machine of this dialect has realtime overrides."""
     return dialect not in ("grbl-0.9", "marlin", "hpgl")
@@ -45,6 +49,11 @@ def keys_of(dialect: str) -> dict[str, bytes]:
     if obeys_overrides(dialect):
         return KEYS
     return {key: order for key, order in KEYS.items() if order in (HOLD, RESUME, ABORT)}
+
+
+def session_keys(dialect: str) -> dict[str, bytes]:
+    """... and while no job runs: ``c`` ends a jog."""
+    return keys_of(dialect) | ({"c": JOG_CANCEL} if obeys_overrides(dialect) else {})
 
 
 class Keys(Protocol):

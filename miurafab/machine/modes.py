@@ -19,8 +19,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from miurafab.findings import Finding
-from miurafab.grbl.events import Modes, Parameter, StartupBlock
-from miurafab.machine.session import Session
 
 SET = "G21G90G17G94G54"
 """What is sent before anything that needs it: mm, absolute, XY plane, feed per minute, offset 1."""
@@ -86,28 +84,3 @@ def _back(word: str) -> str:
     if _VALUE.fullmatch(word):
         return f"{word[0]}0"
     return _BACK.get(word, "")
-
-
-def ask_modes(session: Session) -> ControllerModes:
-    """Ask for the modes, the startup blocks and the offsets."""
-    modes = next((each.words for each in session.ask("$G") if isinstance(each, Modes)), ())
-    startup = {
-        each.number: each.text for each in session.ask("$N") if isinstance(each, StartupBlock)
-    }
-    return ControllerModes(modes, startup)
-
-
-def set_modes(session: Session, found: ControllerModes) -> None:
-    """Set the modes in which a job begins."""
-    session.command(SET + found.way_out)
-
-
-def job_offset(session: Session) -> tuple[float, ...] | None:
-    """What the controller adds to the coordinates of a job in G54, in mm; None: it does not say."""
-    stored = {each.name: each.values for each in session.ask("$#") if isinstance(each, Parameter)}
-    if "G54" not in stored:
-        return session.work_offset
-    return tuple(
-        session.mm_per_unit * (own + shift)
-        for own, shift in zip(stored["G54"], stored.get("G92", (0.0,) * 9), strict=False)
-    )

@@ -11,19 +11,18 @@ stands in the sentence that the user reads.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack, nullcontext
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import TypedDict, Unpack
 
-from miurafab.errors import JobStopped, MiurafabError
-from miurafab.machine.dialects import driver_of, open_machine
-from miurafab.machine.journal import Journal
-from miurafab.machine.keys import Keys, NoKeys
+from miurafab.errors import JobStopped
+from miurafab.machine.dialects import open_machine
+from miurafab.machine.keys import Keys
+from miurafab.machine.known_controller import PortSetup
+from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.signals import StopSignals
-from miurafab.machine.stream_driver import JobContext
-from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import FlowTransport
 
 __all__ = ["Files", "Progress", "StreamOptions", "StreamResult", "deliver", "stream_plan"]
@@ -84,41 +83,11 @@ def deliver(
     keys: Keys | None = None,
 ) -> StreamResult:
     """Send a planned job over an open wire and close it; see :func:`stream_plan`."""
-    job, machine = plan.job, plan.machine
-    with ExitStack() as at_end:
-        at_end.callback(transport.close)
-        transcript = journal = None
-        if transcript_path is not None:
-            transcript = Transcript(transcript_path, f"{job.name} to {transport.name}")
-            at_end.callback(transcript.close)
-        if journal_path is not None and not plan.options.check_mode:
-            rest = plan.resumption
-            journal = Journal(
-                journal_path,
-                job,
-                machine.name,
-                transport.name,
-                plan.lines,
-                from_line=rest.line if rest else 1,
-                chosen=rest is not None and rest.chosen,
-                sha256=plan.sha256,
-            )
-            at_end.callback(journal.close)
-        driver = driver_of(
-            JobContext(
-                plan, transport, transcript, journal, on_progress, keys or NoKeys(), signals.check
-            )
+    session = MachineSession(transport, signals, PortSetup.of(plan.machine), keys)
+    with closing(session):
+        return session.cut(
+            plan,
+            journal_path=journal_path,
+            transcript_path=transcript_path,
+            on_progress=on_progress,
         )
-        # A signal between an exception and its handling would skip the handling, not this.
-        at_end.callback(driver.make_safe)
-        try:
-            return driver.run()
-        except KeyboardInterrupt:
-            signals.hold()
-            driver.end(JobStopped(f"{job.name} was stopped by {signals.reason}."))
-        except MiurafabError as error:
-            signals.hold()
-            driver.end(error)
-        except BaseException:  # a defect or an exit: no signal may tear the making safe at its end
-            signals.hold()
-            raise

@@ -42,6 +42,7 @@ class Session:
     ``check`` is called before every read: it raises the exception that should interrupt the
     conversation. ``on_data`` is called with the bytes as they arrive. ``restarted``: the opening of
     the port reset the board. ``banner`` is what it greeted with, or what its ``$I`` says.
+    ``starts`` grows with each reset that was sent or greeted.
     """
 
     def __init__(
@@ -59,9 +60,10 @@ class Session:
         self.overrides = AS_WRITTEN
         self.mm_per_unit = 1.0
         self.heard = 0.0
+        self.starts = 0
         self.on_data: Callable[[bytes], None] = lambda data: None
         self._transport = transport
-        self._transcript = transcript
+        self.transcript = transcript
         self._check = check
         self._asked_at: float | None = None
         self._start = transport.now()
@@ -88,13 +90,23 @@ class Session:
         offset = self.work_offset or (0.0,) * len(status.machine_position)
         return tuple(m - o for m, o in zip(status.machine_position, offset, strict=False))
 
+    @property
+    def machine_position(self) -> tuple[float, ...] | None:
+        """The same in the machine's own coordinates."""
+        status = self.status
+        if status is None or status.machine_position is not None:
+            return None if status is None else status.machine_position
+        if status.work_position is None or self.work_offset is None:
+            return None
+        return tuple(w + o for w, o in zip(status.work_position, self.work_offset, strict=False))
+
     # The wire
 
     def write(self, data: bytes) -> None:
         """Send bytes that come from the connection."""
         self._transport.write(data)
-        if self._transcript is not None:
-            self._transcript.sent(self.now(), data)
+        if self.transcript is not None:
+            self.transcript.sent(self.now(), data)
 
     def receive(self, timeout: float) -> list[Event]:
         """The events that arrive within ``timeout``; returns as soon as there are bytes.
@@ -106,8 +118,8 @@ class Session:
         if not data:
             return []
         self.heard = self.now()
-        if self._transcript is not None:
-            self._transcript.came(self.heard, data)
+        if self.transcript is not None:
+            self.transcript.came(self.heard, data)
         self.on_data(data)
         self.connection.receive_data(data)
         events = list(self.connection.events())
@@ -120,6 +132,7 @@ class Session:
                 self._asked_at = None
             elif isinstance(event, Banner):
                 self.banner = event
+                self.starts += 1
                 self.overrides = AS_WRITTEN
                 self._asked_at = None
             elif isinstance(event, Setting) and event.number == _REPORT_INCHES:
@@ -287,8 +300,8 @@ class Session:
         """
         try:
             self._transport.write_now(self.connection.send_realtime(FEED_HOLD))
-            if self._transcript is not None:
-                self._transcript.sent(self.now(), FEED_HOLD)
+            if self.transcript is not None:
+                self.transcript.sent(self.now(), FEED_HOLD)
             end = self.now() + _HOLD_S
             at_rest = False
             while not at_rest and self.now() < end:
@@ -304,9 +317,10 @@ class Session:
         data = self.connection.send_realtime(FEED_HOLD) if hold_first else b""
         data += self.connection.send_realtime(SOFT_RESET)
         self._transport.write_now(data)
+        self.starts += 1
         self.forget_query()
-        if self._transcript is not None:
-            self._transcript.sent(self.now(), data)
+        if self.transcript is not None:
+            self.transcript.sent(self.now(), data)
 
     def close(self) -> None:
         """Release the port."""

@@ -19,8 +19,10 @@ from miurafab.findings import Finding
 from miurafab.grbl.streamer import Refusal
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import ABORT, HOLD, Keys, keys_of
+from miurafab.machine.known_controller import KnownController
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import AS_WRITTEN, JobAborted, Overrides, Progress, StreamResult
+from miurafab.machine.session import Session
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import FlowTransport
 
@@ -31,12 +33,16 @@ _TELL_S = 0.2  # between two progress reports for a machine that does not report
 class JobContext:
     """A ``plan``, the wire to send it over, and everybody who follows it or may step in.
 
+    ``conversation`` and ``known`` are what a GRBL controller has said over that wire before.
+
     ``check`` is called before every read: it raises the exception that should interrupt the
     conversation, such as Ctrl-C.
     """
 
     plan: JobPlan
     transport: FlowTransport
+    conversation: Session
+    known: KnownController
     transcript: Transcript | None
     journal: Journal | None
     on_progress: Callable[[Progress], None] | None

@@ -321,7 +321,7 @@ class VirtualTransport:
 
 def open_port(
     port: str, baud: int = BAUD, settings: Mapping[int, float] | None = None
-) -> Transport:
+) -> FlowTransport:
     """The wire to ``port``: a device, a pyserial URL, or ``virtual``.
 
     The controller in memory has ``settings`` over the stock ones and runs as fast as the

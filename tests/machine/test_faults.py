@@ -168,7 +168,7 @@ class Run:
                 assert self.wire.commands.replace(b"$I\n", b"").endswith(b"\x18")
         # Lines went out once each, in order; those taken are the first of them.
         lines = b"".join(line.data + b"\n" for line in LINES)
-        job, _, after = sent.partition(b"$#\n")[2].partition(b"\x18")
+        job, _, after = sent.partition(b"G21G90G17G94G54\n")[2].partition(b"\x18")
         assert lines.startswith(job.translate(None, REALTIME))
         # After a reset nothing is sent but what proves it where no banner came.
         assert not after.replace(b"$I\n", b"").translate(None, REALTIME)

@@ -62,9 +62,10 @@ def send(
         assert wire.closed
 
 
-AS_WRITTEN = b"\x90\x95\x99"
-HANDSHAKE = b"$I\n$$\n$G\n$N\nG21G90G17G94G54\n$#\n"
-"""All that comes before the first line of a job: no override, the questions, the modes."""
+ASKED = b"$I\n$$\n$#\n$G\n$N\n"
+AS_WRITTEN, MODES = b"\x90\x95\x99", b"G21G90G17G94G54\n"
+HANDSHAKE = ASKED + AS_WRITTEN + MODES
+"""All that comes before the first line of a job: the questions, no override, the modes."""
 
 
 def assert_dark_after_reset(wire: FakeWire) -> None:
@@ -465,7 +466,7 @@ def test_a_board_that_rests_is_reset_only_if_asked(reset: bool) -> None:
     plan = plan_job(STOPPED, MACHINE, SendOptions(reset=reset))
     assert deliver(plan, wire, StopSignals()).lines == 65
     first = b"\x18" if reset else b"$I\n"
-    assert wire.commands.startswith(first + AS_WRITTEN + HANDSHAKE + b"G21\nG90\n")
+    assert wire.commands.startswith(first + HANDSHAKE + b"G21\nG90\n")
 
 
 def test_a_board_at_work_is_left_alone() -> None:
@@ -508,7 +509,7 @@ def test_a_machine_with_homing_is_homed_first_if_asked() -> None:
     plan = plan_job(job, MACHINE, SendOptions(force=force, home=True))
     wire = FakeWire(new_device(**homing))
     assert deliver(plan, wire, StopSignals()).lines == 2
-    assert wire.commands.startswith(AS_WRITTEN + b"$H\n" + HANDSHAKE + b"G90\n")
+    assert wire.commands.startswith(ASKED + AS_WRITTEN + b"$H\n" + MODES + b"G90\n")
     assert wire.device.position[0] == pytest.approx(-5)
 
 

@@ -1,0 +1,230 @@
+"""What is known of a controller: asked once, and asked again only where it may have changed.
+
+After the greeting a controller is asked for its build (``$I``), settings (``$$``), offsets
+(``$#``), modes (``$G``) and startup blocks (``$N``). Each answer holds until something is sent that
+may change it: a reset ends the modes and the G92 offset, a line of a person or a job may change
+either, a written setting changes the settings. What status reports tell (state, position,
+overrides) is the conversation's. Both together are the :class:`MachineState`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from miurafab.findings import Finding
+from miurafab.gcode.job import SendLine
+from miurafab.grbl.events import Event, Modes, Options, Parameter, StartupBlock, Version
+from miurafab.grbl.settings import Settings
+from miurafab.machine.keys import OVERRIDES_OFF, obeys_overrides
+from miurafab.machine.modes import SET, ControllerModes
+from miurafab.machine.progress import AS_WRITTEN, Overrides
+from miurafab.machine.session import Session
+from miurafab.profiles import MachineProfile
+from miurafab.profiles.machine import WAIT_S
+
+BUILD, SETTINGS, OFFSETS, MODES, STARTUP = "$I", "$$", "$#", "$G", "$N"
+_QUESTIONS = (BUILD, SETTINGS, OFFSETS, MODES, STARTUP)
+_WRITES_SETTING = re.compile(r"\$\s*(?:\d+|N\d|RST|I)\s*=", re.IGNORECASE)
+_ANSWERS_IN = ("Idle", "Alarm")
+"""The states in which GRBL answers its questions; ``error:8`` in the others (``system.c``)."""
+
+
+@dataclass(frozen=True)
+class MachineState:
+    """A controller at one moment; what it has not told is None or empty.
+
+    ``state`` is the word of its status report with the substate, as ``Hold:0``. Positions are in
+    mm: ``position`` in work coordinates, ``machine_position`` in the machine's own, ``work_offset``
+    between them, ``shift`` the part of that which G92 set. ``beam_on`` and ``beam_off`` are both
+    False for a controller that does not report its beam (GRBL 0.9). ``loaded`` is the job that has
+    burnt on the sheet in the machine, None if the sheet is fresh.
+    """
+
+    port: str
+    firmware: str
+    state: str
+    position: tuple[float, ...] | None
+    machine_position: tuple[float, ...] | None
+    work_offset: tuple[float, ...] | None
+    shift: tuple[float, ...]
+    modes: tuple[str, ...]
+    overrides: Overrides = AS_WRITTEN
+    beam_on: bool = False
+    beam_off: bool = False
+    pins: str = ""
+    loaded: str | None = None
+    settings: Settings = field(default=Settings({}), repr=False)
+
+    @property
+    def idle(self) -> bool:
+        """Whether the machine can take an order: at rest, not locked."""
+        return self.state == "Idle"
+
+    @property
+    def moves(self) -> bool:
+        """Whether the axes may move by themselves."""
+        return self.state.partition(":")[0] in ("Run", "Jog", "Home")
+
+
+@dataclass(frozen=True)
+class PortSetup:
+    """What is known of the other end of a port before it is opened."""
+
+    dialect: str = "grbl-1.1"
+    rx_bytes: int = 128
+    wait: float = WAIT_S
+
+    @classmethod
+    def of(cls, machine: MachineProfile) -> PortSetup:
+        """That of ``machine``."""
+        controller = machine.controller
+        return cls(machine.dialect, controller.rx_bytes, controller.wait)
+
+
+STOCK = PortSetup()
+"""Of a controller of which nothing is known."""
+
+
+class KnownController:
+    """What is known of the controller at the other end of ``session``; mutable, for one thread."""
+
+    def __init__(self, session: Session, dialect: str) -> None:
+        self.version: Version | None = None
+        self.options: Options | None = None
+        self.settings = Settings({})
+        self.modes = ControllerModes((), {})
+        self.loaded: str | None = None
+        self._session = session
+        self._dialect = dialect
+        self._offsets: Mapping[str, tuple[float, ...]] = {}
+        self._unknown = set(_QUESTIONS)
+        self._opened = self._set = self._told = False
+        self._starts = 0
+
+    def open(self, patience: float, *, reset: bool = False) -> None:
+        """Greet the controller and ask it everything, the first time."""
+        if not self._opened:
+            self._session.greet(patience, reset=reset)
+            self._starts = self._session.starts
+            self._opened = True
+        self.refresh()
+
+    @property
+    def rapid_mm_min(self) -> float | None:
+        """The rate that both axes reach (``$110``, ``$111``), if it was told."""
+        values = self.settings.values
+        return min(values[110], values[111]) if {110, 111} <= values.keys() else None
+
+    def refresh(self, *questions: str) -> None:
+        """Ask what is not known (of ``questions``, else of everything), if it answers now."""
+        self.note_restart()
+        session = self._session
+        wanted = [each for each in questions or _QUESTIONS if each in self._unknown]
+        status = session.status
+        if not wanted or status is None or status.state not in _ANSWERS_IN:
+            return
+        for question in wanted:
+            if not session.connection.may_send(SendLine(0, question.encode("ascii"))):
+                return
+            self._unknown.discard(question)
+            self._learn(question, session.ask(question))
+
+    def _learn(self, question: str, said: list[Event]) -> None:
+        if question == BUILD:
+            self.version = next((each for each in said if isinstance(each, Version)), None)
+            self.options = next((each for each in said if isinstance(each, Options)), None)
+        elif question == SETTINGS:
+            self.settings = Settings.from_events(said)
+        elif question == OFFSETS:
+            scale = self._session.mm_per_unit
+            self._offsets = {
+                each.name: tuple(scale * value for value in each.values)
+                for each in said
+                if isinstance(each, Parameter)
+            }
+        elif question == MODES:
+            words = next((each.words for each in said if isinstance(each, Modes)), ())
+            self.modes = ControllerModes(words, self.modes.startup)
+        else:
+            blocks = {each.number: each.text for each in said if isinstance(each, StartupBlock)}
+            self.modes = ControllerModes(self.modes.modes, blocks)
+
+    # What may have changed
+
+    def note_restart(self) -> None:
+        """Take note of a reset since the last look: it ends the modes and the G92 offset."""
+        if self._starts != self._session.starts:
+            self._starts = self._session.starts
+            self._set = self._told = False
+            self._unknown |= {OFFSETS, MODES}
+
+    def may_differ(self, text: str = "") -> None:
+        """Something was sent that may change modes and offsets: a job, or a person's ``text``."""
+        self._set = False
+        self._unknown |= {OFFSETS, MODES}
+        if _WRITES_SETTING.match(text):
+            self._unknown |= {SETTINGS, STARTUP, BUILD}
+
+    # What a job needs
+
+    def clear_overrides(self) -> None:
+        """Set feed, rapid rate and power back to what is written."""
+        if obeys_overrides(self._dialect):
+            for order in OVERRIDES_OFF:
+                self._session.write(self._session.connection.send_realtime(order))
+
+    def set_modes(self) -> tuple[Finding, ...]:
+        """Set the modes in which a job begins, unless they are set; the finding ``modes`` on what
+        the opening or a reset had left.
+        """
+        self.refresh(MODES, STARTUP)
+        if self._set:
+            return ()
+        self._session.command(SET + self.modes.way_out)
+        self._set = True
+        self._unknown.add(MODES)
+        findings = () if self._told else tuple(self.modes.findings())
+        self._told = True
+        return findings
+
+    def set_position(self, x: float, y: float) -> None:
+        """State where the head stands in work coordinates (G92), in known modes."""
+        self._session.command(f"G92X{x:.3f}Y{y:.3f}")
+        self._unknown.add(OFFSETS)
+
+    def job_offset(self) -> tuple[float, ...] | None:
+        """What it adds to the coordinates of a job in G54, in mm; None: it does not say."""
+        self.refresh(OFFSETS)
+        if "G54" not in self._offsets:
+            return self._session.work_offset
+        shift = self._offsets.get("G92", (0.0,) * 9)
+        return tuple(own + more for own, more in zip(self._offsets["G54"], shift, strict=False))
+
+    # All together
+
+    @property
+    def state(self) -> MachineState:
+        """The state as far as it is known now."""
+        self.note_restart()
+        session, status = self._session, self._session.status
+        word = "" if status is None else status.state
+        if status is not None and status.substate is not None:
+            word += f":{status.substate}"
+        return MachineState(
+            port=session.name,
+            firmware=f"{session.banner.firmware} {session.banner.version}".strip(),
+            state=word,
+            position=session.position,
+            machine_position=session.machine_position,
+            work_offset=session.work_offset,
+            shift=() if OFFSETS in self._unknown else self._offsets.get("G92", ()),
+            modes=() if MODES in self._unknown else self.modes.modes,
+            overrides=session.overrides,
+            beam_on=status is not None and status.beam_on,
+            beam_off=status is not None and status.beam_off,
+            pins=(status.pins or "") if status is not None else "",
+            loaded=self.loaded,
+            settings=self.settings,
+        )

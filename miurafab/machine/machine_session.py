@@ -1,0 +1,387 @@
+"""The session that owns a port: opened once, asked once, and every action in one conversation.
+
+A board forgets an unlocking, an origin and an unhomed position when it is reset, and the opening of
+a port resets most boards. So whoever works at a machine holds one session with it: unlock, home,
+jog, set the origin, frame, cut. A command such as ``machine jog`` is a session with one action.
+
+Whatever may leave the machine moving or burning sets it at risk, and a status report that says idle
+and dark ends that. A session that is closed at risk resets the controller first.
+
+Marlin and HPGL machines only take jobs: what a person does at the machine with them is done at its
+panel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from miurafab.errors import (
+    ControllerError,
+    InputError,
+    MachineError,
+    PersonNeeded,
+)
+from miurafab.gcode.job import Job
+from miurafab.grbl.connection import Connection
+from miurafab.grbl.events import StatusReport
+from miurafab.machine.job_sending import OpenWire, send_job
+from miurafab.machine.jog_pad import JogPad
+from miurafab.machine.keys import ABORT, Keys, NoKeys, session_keys
+from miurafab.machine.known_controller import STOCK, KnownController, MachineState, PortSetup
+from miurafab.machine.planning import JobPlan
+from miurafab.machine.progress import JobAborted, Progress, StreamResult
+from miurafab.machine.session import HOMING_S, Session
+from miurafab.machine.signals import StopSignals
+from miurafab.machine.transport import FlowTransport
+
+_POLL_S = 0.1
+_GO_MM_MIN = 3000.0
+_MOST_ON_A_NETWORK = 256
+"""Bytes: two lines of a raster at least; a reset behind 1,023 bytes was unheeded for 2.2 s by
+grblHAL's own simulator."""
+_REALTIME = ("?", "!", "~")
+_ONLY_JOBS = ("marlin", "hpgl")
+
+
+class MachineSession:
+    """One conversation with one machine over ``transport``; mutable, for one thread.
+
+    ``signals`` stop it; ``keys`` act at once in every wait. :meth:`open` greets the machine; the
+    actions do so by themselves the first time.
+    """
+
+    def __init__(
+        self,
+        transport: FlowTransport,
+        signals: StopSignals,
+        setup: PortSetup = STOCK,
+        keys: Keys | None = None,
+    ) -> None:
+        most = (
+            min(setup.rx_bytes, _MOST_ON_A_NETWORK) if "://" in transport.name else setup.rx_bytes
+        )
+        self.conversation = Session(transport, Connection(most), check=self._check)
+        self.known = KnownController(self.conversation, setup.dialect)
+        self._keys = keys or NoKeys()
+        self._wire = OpenWire(transport, self.conversation, self.known, self._keys, signals)
+        self._transport = transport
+        self._signals = signals
+        self._setup = setup
+        self._orders = session_keys(setup.dialect)
+        self._pad = JogPad()
+        self._at_risk = self._in_job = False
+        self._poll_at = 0.0
+
+    # Beginning and end
+
+    def open(self, wait: float | None = None, *, reset: bool = False) -> MachineState:
+        """Greet the controller and ask it everything, once; ``wait`` seconds for a slow board,
+        which is ``reset`` even if it is at rest.
+
+        Raises what :meth:`~miurafab.machine.session.Session.greet` raises, and
+        :class:`~miurafab.errors.InputError` for a machine that only takes jobs.
+        """
+        if self._setup.dialect in _ONLY_JOBS:
+            raise InputError(
+                f"A machine that speaks {self._setup.dialect} only takes whole jobs; home it and "
+                "move it at its panel, and send the job with 'miurafab cut'."
+            )
+        self.known.open(self._setup.wait if wait is None else wait, reset=reset)
+        return self.state
+
+    @property
+    def state(self) -> MachineState:
+        """The state by the last status report and the last answers."""
+        return self.known.state
+
+    def close(self) -> bool:
+        """Reset the machine unless it is idle and dark, then release the port; whether it is dark.
+
+        Never raises because of the machine.
+        """
+        self._signals.hold()
+        dark = True
+        if self._at_risk:
+            self._at_risk = False
+            dark = self.conversation.stop()
+        self._transport.close()
+        return dark
+
+    def look(self) -> MachineState:
+        """The state by a status report that is asked for now, and what was unknown asked again."""
+        self._note(self.conversation.wait_status())
+        if not self.conversation.connection.in_flight:
+            self.known.refresh()
+        return self.state
+
+    def watch(self, seconds: float) -> MachineState:
+        """Let ``seconds`` pass, keep the state true and the held jog going.
+
+        Raises what a refused jog raises.
+        """
+        session = self.conversation
+        end = session.now() + seconds
+        while True:
+            try:
+                if session.now() >= self._poll_at and session.ask_status():
+                    self._poll_at = session.now() + (_POLL_S / 2 if self._pad.busy else _POLL_S)
+                for event in session.receive(min(_POLL_S / 5, max(0.0, end - session.now()))):
+                    if isinstance(event, StatusReport):
+                        self._note(event)
+                        if not (session.connection.in_flight or self._pad.busy):
+                            self.known.refresh()
+                self._tend_pad()
+            except JobAborted:
+                self.abort()
+            if session.now() >= end:
+                return self.state
+
+    def _note(self, report: StatusReport) -> None:
+        self._at_risk = report.beam_on or report.state not in ("Idle", "Alarm", "Sleep", "Check")
+
+    # The keys
+
+    def _check(self) -> None:
+        """Called before every read: a signal stops, a key acts."""
+        self._signals.check()
+        if self._in_job or self.conversation.connection.writing_eeprom:
+            return
+        for key in self._keys.pressed():
+            order = self._orders.get(key)
+            if order == ABORT:
+                raise JobAborted("The machine was stopped at the keyboard.")
+            if order is not None:
+                self.realtime(order)
+
+    def realtime(self, order: bytes) -> None:
+        """Send one realtime byte, such as a feed hold."""
+        self._at_risk = True
+        self.conversation.write(self.conversation.connection.send_realtime(order))
+
+    # The actions
+
+    def unlock(self) -> MachineState:
+        """Unlock the controller after an alarm (``$X``); its position must still be right."""
+        self.open()
+        self.conversation.command("$X")
+        return self.look()
+
+    def home(self) -> MachineState:
+        """Run the homing cycle (``$H``) and wait for its end."""
+        self.open()
+        self._at_risk = True
+        self._or_stop(lambda: self.conversation.command("$H", HOMING_S))
+        return self.look()
+
+    def jog(
+        self,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        feed_mm_min: float = 1000.0,
+        absolute: bool = False,
+    ) -> MachineState:
+        """Move by ``x`` and ``y`` mm (``absolute``: to these work coordinates), beam off, and wait.
+
+        Raises :class:`~miurafab.errors.InputError` if neither is given,
+        :class:`~miurafab.errors.ControllerError` if the controller refuses, as for a target outside
+        its soft limits.
+        """
+        words = require_way(x, y)
+        self.open()
+        if absolute:
+            self.known.set_modes()
+        self._at_risk = True
+        self._or_stop(
+            lambda: self._run_jog(f"$J=G21{'G90' if absolute else 'G91'}{words}F{feed_mm_min:g}")
+        )
+        return self.look()
+
+    def _run_jog(self, line: str) -> None:
+        session = self.conversation
+        session.command(line)
+        while True:
+            status = session.wait_status()
+            if status.state == "Idle":
+                return
+            if status.state != "Jog":
+                raise ControllerError(f"The jog ended in state {status.state}.")
+            session.pause(_POLL_S)
+
+    def nudge(self, dx: float, dy: float) -> None:
+        """One press of a jog key: a step, unless the last ones are still to be made.
+
+        The rest is done by :meth:`watch`.
+        """
+        self.open()
+        self._pad.press(dx, dy, self.conversation.now())
+        self._tend_pad()
+
+    def _tend_pad(self) -> None:
+        if not self._pad.busy:
+            return
+        session = self.conversation
+        order = self._pad.next_order(
+            session.now(),
+            session.machine_position,
+            session.status is not None and session.status.state == "Idle",
+            self.known.settings.values,
+        )
+        if order is None:
+            return
+        self._at_risk = True
+        if len(order) == 1:
+            self.realtime(order)
+            return
+        try:
+            session.command(order.decode("ascii"))
+        except MachineError:
+            self._pad.forget()
+            raise
+
+    def set_origin(self) -> MachineState:
+        """Make the head's place the origin of jobs (``G92 X0 Y0``), in known modes."""
+        self.open()
+        self.known.set_modes()
+        self.known.set_position(0.0, 0.0)
+        return self.look()
+
+    def go_to_origin(self) -> MachineState:
+        """Move the head to the origin of jobs, beam off, and wait."""
+        return self.jog(
+            x=0.0, y=0.0, feed_mm_min=self.known.rapid_mm_min or _GO_MM_MIN, absolute=True
+        )
+
+    def command(self, text: str) -> MachineState:
+        """Send a person's line and wait for its answer; see :meth:`Session.command`."""
+        self.open()
+        self._at_risk = True
+        try:
+            self.conversation.command(text, HOMING_S)
+        finally:
+            self.known.may_differ(text)
+        return self.look()
+
+    def say(self, text: str) -> None:
+        """Send a person's line: ``?``, ``!`` and ``~`` alone, and ``reset``, are realtime bytes.
+
+        Raises :class:`~miurafab.errors.GcodeError` for a line that cannot be sent, and what
+        :meth:`command` raises.
+        """
+        text = text.strip()
+        if text == "reset":
+            self.abort()
+        elif text in _REALTIME:
+            self.realtime(text.encode("ascii"))
+            self.conversation.pause(_POLL_S)
+        elif text:
+            bare = next(Job("The console", text).send_lines(), None)
+            if bare is not None:
+                self.command(bare.data.decode("ascii"))
+
+    def settle(self) -> MachineState:
+        """Wait while the axes move with the beam off."""
+        while (state := self.look()).state in ("Run", "Jog") and not state.beam_on:
+            self.conversation.pause(_POLL_S)
+        return state
+
+    def load(self) -> MachineState:
+        """Somebody has put in fresh material."""
+        self.known.loaded = None
+        return self.state
+
+    def abort(self) -> bool:
+        """Stop whatever runs by a reset, after a dark motion has come to rest; whether the
+        controller then reports that the beam is off.
+        """
+        self._pad.forget()
+        session, self._at_risk = self.conversation, False
+        status = session.status
+        jogs = status is not None and status.state == "Jog" and not status.beam_on
+        dark = session.hold_and_stop() if jogs else session.stop()
+        self._at_risk = not dark
+        return dark
+
+    def _or_stop(self, action: Callable[[], object]) -> None:
+        """Do ``action``; whatever ends it but its own end leaves the machine stopped.
+
+        What the controller refused did not begin, and takes no reset, which would lose the origin.
+        """
+        try:
+            action()
+        except ControllerError:
+            if not self._rests():
+                self.abort()
+            raise
+        except BaseException:
+            self._signals.hold()
+            self.abort()
+            raise
+
+    def _rests(self) -> bool:
+        session = self.conversation
+        if session.connection.in_flight:
+            return False
+        report = session.wait_status()
+        self._note(report)
+        return not self._at_risk
+
+    # Jobs
+
+    def cut(
+        self,
+        plan: JobPlan,
+        *,
+        journal_path: Path | None = None,
+        transcript_path: Path | None = None,
+        on_progress: Callable[[Progress], None] | None = None,
+    ) -> StreamResult:
+        """Send a planned job and wait until it is done, safe on every way out.
+
+        Raises what :func:`~miurafab.machine.sender.stream_plan` raises, and
+        :class:`~miurafab.errors.PersonNeeded` where a sheet lies in the machine on which another
+        job has burnt.
+        """
+        loaded = self.known.loaded
+        fresh = loaded is None or plan.machine.bed.roll_fed or not self._transport.blocks
+        if not fresh and plan.resumption is None:
+            raise PersonNeeded(
+                f"{loaded} has burnt on the sheet in the machine; put in fresh material and say "
+                f"so, then start {plan.job.name}"
+            )
+        with self._job():
+            return send_job(
+                plan,
+                self._wire,
+                journal_path=journal_path,
+                transcript_path=transcript_path,
+                on_progress=on_progress,
+                burns=True,
+            )
+
+    def frame(
+        self, plan: JobPlan, *, on_progress: Callable[[Progress], None] | None = None
+    ) -> StreamResult:
+        """Send a job that only shows where another will burn; as :meth:`cut` but for the sheet."""
+        with self._job():
+            return send_job(plan, self._wire, on_progress=on_progress)
+
+    @contextmanager
+    def _job(self) -> Iterator[None]:
+        """A job leaves the machine safe by itself, and may leave any mode and offset."""
+        self._in_job = True
+        try:
+            yield
+        finally:
+            self._in_job = self._at_risk = False
+            self.known.may_differ()
+
+
+def require_way(x: float | None, y: float | None) -> str:
+    """The words of a jog by ``x`` and ``y``; raises ``InputError`` if neither is given."""
+    words = "".join(f"{a}{v:.3f}" for a, v in (("X", x), ("Y", y)) if v is not None)
+    if not words:
+        raise InputError("A jog needs a distance along X, along Y, or both.")
+    return words
