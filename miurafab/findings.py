@@ -109,6 +109,7 @@ RULES = {
     "rate": Rule("warning", "a feed above the machine's largest rate"),
     "loose": Rule("warning", "a stroke inside a closed stroke that may have cut its piece loose"),
     "armed": Rule("warning", "a job that ends with the laser armed"),
+    "air": Rule("note", "a job that ends with the air on"),
     "characters": Rule("warning", "a character in a comment that other senders pass on"),
     "nothing-burnt": Rule("warning", "a job that burns nothing"),
     "pauses": Rule("note", "a program that waits for a person (`M0`)"),

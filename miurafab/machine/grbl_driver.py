@@ -18,6 +18,7 @@ from miurafab.gcode.program import BEAM_M3, PAUSE
 from miurafab.grbl.events import Error, Ok, StatusReport
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.greeting import ANSWER_S
+from miurafab.machine.judge_job import leaves_air_on
 from miurafab.machine.keys import HOLD, RESUME, NoKeys
 from miurafab.machine.preflight import (
     check_build,
@@ -185,7 +186,10 @@ class GrblDriver(StreamDriver):
         session = self._session
         if self.plan.options.check_mode:
             session.stop()
-        elif self.plan.machine.tool.kind == "laser" and session.wait_status().beam_on:
+            return ()
+        if leaves_air_on(self.plan.job):
+            session.command("M9")
+        if self.plan.machine.tool.kind == "laser" and session.wait_status().beam_on:
             session.stop()
             return (_WAS_ARMED,)
         return ()

@@ -23,14 +23,12 @@ from miurafab.findings import Finding
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.program import BEAM_M3, DWELL, PAUSE, Program
 from miurafab.gcode.reading import has_laser_mode, read_program
-from miurafab.geometry.arrays import Bools, Floats
+from miurafab.geometry.arrays import Bools
 from miurafab.machine.loose_parts import burnt_on_loose_pieces, open_outlines, says_operations
+from miurafab.machine.room import TOLERANCE_MM, first_outside, z_extent
 from miurafab.marlin.connection import FRAME
 from miurafab.profiles import MachineProfile
 
-TOLERANCE_MM = 5e-4
-"""How far a move may pass a limit: half a micron. G-code has three decimals, so a move that
-exceeds a limit by more than this is written as a different number."""
 _FEED_TOLERANCE = 0.5  # mm/min, for the rounding of a feed that is a whole number
 _POWER_TOLERANCE = 0.5  # S words, for the rounding of max_power times full power
 
@@ -45,6 +43,8 @@ _POWER = re.compile(r"S(\d+\.?\d*|\.\d+)")
 _DWELL = re.compile(r"G0*4(?![\d.])")
 _MIST_ANYWHERE = re.compile(rf"[mM]{_GAP}7")
 _MIST = re.compile(r"M\+?0*7(?:\.0*)?(?![\d.])")
+_AIR_ANYWHERE = re.compile(rf"[mM]{_GAP}[23789]")
+_AIR = re.compile(r"M\+?0*(30|2|7|8|9)(?:\.0*)?(?![\d.])")
 _NO_DWELL = re.compile(r"G0*4[PS][+-]?0*\.?0*$")
 _RELATIVE_ANYWHERE = re.compile(rf"[gG]{_GAP}91")
 _RELATIVE = re.compile(r"G\+?0*91(?![\d.])")
@@ -105,6 +105,8 @@ def judge_program(
     if laser:
         yield from _no_laser_mode(machine)
         yield from _armed_at_the_end(job)
+    if machine.dialect != "hpgl" and leaves_air_on(job):
+        yield Finding("air", f"{job.name} ends with the air on; M9 is sent after it.", job.name)
     yield from _rates(program, machine)
     yield from _characters(job)
     if not program.beam_on.any():
@@ -124,21 +126,6 @@ def judge_program(
 def longest_line(machine: MachineProfile) -> int:
     """How many characters of code a line may have, besides the frame that the dialect adds."""
     return machine.controller.line_chars - (FRAME if machine.dialect == "marlin" else 0)
-
-
-def fits_bed(program: Program | None, machine: MachineProfile) -> bool:
-    """Whether some origin puts all moves of ``program`` on the bed."""
-    if program is None or not len(program):
-        return False
-    extent = np.ptp(program.end[:, :2], axis=0)
-    size = np.array([machine.bed.width_mm, machine.bed.height_mm])
-    return bool((extent <= size + TOLERANCE_MM).all())
-
-
-def first_outside(ends: Floats, low: Floats, high: Floats) -> tuple[int, int] | None:
-    """The index of the first of ``ends`` (n, 2) outside the box and the number of all, or None."""
-    outside = ((ends < low - TOLERANCE_MM) | (ends > high + TOLERANCE_MM)).any(axis=1)
-    return (int(np.argmax(outside)), int(outside.sum())) if outside.any() else None
 
 
 def in_line(name: str, line: int, count: int = 1) -> str:
@@ -195,6 +182,17 @@ def _off_the_bed(program: Program, machine: MachineProfile) -> Iterator[Finding]
             f"moves to X{x} Y{y}, off the bed of {machine.name} ({size[0]:g} x {size[1]:g} mm).",
             count,
         )
+    if machine.z is not None and len(program):
+        extent, travel = z_extent(program), machine.z.travel_mm
+        if extent > travel + TOLERANCE_MM:
+            at = int(np.argmax(np.abs(program.end[:, 2] - program.start[0, 2])))
+            yield _in_line(
+                "bounds",
+                program.name,
+                int(program.line[at]),
+                f"is the farthest of moves over {coordinate(extent)} mm in Z, more than the travel "
+                f"of {machine.name} ({travel:g} mm).",
+            )
 
 
 def _power(code: str, program: Program, most: float, words: str) -> Iterator[Finding]:
@@ -337,6 +335,15 @@ def _armed_at_the_end(job: Job) -> Iterator[Finding]:
                 sentence = f"{job.name} ends with M{words[-1]} in force; end it with M5."
                 yield Finding("armed", sentence, job.name)
             return
+
+
+def leaves_air_on(job: Job) -> bool:
+    """Whether the last word that opens or shuts the air opens it; M2 and M30 shut it."""
+    for match in reversed(list(_AIR_ANYWHERE.finditer(job.text))):
+        words = _AIR.findall(_code(_line_at(job.text, match.start())[1]))
+        if words:
+            return words[-1] in ("7", "8")
+    return False
 
 
 def _characters(job: Job) -> Iterator[Finding]:

@@ -22,7 +22,7 @@ from miurafab.errors import ControllerError, MiurafabError, PortError
 from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
 from miurafab.machine.greeting import ANSWER_S
-from miurafab.machine.judge_job import longest_line
+from miurafab.machine.judge_job import leaves_air_on, longest_line
 from miurafab.machine.session import HOMING_S
 from miurafab.machine.stream_driver import JobContext, StreamDriver
 from miurafab.machine.transcript import Transcript
@@ -75,7 +75,8 @@ class MarlinDriver(StreamDriver):
             wire.send(line, self.attend_and_tell, self._where)
             self._taken, self._last = self._taken + 1, line.number
             self.attend_and_tell()
-        for code in (b"M400", b"M5"):
+        air = (b"M9",) if leaves_air_on(self.plan.job) else ()
+        for code in (b"M400", b"M5", *air):
             wire.send(SendLine(0, code), self.attend_and_tell, self._where)
 
     def _lines(self) -> Iterator[SendLine]:

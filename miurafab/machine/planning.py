@@ -11,9 +11,10 @@ from miurafab.findings import Finding
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
 from miurafab.machine.journal import job_digest
-from miurafab.machine.judge_job import JudgedJob, fits_bed, judge_job
+from miurafab.machine.judge_job import JudgedJob, judge_job
 from miurafab.machine.preflight import raise_findings, require_known
 from miurafab.machine.resume import Resumption
+from miurafab.machine.room import fits_bed
 from miurafab.options import (
     Choice,
     Either,

@@ -18,7 +18,8 @@ from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
 from miurafab.grbl.events import StatusReport
 from miurafab.grbl.settings import Settings, profile_settings
-from miurafab.machine.judge_job import first_outside, in_line, line_of_mist
+from miurafab.machine.judge_job import in_line, line_of_mist
+from miurafab.machine.room import first_outside
 from miurafab.profiles import MachineProfile
 
 CHECKS = tuple(code for code, rule in RULES.items() if rule.forceable)
@@ -123,18 +124,23 @@ def check_travel(
     values = settings.values
     if not (values.get(20) or homed) or not len(program):
         return
-    offset = np.array((work_offset or (0.0, 0.0))[:2])
-    travel = np.array([values.get(130, np.inf), values.get(131, np.inf)])
-    ends = program.end[:, :2] + offset
-    outside = first_outside(ends, -travel, np.zeros(2))
+    # Homing need not touch Z; soft limits hold for every axis that moves.
+    deep = values.get(20) and (program.end[:, 2] != program.start[0, 2]).any()
+    axes = 3 if deep else 2
+    offset = np.array((*(work_offset or ()), 0.0, 0.0, 0.0)[:axes])
+    travel = np.array([values.get(130 + axis, np.inf) for axis in range(axes)])
+    ends = program.end[:, :axes] + offset
+    outside = first_outside(ends, -travel, np.zeros(axes))
     if outside is not None:
         index, count = outside
         line = int(program.line[index])
-        x, y = ends[index]
+        place = " ".join(
+            f"{axis}{value:.3f}" for axis, value in zip("XYZ", ends[index], strict=False)
+        )
         yield Finding(
             "travel",
-            f"{in_line(program.name, line, count)} would move the machine to X{x:.3f} Y{y:.3f} in "
-            "its own coordinates, past its soft limits ($20) or its travel ($130, $131); home it "
-            "and set the work origin so that the sheet lies within the travel.",
+            f"{in_line(program.name, line, count)} would move the machine to {place} in its "
+            "own coordinates, past its soft limits ($20) or its travel ($130 to $132); home it and "
+            "set the work origin so that the sheet lies within the travel.",
             f"{program.name}:{line}",
         )

@@ -69,7 +69,7 @@ class MotionParameters:
     def from_profile(cls, profile: MachineProfile) -> MotionParameters:
         """The parameters of a machine profile; its ``settings`` override its motion table.
 
-        A profile has no values for Z, because a sheet needs none: Z gets those of X.
+        Where a profile has no Z axis, Z gets the values of X.
         """
         motion = profile.motion
         rate_x, rate_y = motion.max_rate_mm_min
@@ -78,6 +78,8 @@ class MotionParameters:
         settings |= dict.fromkeys((100, 101, 102), COMMON_STEPS)
         settings |= {110: rate_x, 111: rate_y, 112: rate_x}
         settings |= {120: acceleration_x, 121: acceleration_y, 122: acceleration_x}
+        if profile.z is not None:
+            settings |= {112: profile.z.max_rate_mm_min, 122: profile.z.acceleration_mm_s2}
         settings |= {30: profile.tool.s_max, 31: profile.tool.s_min}
         settings |= {32: float(profile.tool.kind == "laser")}
         return replace(

@@ -36,7 +36,8 @@ _SHALLOW = ("engrave", "score")
 class Words:
     """The words that use the tool.
 
-    ``begin`` and ``end``: the lines before and after all strokes. ``travel``: what a stroke's
+    ``begin`` and ``end``: the lines before and after all strokes. ``air``: what opens and what
+    shuts the air, empty where there is none. ``travel``: what a stroke's
     ``G0`` says besides its place; ``down`` (by operation) and ``up``: what follows that ``G0``
     and the stroke's last ``G1``. ``s`` and ``feed``: the words of each operation, ``s`` None where
     ``down`` sets it; with ``restated`` every stroke says them. ``chains`` says whether the gap
@@ -49,6 +50,7 @@ class Words:
     up: str
     s: tuple[int, ...] | None
     feed: tuple[str, ...]
+    air: tuple[str, ...]
     travel: str = ""
     restated: bool = False
     chains: bool = False
@@ -77,8 +79,8 @@ def words_of(machine: MachineProfile, material: Material) -> Words:
     return _servo(machine, feed)
 
 
-def _air(machine: MachineProfile) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    return (("M8",), ("M9",)) if machine.tool.air_assist else ((), ())
+def _air(machine: MachineProfile) -> tuple[str, ...]:
+    return (machine.tool.air_word, "M9") if machine.tool.air_assist else ()
 
 
 _MODES = ("M5", "G21", "G90", "G17", "G94")
@@ -87,8 +89,8 @@ _HOME = ("G0 X0 Y0", "M2")
 
 def _laser(machine: MachineProfile, s: tuple[int, ...], feed: tuple[str, ...]) -> Words:
     tool = machine.tool
-    air_on, air_off = _air(machine)
-    end = ("M5", *air_off, *_HOME)
+    air = _air(machine)
+    end = ("M5", *air[1:], *_HOME)
     if machine.dialect == "grbl-0.9":
         if tool.beam_mode != "M3":
             raise ProfileError(
@@ -96,22 +98,22 @@ def _laser(machine: MachineProfile, s: tuple[int, ...], feed: tuple[str, ...]) -
                 "[tool] if the beam may burn on wherever the job stops."
             )
         down = tuple(f"\nM3 S{value}" for value in s)
-        return Words((*_MODES, *air_on), end, down, "\nM5", None, feed)
+        return Words(_MODES, end, down, "\nM5", None, feed, air)
     if machine.dialect in _LASER_MODE_IS_SETTING_32 and machine.settings.get(32) != 1:
         raise ProfileError(
             f"{machine.name}: without laser mode the beam would burn along every travel; write "
             '"$32" = 1 under [settings].'
         )
-    begin = (*_MODES, f"{tool.beam_mode} S0", *air_on)
-    return Words(begin, end, ("",) * len(feed), "", s, feed, chains=True)
+    begin = (*_MODES, f"{tool.beam_mode} S0")
+    return Words(begin, end, ("",) * len(feed), "", s, feed, air, chains=True)
 
 
 def _marlin(machine: MachineProfile, s: tuple[int, ...], feed: tuple[str, ...]) -> Words:
-    air_on, air_off = _air(machine)
+    air = _air(machine)
     travel = f" S0 F{trimmed(min(machine.motion.max_rate_mm_min))}"
-    begin = ("M5", "G21", "G90", f"{machine.tool.beam_mode} I S0", *air_on)
-    end = ("M5 I", "M5", *air_off, f"G0 X0 Y0{travel}")
-    return Words(begin, end, ("",) * len(feed), "", s, feed, travel=travel, restated=True)
+    begin = ("M5", "G21", "G90", f"{machine.tool.beam_mode} I S0")
+    end = ("M5 I", "M5", *air[1:], f"G0 X0 Y0{travel}")
+    return Words(begin, end, ("",) * len(feed), "", s, feed, air, travel=travel, restated=True)
 
 
 def _servo(machine: MachineProfile, feed: tuple[str, ...]) -> Words:
@@ -121,11 +123,11 @@ def _servo(machine: MachineProfile, feed: tuple[str, ...]) -> Words:
             f'{machine.name}: "$32" = {machine.settings[32]:g} lifts a servo {tool.kind} in every '
             'travel; write "$32" = 0 under [settings].'
         )
-    air_on, air_off = _air(machine)
+    air = _air(machine)
     settle = f"\nG4 P{trimmed(tool.settle_s)}" if tool.settle_s > 0 else ""
     up = f"M3 S{tool.s_up}{settle}"
     down = tuple(f"\nM3 S{depth(machine, name)}{settle}" for name in OPERATIONS)
-    return Words((*_MODES, up, *air_on), ("M5", *air_off, *_HOME), down, "\n" + up, None, feed)
+    return Words((*_MODES, up), ("M5", *air[1:], *_HOME), down, "\n" + up, None, feed, air)
 
 
 def depth(machine: MachineProfile, operation: str) -> int:

@@ -17,6 +17,7 @@ from miurafab.geometry.arrays import Ints
 from miurafab.motion.estimate import estimate
 from miurafab.motion.parameters import Link, MotionParameters
 from miurafab.posting.absolute_moves import hops
+from miurafab.posting.between import Between, heights_of
 from miurafab.posting.dialects import depth, made_by_knife, words_of
 from miurafab.posting.relative_moves import apart, chains
 from miurafab.posting.strokes import Points, Runs, points_of, repeated, runs_of
@@ -44,8 +45,10 @@ def post(
     ``(sheet ...)``, ``(operation ...)`` and ``(patch ...)`` stand on lines of their own before the
     strokes they hold for, the patch by its label in ``patch_labels``, else by its number. An
     operation of several passes repeats each run of strokes of one patch, so that the sheet cools
-    between two passes over the same place. The job starts and ends dark. A knife's strokes are
-    those of its holder (:mod:`miurafab.fabrication.knife`).
+    between two passes over the same place. Between two runs, with the beam off, the head goes to
+    the height of the next and the air is switched; after the last it goes back to Z0. The job
+    starts and ends dark. A knife's strokes are those of its holder
+    (:mod:`miurafab.fabrication.knife`).
 
     Raises :class:`~miurafab.errors.LayoutError` for a stroke that leaves the bed, has no length
     at 0.001 mm or is not finite, for a name that cannot stand in a comment and for what a knife
@@ -59,6 +62,7 @@ def post(
         left_out = made_by_knife(toolpath, knife, machine)
         toolpath = tip_way(_without(toolpath, left_out), knife, machine.bed.margin_mm)
     runs = runs_of(toolpath, [material.operations[name].passes for name in OPERATIONS])
+    heights = heights_of(runs, machine, material)
     made = repeated(toolpath, runs)
     if knife is not None:
         made = axis_way(made, knife)
@@ -75,9 +79,12 @@ def post(
     ]
     labels = patch_labels or {}
 
+    between = Between(runs, heights, material, words)
+
     def job(lines: tuple[ByteRows, Ints], *modes: str) -> Job:
-        foot = [f"{word}\n" for word in (*modes, *words.end)]
-        return Job(toolpath.sheet, "".join([*head, *_body(runs, *lines, labels), *foot]))
+        foot = [f"{word}\n" for word in (*modes, *between.back, *words.end)]
+        body = _body(runs, *lines, labels, between.lines("".join(f"{mode} " for mode in modes)))
+        return Job(toolpath.sheet, "".join([*head, *body, *foot]))
 
     absolute = hops(points, words)
     if words.chains and _wire_is_short(points, runs, absolute[0], machine, material):
@@ -149,8 +156,16 @@ def _seconds(job: Job, machine: MachineProfile) -> float:
     return estimate(parse_program(job), MotionParameters.from_profile(machine), link).seconds
 
 
-def _body(runs: Runs, rows: ByteRows, row_of_stroke: Ints, labels: Mapping[int, str]) -> list[str]:
-    """The lines of the strokes, a piece for each run, each with its comments."""
+def _body(
+    runs: Runs,
+    rows: ByteRows,
+    row_of_stroke: Ints,
+    labels: Mapping[int, str],
+    between: Sequence[str],
+) -> list[str]:
+    """The lines of the strokes, a piece for each run, each with its comments and with what stands
+    ``between`` it and the run before.
+    """
     byte_of_row = np.concatenate([[0], np.cumsum(np.count_nonzero(rows, axis=1))])
     text = rows[rows != 0].tobytes().decode("ascii")
     cuts = [*byte_of_row[row_of_stroke[runs.first]].tolist(), len(text)]
@@ -159,6 +174,7 @@ def _body(runs: Runs, rows: ByteRows, row_of_stroke: Ints, labels: Mapping[int, 
     for run, (operation, patch) in enumerate(
         zip(runs.operation.tolist(), runs.patch.tolist(), strict=True)
     ):
+        pieces.append(between[run])
         if operation != operation_said:
             pieces.append(comment("operation", OPERATIONS[operation]))
         if patch != patch_said:

@@ -44,6 +44,16 @@ def post_sections(
         lines = job.text.splitlines(keepends=True)
         first, last = _NAMES + len(words.begin), len(lines) - len(words.end)
         head = head or lines[:first]
-        body += lines[first:last]
+        body += _with_air(body, lines[first:last], words.air)
         foot = lines[last:]
     return Job(sections[0][0].sheet, "".join([*head, *body, *foot]))
+
+
+def _with_air(before: Sequence[str], lines: list[str], air: Sequence[str]) -> list[str]:
+    """``lines``, which were written for the air shut, after those ``before``."""
+    if not air:
+        return lines
+    opens, shuts = (f"{word}\n" for word in air)
+    if next((line for line in reversed(before) if line in (opens, shuts)), shuts) == shuts:
+        return lines
+    return lines[1:] if lines[:1] == [opens] else [shuts, *lines]

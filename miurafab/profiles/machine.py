@@ -34,6 +34,7 @@ WAIT_S = 2.5
 """The longest time until the banner of a common board (boot loader: 1 to 2 s)."""
 TOOLS = ("laser", "pen", "knife")
 STREAMING = ("character-counting", "send-response")
+AIR_WORDS = ("M8", "M7")
 FLOW_CONTROL = ("none", "xon-xoff", "rts-cts")
 
 
@@ -75,6 +76,17 @@ class MotionLimits:
 
 
 @dataclass(frozen=True)
+class ZAxis:
+    """A motor that lifts and lowers the head; a machine without the table has none."""
+
+    travel_mm: float = option(length(0.1, 1000), "Travel of Z (`$132`).", REQUIRED)
+    max_rate_mm_min: float = option(feed(), "Maximum rate of Z (`$112`).", REQUIRED)
+    acceleration_mm_s2: float = option(
+        number(0.1, 1e5, unit=" mm/s²"), "Acceleration of Z in mm/s² (`$122`).", REQUIRED
+    )
+
+
+@dataclass(frozen=True)
 class Knife:
     """A blade that trails behind the axis of its holder, as the wheel of a caster does."""
 
@@ -106,7 +118,8 @@ class Tool:
     """What marks the sheet. S values run from ``s_min`` to ``s_max`` (``$31``, ``$30``).
 
     ``beam_mode`` is the word that arms a laser: M4 scales the power with the speed and goes dark
-    whenever motion stops; M3 keeps burning and must be allowed explicitly.
+    whenever motion stops; M3 keeps burning and must be allowed explicitly. ``air_word`` is the
+    word that opens the valve of ``air_assist``.
     For a pen or knife ``s_down`` and ``s_up`` are the servo positions and ``settle_s`` the time
     each takes; on an HPGL machine ``s_down`` is the force of its ``FS`` instruction.
     """
@@ -120,6 +133,7 @@ class Tool:
     s_up: int
     settle_s: float
     knife: Knife | None = None
+    air_word: str = AIR_WORDS[0]
 
 
 @dataclass(frozen=True)
@@ -172,6 +186,8 @@ class MachineProfile(Shown):
         The serial port's speed and buffers.
     settings : dict of int to float
         The controller settings that a job expects, ``{30: 1000.0}`` for ``$30=1000``.
+    z : ZAxis or None
+        The motor that lifts the head, if there is one.
     """
 
     name: str
@@ -182,6 +198,7 @@ class MachineProfile(Shown):
     tool: Tool
     controller: Controller
     settings: dict[int, float]
+    z: ZAxis | None = None
 
     @property
     def job_suffix(self) -> str:
@@ -235,11 +252,22 @@ def load_machine(name: AnyPath) -> MachineProfile:
         tool=_tool(table.table("tool")),
         controller=table.table("controller").options(Controller),
         settings=_settings(table.table("settings", {})),
+        z=_z_axis(table.table("z")) if table.has("z") else None,
     )
     table.finish()
     if 2 * profile.bed.margin_mm >= min(profile.bed.width_mm, profile.bed.height_mm):
         raise table.fault("bed", "has a margin that leaves nothing of the bed")
+    if profile.z is not None and profile.dialect == "hpgl":
+        raise table.fault("z", "is for G-code; HPGL lifts its tool without a height")
+    if profile.tool.air_word == "M7" and profile.dialect == "marlin":
+        raise table.fault("tool", "has the air_word M7; Marlin's usual coolant is M8")
     return profile
+
+
+def _z_axis(table: Table) -> ZAxis:
+    axis = table.options(ZAxis)
+    table.finish()
+    return axis
 
 
 def _tool(table: Table) -> Tool:
@@ -252,6 +280,7 @@ def _tool(table: Table) -> Tool:
         s_max=s_max,
         beam_mode=table.value("beam_mode", Choice(("M4", "M3")), "M4" if kind == "laser" else "M3"),
         air_assist=table.value("air_assist", Flag(), False),
+        air_word=table.value("air_word", Choice(AIR_WORDS), AIR_WORDS[0]),
         s_down=table.value("s_down", own_s, s_max),
         s_up=table.value("s_up", own_s, 0),
         settle_s=table.value("settle", number(0, 10, unit=" s"), 0.0),

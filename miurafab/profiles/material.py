@@ -14,6 +14,7 @@ from miurafab.files import AnyPath
 from miurafab.options import (
     REQUIRED,
     Choice,
+    Flag,
     Text,
     Whole,
     angle,
@@ -110,6 +111,24 @@ class Operation:
     power: float = option(number(0, 1), "Fraction of the laser's full power.", REQUIRED)
     feed_mm_min: float = option(feed(), "Speed of the head.", REQUIRED)
     passes: int = option(Whole(1, 50), "How often each stroke is made.", 1)
+    z_step_mm: float = option(
+        length(0, 20), "How much lower the head is in each further pass; needs a Z axis.", 0.0
+    )
+    focus_mm: float = option(
+        length(-50, 50),
+        "Z of the head in the first pass, 0 being the height to which you focused; needs a Z axis.",
+        0.0,
+    )
+    air: bool = option(
+        Flag(), "Whether air is blown, on a machine with air assist; false switches it off.", True
+    )
+
+    @property
+    def heights_mm(self) -> tuple[float, ...]:
+        """Z in each pass."""
+        return tuple(
+            round(self.focus_mm - number * self.z_step_mm, 3) for number in range(self.passes)
+        )
 
 
 @dataclass(frozen=True, repr=False)
@@ -133,7 +152,7 @@ class Material(Shown):
     tabs : TabRule
         The tabs that join patches, mm.
     operations : dict of str to Operation
-        Power, feed and passes of each operation.
+        Power, feed, passes, heights and air of each operation.
     modulus_pa : float or None
         Young's modulus in bending, None where the file does not give it. Only energies in joules
         need it.

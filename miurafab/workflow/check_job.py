@@ -5,7 +5,8 @@ program is. The pattern: every invariant, as for a pattern file. The strokes: fr
 patches, tabs and places of ``layout.json`` and the rules of the material, each stroke follows
 (:mod:`~miurafab.fabrication.retrace`). Each program is read as the machine reads it. Each burnt
 segment must be a segment of such a stroke, made by the operation of its kind, within
-:data:`NEAR_MM`, and each of these must be burnt exactly once in each pass.
+:data:`NEAR_MM`, and each of these must be burnt exactly once in each pass, at the height of that
+pass.
 
 What is not proven is a finding of its own.
 """
@@ -242,6 +243,10 @@ def _compared(
     found = np.asarray(found) % count
     right = away <= near * 2
     right &= (burnt.operation < 0) | (burnt.operation == wanted.operation[found])
+    heights, due = _heights(material)
+    off = np.abs(heights[wanted.operation[found]] - program.end[burnt.stroke, 2][:, None])
+    level = off.argmin(axis=1)
+    right &= off.min(axis=1) <= near
     stray = ~right & burnt.sure
     for at in np.flatnonzero(stray)[:_NAMED].tolist():
         line = int(program.line[burnt.stroke[at]])
@@ -254,10 +259,11 @@ def _compared(
         )
     if stray.sum() > _NAMED:
         yield Finding("stroke", f"{path.sheet}: so do {stray.sum() - _NAMED} more segments.")
-    times = np.bincount(found[right], minlength=count)
-    passes = np.array([material.operations[name].passes for name in OPERATIONS])
-    due = passes[wanted.operation]
-    for wrong, words in ((times < due, "is not burnt"), (times > due, "is burnt too often")):
+    cells = found[right] * due.shape[1] + level[right]
+    times = np.bincount(cells, minlength=count * due.shape[1]).reshape(count, -1)
+    due = due[wanted.operation]
+    less, more = (times < due).any(axis=1), (times > due).any(axis=1)
+    for wrong, words in ((less, "is not burnt"), (more, "is burnt too often")):
         faulty = np.unique(wanted.stroke[wrong & wanted.sure])
         for stroke in faulty[:_NAMED].tolist():
             x, y = path.starts[stroke].tolist()
@@ -270,8 +276,22 @@ def _compared(
         if len(faulty) > _NAMED:
             yield Finding("stroke", f"{path.sheet}: so of {len(faulty) - _NAMED} more strokes.")
     good = np.ones(len(path), dtype=bool)
-    good[wanted.stroke[(times != due) & wanted.sure]] = False
+    good[wanted.stroke[(less | more) & wanted.sure]] = False
     traced.update(_KINDS[kind] for kind in kinds[good].tolist())
+
+
+def _heights(material: Material) -> tuple[Floats, Ints]:
+    """(operations, h) the heights of the head in each operation, filled up with infinity, and how
+    often each stroke is due at each.
+    """
+    found = [
+        np.unique(material.operations[name].heights_mm, return_counts=True) for name in OPERATIONS
+    ]
+    most = max(len(heights) for heights, _ in found)
+    heights, due = np.full((len(found), most), np.inf), np.zeros((len(found), most), np.int64)
+    for row, (levels, counts) in enumerate(found):
+        heights[row, : len(levels)], due[row, : len(levels)] = levels, counts
+    return heights, due
 
 
 def _wanted(strokes: StrokeSet) -> _Segments:

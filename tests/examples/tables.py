@@ -14,7 +14,7 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.findings import RULES
 from miurafab.options import declared
 from miurafab.origami.fitting.request import FitOptions
-from miurafab.profiles.machine import Bed, Controller, Knife, MotionLimits
+from miurafab.profiles.machine import Bed, Controller, Knife, MotionLimits, ZAxis
 from miurafab.profiles.material import Operation, Perforation, TabRule
 from miurafab.workflow.cut_sheets import CutOptions
 
@@ -75,7 +75,9 @@ TABLES = {
     "FitOptions": lambda: _options(FitOptions),
     "LayoutOptions": lambda: _options(LayoutOptions),
     "CutOptions": lambda: _options(CutOptions),
-    "machine": lambda: _keys(bed=Bed, motion=MotionLimits, controller=Controller, tool=Knife),
+    "machine": lambda: _keys(
+        bed=Bed, motion=MotionLimits, z=ZAxis, controller=Controller, tool=Knife
+    ),
     "material": lambda: _keys(perforation=Perforation, tabs=TabRule, operations=Operation),
     "checks": _checks,
     "findings": _findings,

@@ -9,7 +9,7 @@ import pytest
 from dashes import STROKES, burnt, dashes
 from wires import FakeWire
 
-from miurafab.errors import InputError, OptionError
+from miurafab.errors import InputError, JobStopped, OptionError
 from miurafab.gcode.job import Job
 from miurafab.machine.journal import job_digest, read_journal
 from miurafab.machine.planning import PLACES, SendOptions, plan_job
@@ -160,3 +160,30 @@ def test_what_was_left_out_stays_left_out_when_the_job_is_resumed(tmp_path):
     assert (run.chosen, run.from_line, run.sha256) == (True, rest.line, job_digest(job))
     begun = replace(run, taken=9, line=rest.line + 2, ended=None)
     assert resume(job, MACHINE, [begun]).stroke == 99
+
+
+@pytest.mark.parametrize("how", ["done", "stopped", "M9 in the file"])
+def test_the_air_is_shut_on_each_way_out(how):
+    """A soft reset shuts it (``mc_reset``), and M9 where the file leaves it on."""
+    text = "G21 G90\nM4 S0\nM8\nG0 X5 Y5\nG1 X50 S300 F600\n" + "G1 X5\nG1 X50\n" * 40 + "M5\n"
+    job = Job("air.nc", text + ("M9\n" if how == "M9 in the file" else ""))
+    blew = []
+
+    def before_call(call):
+        blew.append(wire.device.air_on)
+        if how == "stopped" and wire.device.now > 5:
+            wire.before_call = lambda call: None
+            raise KeyboardInterrupt
+
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=115_200), before_call=before_call)
+    plan = plan_job(job, MACHINE)
+    if how == "stopped":
+        with pytest.raises(JobStopped):
+            deliver(plan, wire, StopSignals())
+    else:
+        deliver(plan, wire, StopSignals())
+    assert any(blew)
+    assert not wire.device.air_on
+    sent = b"".join(data for _, data in wire.written)
+    after = sent.rpartition(b"M5\n")[2] if how != "stopped" else sent
+    assert (b"M9" in after, b"\x18" in after) == (how != "stopped", how == "stopped")

@@ -184,6 +184,11 @@ class VirtualGrbl:
         return self._machine.beam.pwm > 0
 
     @property
+    def air_on(self) -> bool:
+        """Whether the air or coolant is on."""
+        return self._machine.flood
+
+    @property
     def position(self) -> tuple[float, float, float]:
         """The machine position in mm."""
         x, y, z = self._machine.millimetres(self._machine.position_now())
