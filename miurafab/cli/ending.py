@@ -20,7 +20,16 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.cli.ctrl_c import CtrlC
-from miurafab.errors import BAD_INPUT, DEFECT, DONE, INTERRUPTED, MiurafabError, spell_options
+from miurafab.errors import (
+    BAD_INPUT,
+    DEFECT,
+    DONE,
+    INTERRUPTED,
+    InputError,
+    MiurafabError,
+    spell_options,
+)
+from miurafab.files import shown, write_text
 from miurafab.version import __version__
 from miurafab.workflow.json_text import json_text
 
@@ -31,9 +40,11 @@ def flag(name: str) -> str:
 
 
 def spelled(value: Any) -> Any:
-    """``value`` with the options that its sentences name as the command line writes them."""
+    """``value`` with the options that its sentences name as the command line writes them, and no
+    control characters, which a terminal would obey.
+    """
     if isinstance(value, str):
-        return spell_options(value, flag)
+        return shown(spell_options(value, flag))
     if isinstance(value, Mapping):
         return {key: spelled(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -120,8 +131,8 @@ def _write_log(trace: str) -> Path | None:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             path = folder / name
-            path.write_text(text, encoding="utf-8")
-        except OSError:
+            write_text(path, text)
+        except (OSError, InputError):
             continue
         return path
     return None

@@ -10,6 +10,7 @@ from miurafab.cli.console import Console
 from miurafab.cli.declared import TargetArgument, option, takes
 from miurafab.cli.ending import spelled
 from miurafab.errors import DONE, INTERRUPTED, NO, OptionError
+from miurafab.files import new_file, write_text
 from miurafab.options import File, Flag
 from miurafab.workflow.json_text import json_text
 
@@ -44,11 +45,13 @@ def fit(
 ) -> int:
     """Fit a generalized Miura-ori to a target surface.
 
-    Exits with 1 if no sheet meets what you ask for; the answer then says what to change. Ctrl-C
-    ends the search: the best sheet up to then is written.
+    Exits with 1 if no sheet meets what you ask for; the answer then says what to change, and the
+    nearest sheet is written to NAME.rejected.fold. Ctrl-C ends the search: the best sheet up to
+    then is written.
     """
     if out.suffix.lower() != ".fold":
         raise OptionError("out", f"is {out}; a fit writes a FOLD file, whose name ends in .fold")
+    new_file(out, "The pattern file", (".fold",))
     if rigid:
         given["flat_foldable"] = "exact"
     asked = miurafab.design(target, **given)
@@ -58,17 +61,20 @@ def fit(
         result = miurafab.fit(asked, on_progress=progress)
     answer = spelled(result.report())
     if result.pattern is not None:
-        result.pattern.save(out, title=asked.title)
-        answer["file"] = str(out)
+        file = out if result.is_valid else out.with_suffix(".rejected.fold")
+        result.pattern.save(file, title=asked.title)
+        answer["file"] = str(file)
     if report is not None:
-        report.write_text(json_text(answer) + "\n", encoding="utf-8", newline="\n")
+        write_text(report, json_text(answer) + "\n")
     hidden = ("attempts", "findings")
     shown = {key: value for key, value in answer.items() if key not in hidden and value != ""}
     console.answer(answer, lambda: console.facts(shown))
     for finding in result.findings:
         if finding not in asked.findings and finding.sentence not in result.advice:
             console.note(finding.sentence)
-    if result.status == "interrupted":
+    if result.pattern is not None and not result.is_valid:
+        console.note(f"The sheet is not valid: it is in {file}, and {out} is as it was.")
+    elif result.status == "interrupted":
         console.note(f"Interrupted: {out} is the best sheet up to then.")
         return INTERRUPTED
     return DONE if result.status == "converged" else NO

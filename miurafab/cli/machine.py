@@ -104,10 +104,11 @@ def backup(
     console: Console = Console(),
 ) -> int:
     """Save the controller's settings to a file, as '$$' prints them."""
+    from miurafab.files import write_text
     from miurafab.machine import actions
 
     read = actions.read_settings(line.port, **line.options(console))
-    file.write_text(read.dump(), encoding="ascii", newline="\n")
+    write_text(file, read.dump())
     console.answer({"file": str(file), "settings": len(read.texts)})
     return DONE
 

@@ -10,6 +10,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
+import reprlib
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,10 +22,13 @@ from miurafab.fabrication.borders import OpenBorder
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.sheets import Layout, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
+from miurafab.files import Reading, file_name, is_plain, parse_json
 from miurafab.findings import finding_from_json, findings_json
 from miurafab.geometry.arrays import Floats
 
 SCHEMA = "miurafab-layout/1"
+LARGEST_MM = 1e5
+"""No sheet is longer."""
 
 
 def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
@@ -41,32 +47,75 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
     return json.dumps(document, separators=(",", ":")) + "\n"
 
 
-def read_layout(text: str) -> Layout:
-    """The layout written in ``text``, without toolpaths.
+@dataclass(frozen=True)
+class LayoutHead:
+    """What a layout says of the whole job: the names of its machine and material, the file of its
+    pattern with its SHA-256, and the sheets.
+    """
+
+    machine: str
+    material: str
+    pattern_file: str
+    pattern_sha256: str
+    sheets: tuple[Sheet, ...]
+
+
+def read_head(text: str, where: object = "The layout") -> LayoutHead:
+    """The head of the layout written in ``text``; ``where`` is how messages call it.
 
     Raises :class:`~miurafab.errors.LayoutError` if it is not a layout of this schema.
     """
-    try:
-        document = json.loads(text)
-    except json.JSONDecodeError as fault:
-        raise LayoutError(f"The layout is not valid JSON: {fault}.") from None
-    schema = document.get("schema") if isinstance(document, dict) else None
-    if schema != SCHEMA:
-        raise LayoutError(f"The layout's schema is {schema!r}; this version reads '{SCHEMA}'.")
-    try:
+    with _reading(where):
+        return _head(_document(text, where), str(where))
+
+
+def read_layout(text: str, where: object = "The layout") -> Layout:
+    """The layout written in ``text``, without toolpaths; ``where`` is how messages call it.
+
+    Raises :class:`~miurafab.errors.LayoutError` if it is not a layout of this schema.
+    """
+    with _reading(where):
+        document = _document(text, where)
+        head = _head(document, str(where))
         return Layout(
-            machine=str(document["machine"]),
-            material=str(document["material"]),
+            machine=head.machine,
+            material=head.material,
             patches=tuple(_patch(table) for table in document["patches"]),
-            sheets=tuple(_sheet(table) for table in document["sheets"]),
-            totals=Totals(**document["totals"]),
+            sheets=head.sheets,
+            totals=_totals(document["totals"]),
             findings=tuple(map(finding_from_json, document.get("findings", ()))),
             borders=tuple(map(_border, document.get("borders", ()))),
         )
-    except KeyError as fault:
-        raise LayoutError(f"The layout lacks {fault}.") from None
-    except (TypeError, ValueError) as fault:
-        raise LayoutError(f"The layout cannot be read: {fault}.") from None
+
+
+def _reading(where: object) -> Reading:
+    return Reading(where, "a layout that 'miurafab sheets' wrote", LayoutError)
+
+
+def _document(text: str, where: object) -> dict[str, Any]:
+    document = parse_json(text)
+    if not isinstance(document, dict) or document.get("schema") != SCHEMA:
+        schema = document.get("schema") if isinstance(document, dict) else None
+        raise LayoutError(
+            f"{where} is not a layout of this version: its schema is {reprlib.repr(schema)}, and "
+            f"this version reads '{SCHEMA}'."
+        )
+    return document
+
+
+def _head(document: dict[str, Any], where: str) -> LayoutHead:
+    machine, material = (file_name(document[key], where) for key in ("machine", "material"))
+    sheets = tuple(_sheet(table, where) for table in document["sheets"])
+    if not sheets:
+        raise ValueError("it has no sheets")
+    pattern = document["pattern"]
+    return LayoutHead(
+        machine,
+        material,
+        file_name(pattern["file"], where),
+        _text(pattern["sha256"]),
+        sheets,
+    )
 
 
 def _patch_table(patch: Patch) -> dict[str, Any]:
@@ -94,15 +143,14 @@ def _patch_table(patch: Patch) -> dict[str, Any]:
 
 
 def _patch(table: dict[str, Any]) -> Patch:
-    x, y = table["origin_mm"]
     return Patch(
         id=int(table["id"]),
-        label=str(table["label"]),
+        label=_text(table["label"]),
         faces=np.array(table["faces"], dtype=np.int64),
         outline_mm=_points(table["outline_mm"]),
         waste_mm=tuple(_points(ring) for ring in table.get("waste_mm", ())),
-        origin_mm=(float(x), float(y)),
-        rotation_deg=float(table["rotation_deg"]),
+        origin_mm=_pair(table["origin_mm"]),
+        rotation_deg=_number(table["rotation_deg"]),
         tabs=tuple(
             Tab(
                 number=int(tab["number"]),
@@ -110,7 +158,7 @@ def _patch(table: dict[str, Any]) -> Patch:
                 mate_edge=_mate(tab.get("mate_edge", tab["edge"])),
                 mate_patch=_mate(tab["mate_patch"]),
                 polygon_mm=_points(tab["polygon_mm"]),
-                fold=str(tab.get("fold", "flat")),
+                fold=_text(tab.get("fold", "flat")),
             )
             for tab in table["tabs"]
         ),
@@ -118,24 +166,56 @@ def _patch(table: dict[str, Any]) -> Patch:
     )
 
 
-def _sheet(table: dict[str, Any]) -> Sheet:
+def _sheet(table: dict[str, Any], where: str) -> Sheet:
+    back = table.get("back")
     return Sheet(
-        name=str(table["name"]),
-        width_mm=float(table["width_mm"]),
-        height_mm=float(table["height_mm"]),
-        placements=tuple(Placement(**placement) for placement in table["placements"]),
-        back=table.get("back"),
-        travel_mm=float(table.get("travel_mm", 0.0)),
-        stock=str(table.get("stock", "")),
-        grain=str(table.get("grain", "none")),
-        defects_mm=tuple(
-            tuple((float(x), float(y)) for x, y in ring) for ring in table.get("defects_mm", ())
-        ),
+        name=file_name(table["name"], where),
+        width_mm=_length(table["width_mm"]),
+        height_mm=_length(table["height_mm"]),
+        placements=tuple(_placement(placement) for placement in table["placements"]),
+        back=None if back is None else file_name(back, where),
+        travel_mm=_number(table.get("travel_mm", 0.0)),
+        stock=_text(table.get("stock", "")),
+        grain=_text(table.get("grain", "none")),
+        defects_mm=tuple(tuple(map(_pair, ring)) for ring in table.get("defects_mm", ())),
     )
+
+
+def _placement(table: dict[str, Any]) -> Placement:
+    turn = {"rotation_deg": _number(table["rotation_deg"])} if "rotation_deg" in table else {}
+    placed = {**table, "x_mm": _number(table["x_mm"]), "y_mm": _number(table["y_mm"]), **turn}
+    return Placement(**{**placed, "patch": int(table["patch"])})
+
+
+def _totals(table: dict[str, Any]) -> Totals:
+    return Totals(**{name: value and _number(value) for name, value in table.items()})
 
 
 def _border(table: dict[str, Any]) -> OpenBorder:
     return OpenBorder(**{**table, "edges": tuple(map(int, table["edges"]))})
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str) or not is_plain(value):
+        raise ValueError(f"{value!r} is not a plain text")
+    return value
+
+
+def _number(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{value!r} is not a number")
+    return value
+
+
+def _length(value: Any) -> float:
+    if not 0 < _number(value) <= LARGEST_MM:
+        raise ValueError(f"{value!r} mm is not the length of a sheet")
+    return float(value)
+
+
+def _pair(values: Any) -> tuple[float, float]:
+    x, y = values
+    return float(_number(x)), float(_number(y))
 
 
 def _mate(number: object) -> int | None:
@@ -147,6 +227,6 @@ def _mate(number: object) -> int | None:
 
 def _points(values: list[list[float]]) -> Floats:
     points = np.array(values, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 2:
-        raise ValueError("a list of points is not a list of pairs")
+    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+        raise ValueError("a list of points is not a list of pairs of numbers")
     return points

@@ -10,7 +10,7 @@ import io
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from miurafab.files import AnyPath, new_file
+from miurafab.files import AnyPath, new_file, write_bytes, write_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,9 +71,9 @@ def write_result(
     """
     file = new_file(path, what, RESULTS)
     if file.suffix.lower() == ".csv":
-        file.write_text(table(), encoding="utf-8", newline="\n")
+        write_text(file, table())
     else:
-        file.write_bytes(plot(file.suffix.lower().removeprefix(".")))
+        write_bytes(file, plot(file.suffix.lower().removeprefix(".")))
 
 
 def without_frame(*axes: Axes) -> None:

@@ -12,6 +12,7 @@ import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+from miurafab.files import write_text
 from miurafab.options import Text
 from miurafab.profiles.table import Table, read_toml, toml_text
 
@@ -53,7 +54,5 @@ def write_defaults(defaults: OwnDefaults) -> Path:
     values = {each.name: getattr(defaults, each.name) for each in fields(OwnDefaults)}
     text = toml_text({name: value for name, value in values.items() if value is not None})
     path.parent.mkdir(parents=True, exist_ok=True)
-    new = path.with_suffix(".new")
-    new.write_text(text, encoding="utf-8", newline="\n")
-    new.replace(path)
+    write_text(path, text)
     return path

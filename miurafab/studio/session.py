@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError
+from miurafab.files import write_bytes
 from miurafab.studio import recipe
 from miurafab.studio.form import by_label
 from miurafab.studio.names import safe_stem, suffix_of
@@ -106,7 +107,7 @@ class Bench:
         number = self._number()
         file = f"{safe_stem(name)}{suffix}"
         path = self._new_folder(number) / file
-        path.write_bytes(content)
+        write_bytes(path, content)
         return self._keep(Source(number, kind, path, file))
 
     def add_own(self, path: Path, kind: str) -> Source:

@@ -16,6 +16,7 @@ from typing import Any
 
 import miurafab
 from miurafab.errors import MiurafabError, PatternError
+from miurafab.files import write_text
 from miurafab.findings import Finding, findings_json
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.fold import read_fold
@@ -23,7 +24,7 @@ from miurafab.origami.picture import flat_svg
 from miurafab.origami.verify import Audit
 from miurafab.studio.recipe import job_name
 from miurafab.surfaces.description import no_target
-from miurafab.workflow.job_directory import GUIDE, write_text
+from miurafab.workflow.job_directory import GUIDE
 from miurafab.workflow.page import write_page
 from miurafab.workflow.picture import svg_text
 from miurafab.workflow.preview import Preview

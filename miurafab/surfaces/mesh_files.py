@@ -20,7 +20,7 @@ import numpy as np
 import trimesh
 
 from miurafab.errors import TargetError
-from miurafab.files import read_bytes
+from miurafab.files import read_bytes, write_draft
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.surfaces.mesh_formats import read_3mf, read_off, read_ply_strips
 
@@ -134,7 +134,7 @@ def _from_step(content: bytes, name: str) -> tuple[Floats, Ints]:
         ) from None
     with tempfile.TemporaryDirectory() as folder:
         step, glb = Path(folder) / "in.step", Path(folder) / "out.glb"
-        step.write_bytes(content)
+        write_draft(step, content)
         vertices, faces = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
         flatness = _COARSE_MM
         for _ in range(2):

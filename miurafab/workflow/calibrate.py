@@ -27,7 +27,16 @@ from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.perforation import MIN_STROKE_MM
 from miurafab.fabrication.sheets import Layout, Sheet, Totals
-from miurafab.files import AnyPath, as_path
+from miurafab.files import (
+    AnyPath,
+    Reading,
+    as_path,
+    file_name,
+    parse_json,
+    read_text,
+    write_draft,
+    write_text,
+)
 from miurafab.options import read_value
 from miurafab.options.verbs import verb
 from miurafab.origami.formats.fold import fold_text
@@ -44,8 +53,8 @@ from miurafab.profiles.material import KERF
 from miurafab.profiles.shipped import Kind
 from miurafab.profiles.table import toml_text
 from miurafab.workflow.dry_run import dry_run
-from miurafab.workflow.job_directory import JobDirectory, write_text
-from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
+from miurafab.workflow.job_directory import JobDirectory
+from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles, settle_job
 from miurafab.workflow.manifest import write_manifest
 
 CHOICES = "calibration.json"
@@ -121,12 +130,12 @@ def calibrate(
         keep_profiles(machine_file, material_file, directory, staging)
         size = (sheet.width_mm, sheet.height_mm)
         timed = dry_run(SHEET, job, profile, size, stock.max_power)
-        write_text(staging / f"{SHEET}{profile.job_suffix}", job.text)
-        write_text(staging / f"{SHEET}.svg", sheet_svg(toolpath))
+        write_draft(staging / f"{SHEET}{profile.job_suffix}", job.text)
+        write_draft(staging / f"{SHEET}.svg", sheet_svg(toolpath))
         guide = calibration_guide(sheet, profile, stock, directory.name or str(directory))
-        (staging / GUIDE).write_bytes(guide)
+        write_draft(staging / GUIDE, guide)
         coupon = fold_text(sheet.coupon, "Fold coupon")
-        write_text(staging / _COUPON, coupon)
+        write_draft(staging / _COUPON, coupon)
         choices = {
             "schema": SCHEMA,
             "machine": profile.name,
@@ -135,7 +144,7 @@ def calibrate(
             "squares": [dataclasses.asdict(square) for square in sheet.squares],
             "kerf_gauge": {"strips": STRIPS},
         }
-        write_text(staging / CHOICES, json.dumps(choices, indent=1) + "\n")
+        write_draft(staging / CHOICES, json.dumps(choices, indent=1) + "\n")
         layout = Layout(
             machine=profile.name,
             material=stock.name,
@@ -154,7 +163,7 @@ def calibrate(
             ),
         )
         digest = hashlib.sha256(coupon.encode("utf-8")).hexdigest()
-        write_text(staging / LAYOUT, write_layout(layout, _COUPON, digest))
+        write_draft(staging / LAYOUT, write_layout(layout, _COUPON, digest))
         profiles: dict[Kind, Path] = {
             "firmware_profiles": machine_file,
             "materials": material_file,
@@ -220,6 +229,7 @@ def add_material(
         raise InputError(f"{path} exists already; choose another name or remove it.")
     if cell is None and cut is None and kerf is None:
         raise InputError("Nothing was chosen; give a `cell`, a `cut` or a `kerf`.")
+    settle_job(directory)
     choices = _choices(directory)
     own = directory / f"{choices['material']}.toml"
     base = own if own.is_file() else find_file("materials", str(choices["material"]))
@@ -257,13 +267,15 @@ def _choices(directory: Path) -> dict[str, Any]:
             f"{directory} holds no calibration ({CHOICES} is missing); make one with "
             "'miurafab calibrate'."
         )
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
+    kind = "a calibration that 'miurafab calibrate' wrote; make it again"
+    text = read_text(file, InputError, kind)
+    with Reading(file, kind, InputError):
+        found = parse_json(text)
         if found["schema"] != SCHEMA:
             raise InputError(f"{file} has schema {found['schema']!r}; this reads '{SCHEMA}'.")
+        for key in ("machine", "material"):
+            file_name(found[key], str(file))
         return {key: found[key] for key in ("machine", "material", "cells", "squares")}
-    except (ValueError, KeyError, TypeError):
-        raise InputError(f"{file} is damaged; make the calibration again.") from None
 
 
 def _labelled(entries: list[dict[str, Any]], label: str, directory: Path) -> dict[str, Any]:

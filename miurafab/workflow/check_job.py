@@ -41,7 +41,7 @@ from miurafab.origami.formats.fold import read_fold
 from miurafab.profiles import OPERATIONS, MachineProfile, Material
 from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.job_directory import WrittenJob, read_written
-from miurafab.workflow.job_files import LAYOUT, job_material
+from miurafab.workflow.job_files import LAYOUT, job_material, settle_job
 from miurafab.workflow.manifest import MANIFEST, TOOL, Manifest, read_manifest, sha256
 from miurafab.workflow.patterns import check
 
@@ -127,6 +127,7 @@ def check_job(directory: AnyPath) -> JobCheck:
     True
     """
     folder = as_path(directory, "The job directory")
+    settle_job(folder)
     if not (folder / LAYOUT).is_file():
         raise InputError(
             f"{folder} holds no whole job ({LAYOUT} is missing); make it with 'miurafab sheets'."

@@ -179,12 +179,9 @@ def _from_value(
     if result.pattern is None or result.status != "converged":
         profile = read_machine(machine)
         return Prepared(name, profile, (), (), report=result.report(), refused=result.findings)
-    directory.mkdir(parents=True, exist_ok=True)
-    file = directory / f"{name}.fold"
-    result.pattern.save(file, title=wanted.title)
     return _from_pattern(
         result.pattern,
-        file,
+        None,
         name,
         result.report(),
         (),

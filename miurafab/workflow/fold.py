@@ -16,7 +16,7 @@ import numpy as np
 
 from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError
-from miurafab.files import AnyPath, new_file
+from miurafab.files import AnyPath, new_file, write_bytes, write_text
 from miurafab.geometry.arrays import Floats
 from miurafab.options import Choice, Whole, declared, length, option, read_options, read_value
 from miurafab.options.documented import described
@@ -115,7 +115,7 @@ class Folding(Shown):
             write_fold(pattern, file, title, motion)
         elif ending == ".glb":
             triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
-            file.write_bytes(glb_bytes(motion.frames[0], triangles, motion.frames))
+            write_bytes(file, glb_bytes(motion.frames[0], triangles, motion.frames))
         elif ending == ".gif":
             write_gif(file, motion, _strain(motion) if by_strain else None, on_progress)
         else:
@@ -131,7 +131,7 @@ class Folding(Shown):
             For another ending, and for a folder that does not exist.
         """
         file = new_file(path, "The table of angles", (".csv",))
-        file.write_text(angles_csv(self.motion), encoding="utf-8", newline="\n")
+        write_text(file, angles_csv(self.motion))
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw five frames of the motion beside each other with matplotlib.

@@ -6,6 +6,7 @@ a canvas twice as large, which is then averaged down. All frames share one palet
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
+from miurafab.files import write_bytes
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.picture import BACK, FRONT, axes, project
@@ -50,14 +52,17 @@ def write_gif(
     for rest in {0, count - 1, target_frame(motion)}:
         durations[rest] = _HOLD
     order = [*range(count), *range(count - 2, 0, -1)]
+    content = io.BytesIO()
     shown[0].save(
-        path,
+        content,
+        format="GIF",
         save_all=True,
         append_images=[shown[frame] for frame in order[1:]],
         duration=[durations[frame] for frame in order],
         loop=0,
         optimize=False,
     )
+    write_bytes(path, content.getvalue())
 
 
 def picture(motion: FoldingMotion, frame: int, strain: Floats | None = None) -> Image.Image:

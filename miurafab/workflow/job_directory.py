@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from miurafab.display import Shown
-from miurafab.errors import InputError, LayoutError
+from miurafab.errors import InputError
 from miurafab.fabrication.layout import read_layout
 from miurafab.fabrication.sheets import Layout, Sheet
-from miurafab.files import AnyPath, as_path
+from miurafab.files import AnyPath, as_path, read_text
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run, read_gcode
-from miurafab.workflow.job_files import LAYOUT, job_machine, job_material
+from miurafab.workflow.job_files import LAYOUT, job_machine, job_material, settle_job
 from miurafab.workflow.manifest import edits
 from miurafab.workflow.picture import first_sheet
 
@@ -142,15 +142,13 @@ class WrittenJob:
 
 def read_written(directory: Path) -> WrittenJob:
     """The job in ``directory``. Raises :class:`~miurafab.errors.InputError` if it is not whole."""
+    settle_job(directory)
     path = directory / LAYOUT
     if not path.is_file():
         raise InputError(
             f"{directory} holds no whole job ({LAYOUT} is missing); make it with 'miurafab sheets'."
         )
-    try:
-        layout = read_layout(path.read_text(encoding="utf-8"))
-    except LayoutError as fault:
-        raise InputError(f"{path}: {fault}") from None
+    layout = read_layout(read_text(path, InputError, "a layout"), path)
     machine = job_machine(layout.machine, directory)
     most_power = job_material(layout.material, directory).max_power
     passes = tuple((name, sheet) for sheet in layout.sheets for name in sheet.passes)
@@ -161,8 +159,3 @@ def read_written(directory: Path) -> WrittenJob:
             raise InputError(f"{file} is missing; make the job again with 'miurafab sheets'.")
         jobs.append(read_gcode(file))
     return WrittenJob(directory, layout, machine, most_power, passes, tuple(jobs))
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write ``text`` with the same bytes on every system."""
-    path.write_text(text, encoding="utf-8", newline="\n")

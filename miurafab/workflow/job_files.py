@@ -1,29 +1,31 @@
 """The files of a job, put in place all at once: whole, or not at all.
 
-They are written to a directory of their own inside the job's. Only when the last one is on the disk
-do they take the places of those of an earlier job, ``layout.json`` last; so a full disk or an error
-in between leaves what was there as it was, and never a half-written file that a machine could run.
+A full disk, an error or a power loss leaves the earlier job or the new one
+(:mod:`~miurafab.workflow.whole_folder`), and never a half-written file that a machine could run.
 """
 
 from __future__ import annotations
 
 import errno
-import json
-import shutil
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from miurafab.errors import InputError
+from miurafab.files import Reading, file_name, parse_json, read_bytes, read_text, write_draft
 from miurafab.profiles import MachineProfile, Material, load_machine, load_material
 from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.drawings import ENDINGS, PICTURE
 from miurafab.workflow.manifest import MANIFEST
+from miurafab.workflow.whole_folder import put_in_place, settle, whole_folder
 
 LAYOUT = "layout.json"
 GUIDES = ("assembly.pdf", "calibration.pdf", "calibration.json")
 """What explains a job; one made in the place of another leaves none of them."""
-_UNFINISHED = ".unfinished"
+_SHEET = re.compile(r"sheet-[0-9]{2,}(-back)?")
+"""The names of programs, which begin those of all that is drawn."""
+_ENDINGS = (".nc", ".plt", ".svg", *ENDINGS)
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
@@ -36,20 +38,21 @@ def job_files(directory: Path) -> Iterator[Path]:
     :class:`~miurafab.errors.InputError` where the directory holds something else than a job, or
     something that is no part of it is in the way, or it cannot be written.
     """
-    sheets, copies = _earlier(directory)
+    if directory.exists() and not directory.is_dir():
+        raise InputError(f"{directory} is a file; a job needs a directory.")
     made = [each for each in (directory, *directory.parents) if not each.exists()]
-    staging = directory / _UNFINISHED
     try:
-        shutil.rmtree(staging, ignore_errors=True)
-        staging.mkdir(parents=True)
-        yield staging
-        _put_in_place(staging, directory, sheets, copies)
+        directory.mkdir(parents=True, exist_ok=True)
+        with whole_folder(directory, _is_of_job) as staging:
+            drawn, copies = _earlier(directory)
+            yield staging
+            _leave_alone(staging, directory, drawn | copies)
+            put_in_place(directory, drawn, (LAYOUT, MANIFEST), LAYOUT)
     except OSError as fault:
         if not _of_writing(fault, directory):
             raise
         raise InputError(f"{directory} cannot be written: {fault.strerror}.") from None
     finally:
-        shutil.rmtree(staging, ignore_errors=True)
         for each in made:
             if each.is_dir() and not any(each.iterdir()):
                 each.rmdir()
@@ -67,8 +70,6 @@ def _earlier(directory: Path) -> tuple[set[str], set[str]]:
     """The names of the files of the job that is in ``directory``: those that are drawn, and those
     that are copies of the user's.
     """
-    if directory.exists() and not directory.is_dir():
-        raise InputError(f"{directory} is a file; a job needs a directory.")
     layout = directory / LAYOUT
     if not layout.exists():
         strangers = sorted(directory.glob("*.nc")) + sorted(directory.glob("*.plt"))
@@ -78,43 +79,49 @@ def _earlier(directory: Path) -> tuple[set[str], set[str]]:
                 "choose another directory or remove it."
             )
         return set(), set()
-    try:
-        made = json.loads(layout.read_text(encoding="utf-8"))
-        sheets = [str(sheet["name"]) for sheet in made["sheets"]]
-        sheets += [str(sheet["back"]) for sheet in made["sheets"] if sheet.get("back")]
-        copies = {str(made["pattern"]["file"])}
-        copies |= {f"{made[kind]}.toml" for kind in ("machine", "material")}
-    except (ValueError, KeyError, TypeError):
-        raise InputError(
-            f"{layout} is not a layout of this version; choose another directory or remove it."
-        ) from None
-    drawn = {
-        f"{Path(name).name}{ending}"
-        for name in sheets
-        for ending in (".nc", ".plt", ".svg", *ENDINGS)
-    }
-    return drawn | {LAYOUT, MANIFEST, PICTURE, *GUIDES}, copies
+    kind = "a layout of this version; choose another directory or remove it"
+    text = read_text(layout, InputError, kind)
+    with Reading(layout, kind, InputError):
+        made = parse_json(text)
+        names = [
+            sheet[key] for sheet in made["sheets"] for key in ("name", "back") if sheet.get(key)
+        ]
+        if not all(map(_SHEET.fullmatch, names)):
+            raise ValueError("it names a sheet that no job has")
+        copies = [made["pattern"]["file"], f"{made['machine']}.toml", f"{made['material']}.toml"]
+        known = {file_name(name, str(layout)) for name in copies}
+    drawn = {f"{name}{ending}" for name in names for ending in _ENDINGS}
+    return drawn | {LAYOUT, MANIFEST, PICTURE, *GUIDES}, known
 
 
-def _put_in_place(staging: Path, directory: Path, drawn: set[str], copies: set[str]) -> None:
-    """Move all files of ``staging`` into ``directory``, in the places of those ``drawn`` and
-    ``copies`` made for an earlier job.
+def _is_of_job(name: str) -> bool:
+    """Whether ``name`` is that of a file that every job may have, and that another removes."""
+    sheet = _SHEET.match(name)
+    drawn = sheet is not None and name[sheet.end() :] in _ENDINGS
+    return drawn or name in (LAYOUT, MANIFEST, PICTURE, *GUIDES)
+
+
+def settle_job(directory: Path) -> None:
+    """Finish what a process that died left of a job in ``directory``, before it is read.
+
+    Raises :class:`~miurafab.errors.InputError` where that cannot be done.
     """
-    fresh = sorted((path.name for path in staging.iterdir()), key=lambda name: name == LAYOUT)
-    for name in fresh:
+    settle(directory, _is_of_job)
+
+
+def _leave_alone(staging: Path, directory: Path, earlier: set[str]) -> None:
+    """Raise where a file in ``staging`` would take the place of one of ``directory`` that is not
+    among those of an ``earlier`` job.
+    """
+    for name in sorted(path.name for path in staging.iterdir()):
         there = directory / name
-        if not there.exists() or name in drawn | copies:
+        if not there.exists() or name in earlier:
             continue
         if there.is_dir() or there.read_bytes() != (staging / name).read_bytes():
             raise InputError(
                 f"{there} is no part of a job and would be overwritten; move it away, or choose "
                 "another directory."
             )
-    (directory / LAYOUT).unlink(missing_ok=True)
-    for name in drawn:
-        (directory / name).unlink(missing_ok=True)
-    for name in fresh:
-        (staging / name).replace(directory / name)
 
 
 def job_machine(name: str, folder: Path | None) -> MachineProfile:
@@ -128,7 +135,7 @@ def job_material(name: str, folder: Path | None) -> Material:
 
 
 def _beside(name: str, folder: Path | None) -> str | Path:
-    own = None if folder is None else folder / f"{name}.toml"
+    own = None if folder is None else folder / f"{file_name(name, 'The job')}.toml"
     return own if own is not None and own.is_file() else name
 
 
@@ -152,4 +159,4 @@ def keep_profiles(machine: Path, material: Path, directory: Path, staging: Path)
                 f"The machine and the material are both called {path.stem}; rename one of them."
             )
         else:
-            shutil.copyfile(path, staging / path.name)
+            write_draft(staging / path.name, read_bytes(path, InputError))

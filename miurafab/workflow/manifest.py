@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError
-from miurafab.files import read_bytes, read_text
+from miurafab.files import Reading, file_name, parse_json, read_bytes, read_text, write_draft
 from miurafab.findings import Finding
 from miurafab.profiles.shipped import Kind
 from miurafab.version import __version__
@@ -53,14 +53,15 @@ def write_manifest(
         "profiles": {f"{kind}/{path.name}": sha256(path) for kind, path in profiles.items()},
     }
     text = json.dumps(document, indent=1) + "\n"
-    (staging / MANIFEST).write_text(text, encoding="utf-8", newline="\n")
+    write_draft(staging / MANIFEST, text)
 
 
 def read_manifest(directory: Path) -> Manifest:
     """The manifest of a job. Raises :class:`~miurafab.errors.InputError` if it cannot be read."""
     path = directory / MANIFEST
-    try:
-        document = json.loads(read_text(path, InputError, "a manifest"))
+    text = read_text(path, InputError, "a manifest")
+    with Reading(path, "a manifest that 'miurafab sheets' wrote; make the job again", InputError):
+        document = parse_json(text)
         if document["schema"] != SCHEMA:
             raise InputError(
                 f"{path} has the schema {document['schema']!r}; this version reads '{SCHEMA}'."
@@ -68,13 +69,10 @@ def read_manifest(directory: Path) -> Manifest:
         tables = (document[name] for name in ("options", "files", "profiles"))
         options, files, profiles = map(dict, tables)
         for name in files:
-            if Path(name).name != name:
-                raise InputError(f"{path} names '{name}', which is not the name of a file.")
+            file_name(name, str(path))
+        for name in profiles:
+            file_name(name.partition("/")[2], str(path))
         return Manifest(str(document["tool"]), options, files, profiles)
-    except (ValueError, KeyError, TypeError, RecursionError) as fault:
-        raise InputError(
-            f"{path} is not a manifest that 'miurafab sheets' wrote: {fault!r}; make the job again."
-        ) from None
 
 
 def edits(folder: Path, names: Iterable[str]) -> tuple[Finding, ...]:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError, ProfileError
-from miurafab.files import AnyPath, as_path
+from miurafab.files import AnyPath, as_path, write_text
 from miurafab.grbl.settings import Settings
 from miurafab.machine.actions import read_dump, read_settings
 from miurafab.profiles import MachineProfile, find_profile, load_machine, read_toml
@@ -102,7 +102,7 @@ def add_machine(
     values["title"] = title or f"{name}, like {base.stem}"
     path.parent.mkdir(parents=True, exist_ok=True)
     head = f"# From the settings of the board ({source}); the rest is that of {base.stem}.\n"
-    path.write_text(head + toml_text(values), encoding="utf-8", newline="\n")
+    write_text(path, head + toml_text(values))
     try:
         return path, load_machine(path)
     except ProfileError:

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import resvg_py
 
+from miurafab.files import write_bytes, write_text
 from miurafab.geometry.arrays import Bools, Ints
 from miurafab.origami.picture import INK
 from miurafab.profiles import MachineProfile
@@ -36,12 +37,11 @@ _MOVES_AT_ONCE, _MOST_MOVES = 16_384, 30_000
 
 def write_pictures(preview: Preview, out_dir: Path) -> tuple[Path, ...]:
     """Write ``NAME.png`` and ``NAME.svg`` for every sheet into ``out_dir``; return their paths."""
-    out_dir.mkdir(parents=True, exist_ok=True)
     written = []
     for sheet in preview.sheets:
         png, svg = (out_dir / f"{sheet.name}.{ending}" for ending in ("png", "svg"))
-        png.write_bytes(png_bytes(sheet, preview.machine))
-        svg.write_text(svg_text(sheet, preview.machine), encoding="utf-8", newline="\n")
+        write_bytes(png, png_bytes(sheet, preview.machine))
+        write_text(svg, svg_text(sheet, preview.machine))
         written += [png, svg]
     return tuple(written)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import re
 import reprlib
@@ -14,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from miurafab.display import Shown
 from miurafab.errors import InputError
-from miurafab.files import AnyPath, as_path
+from miurafab.fabrication.layout import LayoutHead, read_head
+from miurafab.files import AnyPath, as_path, new_folder, read_text
 from miurafab.findings import Finding, findings_json
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import parse_dump
@@ -29,8 +28,8 @@ from miurafab.workflow.dry_run import (
     read_gcode,
     readiness,
 )
-from miurafab.workflow.job_files import LAYOUT, job_machine, job_material
-from miurafab.workflow.manifest import edits
+from miurafab.workflow.job_files import LAYOUT, job_machine, job_material, settle_job
+from miurafab.workflow.manifest import edits, sha256
 
 if TYPE_CHECKING:
     from miurafab.workflow.job_directory import JobDirectory
@@ -89,7 +88,7 @@ class Preview(Shown):
         from miurafab.workflow.page import write_page
         from miurafab.workflow.picture import write_pictures
 
-        directory = as_path(folder, "The folder of the preview")
+        directory = new_folder(folder, "The folder of the preview")
         if on_progress is not None:
             on_progress(0.0, "pictures")
         files = write_pictures(self, directory)
@@ -190,7 +189,7 @@ def preview(
     if settings is not None:
         profile = with_settings(profile, as_path(settings, "The settings"))
     bed = (profile.bed.width_mm, profile.bed.height_mm)
-    papers = {} if layout is None else layout.papers
+    papers = {} if layout is None else _papers(layout)
     most_power = 1.0 if layout is None else job_material(layout.material, path).max_power
     sheets = []
     for number, (file, gcode) in enumerate(zip(files, jobs, strict=True)):
@@ -261,48 +260,28 @@ def with_settings(machine: MachineProfile, dump: Path) -> MachineProfile:
     )
 
 
-@dataclass(frozen=True)
-class _Layout:
-    """What the preview takes from ``layout.json``: ``papers`` are sheet sizes by name."""
-
-    machine: str
-    material: str
-    pattern_file: str
-    pattern_sha256: str
-    papers: dict[str, tuple[float, float]]
-
-
-def _read_layout(path: Path) -> _Layout | None:
+def _read_layout(path: Path) -> LayoutHead | None:
+    settle_job(path.parent)
     if not path.is_file():
         return None
-    try:
-        layout = json.loads(path.read_text(encoding="utf-8"))
-        return _Layout(
-            machine=str(layout["machine"]),
-            material=str(layout["material"]),
-            pattern_file=str(layout["pattern"]["file"]),
-            pattern_sha256=str(layout["pattern"]["sha256"]),
-            papers={
-                str(name): (float(sheet["width_mm"]), float(sheet["height_mm"]))
-                for sheet in layout["sheets"]
-                for name in (sheet.get("back"), sheet["name"])
-                if name
-            },
-        )
-    except (ValueError, KeyError, TypeError) as fault:
-        raise InputError(
-            f"{path} is not a layout that 'miurafab sheets' wrote: {fault!r}; make the job again."
-        ) from None
+    return read_head(read_text(path, InputError, "a layout"), path)
 
 
-def _job_files(path: Path, layout: _Layout | None) -> list[Path]:
+def _papers(layout: LayoutHead) -> dict[str, tuple[float, float]]:
+    """The sheet sizes by the names of their programs."""
+    return {
+        name: (sheet.width_mm, sheet.height_mm) for sheet in layout.sheets for name in sheet.passes
+    }
+
+
+def _job_files(path: Path, layout: LayoutHead | None) -> list[Path]:
     if not path.is_dir():
         return [path]
     if layout is None:
         files = sorted(path.glob("*.nc"))
     else:
         suffix = job_machine(layout.machine, path).job_suffix
-        files = [path / f"{name}{suffix}" for name in layout.papers]
+        files = [path / f"{name}{suffix}" for name in _papers(layout)]
     if not files:
         raise InputError(f"{path} holds no G-code (*.nc); make it with 'miurafab sheets'.")
     return files
@@ -318,7 +297,7 @@ def named_machine(job: Job, folder: Path | None = None) -> MachineProfile | None
 
 
 def _made_for(
-    path: Path, layout: _Layout | None, job: Job, findings: list[Finding]
+    path: Path, layout: LayoutHead | None, job: Job, findings: list[Finding]
 ) -> MachineProfile:
     """The machine that the job was made for, or the assumed machine and a note."""
     folder = path if path.is_dir() else path.parent
@@ -344,18 +323,17 @@ def assumed_machine(path: Path) -> MachineProfile:
     return read_machine(_ASSUMED_CUTTER if path.suffix.lower() == ".plt" else None)
 
 
-def _pattern(path: Path, layout: _Layout, findings: list[Finding]) -> CreasePattern | None:
+def _pattern(path: Path, layout: LayoutHead, findings: list[Finding]) -> CreasePattern | None:
     """The pattern that the sheets fold into, if its file is where the layout says, unchanged."""
-    for folder in (path, Path()):
-        file = folder / layout.pattern_file
-        if file.is_file():
-            if hashlib.sha256(file.read_bytes()).hexdigest() == layout.pattern_sha256:
-                from miurafab.origami.formats.fold import read_fold  # slow to load, seldom needed
+    file = path / layout.pattern_file
+    if file.is_file():
+        if sha256(file) == layout.pattern_sha256:
+            from miurafab.origami.formats.fold import read_fold  # slow to load, seldom needed
 
-                return read_fold(file)
-            says = f"{file} has changed since the sheets were made, so it is not shown."
-            findings.append(Finding("pattern-changed", says, str(file)))
-            return None
+            return read_fold(file)
+        says = f"{file} has changed since the sheets were made, so it is not shown."
+        findings.append(Finding("pattern-changed", says, str(file)))
+        return None
     says = f"The pattern {layout.pattern_file} is not there, so its fold is not shown."
     findings.append(Finding("pattern-missing", says, layout.pattern_file))
     return None

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import reprlib
-import shutil
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from miurafab.display import Shown
-from miurafab.errors import InputError, ProfileError
+from miurafab.errors import InputError, PatternError, ProfileError
 from miurafab.fabrication.drawing.assembly_guide import assembly_guide
 from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import DrawnLayout, lay_out
-from miurafab.files import AnyPath, as_path
+from miurafab.files import AnyPath, as_path, read_bytes, write_draft
 from miurafab.gcode.job import Job
 from miurafab.options import read_options, written_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.formats.fold import write_fold
+from miurafab.origami.formats.fold import fold_text, seen_from
 from miurafab.posting import post
 from miurafab.profiles import (
     MachineProfile,
@@ -38,7 +37,7 @@ from miurafab.profiles.shipped import Kind
 from miurafab.workflow.design import read_layout_table
 from miurafab.workflow.drawings import drawings, read_formats
 from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run
-from miurafab.workflow.job_directory import GUIDE, JobDirectory, write_text
+from miurafab.workflow.job_directory import GUIDE, JobDirectory
 from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
 from miurafab.workflow.manifest import sha256, write_manifest
 from miurafab.workflow.patterns import PatternLike, as_pattern
@@ -147,16 +146,16 @@ class SheetJob(Shown):
             keep_profiles(self.machine_file, self.material_file, folder, staging)
             for number, (toolpath, job) in enumerate(zip(layout.passes, self.jobs, strict=True)):
                 tell(0.7 * number / len(self.jobs), f"drawing {toolpath.sheet}")
-                write_text(staging / f"{toolpath.sheet}{machine.job_suffix}", job.text)
-                write_text(staging / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
+                write_draft(staging / f"{toolpath.sheet}{machine.job_suffix}", job.text)
+                write_draft(staging / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
             for name, content in drawings(layout, self.pattern, wanted, self.name):
-                (staging / name).write_bytes(content)
+                write_draft(staging / name, content)
             tell(0.7, "drawing the assembly guide")
             guide = assembly_guide(layout, self.pattern, machine, self.material, self.name)
-            (staging / GUIDE).write_bytes(guide)
+            write_draft(staging / GUIDE, guide)
             used = self._put_pattern(folder, staging)
             digest = sha256(used)
-            write_text(staging / LAYOUT, write_layout(layout, used.name, digest))
+            write_draft(staging / LAYOUT, write_layout(layout, used.name, digest))
             besides = [] if used.parent == staging else [used]
             profiles: dict[Kind, Path] = {
                 "firmware_profiles": self.machine_file,
@@ -171,12 +170,12 @@ class SheetJob(Shown):
         if self.pattern_file is None:
             capped = CAPPED if self.opened and self.options.caps else ""
             file = staging / f"{self.name}{capped or (OPENED if self.opened else '')}.fold"
-            write_fold(self.pattern, file, self.name)
+            write_draft(file, fold_text(seen_from(self.pattern, folder), self.name))
             return file
         file = staging / self.pattern_file.name
         if (folder / file.name).resolve() == self.pattern_file.resolve():
             return self.pattern_file
-        shutil.copyfile(self.pattern_file, file)
+        write_draft(file, read_bytes(self.pattern_file, PatternError))
         return file
 
     def plot(self) -> list[Axes]:

@@ -233,7 +233,7 @@ def test_a_file_that_is_no_layout_is_refused(text, complaint):
 def test_a_layout_with_a_broken_value_is_refused(wrong):
     document = json.loads(write_layout(lay_out(miura(3, 3), MACHINE, card()), "p", "s"))
     document["patches"][0]["outline_mm"] = wrong
-    with pytest.raises(LayoutError, match="cannot be read"):
+    with pytest.raises(LayoutError, match="is not a layout"):
         read_layout(json.dumps(document))
 
 

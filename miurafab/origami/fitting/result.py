@@ -93,6 +93,11 @@ class FitResult(Shown):
     active_bounds: Mapping[str, int] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 
+    @property
+    def is_valid(self) -> bool:
+        """Whether ``pattern`` is a sheet that meets every limit, or the best one at Ctrl-C."""
+        return self.pattern is not None and self.status in ("converged", "interrupted")
+
     def plot(self, form: str | None = None, ax: Axes | None = None) -> Axes:
         """Draw the pattern (:meth:`CreasePattern.plot`).
 

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from miurafab.errors import InputError, OptionError, PatternError
-from miurafab.files import AnyPath, as_path, new_file, read_bytes
+from miurafab.files import AnyPath, as_path, new_file, read_bytes, write_bytes, write_text
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
@@ -139,11 +139,11 @@ def _write_solid(pattern: CreasePattern, path: Path, form: str) -> None:
     triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
     if path.suffix.lower() == ".obj":
         text = obj_text(points, pattern.faces_vertices, path.stem)
-        path.write_text(text, encoding="utf-8", newline="\n")
+        write_text(path, text)
     elif path.suffix.lower() == ".stl":
-        path.write_bytes(stl_bytes(points, triangles))
+        write_bytes(path, stl_bytes(points, triangles))
     else:
-        path.write_bytes(glb_bytes(points, triangles))
+        write_bytes(path, glb_bytes(points, triangles))
 
 
 def _write_drawing(pattern: CreasePattern, path: Path, title: str) -> None:
@@ -154,4 +154,4 @@ def _write_drawing(pattern: CreasePattern, path: Path, title: str) -> None:
         text = opx_text(lines, title)
     else:
         text = cp_text(lines) if ending == ".cp" else dxf_text(lines)
-    path.write_text(text, encoding="utf-8", newline="\n")
+    write_text(path, text)

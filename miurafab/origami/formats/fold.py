@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
-from miurafab.files import read_text
+from miurafab.files import read_text, write_text
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import (
     connected_parts,
@@ -137,11 +137,16 @@ def write_fold(
     A mesh file that is its target is named from the folder of ``path``, so that both can move
     together.
     """
+    write_text(path, fold_text(seen_from(pattern, path.parent), title, motion))
+
+
+def seen_from(pattern: CreasePattern, folder: Path) -> CreasePattern:
+    """``pattern`` with the mesh that is its target, if any, named from ``folder``."""
     mesh = pattern.target.get("mesh")
-    if mesh is not None:
-        relative = Path(os.path.relpath(mesh, path.resolve().parent)).as_posix()
-        pattern = replace(pattern, target={**pattern.target, "mesh": relative})
-    path.write_text(fold_text(pattern, title, motion), encoding="utf-8", newline="\n")
+    if mesh is None:
+        return pattern
+    relative = Path(os.path.relpath(mesh, folder.resolve())).as_posix()
+    return replace(pattern, target={**pattern.target, "mesh": relative})
 
 
 def read_fold(path: Path) -> CreasePattern:

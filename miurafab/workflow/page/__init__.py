@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
+from miurafab.files import write_text
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.contact import triangulate
@@ -63,7 +64,7 @@ def write_page(
     page shows the flat and the folded form only. The same input gives the same bytes.
     """
     text = page_text(title, preview, pattern, motion, slider)
-    path.write_text(text, encoding="utf-8", newline="\n")
+    write_text(path, text)
 
 
 def page_text(
