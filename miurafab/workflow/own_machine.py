@@ -1,9 +1,7 @@
 """A machine profile of one's own, from the settings of the board itself.
 
 The nearest profile gives what ``$$`` does not tell (the tool, the buffers). The settings replace
-what they tell: rates ``$110`` ``$111``, accelerations ``$120`` ``$121``, junction ``$11``,
-travel ``$130`` ``$131``, S range ``$30`` ``$31``, laser mode ``$32`` (gnea/grbl 1.1,
-``doc/markdown/settings.md``).
+what they tell (:mod:`miurafab.profiles.board`).
 """
 
 from __future__ import annotations
@@ -17,21 +15,13 @@ from miurafab.files import AnyPath, as_path, write_text
 from miurafab.grbl.settings import Settings
 from miurafab.machine.actions import read_dump, read_settings
 from miurafab.profiles import MachineProfile, find_profile, load_machine, read_toml
+from miurafab.profiles.board import PLACES, told
 from miurafab.profiles.shipped import own_directory
 from miurafab.profiles.table import toml_text
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
-_PLACES = {
-    130: ("bed", "width", "{:g}mm"),
-    131: ("bed", "height", "{:g}mm"),
-    110: ("motion", "max_rate_x", "{:g}mm/min"),
-    111: ("motion", "max_rate_y", "{:g}mm/min"),
-    120: ("motion", "acceleration_x", None),
-    121: ("motion", "acceleration_y", None),
-    11: ("motion", "junction_deviation", "{:g}mm"),
-}
-_S_RANGE = {30: "s_max", 31: "s_min"}
-_ASKED_FOR = sorted((*_PLACES, *_S_RANGE, 32))
+_LASER_MODE = 32
+_ASKED_FOR = sorted((*(number for number, each in PLACES.items() if each.part != "z"), _LASER_MODE))
 """The settings that a job relies on; the profile then requires them."""
 
 
@@ -112,16 +102,11 @@ def add_machine(
 
 def _take(values: dict[str, Any], found: Settings) -> None:
     """Put what the settings tell into the ``values`` of a profile."""
-    told = found.values
-    for number, (table, key, form) in _PLACES.items():
-        if number in told:
-            value = told[number]
-            values.setdefault(table, {})[key] = value if form is None else form.format(value)
-    tool = values["tool"]
-    for number, key in _S_RANGE.items():
-        if number in told:
-            tool[key] = round(told[number])
+    for place, value in told(found.values, has_z="z" in values):
+        plain = place.kind.metavar in ("N", "NUMBER")
+        written = value if plain else place.kind.show(value).replace(" ", "")
+        values.setdefault(place.part, {})[place.key] = written
     required = values.setdefault("settings", {})
-    required |= {f"${number}": told[number] for number in _ASKED_FOR if number in told}
-    if tool.get("kind") == "laser" and told.get(32) == 0:
+    required |= {f"${n}": found.values[n] for n in _ASKED_FOR if n in found.values}
+    if values["tool"].get("kind") == "laser" and found.values.get(_LASER_MODE) == 0:
         required["$32"] = 1  # a laser burns along its travels without it, so `cut` asks for it

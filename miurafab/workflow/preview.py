@@ -6,7 +6,7 @@ import os
 import re
 import reprlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from miurafab.grbl.settings import parse_dump
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, read_machine
+from miurafab.profiles.board import with_settings
 from miurafab.workflow.dry_run import (
     SheetPreview,
     clock_text,
@@ -187,7 +188,7 @@ def preview(
     if profile is None:
         profile = _made_for(path, layout, jobs[0], findings)
     if settings is not None:
-        profile = with_settings(profile, as_path(settings, "The settings"))
+        profile = _as_dumped(profile, as_path(settings, "The settings"))
     bed = (profile.bed.width_mm, profile.bed.height_mm)
     papers = {} if layout is None else _papers(layout)
     most_power = 1.0 if layout is None else job_material(layout.material, path).max_power
@@ -222,7 +223,7 @@ def _of_value(job: object, machine: MachineProfile | None, settings: AnyPath | N
     if machine is not None or settings is not None:
         profile = machine or job.machine
         if settings is not None:
-            profile = with_settings(profile, as_path(settings, "The settings"))
+            profile = _as_dumped(profile, as_path(settings, "The settings"))
         dry_runs = tuple(
             dry_run(sheet.name, gcode, profile, sheet.paper_mm, job.most_power)
             for sheet, gcode in zip(job.dry_runs, job.jobs, strict=True)
@@ -232,32 +233,12 @@ def _of_value(job: object, machine: MachineProfile | None, settings: AnyPath | N
     return Preview(name, profile, dry_runs, pattern, edited)
 
 
-def with_settings(machine: MachineProfile, dump: Path) -> MachineProfile:
-    """``machine`` with the rates, accelerations, S range and travel of a ``$$`` dump.
+def _as_dumped(machine: MachineProfile, dump: Path) -> MachineProfile:
+    """``machine`` as the board has it whose ``$$`` is in the file ``dump``.
 
     Raises :class:`~miurafab.errors.ProfileError` for a line that is no setting.
     """
-    values = parse_dump(read_gcode(dump).text, dump.name).values
-    motion, tool, bed = machine.motion, machine.tool, machine.bed
-    width, height = values.get(130, bed.width_mm), values.get(131, bed.height_mm)
-    return replace(
-        machine,
-        motion=replace(
-            motion,
-            max_rate_x_mm_min=values.get(110, motion.max_rate_x_mm_min),
-            max_rate_y_mm_min=values.get(111, motion.max_rate_y_mm_min),
-            acceleration_x_mm_s2=values.get(120, motion.acceleration_x_mm_s2),
-            acceleration_y_mm_s2=values.get(121, motion.acceleration_y_mm_s2),
-            junction_deviation_mm=values.get(11, motion.junction_deviation_mm),
-        ),
-        tool=replace(
-            tool,
-            s_max=round(values.get(30, tool.s_max)),
-            s_min=round(values.get(31, tool.s_min)),
-        ),
-        bed=replace(bed, width_mm=width, height_mm=height),
-        settings={**machine.settings, **values},
-    )
+    return with_settings(machine, parse_dump(read_gcode(dump).text, dump.name).values)
 
 
 def _read_layout(path: Path) -> LayoutHead | None:

@@ -16,7 +16,7 @@ from miurafab.errors import GcodeError, InputError, ProfileError
 from miurafab.gcode.job import Job
 from miurafab.profiles import load_machine
 from miurafab.workflow.dry_run import LAYERS, clock_text, dry_run, length_text
-from miurafab.workflow.preview import preview, with_settings
+from miurafab.workflow.preview import preview
 
 BED = (400.0, 400.0)
 
@@ -157,7 +157,7 @@ def test_a_dump_wins_over_the_profile(tmp_path):
     assert "more than the 300 that is full power" in warnings
     dump.write_text("hello\n")
     with pytest.raises(ProfileError, match=r"mine\.txt"):
-        with_settings(LASER, dump)
+        preview(path, settings=dump)
     with pytest.raises(InputError, match=r"none\.txt"):
         preview(path, settings=tmp_path / "none.txt")
 
