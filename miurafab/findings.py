@@ -97,7 +97,9 @@ RULES = {
     "unlettered": Rule("warning", "names and numbers without room on the sheets"),
     # A job, judged without a machine (miurafab.machine.judge_job)
     "lines": Rule("refusal", "a line too long for the controller, or not printable ASCII"),
-    "program": _check("a program that GRBL 1.1 would answer with an error"),
+    "program": _check(
+        "a line that the controller would answer with an error, or whose effect cannot be told"
+    ),
     "m3": _check("`M3`: the beam stays on wherever motion stops"),
     "bounds": _check("a move off the bed"),
     "islands": _check("a stroke inside an outline that is cut through already"),
@@ -112,6 +114,7 @@ RULES = {
     "air": Rule("note", "a job that ends with the air on"),
     "characters": Rule("warning", "a character in a comment that other senders pass on"),
     "nothing-burnt": Rule("warning", "a job that burns nothing"),
+    "outputs": Rule("warning", "an output that is switched (`M62` to `M65`)"),
     "pauses": Rule("note", "a program that waits for a person (`M0`)"),
     "relative": Rule("note", "relative moves (`G91`)"),
     # A job directory, checked (miurafab.workflow.check_job)

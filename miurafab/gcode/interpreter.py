@@ -11,6 +11,7 @@ import numpy as np
 
 from miurafab.errors import GcodeError
 from miurafab.gcode.block_errors import BlockError
+from miurafab.gcode.dialect_words import UntoldEffect, adapt, known_elsewhere, require_told
 from miurafab.gcode.execution import (
     Dwell,
     Pause,
@@ -47,23 +48,30 @@ _CHUNK = 1 << 18  # characters read at once
 
 
 def parse_program(
-    job: Job, *, laser: bool = True, arc_tolerance_mm: float = 0.002, inline: bool = False
+    job: Job,
+    *,
+    laser: bool = True,
+    arc_tolerance_mm: float = 0.002,
+    inline: bool = False,
+    dialect: str = "grbl-1.1",
 ) -> Program:
     """Read ``job`` as the controller would run it from power-up, at machine position 0.
 
     ``laser`` is the controller's laser mode ($32): the beam is off in G0, and S may change in
     motion. Arcs become chords within ``arc_tolerance_mm`` of the arc ($12). With ``inline`` the job
-    is for Marlin (:mod:`miurafab.gcode.marlin`). Raises :class:`~miurafab.errors.GcodeError`,
+    is for Marlin (:mod:`miurafab.gcode.marlin`); ``dialect`` may know more words
+    (:mod:`miurafab.gcode.dialect_words`). Raises :class:`~miurafab.errors.GcodeError`,
     naming file and line, for a line that the controller would refuse and for a ``$`` command.
     """
-    return _Interpreter(job, ReaderRules(laser, arc_tolerance_mm), inline).read()
+    return _Interpreter(job, ReaderRules(laser, arc_tolerance_mm), inline, dialect).read()
 
 
 class _Interpreter:
-    def __init__(self, job: Job, rules: ReaderRules, inline: bool) -> None:
+    def __init__(self, job: Job, rules: ReaderRules, inline: bool, dialect: str) -> None:
         self.job = job
         self.rules = rules
         self.inline = inline
+        self.dialect = dialect
         self.state = ModalState()
         self.stored: list[Sequence[float]] = [(0.0, 0.0, 0.0)] * 8
         self.at: Sequence[float] = (0.0, 0.0, 0.0)
@@ -92,7 +100,7 @@ class _Interpreter:
         bounds = lines.bounds[first : stop + 1].tolist()
         for index, (begin, end) in enumerate(pairwise(bounds), number + first):
             line = text[begin : end - 1]
-            code = bare_code(self.job.name, index, line)
+            code = bare_code(self.job.name, index, line, begun=bool(len(self.tables.sent)))
             if code:
                 code = code.upper()
                 words = len(code.translate(_NO_LETTERS))
@@ -156,10 +164,19 @@ class _Interpreter:
                 code = grbl_words(code)
             except ValueError as error:
                 raise GcodeError(f"{name}, line {number}: {error}.") from None
+        line = adapt(code, self.dialect)
         try:
-            block = parse_block(code, self.state, self.stored.__getitem__, self.rules)
+            require_told(line.code, self.dialect)
+            block = parse_block(line.code, self.state, self.stored.__getitem__, self.rules)
+        except UntoldEffect as error:
+            raise GcodeError(f"{name}, line {number}: {error}.") from None
         except BlockError as error:
-            raise GcodeError(f"{name}, line {number}: {error} (error:{error.code}).") from None
+            others = known_elsewhere(code, self.dialect)
+            raise GcodeError(
+                f"{name}, line {number}: {error} (error:{error.code}){others}."
+            ) from None
+        if line.waits:
+            self._event(SYNC, number)
         for action in execute(block, self.state, self.rules):
             if isinstance(action, StraightMove):
                 self._move(action, number)

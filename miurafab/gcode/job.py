@@ -19,7 +19,7 @@ _LINES = re.compile(r"([^\r\n]*)(?:\r\n|\n|\r|$)")
 # As the controller reads them: "(" up to ")" or the line's end, or ";" to the line's end.
 _COMMENTS = re.compile(r"\([^)]*\)?|;.*", re.DOTALL)
 _FORBIDDEN = re.compile(r"[^!-~]|[!?~]")
-_FRAME = re.compile(r"%|[oO]\d+")
+_PROGRAM_NUMBER = re.compile(r"[oO]\d+")
 _REALTIME = {"!": "the feed hold", "?": "the status query", "~": "the cycle start"}
 
 
@@ -58,8 +58,10 @@ class Job:
         ``protocol.h``). Raises :class:`~miurafab.errors.GcodeError`, naming file and line, for a
         realtime character, a character outside printable ASCII, or a line that is too long.
         """
+        begun = False
         for number, line in enumerate(self.iter_lines(), 1):
-            code = bare_code(self.name, number, line)
+            code = bare_code(self.name, number, line, begun=begun)
+            begun = begun or bool(code)
             if len(code) > line_chars:
                 raise GcodeError(
                     f"{self.name}, line {number}: {len(code)} characters without comments and "
@@ -69,11 +71,11 @@ class Job:
                 yield SendLine(number, code.encode("ascii"))
 
 
-def bare_code(name: str, number: int, line: str) -> str:
+def bare_code(name: str, number: int, line: str, *, begun: bool = True) -> str:
     """``line`` without comments and blanks; raises ``GcodeError`` for a forbidden character.
 
-    ``%`` alone marks the first and the last line of a program, ``O1000`` alone numbers it
-    (ISO 6983-1). They are no code, and GRBL would refuse them.
+    ``%`` alone marks the first and the last line of a program, ``O1000`` alone numbers it, before
+    any code has ``begun`` (ISO 6983-1). They are no code, and GRBL would refuse them.
     """
     code = line.rstrip("\r\n")
     if "(" in code or ";" in code:
@@ -82,7 +84,8 @@ def bare_code(name: str, number: int, line: str) -> str:
     bad = _FORBIDDEN.search(code)
     if bad is not None:
         raise GcodeError(f"{name}, line {number}: {_why_forbidden(bad[0])}.")
-    return "" if _FRAME.fullmatch(code) else code
+    frame = code == "%" or (not begun and _PROGRAM_NUMBER.fullmatch(code))
+    return "" if frame else code
 
 
 def _why_forbidden(character: str) -> str:

@@ -29,6 +29,7 @@ def read_program(job: Job, machine: MachineProfile) -> Program:
         laser=has_laser_mode(machine),
         arc_tolerance_mm=machine.settings.get(_ARC_TOLERANCE, _STOCK_ARC_TOLERANCE),
         inline=machine.dialect == "marlin",
+        dialect=machine.dialect,
     )
     if machine.tool.kind == "laser":
         return program

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.errors import GcodeError
+from miurafab.gcode.dialect_words import adapt
 from miurafab.gcode.execution import execute
 from miurafab.gcode.job import Job, bare_code
 from miurafab.gcode.marlin import grbl_words
@@ -95,16 +96,16 @@ class RigidMotion:
         return np.asarray(points @ matrix + [self.dx, self.dy])
 
 
-def moved(job: Job, program: Program, motion: RigidMotion, *, inline: bool = False) -> Job:
+def moved(job: Job, program: Program, motion: RigidMotion, dialect: str = "grbl-1.1") -> Job:
     """``job``, whose moves are ``program``, after ``motion``: line by line, under its own name.
 
-    ``inline`` is said of a job for Marlin. Raises :class:`~miurafab.errors.GcodeError`, naming the
+    ``dialect`` is that of its machine. Raises :class:`~miurafab.errors.GcodeError`, naming the
     line, for what cannot be moved.
     """
     burnt = program.line[program.beam_on]
     if not len(burnt):
         return job
-    writer = _Writer(job.name, motion, int(burnt[0]), int(burnt[-1]), inline)
+    writer = _Writer(job.name, motion, int(burnt[0]), int(burnt[-1]), dialect)
     return Job(job.name, "".join(writer.lines(job.text)))
 
 
@@ -114,13 +115,14 @@ class _Writer:
     """
 
     def __init__(
-        self, name: str, motion: RigidMotion, first_burnt: int, last_burnt: int, inline: bool
+        self, name: str, motion: RigidMotion, first_burnt: int, last_burnt: int, dialect: str
     ) -> None:
         self._name = name
         self._motion = motion
         self._first_burnt = first_burnt
         self._last_burnt = last_burnt
-        self._inline = inline
+        self._dialect = dialect
+        self._begun = False
         self._state = ModalState()
         self._rules = ReaderRules()
         self._at = [0.0, 0.0]
@@ -131,11 +133,13 @@ class _Writer:
             yield match[0] if number > self._last_burnt else self._line(number, match[0])
 
     def _line(self, number: int, line: str) -> str:
-        code = bare_code(self._name, number, line).upper().replace("/", "")
+        code = bare_code(self._name, number, line, begun=self._begun).upper().replace("/", "")
         if not code:
             return line
+        self._begun = True
         start = list(self._state.position)
-        plain = grbl_words(code) if self._inline else code
+        inline = self._dialect == "marlin"
+        plain = grbl_words(code) if inline else adapt(code, self._dialect).code
         block = parse_block(plain, self._state, lambda index: (0.0, 0.0, 0.0), self._rules)
         self._require_movable(block, number, code)
         for _ in execute(block, self._state, self._rules):

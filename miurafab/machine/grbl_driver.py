@@ -18,7 +18,7 @@ from miurafab.gcode.program import BEAM_M3, PAUSE
 from miurafab.grbl.events import Error, Ok, StatusReport
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.greeting import ANSWER_S
-from miurafab.machine.judge_job import leaves_air_on
+from miurafab.machine.judge_words import leaves_air_on
 from miurafab.machine.keys import HOLD, RESUME, NoKeys
 from miurafab.machine.preflight import (
     check_build,

@@ -22,7 +22,8 @@ from miurafab.errors import ControllerError, MiurafabError, PortError
 from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
 from miurafab.machine.greeting import ANSWER_S
-from miurafab.machine.judge_job import leaves_air_on, longest_line
+from miurafab.machine.judge_job import longest_line
+from miurafab.machine.judge_words import leaves_air_on
 from miurafab.machine.session import HOMING_S
 from miurafab.machine.stream_driver import JobContext, StreamDriver
 from miurafab.machine.transcript import Transcript

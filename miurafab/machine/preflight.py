@@ -18,7 +18,7 @@ from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
 from miurafab.grbl.events import StatusReport
 from miurafab.grbl.settings import Settings, profile_settings
-from miurafab.machine.judge_job import in_line, line_of_mist
+from miurafab.machine.judge_words import in_line, line_of_mist
 from miurafab.machine.room import first_outside
 from miurafab.profiles import MachineProfile
 

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import GcodeError, InputError, OptionError
 from miurafab.findings import Finding
+from miurafab.gcode.dialect_words import adapt
 from miurafab.gcode.execution import Jog, OffsetsChanged, Probe, Store, execute
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job, bare_code
@@ -95,7 +96,7 @@ def resume(job: Job, machine: MachineProfile, runs: Sequence[JournalRun]) -> Res
     of another text, or was done; and for a job that cannot be taken up in its middle.
     """
     _require_resumable(job, machine, runs[-1])
-    program = parse_program(job)
+    program = parse_program(job, dialect=machine.dialect)
     burnt = strokes(program)
     certain, possible = _reach(program, machine, runs)
     first = program.line[burnt.first_move]
@@ -108,7 +109,7 @@ def resume(job: Job, machine: MachineProfile, runs: Sequence[JournalRun]) -> Res
     # Where one operation follows another without a travel, the beam is on at the boundary.
     while program.beam_on[burnt.first_move[stroke] - 1] and stroke > _left_out(runs, last):
         stroke -= 1
-    rest, line = _rest(job, _line_of(program, burnt, stroke))
+    rest, line = _rest(job, _line_of(program, burnt, stroke), machine.dialect)
     if line == 1:
         stroke = 0
     new_stroke = int(np.searchsorted(first, possible, side="right"))
@@ -134,7 +135,7 @@ def from_stroke(job: Job, machine: MachineProfile, number: int) -> Resumption | 
     if number == 1:
         return None
     begins = _line_of(program, burnt, number - 1)
-    rest, line = _rest(job, begins)
+    rest, line = _rest(job, begins, machine.dialect)
     if line == 1:
         raise OptionError(
             "from_stroke",
@@ -251,11 +252,11 @@ def _begun(program: Program, machine: MachineProfile, moving: Ints, held: int, a
     return at + int(ahead[held]) if len(ahead) > held else len(program.line_number)
 
 
-def _rest(job: Job, line: int) -> tuple[Job, int]:
+def _rest(job: Job, line: int, dialect: str) -> tuple[Job, int]:
     """``job`` from ``line`` on behind its preamble, and that line: 1 if it is too early."""
     if line == 1:
         return job, 1
-    modes = list(_modes(_state_before(job, line)))
+    modes = list(_modes(_state_before(job, line, dialect)))
     if len(modes) >= line:
         return job, 1
     blank = [""] * (line - 1 - len(modes))
@@ -264,22 +265,25 @@ def _rest(job: Job, line: int) -> tuple[Job, int]:
     ), line
 
 
-def _state_before(job: Job, line: int) -> ModalState:
+def _state_before(job: Job, line: int, dialect: str) -> ModalState:
     """The modes before ``line``; raises ``InputError`` if no preamble can restore them."""
     state, rules = ModalState(), ReaderRules()
+    begun = False
     for number, text in zip(range(1, line), job.iter_lines(), strict=False):
-        code = bare_code(job.name, number, text).upper().replace("/", "")
+        code = bare_code(job.name, number, text, begun=begun).upper().replace("/", "")
         if not code:
             continue
-        block = parse_block(code, state, lambda index: (0.0, 0.0, 0.0), rules)
+        begun, adapted = True, adapt(code, dialect)
+        block = parse_block(adapted.code, state, lambda index: (0.0, 0.0, 0.0), rules)
         lost = block.action in (GO_G28, GO_G30) or block.offset or block.inverse_time
+        lost = lost or adapted.switches
         for action in execute(block, state, rules):
             lost = lost or isinstance(action, Store | OffsetsChanged | Probe | Jog)
         if lost:
             raise GcodeError(
-                f"{job.name}, line {number} ({code}) counts positions anew, measures, or uses "
-                "inverse time, so the job cannot be taken up in its middle; cut it from the "
-                "beginning on fresh material."
+                f"{job.name}, line {number} ({code}) counts positions anew, measures, switches an "
+                "output, or uses inverse time, so the job cannot be taken up in its middle; cut it "
+                "from the beginning on fresh material."
             )
     return state
 

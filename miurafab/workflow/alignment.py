@@ -92,7 +92,7 @@ def align(prepared: Prepared, sheets: Sequence[int] | None, marks: Sequence[Mark
 
 
 def _moved(job: Job, machine: MachineProfile, motion: RigidMotion) -> Job:
-    return moved(job, read_program(job, machine), motion, inline=machine.dialect == "marlin")
+    return moved(job, read_program(job, machine), motion, machine.dialect)
 
 
 def _motion(name: str, program: Program, marks: Sequence[Mark]) -> tuple[RigidMotion, Finding]:

@@ -29,6 +29,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from miurafab.gcode.dialect_words import FLUIDNC, GRBLHAL
+
 _1_1_BYTES = {
     0x18: "reset",
     ord("?"): "status",
@@ -57,6 +59,7 @@ class Dialect:
 
     banner: str
     build_info: tuple[str, ...]
+    name: str = "grbl-1.1"
     message: str = "[MSG:{}]\r\n"
     modes: str = "[GC:{}]\r\n"
     error: str = "error:{}\r\n"
@@ -180,6 +183,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             sleeps=False,
         ),
         "grblhal": Dialect(
+            name=GRBLHAL,
             banner="GrblHAL 1.1f ['$' or '$HELP' for help]",
             build_info=(
                 "[VER:1.1f.20240417:{}]",
@@ -199,6 +203,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
             deaf_writes=False,
         ),
         "fluidnc": Dialect(
+            name=FLUIDNC,
             banner="Grbl 3.7 [FluidNC v3.7.8 (noradio) '$' for help]",
             build_info=("[VER:3.7 FluidNC v3.7.8:{}]", "[OPT:PHSW]"),
             settings=MappingProxyType({10: ""}),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from miurafab.gcode.block_errors import BlockError
+from miurafab.gcode.dialect_words import adapt
 from miurafab.gcode.execution import (
     Action,
     CoolantSync,
@@ -51,11 +52,14 @@ def run_gcode(machine: Machine, line: str, *, jog: bool = False) -> Routine:
     yield float(cpu.LINE_FIXED + cpu.words_cost(letters, len(line), line.count(".")))
     settings = machine.settings
     machine.answer = 0
+    adapted = adapt(line, machine.dialect.name)
     try:
-        block = parse_block(line, machine.parser, settings.position, settings, jog=jog)
+        block = parse_block(adapted.code, machine.parser, settings.position, settings, jog=jog)
     except BlockError as fault:
         machine.answer = fault.code
         return
+    if adapted.waits:
+        yield from synchronize(machine)
     chord = float(cpu.ARC_CHORD) if block.radius else 0.0
     if chord:
         yield float(cpu.ARC_SETUP)
