@@ -49,9 +49,10 @@ def turn(angle: float, dx: float, dy: float) -> RigidMotion:
     return RigidMotion(math.cos(angle), math.sin(angle), dx, dy)
 
 
-def after(text: str, motion: RigidMotion, **how: bool) -> str:
+def after(text: str, motion: RigidMotion, dialect: str = "grbl-1.1") -> str:
     job = Job("a.nc", text)
-    return moved(job, parse_program(job, **how), motion, **how).text
+    program = parse_program(job, inline=dialect == "marlin", dialect=dialect)
+    return moved(job, program, motion, dialect).text
 
 
 @pytest.mark.parametrize("text", [SQUARE, ARCS, SQUARE.replace("\n", "\r\n")])
@@ -101,7 +102,7 @@ def test_relative_steps_do_not_add_up_their_rounding():
 
 def test_marlin_says_its_words_again():
     text = "G21\nM4 I S0\nG0 X10 Y10 S0 F3000\nG1 X20 S100 F1000\nM5 I\nG0 X0 Y0 S0\n"
-    assert after(text, quarter(), inline=True).splitlines()[2:4] == [
+    assert after(text, quarter(), dialect="marlin").splitlines()[2:4] == [
         "G0 X-10 Y10 S0 F3000",
         "G1 X-10 Y20 S100 F1000",
     ]
@@ -129,3 +130,12 @@ def test_a_stroke_from_where_the_head_stands_is_refused():
     with pytest.raises(GcodeError, match="write a G0 to its beginning"):
         after("G90 G21\nM4 S9\nG1 X10 F900\n", quarter(1, 1))
     assert after("M4 S9\nG1 X10 F900\n", turn(0, 0, 0)) == "M4 S9\nG1 X10 F900\n"
+
+
+def test_the_frame_of_a_file_and_the_words_of_a_dialect_stay_as_they_are() -> None:
+    text = "%\nO1001\nG21\nM62 P1\nG0 X10 Y10\nG1 X20 S100 F1000\n"
+    assert after(text, quarter(), "grblhal").splitlines() == [
+        *text.splitlines()[:4],
+        "G0 X-10 Y10",
+        "G1 X-10 Y20 S100 F1000",
+    ]

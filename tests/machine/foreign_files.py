@@ -24,6 +24,7 @@ class Burnt:
     box: tuple[float, float, float, float] = BOX
     machine: str = GRBL
     findings: frozenset[str] = frozenset()
+    timed: bool = True
     standing: bool = False  # M3 keeps the beam on where the motion stops
 
 
@@ -154,6 +155,7 @@ FILES: dict[str, Burnt | Refused] = {
         ).encode(),
         44,
         standing=True,  # while Z goes down
+        timed=False,  # the profile knows no Z
     ),
     "fusion profile": Burnt(fusion(SQUARE).encode(), findings=frozenset({"relative"})),
     "fusion arcs by radius": Burnt(
@@ -201,7 +203,7 @@ FILES: dict[str, Burnt | Refused] = {
     ),
     "grblHAL, drilling level": Burnt(("G98 G80\n" + SQUARE).encode(), machine=HAL),
     "grblHAL, optional stop": Burnt(
-        (SQUARE + "M1\n").encode(), machine=HAL, findings=frozenset({"pauses"})
+        (SQUARE + "M1\n").encode(), machine=HAL, findings=frozenset({"pauses"}), timed=False
     ),
     "FluidNC, outputs in step": Burnt(
         SQUARE.replace("G1 X50 Y50", "M62 P1\nG1 X50 Y50").encode(),
