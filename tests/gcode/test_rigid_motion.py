@@ -133,7 +133,7 @@ def test_a_stroke_from_where_the_head_stands_is_refused():
 
 
 def test_the_frame_of_a_file_and_the_words_of_a_dialect_stay_as_they_are() -> None:
-    text = "%\nO1001\nG21\nM62 P1\nG0 X10 Y10\nG1 X20 S100 F1000\n"
+    text = "%\nO1001\nM4 S0\nM62 P1\nG0 X10 Y10\nG1 X20 S100 F1000\n"
     assert after(text, quarter(), "grblhal").splitlines() == [
         *text.splitlines()[:4],
         "G0 X-10 Y10",
