@@ -176,7 +176,8 @@ def talk(
     tell: Callable[[str], None],
     **line: Unpack[LineOptions],
 ) -> None:
-    """Send ``lines`` one at a time as they come, and ``tell`` the answers of the controller.
+    """Send ``lines`` one at a time as they come, and ``tell`` the modes in force at the start and the
+    answers of the controller.
 
     ``?``, ``!`` and ``~`` alone on a line are the realtime bytes, ``reset`` is a soft reset. A
     refused line is told and does not end the conversation. At the end the function waits for dark
@@ -195,6 +196,7 @@ def talk(
                 if line.strip():
                     tell(line.decode("ascii", "backslashreplace").strip())
 
+        tell(f"Modes in force: {' '.join(session.state.modes) or 'not told'}")
         session.conversation.on_data = hear
         for each in _awaited(lines, signals):
             try:

@@ -36,6 +36,8 @@ WAS_HALTED = "the controller was halted (M112) with the laser off; reset it befo
 NOT_CONFIRMED = (
     "the controller did not confirm that it halted, so switch the laser off at the machine"
 )
+SET = (b"G21", b"G90")
+"""mm and absolute moves, as after power-up: a board that was not reset keeps its last modes."""
 _LOOK_S = 0.05  # between two reads of the keys
 _SILENCES = 3  # the line is sent again after each silence but the last
 _KILL_S = 0.8  # from M112 to its answer
@@ -93,6 +95,8 @@ class MarlinDriver(StreamDriver):
             self.at_risk = True
             wire.send(SendLine(0, b"G28XY"), patience=HOMING_S)
             self.at_risk = False
+        for code in SET:
+            wire.send(SendLine(0, code))
         if plan.at is not None:
             wire.send(SendLine(0, b"G92X%.3fY%.3f" % plan.at))
         parser = any("EMERGENCY_PARSER:1" in reply.text for reply in said)

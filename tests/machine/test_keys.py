@@ -263,7 +263,8 @@ def test_more_than_the_material_takes_is_refused() -> None:
 def test_the_console_tells_what_is_answered_and_goes_on_after_a_refusal() -> None:
     said: list[str] = []
     talk("virtual", ["?\n", "G1 X5\n", "G0 X3 (there)\n", "oh!\n", "M3 S10\n"], said.append)
-    assert said[0].startswith("<Idle|")
+    assert said[0] == "Modes in force: G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0"
+    assert said[1].startswith("<Idle|")
     assert "error:22" in said
     assert any("refused 'G1X5'" in line for line in said)
     assert any("feed hold" in line for line in said)
@@ -275,6 +276,7 @@ def test_ctrl_c_ends_a_console_that_waits_for_a_line():
     command = [sys.executable, "-m", "miurafab", "machine", "console", "--port", "virtual"]
     with Popen(command, stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True, bufsize=1) as process:
         process.stdin.write("?\n")
+        assert process.stdout.readline().startswith("Modes in force: G0 G54")
         assert process.stdout.readline().startswith("<Idle|")
         process.send_signal(signal.SIGINT)
         assert process.wait(20) == JobStopped.exit_code

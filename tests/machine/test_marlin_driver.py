@@ -259,6 +259,27 @@ def test_homing_and_a_stated_place_come_first() -> None:
     assert wire.written.index(b"G28XY*") < wire.written.index(b"G92X5.000Y6.000*")
 
 
+@pytest.mark.parametrize("at", [None, (10.0, 10.0)])
+def test_a_board_that_kept_inches_and_relative_moves_is_put_into_mm(
+    at: tuple[float, float] | None,
+) -> None:
+    """The modes are on the wire before a place is stated and before the job."""
+    device = new_device()
+    device.receive(b"G20\nG91\n")
+    device.advance(1.0)
+    device.take_output()
+    wire = Wire(device)
+    job = Job("a.nc", "M4 I S0\nG0 X20 Y20 S0 F3000\nG1 X30 S200 F1000\nM5 I\nM5\n")
+    deliver(plan_job(job, MACHINE, SendOptions(at=at)), wire, StopSignals())
+    (burnt_one,) = device.beam_log
+    x, y = (0.0, 0.0) if at is None else at
+    assert (burnt_one.x0, burnt_one.y0) == pytest.approx((20 - x, 20 - y), abs=0.01)
+    assert burnt_one.x1 == pytest.approx(30 - x, abs=0.01)
+    sent = wire.written
+    stated = sent.index(b"G92X10.000Y10.000*") if at else sent.index(b"M4IS0*")
+    assert sent.index(b"G21*") < sent.index(b"G90*") < stated
+
+
 class Pressed:
     """Keys pressed at their times."""
 
