@@ -176,7 +176,7 @@ def talk(
     tell: Callable[[str], None],
     **line: Unpack[LineOptions],
 ) -> None:
-    """Send ``lines`` one at a time as they come, and ``tell`` the modes in force at the start and the
+    """Send ``lines`` one at a time as they come; ``tell`` the modes in force at the start, and the
     answers of the controller.
 
     ``?``, ``!`` and ``~`` alone on a line are the realtime bytes, ``reset`` is a soft reset. A
