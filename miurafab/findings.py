@@ -68,6 +68,19 @@ RULES = {
         "refusal", "an interior vertex whose angles do not add up to 360 degrees"
     ),
     "isometry": Rule("refusal", "a facet whose edges differ between flat and folded form"),
+    "double-edge": Rule("refusal", "an edge that is there twice"),
+    "assignment": Rule("refusal", "a letter that contradicts the facets or the fold of its edge"),
+    "fold-angle": Rule("refusal", "a fold angle that is not that of the folded form"),
+    "facets": Rule("refusal", "a facet that is missing, or is not in its place in the grid"),
+    "turned-over": Rule("refusal", "a facet that lies turned over in the flat pattern"),
+    "scale": Rule("refusal", "a folded form that lies on the target in another size than given"),
+    "closure": Rule("refusal", "a vertex that the given fold angles do not close"),
+    "flat-folding": Rule(
+        "refusal", "a vertex that cannot fold flat, where all folds are 180 degrees"
+    ),
+    "not-flat-foldable": Rule(
+        "note", "a vertex that cannot fold flat, where nothing asks for that"
+    ),
     "self-intersection": Rule("refusal", "facets that meet in the folded form"),
     "bow-tie": Rule("refusal", "a facet whose own sides cross"),
     "dented": Rule("warning", "a quad facet that is not convex"),

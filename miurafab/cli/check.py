@@ -35,8 +35,10 @@ def check(
     report = result.report()
 
     def show() -> None:
-        hidden = {"findings", "advice", "iterations"}
+        hidden = {"findings", "advice", "iterations", "proved"}
         console.facts({key: value for key, value in report.items() if key not in hidden})
+        for sentence in result.proved:
+            console.line(f"Proved: {sentence}")
         console.findings(result.findings)
 
     console.answer(report, show)

@@ -64,6 +64,8 @@ class CreasePattern(Shown):
         The folded form lies on ``scale`` times the target, relative to :attr:`origin`.
     target : dict
         The surface and its parameters (:mod:`miurafab.surfaces.description`).
+    angles_assumed : bool
+        Whether the fold angles are not known, and taken as 180 degrees.
 
     Raises
     ------
@@ -83,6 +85,7 @@ class CreasePattern(Shown):
     cells: Ints | None = None
     scale: float = 1.0
     target: dict[str, Any] = field(default_factory=dict)
+    angles_assumed: bool = False
 
     def __post_init__(self) -> None:
         vertices, edges = len(self.vertices_coords), len(self.edges_vertices)
@@ -95,6 +98,9 @@ class CreasePattern(Shown):
                 raise PatternError("The folded form holds a coordinate that is not finite.")
         if len(self.edges_assignment) != edges or len(self.edges_fold_angle) != edges:
             raise PatternError("The pattern does not have one assignment and angle for each edge.")
+        if not np.isfinite(self.edges_fold_angle).all():
+            edge = int(np.argmin(np.isfinite(self.edges_fold_angle)))
+            raise PatternError(f"The fold angle of edge {edge} is not a finite number.")
         for name, indices in (
             ("edges_vertices", self.edges_vertices),
             ("faces_vertices", self.faces_vertices),
@@ -275,14 +281,21 @@ class CreasePattern(Shown):
         found = order[place]
         real = tail >= 0
         if np.any(real & (edge_keys[found] != key)):
-            raise PatternError("A facet has a side that is not among edges_vertices.")
+            lone = int(np.argmax((real & (edge_keys[found] != key)).any(axis=1)))
+            raise PatternError(f"A side of facet {lone} is not among edges_vertices.")
         faces_edges = np.where(real, found, -1)
         edges_faces = np.full((len(self.edges_vertices), 2), -1, dtype=np.int64)
         face, corner = np.nonzero(real)
         edge = faces_edges[face, corner]
         right = (self.edges_vertices[edge, 0] != tail[face, corner]).astype(np.int64)
-        if len(np.unique(edge * 2 + right)) != len(edge):
-            raise PatternError("Two facets lie on the same side of one edge.")
+        _, first, which = np.unique(edge * 2 + right, return_index=True, return_inverse=True)
+        if len(first) != len(edge):
+            order = first[which.reshape(-1)]
+            again = int(np.argmax(order != np.arange(len(edge))))
+            raise PatternError(
+                f"Facets {face[order[again]]} and {face[again]} lie on the same side of "
+                f"edge {edge[again]}."
+            )
         edges_faces[edge, right] = face
         return faces_edges, edges_faces
 

@@ -46,6 +46,12 @@ class Residuals:
     isometry: Floats
     exact: float
 
+    @property
+    def worst(self) -> float:
+        """The largest residual of planarity, developability and isometry."""
+        found = (self.planarity, self.developability, self.isometry)
+        return max(float(each.max(initial=0.0)) for each in found)
+
 
 def residuals(pattern: CreasePattern) -> Residuals:
     """All residuals of the folded ``pattern``."""

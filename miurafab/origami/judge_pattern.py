@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,17 +17,31 @@ from miurafab.geometry.arrays import Ints
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami import invariants
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.flat_folding import judge_flat_folding
 from miurafab.origami.folding.contact import overlaps, self_intersections
 from miurafab.origami.invariants import DEGENERATE, EXACT, Residuals
+from miurafab.origami.judge_creases import (
+    MeasuredFolds,
+    judge_creases,
+    measured_folds,
+    unmeasured,
+)
+from miurafab.origami.nearness import scale_misfit
 
 if TYPE_CHECKING:
     from miurafab.origami.verify import Measurements
+    from miurafab.surfaces.surface import TargetSurface
 
 STEEP_FOLD = math.radians(165)
 """A crease beyond this angle nearly lies on its neighbour."""
 
 MUCH_PAPER = 4.0
 """From this area ratio on, the paper lies in more than four layers on average."""
+
+WRONG_SCALE, BETTER_SHARE, ON_TARGET = 0.01, 0.3, 0.005
+"""A scale is wrong if one that differs by 1 % takes away 30 % of the mean square distance and the
+sheet then lies within 0.5 % of its diagonal. On the named surfaces the best scale is within 0.8 %
+of the given one, or the sheet lies farther away."""
 
 LITTLE_COVERED, MUCH_OVERHANG = 0.95, 0.01
 
@@ -41,14 +55,17 @@ class Evidence:
     overlaps: Ints
     crossings: Ints
     residuals: Residuals | None
+    folds: MeasuredFolds | None
 
 
 def gather(pattern: CreasePattern) -> Evidence:
     """Everything that :func:`judge` needs of ``pattern``."""
     if pattern.folded_coords is None:
-        return Evidence(overlaps(pattern), np.empty((0, 2), dtype=np.int64), None)
+        return Evidence(overlaps(pattern), np.empty((0, 2), dtype=np.int64), None, None)
     found = invariants.residuals(pattern)
-    return Evidence(overlaps(pattern), self_intersections(pattern), found)
+    return Evidence(
+        overlaps(pattern), self_intersections(pattern), found, measured_folds(pattern, found)
+    )
 
 
 def judge_quality(measured: Measurements) -> Iterator[Finding]:
@@ -80,6 +97,19 @@ def judge_quality(measured: Measurements) -> Iterator[Finding]:
         )
 
 
+def judge_scale(pattern: CreasePattern, surface: TargetSurface) -> Iterator[Finding]:
+    """Whether the folded form lies on the target of the size that the pattern gives."""
+    found = scale_misfit(pattern, surface)
+    if found is None or abs(found.better) <= WRONG_SCALE:
+        return
+    if found.share >= BETTER_SHARE and found.left <= ON_TARGET:
+        yield Finding(
+            "scale",
+            f"The folded form lies on {pattern.scale * (1 + found.better):.6g} times the target, "
+            f"and its scale is given as {pattern.scale:.6g}: scale or target have changed.",
+        )
+
+
 def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
     """The faults of ``pattern``."""
     edges = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
@@ -93,6 +123,16 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
             tuple(short.tolist()),
         )
     yield from _shapes(pattern)
+    yield from judge_creases(pattern, evidence.folds)
+    if evidence.folds is None:
+        yield from judge_flat_folding(pattern)
+        says = (
+            "Without a folded form it is not known whether the facets stay flat and keep clear of "
+            "each other."
+        )
+        yield Finding("not-proven", says)
+    else:
+        yield from unmeasured(evidence.folds, pattern)
     if len(evidence.overlaps):
         yield _overlap(pattern, evidence.overlaps)
     found = evidence.residuals
@@ -116,6 +156,42 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
             f"form, the first being facets {pairs[0][0]} and {pairs[0][1]}.",
             tuple(np.unique(pairs).tolist()),
         )
+
+
+def proved(
+    pattern: CreasePattern, evidence: Evidence, findings: Iterable[Finding]
+) -> tuple[str, ...]:
+    """What the audit with these ``findings`` has proved of ``pattern``, in sentences."""
+    broken = {finding.code for finding in findings}
+    facets, edges = len(pattern.faces_vertices), len(pattern.edges_vertices)
+    lattice = pattern.grid is not None or pattern.cells is not None
+    claims = [
+        (
+            {"double-edge", "facets", "turned-over", "bow-tie", "degenerate-edge"},
+            f"The {facets} facets fit the {edges} edges"
+            + (" and the lattice." if lattice else "."),
+        ),
+        ({"assignment"}, f"The letters of {edges} edges agree with their facets and fold angles."),
+        ({"overlap"}, "No facets overlap in the flat pattern."),
+    ]
+    folds = evidence.folds
+    if folds is not None:
+        sized, signed = int(folds.known.sum()), int(folds.signed.sum())
+        claims += [
+            (
+                {"fold-angle", "assignment"},
+                f"{sized} fold angles, {signed} of them with their sign, are those of the folded "
+                "form.",
+            ),
+            (
+                {"planarity", "isometry", "developability"},
+                f"The {facets} facets are flat, and the same in both forms.",
+            ),
+            ({"self-intersection"}, "No facets meet in the folded form."),
+        ]
+    if pattern.seams is not None:
+        claims.append(({"seam"}, f"The two edges of each of {len(pattern.seams)} seams fit."))
+    return tuple(sentence for codes, sentence in claims if not codes & broken)
 
 
 def _shapes(pattern: CreasePattern) -> Iterator[Finding]:

@@ -23,6 +23,7 @@ from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import edge_lengths, facet_areas, facet_means, next_corners
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.trim_cuts import EdgeCuts, bend, edge_cuts, meeting_vertices
+from miurafab.origami.unfold import with_angles_of_the_folded_form
 from miurafab.surfaces.outline import WholeMesh
 
 SLIVER = 0.12
@@ -253,7 +254,8 @@ class _Sides:
         second[first] = False
         facets[edge[first], 0] = facet[first]
         facets[edge[second], 1] = facet[second]
-        parent = parents[real][first]
+        parent = np.full(len(ends), -1, dtype=np.int64)
+        np.maximum.at(parent, edge, parents[real])
         border = np.flatnonzero((facets[:, 1] < 0) & (parent >= 0))
         points, point = np.unique(
             np.sort(meeting[ends[border]], axis=1), axis=0, return_inverse=True
@@ -319,16 +321,28 @@ def _pattern(
     inner = sides.facets[:, 1] >= 0
     pieces = sides.pieces()
     corner = flat[used[1:]]
-    return replace(
+    kept = inner & (sides.parent >= 0)
+    letters = np.where(kept, pattern.edges_assignment[sides.parent], np.where(inner, "U", "B"))
+    trimmed = replace(
         pattern,
         vertices_coords=corner - corner.min(axis=0),
         edges_vertices=place[sides.ends],
-        edges_assignment=np.where(inner, pattern.edges_assignment[sides.parent], "B"),
-        edges_fold_angle=np.where(inner, pattern.edges_fold_angle[sides.parent], 0.0),
+        edges_assignment=letters,
+        edges_fold_angle=np.where(kept, pattern.edges_fold_angle[sides.parent], 0.0),
         faces_vertices=numbers[:, :width],
         folded_coords=folded[used[1:]],
         grid=None,
         pieces=pieces if pieces.any() else None,
         seams=sides.seams if len(sides.seams) else None,
         cells=None if pattern.cells is None else pattern.cells[owners],
+    )
+    new = inner & ~kept
+    if not new.any():
+        return trimmed
+    # The outline runs along a crease and back: the crease stays, in parts that had no letter.
+    measured = with_angles_of_the_folded_form(trimmed)
+    return replace(
+        trimmed,
+        edges_assignment=np.where(new, measured.edges_assignment, letters),
+        edges_fold_angle=np.where(new, measured.edges_fold_angle, trimmed.edges_fold_angle),
     )

@@ -21,7 +21,14 @@ from miurafab.origami import invariants
 from miurafab.origami.coverage import coverage
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
-from miurafab.origami.judge_pattern import Evidence, gather, judge, judge_quality
+from miurafab.origami.judge_pattern import (
+    Evidence,
+    gather,
+    judge,
+    judge_quality,
+    judge_scale,
+    proved,
+)
 from miurafab.origami.nearness import nearness
 from miurafab.origami.quality import Quality, quality
 from miurafab.surfaces.surface import TargetSurface
@@ -113,11 +120,14 @@ class Audit(Shown):
         the distances are left out.
     seconds : float
         The time that the audit took.
+    proved : tuple of str
+        What was proved, in sentences; a finding ``not-proven`` says what was not.
     """
 
     measurements: Measurements
     findings: tuple[Finding, ...]
     seconds: float
+    proved: tuple[str, ...] = ()
 
     @property
     def valid(self) -> bool:
@@ -140,6 +150,7 @@ class Audit(Shown):
             **Measurements.report(self.measurements),
             "iterations": None,
             "seconds": self.seconds,
+            "proved": list(self.proved),
             "findings": findings_json(self.findings),
         }
 
@@ -152,8 +163,10 @@ def audit(pattern: CreasePattern, surface: TargetSurface | None = None) -> Audit
     started = time.perf_counter()
     evidence = gather(pattern)
     measured = _measured(pattern, surface, evidence)
-    findings = (*judge(pattern, evidence), *judge_quality(measured))
-    return Audit(measured, findings, time.perf_counter() - started)
+    of_scale = () if surface is None or evidence.folds is None else judge_scale(pattern, surface)
+    findings = (*judge(pattern, evidence), *judge_quality(measured), *of_scale)
+    seconds = time.perf_counter() - started
+    return Audit(measured, findings, seconds, proved(pattern, evidence, findings))
 
 
 def measure(pattern: CreasePattern, surface: TargetSurface | None = None) -> Measurements:

@@ -17,6 +17,7 @@ from miurafab.findings import Finding, findings_json
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.formats.files import SOLIDS, WITHOUT_ANGLES, WRITTEN, load, write_pattern
+from miurafab.workflow.patterns import require_consistent
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,6 +107,7 @@ def convert(
     source = as_path(source, "The pattern file")
     target = new_file(target, "The file to write", WRITTEN)
     pattern = load(source, folded=folded, tolerance=tolerance)
+    require_consistent(pattern, str(source))
     findings = [] if source.suffix.lower() == ".fold" else _assumed(source, pattern)
     write_pattern(pattern, target, title=source.stem, form=form)
     ending = target.suffix.lower()

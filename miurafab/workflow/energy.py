@@ -15,7 +15,7 @@ from miurafab.origami.energy.curve import EnergyCurve, energy_curve
 from miurafab.origami.energy.path import Progress
 from miurafab.origami.energy.pieces import PieceEnergies, energies_of_pieces
 from miurafab.profiles import Material, load_material
-from miurafab.workflow.patterns import PatternLike, as_pattern
+from miurafab.workflow.patterns import PatternLike, consistent_pattern
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def energy(
     True
     """
     asked = read_options(EnergyOptions, options | {"steps": steps})
-    found = as_pattern(pattern)
+    found = consistent_pattern(pattern)
     paper = None
     if material is not None:
         stock = material if isinstance(material, Material) else load_material(material)

@@ -36,7 +36,7 @@ from miurafab.origami.formats.fold import write_fold
 from miurafab.origami.formats.mesh import glb_bytes
 from miurafab.workflow.fold_gif import target_frame, write_gif
 from miurafab.workflow.page import Slider, write_page
-from miurafab.workflow.patterns import PatternLike, as_pattern
+from miurafab.workflow.patterns import PatternLike, consistent_pattern
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -223,7 +223,7 @@ def fold(
     <Folding rigid, 11 frames of 16 facets, no contacts>
     """
     steps = read_options(FoldOptions, {"steps": steps}).steps
-    pattern = as_pattern(pattern)
+    pattern = consistent_pattern(pattern)
     motion = rigid_motion(pattern, states_between(pattern, steps))
     assert motion.mismatch is not None
     mismatch = float(motion.mismatch.max())
@@ -300,7 +300,7 @@ def thick_panels(
     0.5
     """
     panel_mm = read_value("thickness", declared(FoldOptions)["thickness"].kind, thickness)
-    return make_panels(as_pattern(pattern), panel_mm, on_progress)
+    return make_panels(consistent_pattern(pattern), panel_mm, on_progress)
 
 
 def thickness_report(panels: ThickPanels) -> dict[str, Any]:

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import os
 import reprlib
+from collections.abc import Sequence
 from dataclasses import replace
 
 from miurafab.errors import InputError, PatternError
 from miurafab.files import AnyPath
+from miurafab.findings import Finding, refusals
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.formats.files import load
+from miurafab.origami.judge_pattern import gather, judge
 from miurafab.origami.verify import Audit, audit
 from miurafab.surfaces.description import described_surface
+
+ROUNDED = 1e-4
+"""Flat and folded form in a file of five digits differ by as much, as a part of an edge."""
+
+_SHAPES = frozenset({"degenerate-edge", "bow-tie", "overlap", "self-intersection"})
+_RESIDUALS = frozenset({"planarity", "developability", "isometry"})
 
 PatternLike = CreasePattern | FitResult | AnyPath
 
@@ -36,6 +45,54 @@ def as_pattern(pattern: object) -> CreasePattern:
         f"{reprlib.repr(pattern)} is no pattern; give a pattern, the result of a fit, or the path "
         "of a pattern file."
     )
+
+
+def sound_pattern(pattern: object) -> CreasePattern:
+    """The pattern that ``pattern`` is or names, if it can be made: what is cut goes through here.
+
+    The invariants decide, and not how its fit ended: a sheet that only missed a limit of the fit is
+    exact and can be made.
+
+    Raises what :func:`as_pattern` raises, and :class:`~miurafab.errors.PatternError` for a pattern
+    that :func:`check` would refuse.
+    """
+    found = as_pattern(pattern)
+    _refuse(refusals(judge(found, gather(found))), _called(pattern))
+    return found
+
+
+def consistent_pattern(pattern: object) -> CreasePattern:
+    """The pattern that ``pattern`` is or names, if it does not contradict itself: what is told of a
+    pattern goes through here.
+
+    A shape that cannot be made can be shown, and forms that differ by the rounding of a file are
+    one. Raises what :func:`sound_pattern` raises.
+    """
+    found = as_pattern(pattern)
+    require_consistent(found, _called(pattern))
+    return found
+
+
+def require_consistent(pattern: CreasePattern, name: str) -> None:
+    """Raise :class:`~miurafab.errors.PatternError` if ``pattern`` contradicts itself."""
+    evidence = gather(pattern)
+    shown = set(_SHAPES)
+    if evidence.residuals is not None and evidence.residuals.worst <= ROUNDED:
+        shown |= _RESIDUALS
+    _refuse([each for each in refusals(judge(pattern, evidence)) if each.code not in shown], name)
+
+
+def _called(pattern: object) -> str:
+    return os.fspath(pattern) if isinstance(pattern, str | os.PathLike) else "The pattern"
+
+
+def _refuse(faults: Sequence[Finding], name: str) -> None:
+    if faults:
+        more = f" Of {len(faults)} faults this is the first." if len(faults) > 1 else ""
+        raise PatternError(
+            f"{name} does not hold, and nothing is made of it: {faults[0].sentence}{more} "
+            "'miurafab check' names all."
+        )
 
 
 @verb
@@ -66,4 +123,6 @@ def check(pattern: PatternLike) -> Audit:
     found = as_pattern(pattern)
     surface, missing = described_surface(found.target)
     checked = audit(found, surface)
+    if not found.target:
+        missing = (Finding("no-target", "The pattern names no target, so distances are left out."),)
     return replace(checked, findings=missing + checked.findings)

@@ -40,7 +40,7 @@ from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run
 from miurafab.workflow.job_directory import GUIDE, JobDirectory
 from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
 from miurafab.workflow.manifest import sha256, write_manifest
-from miurafab.workflow.patterns import PatternLike, as_pattern
+from miurafab.workflow.patterns import PatternLike, sound_pattern
 from miurafab.workflow.picture import first_sheet
 
 if TYPE_CHECKING:
@@ -255,7 +255,7 @@ def sheets(
     wanted, usual_machine, usual_material = layout_options(options, design)
     machine = machine if machine is not None else usual_machine
     material = material if material is not None else usual_material
-    given = as_pattern(pattern)
+    given = sound_pattern(pattern)
     file = None if isinstance(pattern, CreasePattern | Shown) else as_path(pattern, "The pattern")
     name = file.stem if file is not None else given.name or "sheet"
     return make_job(given, name, machine, material, wanted, file=file, on_progress=on_progress)

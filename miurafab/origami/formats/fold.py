@@ -8,7 +8,8 @@ frame, facets may run clockwise or be missing, and fold angles may have to come 
 A pattern of several pieces has the keys ``miurafab:pieces`` (the piece of each facet) and
 ``miurafab:seams`` (pairs of border edges that meet in the folded form). Without the first, the
 parts of the pattern that do not touch are its pieces. ``miurafab:cells`` has the column and row of
-each facet where they do not fill the grid of ``miurafab:grid``.
+each facet where they do not fill the grid of ``miurafab:grid``. ``miurafab:angles`` is
+``assumed`` where no fold angle is known and each fold is given as 180 degrees.
 
 Numbers have as many digits as are needed to read them back bit for bit. The same pattern gives the
 same bytes.
@@ -32,13 +33,10 @@ from miurafab.files import read_text, write_text
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import (
     connected_parts,
-    filled,
-    reversed_faces,
-    signed_areas,
 )
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.kinematics import FoldingMotion
-from miurafab.origami.formats.planar_graph import faces_of_plane_graph
+from miurafab.origami.formats.planar_graph import enclosed_facets, oriented
 from miurafab.origami.formats.target_frame import (
     exact_frames,
     in_own_frame,
@@ -50,6 +48,7 @@ from miurafab.origami.unfold import with_angles_of_the_folded_form
 from miurafab.surfaces.frame import origin_in
 from miurafab.version import __version__
 
+ASSUMED = "assumed"
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "um": 1e-3}
 
 
@@ -99,6 +98,8 @@ def fold_text(pattern: CreasePattern, title: str = "", motion: FoldingMotion | N
     ):
         if numbers is not None:
             keys[f"miurafab:{name}"] = numbers.tolist()
+    if pattern.angles_assumed:
+        keys["miurafab:angles"] = ASSUMED
     if pattern.target:
         keys["miurafab:target"] = pattern.target
         keys["miurafab:scale"] = pattern.scale
@@ -183,8 +184,9 @@ def parse_fold(document: Any) -> CreasePattern:
     factor = _unit(key, 1.0)
     flat = np.ascontiguousarray(_coordinates(key, "vertices_coords")[:, :2] * factor)
     edges = _indices(key, "edges_vertices", 2)
-    faces = _face_indices(key) if "faces_vertices" in key else _walked(flat, edges)
     assignment = _assignments(key, len(edges))
+    given = "faces_vertices" in key
+    faces = _face_indices(key) if given else enclosed_facets(flat, edges, assignment)
     others = [frame for frame in frames if frame is not key]
     pattern = CreasePattern(
         vertices_coords=flat,
@@ -199,8 +201,10 @@ def parse_fold(document: Any) -> CreasePattern:
         cells=_numbers(document, "miurafab:cells", 2),
         scale=scale_in(document),
         target=target_in(document),
+        angles_assumed=document.get("miurafab:angles") == ASSUMED,
     )
-    pattern = replace(pattern, faces_vertices=_counter_clockwise(flat, faces))
+    pattern = replace(pattern, faces_vertices=oriented(flat, faces))
+    pattern.edges_faces  # noqa: B018 - facets that do not fit their edges are a fault of the file
     if pattern.folded_coords is not None and key.get("edges_foldAngle") is None:
         return with_angles_of_the_folded_form(pattern)
     return pattern
@@ -242,22 +246,6 @@ def _unit(frame: Mapping[str, Any], default: float) -> float:
     """The frame's unit in millimetres; ``default`` if it has none, or one that is no length."""
     unit = frame.get("frame_unit")
     return _UNITS_MM.get(unit, default) if isinstance(unit, str) else default
-
-
-def _counter_clockwise(flat: Floats, faces: Ints) -> Ints:
-    """``faces``, with clockwise faces reversed."""
-    clockwise = signed_areas(flat[filled(faces)]) < 0
-    return np.where(clockwise[:, None], reversed_faces(faces), faces)
-
-
-def _walked(flat: Floats, edges: Ints) -> Ints:
-    """The facets that ``edges`` enclose, for a file without facets."""
-    if edges.max() >= len(flat):
-        raise PatternError("'edges_vertices' refers to a vertex that does not exist.")
-    faces = faces_of_plane_graph(flat, edges)
-    if not len(faces):
-        raise PatternError("'faces_vertices' is missing and 'edges_vertices' encloses no facet.")
-    return faces
 
 
 def _array(document: Mapping[str, Any], key: str) -> list[Any]:

@@ -18,7 +18,13 @@ from scipy.spatial import cKDTree
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.boxes import meeting_pairs
-from miurafab.geometry.polygons import connected_parts, filled
+from miurafab.geometry.polygons import (
+    connected_parts,
+    filled,
+    next_corners,
+    reversed_faces,
+    signed_areas,
+)
 from miurafab.origami.crease_pattern import CreasePattern
 
 TOLERANCE = 1e-4
@@ -76,7 +82,7 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
     faces = faces_of_plane_graph(points, sides)
     letter = lines.assignment[source]
     pieces, piece = connected_parts(faces)
-    whole = _without_holes(faces, piece, sides, letter, len(points))
+    whole = without_holes(faces, piece, sides, letter, len(points))
     faces, piece = faces[whole], piece[whole]
     if pieces > 1:
         _refuse_loose(points, faces, piece)
@@ -97,6 +103,9 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
         edges_fold_angle=angle,
         faces_vertices=renumber[faces],
         pieces=piece if pieces > 1 else None,
+        angles_assumed=bool(
+            (np.isnan(lines.fold_angle[source]) & np.isin(letter, ("M", "V"))).any()
+        ),
     )
 
 
@@ -137,6 +146,36 @@ def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
             break
         corners.append(np.where(open_, tail[at], -1))
     return np.stack(corners, axis=1)
+
+
+def enclosed_facets(flat: Floats, edges: Ints, assignment: NDArray[np.str_]) -> Ints:
+    """The facets that ``edges`` enclose, for a file without facets; what only borders enclose in a
+    creased sheet is a hole.
+    """
+    if edges.max() >= len(flat):
+        raise PatternError("'edges_vertices' refers to a vertex that does not exist.")
+    faces = faces_of_plane_graph(flat, edges)
+    if not len(faces):
+        raise PatternError("'faces_vertices' is missing and 'edges_vertices' encloses no facet.")
+    return faces[without_holes(faces, connected_parts(faces)[1], edges, assignment, len(flat))]
+
+
+def oriented(flat: Floats, faces: Ints) -> Ints:
+    """``faces`` counter-clockwise.
+
+    The order of the corners says which side of the paper a facet shows. So where neighbours agree,
+    a part of the sheet is reversed as a whole, if most of it runs clockwise: a facet that lies
+    turned over in the flat pattern stays so, and verification finds it. A file whose neighbours do
+    not agree says nothing of sides, and each facet is made to run counter-clockwise.
+    """
+    areas = signed_areas(flat[filled(faces)])
+    tails = faces[faces >= 0]
+    heads = np.take_along_axis(faces, next_corners(faces), axis=1)[faces >= 0]
+    agree = len(np.unique(tails * len(flat) + heads)) == len(tails)
+    if agree:
+        part = connected_parts(faces)[1]
+        areas = np.bincount(part, areas).astype(np.float64)[part]
+    return np.where((areas < 0)[:, None], reversed_faces(faces), faces)
 
 
 def _split(ends: Floats, near: float) -> tuple[Floats, Ints, Ints]:
@@ -219,7 +258,7 @@ def _without_loose_ends(points: Floats, sides: Ints, source: Ints) -> tuple[Floa
     return points[used], renumber[sides], source
 
 
-def _without_holes(
+def without_holes(
     faces: Ints, piece: Ints, sides: Ints, letter: NDArray[np.str_], vertices: int
 ) -> Bools:
     """(F,) all but the facets that only border lines enclose; in a piece of only such, all."""
