@@ -3,7 +3,8 @@
 ``python -c`` and ``python -m`` search the working directory before the standard library, so that a
 ``json.py`` beside a pattern would run in place of Python's own. A child is therefore started in
 Python's isolated mode (``-I``), which searches neither it nor ``PYTHONPATH``. It is given the
-search path of this process without the working directory, and the folder of the package last.
+search path of this process without the working directory, and the folder of the package last, but
+before any other copy of the package.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ def python_command(module: str) -> list[str]:
         here = None
     search = [place for place in sys.path if place and Path(place).resolve() != here]
     if _ROOT not in search:
-        search.append(_ROOT)
+        copies = [(Path(place) / "miurafab").is_dir() for place in search]
+        search.insert(copies.index(True) if True in copies else len(search), _ROOT)
     code = f"import sys; sys.path[:] = {search!r}; from {module} import main; main()"
     return [sys.executable, "-I", "-c", code]
 

@@ -15,8 +15,9 @@ from typing import TypedDict, Unpack
 
 from miurafab.errors import ControllerError, GcodeError, JobStopped, ProfileError
 from miurafab.grbl.settings import Settings, parse_dump
+from miurafab.machine.jog_pad import require_way
 from miurafab.machine.known_controller import MachineState
-from miurafab.machine.machine_session import MachineSession, require_way
+from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import open_port
 from miurafab.profiles.machine import BAUD, WAIT_S
@@ -186,18 +187,8 @@ def talk(
     """
     signals = StopSignals()
     with conversation(port, signals=signals, **line) as session:
-        heard = bytearray()
-
-        def hear(data: bytes) -> None:
-            heard.extend(data)
-            while b"\n" in heard:
-                line, _, rest = heard.partition(b"\n")
-                heard[:] = rest
-                if line.strip():
-                    tell(line.decode("ascii", "backslashreplace").strip())
-
         tell(f"Modes in force: {' '.join(session.state.modes) or 'not told'}")
-        session.conversation.on_data = hear
+        session.lines.on_line = tell
         for each in _awaited(lines, signals):
             try:
                 session.say(each)

@@ -17,6 +17,7 @@ import math
 from collections import deque
 from collections.abc import Mapping
 
+from miurafab.errors import InputError
 from miurafab.machine.keys import JOG_CANCEL
 
 _RUN_S = 0.12
@@ -114,3 +115,11 @@ def _feed(dx: float, dy: float, settings: Mapping[int, float]) -> float:
     rate = min(settings.get(110 + n, _STOCK_RATE) for n in axes)
     v = a * (math.sqrt(_RELEASE_S**2 + 2 * math.hypot(dx, dy) / a) - _RELEASE_S)
     return max(1.0, min(60 * v, rate))
+
+
+def require_way(x: float | None, y: float | None) -> str:
+    """The words of a jog by ``x`` and ``y``; raises ``InputError`` if neither is given."""
+    words = "".join(f"{a}{v:.3f}" for a, v in (("X", x), ("Y", y)) if v is not None)
+    if not words:
+        raise InputError("A jog needs a distance along X, along Y, or both.")
+    return words

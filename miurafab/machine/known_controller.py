@@ -112,6 +112,11 @@ class KnownController:
         self.refresh()
 
     @property
+    def opened(self) -> bool:
+        """Whether it was greeted."""
+        return self._opened
+
+    @property
     def rapid_mm_min(self) -> float | None:
         """The rate that both axes reach (``$110``, ``$111``), if it was told."""
         values = self.settings.values

@@ -26,10 +26,12 @@ from miurafab.errors import (
 from miurafab.gcode.job import Job
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import StatusReport
+from miurafab.machine.console_lines import ConsoleLines
 from miurafab.machine.job_sending import OpenWire, send_job
-from miurafab.machine.jog_pad import JogPad
+from miurafab.machine.jog_pad import JogPad, require_way
 from miurafab.machine.keys import ABORT, Keys, NoKeys, session_keys
 from miurafab.machine.known_controller import STOCK, KnownController, MachineState, PortSetup
+from miurafab.machine.owner import Owner, claim, this_owner
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import JobAborted, Progress, StreamResult
 from miurafab.machine.session import HOMING_S, Session
@@ -49,7 +51,8 @@ class MachineSession:
     """One conversation with one machine over ``transport``; mutable, for one thread.
 
     ``signals`` stop it; ``keys`` act at once in every wait. :meth:`open` greets the machine; the
-    actions do so by themselves the first time.
+    actions do so by themselves the first time. ``owner`` is who holds the port (this process).
+    ``on_state`` is called with each new state; ``lines`` are what the controller says to a person.
     """
 
     def __init__(
@@ -58,6 +61,7 @@ class MachineSession:
         signals: StopSignals,
         setup: PortSetup = STOCK,
         keys: Keys | None = None,
+        owner: Owner | None = None,
     ) -> None:
         most = (
             min(setup.rx_bytes, _MOST_ON_A_NETWORK) if "://" in transport.name else setup.rx_bytes
@@ -73,6 +77,11 @@ class MachineSession:
         self._pad = JogPad()
         self._at_risk = self._in_job = False
         self._poll_at = 0.0
+        self._told: StatusReport | None = None  # the report of the last state that was told
+        self.on_state: Callable[[MachineState], None] = lambda state: None
+        self.lines = ConsoleLines()
+        self.conversation.on_data = self.lines.hear
+        self._release = claim(transport.name, owner or this_owner())
 
     # Beginning and end
 
@@ -92,6 +101,11 @@ class MachineSession:
         return self.state
 
     @property
+    def blocks(self) -> bool:
+        """Whether its waits take real time."""
+        return self._transport.blocks
+
+    @property
     def state(self) -> MachineState:
         """The state by the last status report and the last answers."""
         return self.known.state
@@ -107,6 +121,7 @@ class MachineSession:
             self._at_risk = False
             dark = self.conversation.stop()
         self._transport.close()
+        self._release()
         return dark
 
     def look(self) -> MachineState:
@@ -146,6 +161,9 @@ class MachineSession:
     def _check(self) -> None:
         """Called before every read: a signal stops, a key acts."""
         self._signals.check()
+        if self.conversation.status is not self._told:
+            self._told = self.conversation.status
+            self.on_state(self.state)
         if self._in_job or self.conversation.connection.writing_eeprom:
             return
         for key in self._keys.pressed():
@@ -258,10 +276,11 @@ class MachineSession:
         """Send a person's line and wait for its answer; see :meth:`Session.command`."""
         self.open()
         self._at_risk = True
-        try:
-            self.conversation.command(text, HOMING_S)
-        finally:
-            self.known.may_differ(text)
+        with self.lines.everything():
+            try:
+                self._or_stop(lambda: self.conversation.command(text, HOMING_S))
+            finally:
+                self.known.may_differ(text)
         return self.look()
 
     def say(self, text: str) -> None:
@@ -274,8 +293,9 @@ class MachineSession:
         if text == "reset":
             self.abort()
         elif text in _REALTIME:
-            self.realtime(text.encode("ascii"))
-            self.conversation.pause(_POLL_S)
+            with self.lines.everything():
+                self.realtime(text.encode("ascii"))
+                self.conversation.pause(_POLL_S)
         elif text:
             bare = next(Job("The console", text).send_lines(), None)
             if bare is not None:
@@ -377,11 +397,3 @@ class MachineSession:
         finally:
             self._in_job = self._at_risk = False
             self.known.may_differ()
-
-
-def require_way(x: float | None, y: float | None) -> str:
-    """The words of a jog by ``x`` and ``y``; raises ``InputError`` if neither is given."""
-    words = "".join(f"{a}{v:.3f}" for a, v in (("X", x), ("Y", y)) if v is not None)
-    if not words:
-        raise InputError("A jog needs a distance along X, along Y, or both.")
-    return words

@@ -53,6 +53,10 @@ class StopSignals:
         """From now on ignore every signal: the job is being stopped."""
         self._held = True
 
+    def release(self) -> None:
+        """Heed signals again: what was being stopped has been stopped."""
+        self._held = False
+
     def __enter__(self) -> StopSignals:
         if threading.current_thread() is threading.main_thread():
             for name in _WORDS:

@@ -32,6 +32,7 @@ import serial
 import serial.tools.list_ports
 
 from miurafab.errors import PortError
+from miurafab.machine.owner import holder_of, owner_of
 from miurafab.profiles.machine import BAUD
 from miurafab.simulate.beam import BeamSegment
 from miurafab.simulate.grbl.controller import VirtualGrbl
@@ -104,6 +105,8 @@ class SerialTransport:
     def __init__(self, port: str, baud: int, flow_control: str = "none") -> None:
         self.name = port
         # pyserial's RFC 2217 client refuses a write timeout.
+        if "://" in port and owner_of(port) is not None:  # no system locks these
+            raise PortError(_in_use(port))
         patience = None if port.lower().startswith("rfc2217:") else _WRITE_TIMEOUT
         try:
             self._serial = serial.serial_for_url(
@@ -351,18 +354,9 @@ def list_ports() -> list[tuple[str, str]]:
     return sorted((port.device, port.description or "") for port in ports)
 
 
-def _holder(port: str) -> str:
-    """Who has ``port``, as far as the system tells (Linux: the open files in ``/proc``)."""
-    device = os.path.realpath(port)
-    for link in Path("/proc").glob("[1-9]*/fd/*"):
-        process = link.parent.parent
-        try:
-            if os.path.realpath(link) == device and process.name != str(os.getpid()):
-                words = (process / "cmdline").read_bytes().decode("utf-8", "replace").split("\0")
-                return f", process {process.name} ({' '.join(words).strip()[:100]})"
-        except OSError:  # it has ended, or belongs to somebody else
-            continue
-    return ""
+def _in_use(port: str) -> str:
+    who = holder_of(port)
+    return f"The port {port} is in use by another program{who}, or close that program first."
 
 
 def _no_such_port(port: str) -> str:
@@ -375,10 +369,7 @@ def _why_not_opened(port: str, fault: Exception) -> str:
     number = getattr(fault, "errno", None)
     text = str(fault)
     if number in (errno.EAGAIN, errno.EWOULDBLOCK, errno.EBUSY) or "lock port" in text:
-        return (
-            f"The port {port} is in use by another program{_holder(port)}; do it there, or close "
-            "that program first."
-        )
+        return _in_use(port)
     if number == errno.EACCES or "Access is denied" in text:
         return (
             f"The port {port} may not be opened by this user, or another program has it; on Linux "

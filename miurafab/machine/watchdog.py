@@ -1,7 +1,8 @@
-"""The watchdog: the process that sends a job ends it when the program that started it is gone.
+"""The watchdog: the process that holds a port stops the machine when its starting program is gone.
 
 The starting program writes bytes to the standard input of this process: a :data:`BEAT` every
-second, each key that the user presses, or the number of a stop. When the pipe closes (that program
+second, each key that the user presses, the number of a stop, or an order (:data:`ORDER`, four bytes
+of its length, and that many). When the pipe closes (that program
 has died) or is silent for :data:`SILENCE_S` (it hangs), this process stops as by SIGTERM: it resets
 the controller, the beam is off, and the journal gets its last record. So the user interface can die
 without harm.
@@ -10,6 +11,7 @@ without harm.
 from __future__ import annotations
 
 import os
+import queue
 import signal
 import threading
 import time
@@ -24,6 +26,13 @@ SILENCE_S = 5.0
 """The silence after which the starting program counts as hung."""
 STOPS = {"SIGINT": b"\1", "SIGTERM": b"\2", "SIGHUP": b"\3", "SIGBREAK": b"\4"}
 """The bytes that stop this process as the signal of that name does."""
+ORDER = b"\5"
+
+
+def framed(order: bytes) -> bytes:
+    """An order as the starting program writes it."""
+    return ORDER + len(order).to_bytes(4, "big") + order
+
 
 _SIGNALS = {code[0]: name for name, code in STOPS.items()}
 
@@ -42,6 +51,14 @@ class ParentWatch:
         self._heard = time.monotonic()
         self._over = threading.Event()
         self._keys: list[str] = []
+        self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+
+    def next_order(self, timeout: float) -> bytes | None:
+        """The next order, waiting up to ``timeout`` seconds; None if there is none."""
+        try:
+            return self._orders.get(timeout=timeout)
+        except queue.Empty:
+            return None
 
     def pressed(self) -> str:
         """The keys pressed since the last call; never waits."""
@@ -64,15 +81,30 @@ class ParentWatch:
         self._over.set()
 
     def _read(self) -> None:
-        while data := os.read(self._descriptor, 256):
+        coming = bytearray()
+        while data := os.read(self._descriptor, 65_536):
             self._heard = time.monotonic()
-            for byte in data.replace(BEAT, b""):
-                name = _SIGNALS.get(byte)
-                if name is None:
-                    self._keys.append(chr(byte))
-                else:
-                    self._stop(name)
+            coming += data
+            while size := self._take(coming):
+                del coming[:size]
         self._lost("the end of the program that started it")
+
+    def _take(self, coming: bytearray) -> int:
+        """Take the first message; returns its bytes, 0 while it is not whole."""
+        if not coming:
+            return 0
+        if coming[:1] == ORDER:
+            end = 5 + int.from_bytes(coming[1:5], "big")
+            if len(coming) < max(5, end):
+                return 0
+            self._orders.put(bytes(coming[5:end]))
+            return end
+        name = _SIGNALS.get(coming[0])
+        if name is not None:
+            self._stop(name)
+        elif coming[:1] != BEAT:
+            self._keys.append(chr(coming[0]))
+        return 1
 
     def _guard(self) -> None:
         while not self._over.wait(self._silence / 20):
