@@ -45,7 +45,7 @@ def tip_way(toolpath: Toolpath, knife: Knife, margin_mm: float) -> Toolpath:
     tip = _overcut(_distinct(toolpath), knife.overcut_mm)
     if knife.offset_mm == 0 or not len(tip):
         return tip
-    return _with_aligning(tip, knife.offset_mm, margin_mm)
+    return with_aligning_cut(tip, knife.offset_mm, margin_mm)
 
 
 def _distinct(toolpath: Toolpath) -> Toolpath:
@@ -86,7 +86,7 @@ def _led_on(points: Floats, overcut: float) -> Floats:
     return np.concatenate([points, inner, [last]])
 
 
-def _with_aligning(toolpath: Toolpath, d: float, margin_mm: float) -> Toolpath:
+def with_aligning_cut(toolpath: Toolpath, d: float, margin_mm: float) -> Toolpath:
     """``toolpath`` after the cut that aligns the blade, in the middle of the margin."""
     y = margin_mm / 2
     length = ALIGNING_OFFSETS * d

@@ -60,7 +60,7 @@ def post(
     left_out: tuple[str, ...] = ()
     if knife is not None:
         left_out = made_by_knife(toolpath, knife, machine)
-        toolpath = tip_way(_without(toolpath, left_out), knife, machine.bed.margin_mm)
+        toolpath = tip_way(without_operations(toolpath, left_out), knife, machine.bed.margin_mm)
     runs = runs_of(toolpath, [material.operations[name].passes for name in OPERATIONS])
     heights = heights_of(runs, machine, material)
     made = repeated(toolpath, runs)
@@ -94,7 +94,7 @@ def post(
     return job(absolute)
 
 
-def _without(toolpath: Toolpath, names: Sequence[str]) -> Toolpath:
+def without_operations(toolpath: Toolpath, names: Sequence[str]) -> Toolpath:
     """``toolpath`` without the strokes of the operations ``names``."""
     if not names:
         return toolpath

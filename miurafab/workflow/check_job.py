@@ -3,10 +3,8 @@
 Three things are recomputed. The sums: each file of the manifest is there, unchanged, and no other
 program is. The pattern: every invariant, as for a pattern file. The strokes: from the pattern, the
 patches, tabs and places of ``layout.json`` and the rules of the material, each stroke follows
-(:mod:`~miurafab.fabrication.retrace`). Each program is read as the machine reads it. Each burnt
-segment must be a segment of such a stroke, made by the operation of its kind, within
-:data:`NEAR_MM`, and each of these must be burnt exactly once in each pass, at the height of that
-pass.
+(:mod:`~miurafab.fabrication.retrace`). Each program is read as the machine reads it and
+compared with them (:mod:`~miurafab.workflow.trace`).
 
 What is not proven is a finding of its own.
 """
@@ -20,42 +18,27 @@ from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from miurafab.display import Shown
 from miurafab.errors import InputError, LayoutError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.retrace import retraced
-from miurafab.fabrication.route.order import HOLE, StrokeSet
-from miurafab.fabrication.strokes import SLIT
 from miurafab.files import AnyPath, as_path
 from miurafab.findings import Finding, findings_json, refusals
 from miurafab.gcode.program import Program
 from miurafab.gcode.reading import read_program
-from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.machine.judge_job import judge_program
 from miurafab.options import read_options
 from miurafab.options.verbs import verb
-from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.fold import read_fold
-from miurafab.profiles import OPERATIONS, MachineProfile, Material
 from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.job_directory import WrittenJob, read_written
 from miurafab.workflow.job_files import LAYOUT, job_material, settle_job
 from miurafab.workflow.manifest import MANIFEST, TOOL, Manifest, read_manifest, sha256
 from miurafab.workflow.patterns import check
-
-NEAR_MM = 0.002
-"""G-code is rounded to 0.001 mm, and relative moves add up to as much again."""
-HPGL_MM = 0.03
-"""Plotters count in steps of 0.025 mm."""
-SHORTEST_MM = 0.002
-"""A shorter segment may vanish in the rounding of a program."""
+from miurafab.workflow.trace import traced_strokes
 
 _PROGRAMS = (".nc", ".plt", ".hpgl", ".gcode")
-_KINDS = ("crease", "tab fold", "outline", "hole", "slit", "label")
-_NAMED = 5
-"""So many faults of one kind are named on a sheet; the others are counted."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -199,136 +182,6 @@ def _traced(
         return
     for sentence in faults:
         yield Finding("layout", sentence, LAYOUT)
-    if machine.tool.knife is not None:
-        says = "The strokes of a drag knife are not traced: its holder leads the tip on other ways."
-        yield Finding("not-proven", says)
-        return
     tab_edges = np.array([t.edge for p in layout.patches for t in p.tabs], dtype=np.int64)
     for strokes, program in zip(passes, programs, strict=True):
-        kinds = _kinds(strokes, pattern, tab_edges)
-        yield from _compared(strokes, kinds, program, machine, material, traced)
-
-
-@dataclass(frozen=True, eq=False)
-class _Segments:
-    """N segments: ``ends`` (N, 4) in mm, the ``operation`` (N,), -1 where it is not said, and the
-    ``stroke`` (N,) or move that each is of. Those that are ``sure`` (N,) are not lost in rounding.
-    """
-
-    ends: Floats
-    operation: Ints
-    stroke: Ints
-
-    @property
-    def sure(self) -> Bools:
-        lengths = np.linalg.norm(self.ends[:, 2:] - self.ends[:, :2], axis=1)
-        return np.asarray(lengths > SHORTEST_MM)
-
-
-def _compared(
-    strokes: StrokeSet,
-    kinds: Ints,
-    program: Program,
-    machine: MachineProfile,
-    material: Material,
-    traced: Counter[str],
-) -> Iterator[Finding]:
-    """The strokes of one program that are not those of the pattern."""
-    path = strokes.toolpath
-    wanted, burnt = _wanted(strokes), _burnt(program)
-    near = HPGL_MM if machine.dialect == "hpgl" else NEAR_MM
-    count = len(wanted.ends)
-    # A segment may be burnt either way.
-    both = np.concatenate([wanted.ends, wanted.ends[:, [2, 3, 0, 1]]])
-    away, found = KDTree(both).query(burnt.ends)
-    found = np.asarray(found) % count
-    right = away <= near * 2
-    right &= (burnt.operation < 0) | (burnt.operation == wanted.operation[found])
-    heights, due = _heights(material)
-    off = np.abs(heights[wanted.operation[found]] - program.end[burnt.stroke, 2][:, None])
-    level = off.argmin(axis=1)
-    right &= off.min(axis=1) <= near
-    stray = ~right & burnt.sure
-    for at in np.flatnonzero(stray)[:_NAMED].tolist():
-        line = int(program.line[burnt.stroke[at]])
-        x, y = burnt.ends[at, :2].tolist()
-        yield Finding(
-            "stroke",
-            f"{path.sheet}: line {line} burns a stroke from X{x:.3f} Y{y:.3f} that is not of the "
-            "pattern, or out of its place.",
-            path.sheet,
-        )
-    if stray.sum() > _NAMED:
-        yield Finding("stroke", f"{path.sheet}: so do {stray.sum() - _NAMED} more segments.")
-    cells = found[right] * due.shape[1] + level[right]
-    times = np.bincount(cells, minlength=count * due.shape[1]).reshape(count, -1)
-    due = due[wanted.operation]
-    less, more = (times < due).any(axis=1), (times > due).any(axis=1)
-    for wrong, words in ((less, "is not burnt"), (more, "is burnt too often")):
-        faulty = np.unique(wanted.stroke[wrong & wanted.sure])
-        for stroke in faulty[:_NAMED].tolist():
-            x, y = path.starts[stroke].tolist()
-            edge = f" on edge {path.edge[stroke]}" if path.edge[stroke] >= 0 else ""
-            yield Finding(
-                "stroke",
-                f"{path.sheet}: the {_KINDS[kinds[stroke]]}{edge} from X{x:.3f} Y{y:.3f} {words}.",
-                path.sheet,
-            )
-        if len(faulty) > _NAMED:
-            yield Finding("stroke", f"{path.sheet}: so of {len(faulty) - _NAMED} more strokes.")
-    good = np.ones(len(path), dtype=bool)
-    good[wanted.stroke[(less | more) & wanted.sure]] = False
-    traced.update(_KINDS[kind] for kind in kinds[good].tolist())
-
-
-def _heights(material: Material) -> tuple[Floats, Ints]:
-    """(operations, h) the heights of the head in each operation, filled up with infinity, and how
-    often each stroke is due at each.
-    """
-    found = [
-        np.unique(material.operations[name].heights_mm, return_counts=True) for name in OPERATIONS
-    ]
-    most = max(len(heights) for heights, _ in found)
-    heights, due = np.full((len(found), most), np.inf), np.zeros((len(found), most), np.int64)
-    for row, (levels, counts) in enumerate(found):
-        heights[row, : len(levels)], due[row, : len(levels)] = levels, counts
-    return heights, due
-
-
-def _wanted(strokes: StrokeSet) -> _Segments:
-    path = strokes.toolpath
-    stroke = np.repeat(np.arange(len(path)), np.diff(path.offsets))
-    inner = stroke[1:] == stroke[:-1]
-    ends = np.concatenate([path.points[:-1], path.points[1:]], axis=1)[inner]
-    stroke = stroke[1:][inner]
-    return _Segments(ends, path.operation[stroke], stroke)
-
-
-def _burnt(program: Program) -> _Segments:
-    burns = np.flatnonzero(program.beam_on)
-    ends = np.concatenate([program.start[burns, :2], program.end[burns, :2]], axis=1)
-    of_context = np.array(
-        [
-            OPERATIONS.index(c.operation) if c.operation in OPERATIONS else -1
-            for c in program.contexts
-        ]
-    )
-    return _Segments(ends, of_context[program.context[burns]], burns)
-
-
-def _kinds(strokes: StrokeSet, pattern: CreasePattern, tab_edges: Ints) -> Ints:
-    """(S,) the kind of each stroke, an index of :data:`_KINDS`."""
-    path = strokes.toolpath
-    cut = path.operation == OPERATIONS.index("cut")
-    crease, tab_fold, outline, hole, slit, label = range(len(_KINDS))
-    return np.select(
-        [
-            path.operation == OPERATIONS.index("engrave"),
-            cut & (strokes.rank == HOLE),
-            path.edge < 0,
-            np.isin(path.edge, tab_edges),
-            np.isin(pattern.edges_assignment[path.edge], SLIT),
-        ],
-        [label, hole, outline, tab_fold, slit],
-        crease,
-    )
+        yield from traced_strokes(strokes, pattern, tab_edges, program, machine, material, traced)

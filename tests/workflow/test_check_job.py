@@ -177,11 +177,68 @@ def test_a_directory_without_a_job_or_a_manifest_is_refused(job, tmp_path):
         mf.check_job(job)
 
 
+KNIVES = {"hpgl-cutter-a3": "sheet-01.plt", "grbl-knife-a3": "sheet-01.nc"}
+
+
+@pytest.fixture(scope="module", params=KNIVES)
+def knife_job(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("knives") / request.param
+    mf.sheets(trimmed(), machine=request.param).write(folder)
+    return folder, KNIVES[request.param]
+
+
+def knife_dash(text):
+    """A straight cut of a knife: its lines, with the points of its two ends."""
+    hpgl = re.compile(r"PU(\d+),(\d+);PD(\d+),(\d+);\n")
+    gcode = re.compile(r"G0 X(\S+) Y(\S+)\nM3 S\d+\nG4 P\S+\nG1 X(\S+) Y(\S+)\nM3 S\d+\nG4 P\S+\n")
+    found = list((hpgl if text.startswith("IN") else gcode).finditer(text))
+    return found[len(found) // 2]
+
+
+def test_the_tip_of_a_knife_is_traced_from_the_way_of_its_axis(knife_job, tmp_path):
+    made, name = knife_job
+    whole = mf.check_job(made)
+    assert whole.valid, whole.findings
+    assert whole.traced["aligning cut"] == 1
+    assert whole.traced["outline"] == 1
+    assert whole.traced["crease"] > 300
+    job = shutil.copytree(made, tmp_path / "job")
+    before = (job / name).read_text()
+    at = knife_dash(before)
+    step = 4 if name.endswith("plt") else 0.1
+
+    def moved(text):
+        line = at[0]
+        for x in (at[1], at[3]):
+            line = re.sub(
+                rf"(?<![\d.]){re.escape(x)}(?![\d.])", f"{float(x) + step:g}", line, count=1
+            )
+        return text[: at.start()] + line + text[at.end() :]
+
+    edited(job, name, moved)
+    found = sentences(job, "stroke")
+    assert any("burns a stroke" in each for each in found)
+    assert any("is not burnt" in each for each in found)
+    edited(job, name, lambda _: before[: at.start()] + before[at.end() :])
+    assert any("is not burnt" in each for each in sentences(job, "stroke"))
+    edited(job, name, lambda _: before[: at.end()] + at[0] + before[at.end() :])
+    assert any("is burnt too often" in each for each in sentences(job, "stroke"))
+
+
+def test_an_outline_without_its_overcut_is_named(tmp_path):
+    job = mf.sheets(trimmed(), machine="grbl-knife-a3").write(tmp_path / "job").path
+    lines = (job / "sheet-01.nc").read_text().splitlines(keepends=True)
+    last = max(n for n, line in enumerate(lines) if line.startswith("G1"))
+    short = "".join(lines[: last - 1] + lines[last + 1 :])  # the outline comes last
+    edited(job, "sheet-01.nc", lambda _: short)
+    assert any("overcut of 0.5 mm" in each for each in sentences(job, "stroke"))
+
+
 def test_what_is_not_proven_is_said(tmp_path):
-    mf.sheets(trimmed(), machine="hpgl-cutter-a3").write(tmp_path / "knife")
-    found = mf.check_job(tmp_path / "knife")
+    mf.calibrate(tmp_path / "job")
+    found = mf.check_job(tmp_path / "job")
     assert [f.sentence for f in found.findings if f.code == "not-proven"] == [
-        "The strokes of a drag knife are not traced: its holder leads the tip on other ways."
+        "The strokes of a calibration sheet are not traced: no pattern stands behind them."
     ]
     assert found.traced == {}
 
