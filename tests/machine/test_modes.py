@@ -66,6 +66,31 @@ def test_the_stated_position_is_set_in_known_modes(block: str) -> None:
     np.testing.assert_allclose(box, [5, 5, 15, 5], atol=0.06)
 
 
+@pytest.mark.parametrize(
+    ("left", "back"),
+    [
+        ("G1S700F500", "G0F0S0"),
+        ("M4S1", "M5S0"),
+        ("G91G20G1F9", "G0F0"),
+        ("G43.1Z5", "G49"),
+        ("G80", "G0"),
+    ],
+)
+def test_what_the_last_program_left_does_not_burn(left: str, back: str) -> None:
+    """A controller that was not reset keeps its power; a job that says none is dark."""
+    device = controller()
+    device.advance(0.1)
+    device.receive(left.encode() + b"\n")
+    device.advance(1.0)
+    device.take_output()
+    wire = FakeWire(device)
+    dark = "G21\nG90\nM4\nG0 X10 Y10\nG1 X20 F3000\nM5\n"
+    deliver(plan_job(Job("job.nc", dark), MACHINE), wire, StopSignals())
+    assert wire.commands.startswith(b"$I\n")  # no reset
+    assert f"{SET}{back}\n".encode() in wire.commands
+    assert device.beam_log == []
+
+
 def test_both_blocks_are_named_and_what_was_set() -> None:
     result, _ = cut(controller("G20", "M8"), SAID)
     (finding,) = result.findings

@@ -22,7 +22,7 @@ import serial
 from miurafab.errors import ControllerError
 from miurafab.gcode.job import Job
 from miurafab.machine import transport
-from miurafab.machine.actions import machine_info, read_settings, unlock
+from miurafab.machine.actions import machine_info, read_settings, talk, unlock
 from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import stream_plan
 from miurafab.machine.transport import SerialTransport
@@ -49,6 +49,7 @@ def served(*options: str) -> Iterator[str]:
             yield server.stdout.readline().strip()
         finally:
             server.terminate()
+            server.wait(20)
 
 
 @pytest.fixture
@@ -100,6 +101,27 @@ def test_a_board_that_never_greets_is_known_by_its_answers() -> None:
         info = machine_info(port)
         assert (info.firmware, info.version, info.state) == ("Grbl", "1.1h", "Idle")
         assert cut(port) == 6
+
+
+@pytest.mark.parametrize("blocks", [("G20", ""), ("G91", "M8"), ("G20G55", "G91"), ("M8", "G20")])
+def test_startup_blocks_change_nothing_that_is_burnt(
+    blocks: tuple[str, str], tmp_path: Path
+) -> None:
+    """Typed at a console, kept by the board, run at the reset of the next command."""
+    log = tmp_path / "beam.csv"
+    with served("--settings", "grbl-laser-400", "--beam-log", str(log)) as port:
+        typed = ("G10L2P2X100Y100", *(f"$N{n}={block}" for n, block in enumerate(blocks)))
+        talk(port, typed, lambda line: None)
+        job = Job("job.nc", JOB.replace("G21\nG90\n", ""))
+        plan = plan_job(job, load_machine("grbl-laser-400"), SendOptions(reset=True))
+        (finding,) = stream_plan(plan, port).findings
+    assert finding.code == "modes"
+    named = [f"$N{n}={block}" for n, block in enumerate(blocks) if block]
+    assert f"runs {' and '.join(named)} after each reset" in finding.sentence
+    rows = [[float(x) for x in row.split(",")] for row in log.read_text().splitlines()[1:]]
+    assert min(row[2] for row in rows) == pytest.approx(5, abs=0.1)
+    assert max(row[4] for row in rows) == pytest.approx(15, abs=0.1)
+    assert {row[3] for row in rows} == {0.0}
 
 
 @pytest.fixture
