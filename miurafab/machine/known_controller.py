@@ -18,7 +18,7 @@ from miurafab.gcode.job import SendLine
 from miurafab.grbl.events import Event, Modes, Options, Parameter, StartupBlock, Version
 from miurafab.grbl.settings import Settings
 from miurafab.machine.keys import OVERRIDES_OFF, obeys_overrides
-from miurafab.machine.modes import SET, ControllerModes
+from miurafab.machine.modes import SET, TOOL_LENGTH, ControllerModes
 from miurafab.machine.progress import AS_WRITTEN, Overrides
 from miurafab.machine.session import Session
 from miurafab.profiles import MachineProfile
@@ -151,6 +151,8 @@ class KnownController:
             }
         elif question == MODES:
             words = next((each.words for each in said if isinstance(each, Modes)), ())
+            if any(self._offsets.get("TLO", ())) and TOOL_LENGTH not in words:
+                words = (*words, TOOL_LENGTH)  # GRBL 1.1 tells it by its length alone
             self.modes = ControllerModes(words, self.modes.startup)
         else:
             blocks = {each.number: each.text for each in said if isinstance(each, StartupBlock)}
@@ -184,12 +186,12 @@ class KnownController:
         """Set the modes in which a job begins, unless they are set; the finding ``modes`` on what
         the opening or a reset had left.
         """
-        self.refresh(MODES, STARTUP)
+        self.refresh(OFFSETS, MODES, STARTUP)
         if self._set:
             return ()
         self._session.command(SET + self.modes.way_out)
         self._set = True
-        self._unknown.add(MODES)
+        self._unknown |= {MODES, OFFSETS} if TOOL_LENGTH in self.modes.modes else {MODES}
         findings = () if self._told else tuple(self.modes.findings())
         self._told = True
         return findings

@@ -23,6 +23,7 @@ from miurafab.findings import Finding
 SET = "G21G90G17G94G54"
 """What is sent before anything that needs it: mm, absolute, XY plane, feed per minute, offset 1."""
 
+TOOL_LENGTH = "G43.1"
 _MEANS = {
     "G20": "inches",
     "G91": "relative moves",
@@ -31,14 +32,14 @@ _MEANS = {
     "G93": "inverse time feed",
     "G95": "feed per turn",
     "G51": "scaled coordinates",
-    "G43.1": "a tool length offset",
+    TOOL_LENGTH: "a tool length offset",
     "M3": "the spindle or beam armed",
     "M4": "the spindle or beam armed",
     "M7": "mist on",
     "M8": "air or coolant on",
 } | {f"G{n}": f"the work offset G{n}" for n in (55, 56, 57, 58, 59, "59.1", "59.2", "59.3")}
 """The modes that a job does not begin in."""
-_BACK = {"G51": "G50", "G43.1": "G49", "M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
+_BACK = {"G51": "G50", TOOL_LENGTH: "G49", "M3": "M5", "M4": "M5", "M7": "M9", "M8": "M9"}
 """What ends those that :data:`SET` does not end."""
 _MOTION = re.compile(r"G(?:[1-3]|5(?:\.\d)?|33|38\.\d|73|8\d(?:\.\d)?)")
 _VALUE = re.compile(r"[FS](?!0*\.?0*$).*")
