@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from miurafab.errors import ProfileError
 from miurafab.profiles import MachineProfile
+from miurafab.profiles.board import settings_of
 from miurafab.profiles.machine import BAUD
 
 _NEEDED = (1, 11, 12, 30, 31, 32, 100, 101, 102, 110, 111, 112, 120, 121, 122)
@@ -71,16 +72,9 @@ class MotionParameters:
 
         Where a profile has no Z axis, Z gets the values of X.
         """
-        motion = profile.motion
-        rate_x, rate_y = motion.max_rate_mm_min
-        acceleration_x, acceleration_y = motion.acceleration_mm_s2
-        settings = {1: 25.0, 12: 0.002, 11: motion.junction_deviation_mm}
-        settings |= dict.fromkeys((100, 101, 102), COMMON_STEPS)
-        settings |= {110: rate_x, 111: rate_y, 112: rate_x}
-        settings |= {120: acceleration_x, 121: acceleration_y, 122: acceleration_x}
-        if profile.z is not None:
-            settings |= {112: profile.z.max_rate_mm_min, 122: profile.z.acceleration_mm_s2}
-        settings |= {30: profile.tool.s_max, 31: profile.tool.s_min}
+        rate, acceleration = profile.motion.max_rate_mm_min[0], profile.motion.acceleration_mm_s2[0]
+        settings = {1: 25.0, 12: 0.002, 112: rate, 122: acceleration}
+        settings |= dict.fromkeys((100, 101, 102), COMMON_STEPS) | settings_of(profile)
         settings |= {32: float(profile.tool.kind == "laser")}
         return replace(
             cls.from_settings(settings | profile.settings),

@@ -58,6 +58,16 @@ def told(values: Mapping[int, float], *, has_z: bool) -> Iterator[tuple[Place, A
             yield place, round(value) if isinstance(place.kind, Whole) else value
 
 
+def settings_of(machine: MachineProfile) -> dict[int, float]:
+    """The settings that the places of ``machine`` stand for."""
+    parts = {number: getattr(machine, place.part) for number, place in PLACES.items()}
+    return {
+        number: getattr(part, PLACES[number].field)
+        for number, part in parts.items()
+        if part is not None
+    }
+
+
 def with_settings(machine: MachineProfile, values: Mapping[int, float]) -> MachineProfile:
     """``machine`` as a board with the settings ``values`` has it, which it then requires."""
     parts: dict[str, dict[str, Any]] = {}

@@ -72,11 +72,11 @@ def share_sheets(
             "A frame is looked at before its sheet is cut, and machines that share sheets do not "
             "wait: first trace it at each with 'miurafab machine frame' and the same `port`."
         )
-    if options.align:
-        raise InputError(
-            "A sheet that was moved lies at one machine, and `align` says where; name its `port` "
-            "alone."
-        )
+    for name in ("align", "from_stroke"):
+        if getattr(options, name):
+            raise InputError(
+                f"`{name}` is said of a sheet that lies at one machine; name its `port` alone."
+            )
     twice = {port for port in ports if ports.count(port) > 1 and port != "virtual"}
     if twice:
         raise InputError(f"The port {min(twice)} is named twice.")

@@ -18,6 +18,7 @@ from miurafab.profiles import MachineProfile, find_profile, load_machine, read_t
 from miurafab.profiles.board import PLACES, told
 from miurafab.profiles.shipped import own_directory
 from miurafab.profiles.table import toml_text
+from miurafab.simulate.grbl.controller import virtual_settings
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _LASER_MODE = 32
@@ -85,8 +86,11 @@ def add_machine(
         file = as_path(settings, "The settings")
         found, source = read_dump(file), file.name
     else:
-        speed = load_machine(base).controller.baud if baud is None else baud
-        found, source = read_settings(port, baud=speed), port
+        known = load_machine(base)
+        speed = known.controller.baud if baud is None else baud
+        # The machine in memory is one like the profile, and not a board fresh from its maker.
+        found = read_settings(port, baud=speed, settings=virtual_settings(known))
+        source = port
         values.setdefault("controller", {})["baud"] = speed
     _take(values, found)
     values["title"] = title or f"{name}, like {base.stem}"

@@ -38,3 +38,10 @@ def test_a_file_of_ones_own_says_the_same(tmp_path, monkeypatch, tall):
     for part in ("bed", "motion", "z"):
         assert getattr(made, part) == getattr(wanted, part)
     assert (made.tool.s_max, made.tool.s_min) == (wanted.tool.s_max, wanted.tool.s_min) == (130, 2)
+
+
+def test_the_practice_machine_of_a_profile_tells_what_the_profile_says(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    _, made = mf.add_machine("practice", port="virtual", like="grblhal-laser-600")
+    like = load_machine("grblhal-laser-600")
+    assert (made.bed.width_mm, made.motion) == (like.bed.width_mm, like.motion)

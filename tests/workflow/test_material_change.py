@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 from small_jobs import known_toolpath, write_nc
 
-from miurafab.errors import WAITING, PersonNeeded
+from miurafab.errors import WAITING, InputError, PersonNeeded
 from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import NoKeys
 from miurafab.machine.planning import SendOptions
@@ -97,7 +97,7 @@ def test_machines_that_share_a_job_wait_each_for_its_material(job, monkeypatch, 
 
     monkeypatch.setattr(multi_machine, "stream_apart", apart)
     monkeypatch.setattr(multi_machine, "StopSignals", lambda: NoSignals())
-    job = dataclasses.replace(job, directory=SimpleNamespace(most_power=1.0))
+    job = dataclasses.replace(job, directory=SimpleNamespace(most_power=1.0, edits=()))
     asked = []
 
     def before(number, port, signals):
@@ -133,3 +133,29 @@ class NoSignals:
 
     def hold(self):
         pass
+
+
+@pytest.mark.parametrize("name", ["align", "from_stroke"])
+def test_what_is_said_of_one_sheet_is_not_said_to_several_machines(job, name):
+    job = dataclasses.replace(job, directory=SimpleNamespace(most_power=1.0, edits=()))
+    marks = (((0.0, 0.0), (1.0, 1.0)), ((200.0, 200.0), (201.0, 201.0)))
+    options = CutOptions(**{name: {"align": marks, "from_stroke": 2}[name]})
+    with pytest.raises(InputError, match=f"'{name}' is said of a sheet .* name its 'port' alone"):
+        share_sheets(job, ["A", "B"], None, options, on_progress=lambda *a: None)
+
+
+def test_each_of_several_machines_begins_where_its_head_stands(job, monkeypatch):
+    seen = {}
+
+    def apart(plan, port, *, signals, virtual_speed, **files):
+        seen.setdefault(port, []).append(plan.at)
+        return stream_plan(plan, "virtual", signals=signals, **files)
+
+    monkeypatch.setattr(multi_machine, "stream_apart", apart)
+    monkeypatch.setattr(multi_machine, "StopSignals", lambda: NoSignals())
+    job = dataclasses.replace(job, directory=SimpleNamespace(most_power=1.0, edits=()))
+    options = CutOptions(send=SendOptions(at="front-left"))
+    share_sheets(job, ["A", "B"], None, options, pause=False, on_progress=lambda *a: None)
+    # The box begins at 3,4; the program ends at its origin.
+    assert {places[0] for places in seen.values()} == {(3.0, 4.0)}
+    assert {place for places in seen.values() for place in places[1:]} == {(0.0, 0.0)}

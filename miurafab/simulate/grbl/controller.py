@@ -23,6 +23,7 @@ from miurafab.motion import cpu
 from miurafab.motion.parameters import COMMON_STEPS
 from miurafab.motion.stepper import Processor
 from miurafab.profiles import MachineProfile
+from miurafab.profiles.board import settings_of
 from miurafab.simulate.beam import BeamSegment
 from miurafab.simulate.cable import Cable
 from miurafab.simulate.faults import Fault
@@ -35,23 +36,13 @@ from miurafab.simulate.grbl.state import Machine, Until, Wait
 def virtual_settings(machine: MachineProfile) -> dict[int, float]:
     """The settings that turn a simulated controller into ``machine``.
 
-    These are the settings of :func:`~miurafab.grbl.settings.profile_settings`; the bed, the motion
-    and the motor steps that the time estimate assumes if the profile has no settings for them; and
-    the tool, which firmware without ``$30`` to ``$32`` keeps elsewhere.
+    These are what the profile stands for (:mod:`miurafab.profiles.board`), the motor steps that
+    the time estimate assumes if it has no settings for them, laser mode, and what a job expects
+    (:func:`~miurafab.grbl.settings.profile_settings`).
     """
-    bed, motion, tool = machine.bed, machine.motion, machine.tool
-    pairs = dict.fromkeys((100, 101, 102), COMMON_STEPS) | {
-        30: tool.s_max,
-        31: tool.s_min,
-        32: 1.0 if tool.kind == "laser" and machine.dialect != "grbl-0.9" else 0.0,
-        11: motion.junction_deviation_mm,
-        110: motion.max_rate_mm_min[0],
-        111: motion.max_rate_mm_min[1],
-        120: motion.acceleration_mm_s2[0],
-        121: motion.acceleration_mm_s2[1],
-        130: bed.width_mm,
-        131: bed.height_mm,
-    }
+    laser = machine.tool.kind == "laser" and machine.dialect != "grbl-0.9"
+    pairs = dict.fromkeys((100, 101, 102), COMMON_STEPS) | settings_of(machine)
+    pairs[32] = float(laser)
     return pairs | profile_settings(machine)
 
 
