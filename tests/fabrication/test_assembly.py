@@ -22,7 +22,8 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_what_is_assembled_stays_a_disk(name):
     pattern = CASES[name]
-    layout = lay_out(pattern, bed(120.0, 100.0), card())
+    size = (120.0, 100.0) if pattern.grid else (200.0, 160.0)
+    layout = lay_out(pattern, bed(*size), card())
     steps = assembly_order(layout, pattern)
     assert len(steps) == len(layout.patches) > 6
     faces = np.empty(0, dtype=np.int64)
