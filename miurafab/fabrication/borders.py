@@ -34,6 +34,7 @@ from miurafab.fabrication.tabs import (
     clip_convex,
     edge_axes,
     inset_of,
+    not_slender,
     not_steeper,
 )
 from miurafab.geometry.arrays import Bools, Floats, Ints
@@ -129,8 +130,8 @@ def open_tabs(pattern: CreasePattern, edges: Ints, material: Material) -> TabReg
         limit = inset + end * length * normal[:, 0]
         points, sides = clip_convex(points, sides, normal, limit)
         points, sides = base_first(points, sides)
-    if material.tabs.max_angle < math.pi:
-        points, sides = not_steeper(points, sides, material.tabs.max_angle)
+    points, sides = not_steeper(points, sides, np.full(count, material.tabs.max_angle))
+    points, sides = not_slender(points, sides)
     _, last, frame = edge_axes(pattern, edges, faces)
     placed = last[:, None] - np.einsum("nij,nki->nkj", frame, points)
     return TabRegions(seams, placed, placed, sides)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from miurafab.fabrication.borders import chosen_edges
 from miurafab.fabrication.labels import Lettering
@@ -90,6 +92,23 @@ def _untabbed(pattern: CreasePattern, edges: Ints, options: LayoutOptions) -> li
         ends = pattern.edges_vertices[own]
         short = int((edge_lengths(pattern.vertices_coords, ends) < MIN_BASE_MM).sum())
         which = f", {short} of them shorter than {MIN_BASE_MM:g} mm" if short else ""
-        sentence = f"{count(len(own), one, many)} no tab{which}, since there is no room: {remedy}."
+        run, at = longest_run(pattern, own)
+        sentence = (
+            f"{count(len(own), one, many)} no tab{which}, since there is no room: {remedy}. The "
+            f"longest bare run is {run:.1f} mm, at edge {at} of the pattern."
+        )
         found.append(Finding("untabbed", sentence, tuple(own.tolist())))
     return found
+
+
+def longest_run(pattern: CreasePattern, edges: Ints) -> tuple[float, int]:
+    """The length in mm of the longest chain of joined ``edges`` (n,), and its first edge."""
+    ends = pattern.edges_vertices[edges]
+    _, which = np.unique(ends, return_inverse=True)
+    pairs = which.reshape(ends.shape)
+    count = int(pairs.max()) + 1
+    joined = sparse.coo_array((np.ones(len(edges)), (pairs[:, 0], pairs[:, 1])), (count, count))
+    chain = connected_components(joined, directed=False)[1][pairs[:, 0]]
+    lengths = np.bincount(chain, edge_lengths(pattern.vertices_coords, ends))
+    longest = int(lengths.argmax())
+    return float(lengths[longest]), int(edges[chain == longest].min())

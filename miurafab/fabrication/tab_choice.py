@@ -29,7 +29,7 @@ def choose_tabs(
 
     The patch that ``options`` name bears the tab. If the tab has less glue area than the material
     requires, it goes to the other patch if it is larger there. If that is not enough, it is raised:
-    up to :data:`RAISED` times as high, and as wide as its facet allows. If a patch is glued to
+    up to :data:`RAISED` times as high, and as wide as its base. If a patch is glued to
     itself, the lower pattern edge counts as the lower patch. ``tight`` patches (P,) may carry
     standard tabs only.
 

@@ -12,8 +12,9 @@ splits g on the bisector of its two seam edges. So a tab touches only its own se
 flat pattern and, after folding, inside g. It crosses no crease, because a facet has none. For a
 facet that is not convex the region is smaller than possible, but valid.
 
-A largest angle at the base, if given, bounds the tab by two lines through the ends of the base at
-that angle. A full-facet tab has no limit to its height.
+A largest angle at the base bounds the tab by two lines through the ends of the base at that angle.
+It is 90 degrees for a raised tab, which so is nowhere wider than its base. No tab is higher than
+``SLENDER`` times its base. A full-facet tab has none of these limits.
 
 The base of a tab is the part of e on which it stands; it is the fold of the tab, and the rest of e
 is cut. The fold has the assignment of the crease along the seam.
@@ -32,8 +33,11 @@ from miurafab.geometry.polygons import edge_lengths, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
-MIN_BASE_MM = 2.0
-"""A tab with a shorter base tears at its root (judged)."""
+MIN_BASE_MM = 2.5
+"""A tab with a shorter base tears at its root, and a slender one may catch fire (judged)."""
+
+SLENDER = 2.0
+"""The height of a tab over its base, at most; a higher one bends or tears at its root (judged)."""
 
 MIN_SIDE_MM = 1.0
 """A tab with a smaller mean height cannot be handled (judged)."""
@@ -164,7 +168,7 @@ def tab_regions(
     raised: Bools | None = None,
 ) -> TabRegions:
     """The tabs on N ``seams``; tabs that are ``raised`` (N,) may be :data:`RAISED` times as high as
-    the material's, at any angle.
+    the material's, with angles up to 90 degrees at the base.
 
     ``bearing`` (F, k) marks the sides of each facet inside which a tab is glued; these tabs share
     the facet. Without it every tab is computed as if it were alone, which only makes it larger.
@@ -224,8 +228,12 @@ def tab_regions(
         over = (sides >= 3) & reach_out
         points, sides = clip_convex(points, sides, normals, np.where(over, limit, NO_LIMIT))
         points, sides = base_first(points, sides)
-    if material.tabs.max_angle < math.pi and not full_facet:
-        points, sides = not_steeper(points, sides, material.tabs.max_angle, raised)
+    if not full_facet:
+        largest = np.full(count, material.tabs.max_angle)
+        if raised is not None:
+            largest[raised] = math.pi / 2
+        points, sides = not_steeper(points, sides, largest)
+        points, sides = not_slender(points, sides)
     glued = placed = a[:, None] + np.einsum("nij,nki->nkj", frame, points)
     if (seams.edges[:, 0] != seams.edges[:, 1]).any():
         # The side of the facet that bears the tab runs the opposite way.
@@ -248,25 +256,27 @@ def edge_axes(pattern: CreasePattern, edges: Ints, faces: Ints) -> tuple[Floats,
     return start, end, np.stack([along, np.column_stack([-along[:, 1], along[:, 0]])], axis=1)
 
 
-def not_steeper(
-    points: Floats, count: Ints, angle: float, free: Bools | None = None
-) -> tuple[Floats, Ints]:
-    """The polygons, on the base y = 0, with inner angles at the base cut to at most ``angle``;
-    ``free`` (N,) polygons are not cut.
+def not_steeper(points: Floats, count: Ints, angle: Floats) -> tuple[Floats, Ints]:
+    """The polygons, on the base y = 0, with inner angles at the base cut to at most ``angle`` (N,)
+    radians.
     """
-    c, s = math.cos(angle), math.sin(angle)
+    c, s = np.cos(angle), np.sin(angle)
     row = np.arange(len(points))
-    for end, normal in ((0, np.array([s, -c])), (1, np.array([-s, -c]))):
+    for end, normal in ((0, np.column_stack([s, -c])), (1, np.column_stack([-s, -c]))):
         beyond = points[row, 2 if end else np.maximum(count, 1) - 1]
-        limit = points[:, end] @ normal
+        limit = np.einsum("nk,nk->n", points[:, end], normal)
         # Only sides that are too steep are cut: elsewhere the clip would double the corner.
-        steep = (count >= 3) & (beyond @ normal < limit - 1e-9)
-        if free is not None:
-            steep &= ~free
-        limit = np.where(steep, limit + 1e-9, NO_LIMIT)
-        points, count = clip_convex(points, count, np.broadcast_to(normal, (len(points), 2)), limit)
+        steep = (count >= 3) & (np.einsum("nk,nk->n", beyond, normal) < limit - 1e-9)
+        points, count = clip_convex(points, count, normal, np.where(steep, limit + 1e-9, NO_LIMIT))
         points, count = base_first(points, count)
     return points, count
+
+
+def not_slender(points: Floats, count: Ints) -> tuple[Floats, Ints]:
+    """The polygons, on the base y = 0, cut to :data:`SLENDER` times their base."""
+    limit = SLENDER * (points[:, 1, 0] - points[:, 0, 0])
+    down = np.broadcast_to(np.array([0.0, -1.0]), (len(points), 2))
+    return clip_convex(points, count, down, -limit)
 
 
 def clip_convex(points: Floats, count: Ints, normal: Floats, limit: Floats) -> tuple[Floats, Ints]:

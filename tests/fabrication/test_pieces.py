@@ -149,7 +149,7 @@ def test_a_tab_is_not_made_on_a_short_edge():
     assert layout.totals.tabs == 0
     (found,) = [each for each in layout.findings if each.code == "untabbed"]
     assert found.where == tuple(np.sort(pattern.seams.min(axis=1)).tolist())
-    assert "8 seam edges bear no tab, 8 of them shorter than 2 mm" in str(found)
+    assert "8 seam edges bear no tab, 8 of them shorter than 2.5 mm" in str(found)
 
 
 def test_cells_give_the_lines_for_seams_where_there_is_no_whole_grid():

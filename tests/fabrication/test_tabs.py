@@ -13,6 +13,7 @@ from flat_patterns import card, facet_polygons, miura, triangles, zigzag
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miurafab.fabrication.layout_findings import longest_run
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.tab_choice import choose_tabs
 from miurafab.fabrication.tabs import MIN_AREA_MM2, MIN_BASE_MM, inset_of
@@ -239,3 +240,35 @@ def test_any_split_of_any_shaken_grid_has_sound_tabs(seed, height, inset, kerf, 
     if len(shapes):
         near = shapely.STRtree(shapes).query(shapes, predicate="intersects")
         assert (near[0] == near[1]).all()
+
+
+@settings(derandomize=True, max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.floats(1.5, 6.0), st.floats(8.0, 30.0), st.floats(0.0, 0.3))
+def test_no_tab_is_a_needle(seed, short, long, shake):
+    """Small facets with short seam edges, whose tabs are raised."""
+    rng = np.random.default_rng(seed)
+    points = np.stack(np.meshgrid(long * np.arange(5), short * np.arange(7)), axis=-1)
+    points = points + rng.uniform(-shake, shake, points.shape) * short
+    pattern = flat_patterns.grid(points)
+    patch = np.arange(len(pattern.faces_vertices)) % 4
+    tabs, unusual, untabbed = choose_tabs(pattern, patch, card(tab=7.0, inset=0.3))
+    assert len(tabs) + len(untabbed) == 18
+    for k in range(len(tabs)):
+        ring = tabs.polygon(k)
+        base = np.linalg.norm(ring[1] - ring[0])
+        along = (ring[1] - ring[0]) / base
+        x, y = (ring - ring[0]) @ along, (ring - ring[0]) @ [-along[1], along[0]]
+        assert base >= MIN_BASE_MM
+        assert y.max() <= 2 * base + 1e-9
+        if unusual[k]:
+            assert x.min() >= -1e-6
+            assert x.max() <= base + 1e-6
+
+
+def test_the_longest_bare_run_is_told():
+    points = np.stack(np.meshgrid([0.0, 30.0, 60.0], [0.0, 1.0, 2.0, 20.0, 38.0, 39.0]), axis=-1)
+    pattern = flat_patterns.grid(points)
+    _, _, untabbed = choose_tabs(pattern, np.arange(10) % 2, card())
+    assert len(untabbed) == 3
+    assert longest_run(pattern, untabbed)[0] == pytest.approx(2.0)
+    assert longest_run(pattern, untabbed)[1] == untabbed.min()
