@@ -19,6 +19,7 @@ from small_jobs import LASER, dashes, write_folder, write_nc
 from miurafab.errors import InputError
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
+from miurafab.gcode.program import strokes
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.workflow.dry_run import LAYERS, dry_run
 from miurafab.workflow.page import Slider, page_text, write_page
@@ -116,8 +117,10 @@ def test_the_sheets_are_the_moves(job):
         size = max(shown["box"][2:])
         assert np.abs(track[:-1] - sheet.program.start[:, :2]).max() <= size / 65535
         assert np.abs(track[1:] - sheet.program.end[:, :2]).max() <= size / 65535
-        assert np.array_equal(unpack(shown["layers"], "u1"), sheet.layer)
+        assert np.array_equal(unpack(shown["layers"], "u1") & 127, sheet.layer)
         assert np.allclose(unpack(shown["ends"], "<f4"), sheet.end_seconds, rtol=1e-6)
+        begins = np.flatnonzero(unpack(shown["layers"], "u1") & 128)
+        assert begins.tolist() == strokes(sheet.program).first_move.tolist()
         assert shown["paper"] == [380.0, 300.0]
         assert shown["bed"] == [400.0, 400.0, 5.0]
         assert shown["lines"] == sheet.lines
@@ -227,6 +230,7 @@ def test_a_browser_draws_both_views(job, tmp_path):
     assert 'data-ready="sheets fold"' in dom
     assert "data-fault" not in dom
     assert "0:1" in dom.split('id="clock"')[1][:60]
+    assert "stroke 4 of 4" in dom.split('id="clock"')[1][:90]
 
 
 def test_seams_are_a_kind_of_their_own_with_the_length_of_one_side():

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from miurafab.errors import InputError
 from miurafab.files import write_text
+from miurafab.gcode.program import strokes
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.contact import triangulate
@@ -33,6 +34,8 @@ _SCRIPTS = ("viewer.js", "sheets.js", "fold.js", "page.js")
 _SEAM = "S"
 """What the page calls a border that is glued to another."""
 _STEPS = 65535
+_BEGINS_STROKE = np.uint8(128)
+"""Added to the layer of the first move of each stroke."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +141,8 @@ def _sheet(preview: Preview, sheet: SheetPreview) -> dict[str, Any]:
     track = np.concatenate([program.start[:1, :2], program.end[:, :2]])
     box, packed = _packed(track if len(track) else np.zeros((1, 2)))
     bed = preview.machine.bed
+    layers = sheet.layer.astype(np.uint8)
+    layers[strokes(program).first_move] |= _BEGINS_STROKE
     return {
         "name": sheet.name,
         **sheet.figures(),
@@ -149,7 +154,7 @@ def _sheet(preview: Preview, sheet: SheetPreview) -> dict[str, Any]:
         "lengths": [round(length, 3) for length in sheet.layer_mm],
         "box": box,
         "points": packed,
-        "layers": _base64(sheet.layer, np.uint8),
+        "layers": _base64(layers, np.uint8),
         "ends": _base64(sheet.end_seconds, np.float32),
     }
 

@@ -47,6 +47,8 @@ class SheetView {
     byId("sheet-after").disabled = index === this.sheets.length - 1;
     const points = decode(sheet.points, Uint16Array);
     this.ends = decode(sheet.ends, Float32Array);
+    const marked = decode(sheet.layers, Uint8Array);
+    this.strokes = [...marked.keys()].filter((at) => marked[at] & 128);
     this.points = points;
     this.count = this.ends.length;
     const times = new Float32Array(2 * this.count);
@@ -57,7 +59,7 @@ class SheetView {
       ends.set(points.subarray(2 * at, 2 * at + 4), 4 * at);
     }
     if (this.moves) this.moves.free();
-    this.moves = new Lines(this.stage, decode(sheet.layers, Uint8Array), times).place(ends, 2);
+    this.moves = new Lines(this.stage, marked.map((mark) => mark & 127), times).place(ends, 2);
     this.frame = this.outline(sheet);
     const shown = this.shown ? this.shown() : null;
     const entries = this.layers.flatMap((layer, at) => {
@@ -124,7 +126,7 @@ class SheetView {
   seek(seconds) {
     this.now = Math.min(Math.max(seconds, 0), this.sheet.seconds);
     byId("time").value = this.sheet.seconds ? (1000 * this.now) / this.sheet.seconds : 1000;
-    const text = `${clockText(this.now)} of ${clockText(this.sheet.seconds)}`;
+    const text = `${clockText(this.now)} of ${clockText(this.sheet.seconds)}, stroke ${this.stroke()} of ${this.strokes.length}`;
     byId("clock").value = text;
     byId("time").setAttribute("aria-valuetext", text);
     this.stage.draw();
@@ -146,6 +148,18 @@ class SheetView {
       else requestAnimationFrame(tick);
     };
     requestAnimationFrame(tick);
+  }
+
+  /** The number of the stroke that is under way now, or was last; `cut --from-stroke` takes it. */
+  stroke() {
+    let [low, high] = [0, this.strokes.length];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      const move = this.strokes[middle];
+      if ((move ? this.ends[move - 1] : 0) < this.now) low = middle + 1;
+      else high = middle;
+    }
+    return low;
   }
 
   /** The move that is under way now. */
