@@ -27,6 +27,20 @@ FLAG = re.compile(r"(?<![\w-])--[a-z]{2,}")
 WRITE_COMMANDS = ("errors.py", "studio/recipe.py", "fabrication/drawing/calibration_guide.py")
 """Below ``cli``, these spell options for it, or write whole command lines for a person to type."""
 
+ONE_SYSTEM = {
+    "fcntl",
+    "termios",
+    "tty",
+    "pty",
+    "pwd",
+    "grp",
+    "resource",
+    "msvcrt",
+    "winreg",
+    "winsound",
+}
+"""Modules that only POSIX has, and that only Windows has (docs.python.org, library)."""
+
 
 def name(module: Path) -> str:
     return module.relative_to(ROOT).as_posix()
@@ -88,6 +102,27 @@ def test_the_usual_baud_rate_stands_once() -> None:
         name(module) for module in MODULES if re.search("115_?200\\b(?! baud)", module.read_text())
     ]
     assert users == ["miurafab/profiles/machine.py"]
+
+
+def test_modules_of_one_system_are_imported_where_it_is_known() -> None:
+    """Inside a function or under a look at the system: elsewhere the import itself would fail."""
+    tests = [path for path in (ROOT / "tests").rglob("*.py") if "node_modules" not in path.parts]
+    assert len(tests) > 100
+    bare = [
+        f"{name(module)}: {word}"
+        for module in (*MODULES, *tests)
+        for node in tree(module).body
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for word in _imports(node)
+        if word in ONE_SYSTEM
+    ]
+    assert bare == []
+
+
+def _imports(node: ast.Import | ast.ImportFrom) -> list[str]:
+    if isinstance(node, ast.ImportFrom):
+        return [(node.module or "").partition(".")[0]]
+    return [alias.name.partition(".")[0] for alias in node.names]
 
 
 def test_only_the_command_line_names_its_flags() -> None:

@@ -72,6 +72,19 @@ def test_shipped_files_are_found(installed, tmp_path, place):
     assert pattern == "Hyperbolic paraboloid"
 
 
+def test_the_workflow_runs_on_the_systems_and_pythons_that_are_promised():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    promised = re.findall(r"Python :: (\d\.\d+)", " ".join(project["classifiers"]))
+    workflow = (ROOT / ".github" / "workflows" / "tests.yml").read_text()
+    pythons = re.search(r"python: \[(.*)\]", workflow)[1]
+    assert re.findall(r"[\d.]+", pythons) == promised
+    assert re.search(r"os: \[(.*)\]", workflow)[1].split(", ") == [
+        "ubuntu-latest",
+        "macos-latest",
+        "windows-latest",
+    ]
+
+
 def test_the_libraries_that_the_package_imports_are_its_dependencies():
     """Nothing that README shows needs more than ``pip install .`` brings."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]

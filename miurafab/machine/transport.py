@@ -169,15 +169,21 @@ class SerialTransport:
             return self._serial.out_waiting if isinstance(self._serial, serial.Serial) else 0
 
     def offer(self, data: bytes) -> int:
-        """Offer ``data``; returns the number of bytes taken. Does not wait for an XON."""
+        """Offer ``data``; returns the number of bytes taken. Does not wait for an XON; on Windows,
+        whose driver gives no byte back, a second at most and byte by byte.
+        """
+        taken = 0
         with self._gone():
             if isinstance(self._serial, serial.Serial) and os.name == "posix":
                 try:
                     return os.write(self._serial.fileno(), data)
                 except BlockingIOError:
                     return 0
-            self._serial.write(data)
-        return len(data)
+            with contextlib.suppress(serial.SerialTimeoutException):
+                for taken in range(len(data)):
+                    self._serial.write(data[taken : taken + 1])
+                return len(data)
+        return taken
 
     def read(self, timeout: float) -> bytes:
         """The bytes that have arrived; waits up to ``timeout`` seconds for the first."""

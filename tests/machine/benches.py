@@ -7,11 +7,9 @@ tests that use this take real seconds.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import subprocess
 import sys
-import termios
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -142,6 +140,9 @@ class Terminal:
 
     def options(self) -> dict[str, object]:
         """For ``Popen``: the command is the terminal's session, as a shell starts it."""
+        import fcntl
+        import termios
+
         return {
             "stdin": self._slave,
             "stdout": self._slave,

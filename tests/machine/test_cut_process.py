@@ -7,7 +7,6 @@ test_adversarial.py has the same faults, and more, on the controller's clock.
 from __future__ import annotations
 
 import os
-import resource
 import signal
 from pathlib import Path
 
@@ -172,6 +171,8 @@ def test_kill_9_and_on_again(whom: str, nc: Path) -> None:
 def test_a_disk_that_fills_up(nc: Path) -> None:
     """The limit on the size of files stands for the disk: a write beyond it fails."""
     bench = Bench()
+
+    import resource
 
     def limit() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

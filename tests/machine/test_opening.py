@@ -11,7 +11,6 @@ import os
 import re
 import subprocess
 import sys
-import termios
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -147,6 +146,8 @@ def test_only_the_first_opening_makes_an_edge(wire: PtyWire) -> None:
 
 
 def test_a_program_that_leaves_hupcl_set_lowers_the_line(wire: PtyWire) -> None:
+    import termios
+
     for _ in range(2):
         line = serial.Serial(wire.address)
         attributes = termios.tcgetattr(line.fileno())
