@@ -7,6 +7,7 @@ BIN := .venv/bin
 
 demo: .venv/installed
 	$(BIN)/miurafab cut patterns/hypar.toml --port virtual
+	$(BIN)/miurafab check jobs/hypar --rebuild
 	@echo "How to glue it: jobs/hypar/assembly.pdf. Pictures of the sheets: $(BIN)/miurafab preview jobs/hypar"
 
 test: .venv/installed-dev

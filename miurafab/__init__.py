@@ -91,6 +91,8 @@ if TYPE_CHECKING:
     from miurafab.workflow.patterns import check as check
     from miurafab.workflow.preview import Preview as Preview
     from miurafab.workflow.preview import preview as preview
+    from miurafab.workflow.rebuild import Rebuilt as Rebuilt
+    from miurafab.workflow.rebuild import rebuild as rebuild
     from miurafab.workflow.sheets import SheetJob as SheetJob
     from miurafab.workflow.sheets import sheets as sheets
     from miurafab.workflow.tradeoff import tradeoff as tradeoff

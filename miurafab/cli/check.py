@@ -7,13 +7,15 @@ from typing import Annotated
 
 import miurafab
 from miurafab.cli.console import Console
-from miurafab.cli.declared import argument
-from miurafab.errors import DONE, NO
+from miurafab.cli.declared import argument, option
+from miurafab.errors import DONE, NO, OptionError
+from miurafab.options import Flag
 
 EXAMPLES = (
     "miurafab check hypar.fold",
     "miurafab check hypar.fold --json",
     "miurafab check jobs/hypar",
+    "miurafab check jobs/hypar --rebuild",
 )
 
 
@@ -21,6 +23,14 @@ def check(
     thing: Annotated[Path, argument("THING", "The pattern, a FOLD file, or a job directory.")],
     /,
     *,
+    rebuild: Annotated[
+        bool,
+        option(
+            Flag(),
+            "Also run the job in memory, fold and glue what the beam has cut, and say how far that "
+            "shell lies from the folded form.",
+        ),
+    ] = False,
     console: Console = Console(),
 ) -> int:
     """Recompute every invariant of a pattern, or prove a job, from files alone.
@@ -30,7 +40,9 @@ def check(
     hold.
     """
     if thing.is_dir():
-        return _check_job(thing, console)
+        return _check_job(thing, rebuild, console)
+    if rebuild:
+        raise OptionError("rebuild", f"is for a job directory; {thing} is a pattern")
     result = miurafab.check(thing)
     report = result.report()
 
@@ -45,14 +57,31 @@ def check(
     return DONE if result.valid else NO
 
 
-def _check_job(folder: Path, console: Console) -> int:
+def _check_job(folder: Path, rebuild: bool, console: Console) -> int:
     result = miurafab.check_job(folder)
+    again = miurafab.rebuild(folder) if rebuild else None
+    answer = result.report()
+    if again is not None:
+        answer["rebuilt"] = again.report()
 
     def show() -> None:
         facts: dict[str, object] = {"status": result.report()["status"], "files": result.files}
         facts |= {f"{kind} strokes": number for kind, number in result.traced.items()}
         console.facts(facts)
         console.findings(result.findings)
+        if again is not None:
+            to_target = (
+                ""
+                if again.target_mm is None
+                else (
+                    f" and {again.target_mm:.3g} mm from the target (the folded form "
+                    f"{again.folded_target_mm:.3g} mm)"
+                )
+            )
+            console.line(
+                f"Folded and glued from the beam log alone, {again.measured} of {again.corners} "
+                f"corners lie at worst {again.worst_mm:.3f} mm from the folded form{to_target}."
+            )
 
-    console.answer(result.report(), show)
+    console.answer(answer, show)
     return DONE if result.valid else NO

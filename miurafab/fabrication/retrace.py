@@ -31,7 +31,7 @@ from miurafab.fabrication.placing import motion_of, texts_of
 from miurafab.fabrication.route.order import StrokeSet
 from miurafab.fabrication.seams import Seams, all_seams
 from miurafab.fabrication.sheets import Layout, worked
-from miurafab.fabrication.strokes import Blank, sheet_strokes
+from miurafab.fabrication.strokes import Blank, RigidTransform, sheet_strokes
 from miurafab.fabrication.tabs import FOLDS, TabRegions, edge_axes
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
@@ -56,16 +56,7 @@ def retraced(
     Raises :class:`~miurafab.errors.LayoutError` for a layout that names what the pattern lacks.
     """
     material = worked(material, machine, options)
-    outlined, numbers = _outlined(layout, pattern)
-    placed = {
-        placement.patch: (number, placement)
-        for number, sheet in enumerate(layout.sheets)
-        for placement in sheet.placements
-    }
-    if sorted(placed) != list(range(len(layout.patches))):
-        raise LayoutError("The layout does not place each patch once on a sheet.")
-    sheets = np.array([placed[patch.id][0] for patch in layout.patches])
-    motion = motion_of(layout.patches, [placed[patch.id][1] for patch in layout.patches], sheets)
+    outlined, numbers, motion = patches_on_sheets(layout, pattern)
     margin = options.nesting.margin_mm
     margin = machine.bed.margin_mm if margin is None else margin
     drawn = sheet_strokes(
@@ -89,6 +80,27 @@ def retraced(
         if not told.is_valid or told.symmetric_difference(own).area > NEAR_MM * own.length:
             faults.append(f"The outline of {patch.label} does not surround its facets and tabs.")
     return passes, faults
+
+
+def patches_on_sheets(
+    layout: Layout, pattern: CreasePattern
+) -> tuple[OutlinedPatches, Ints, RigidTransform]:
+    """The patches of the first model in the plane of the pattern, the numbers of their tabs, and
+    the motions of all patches to their sheets.
+
+    Raises :class:`~miurafab.errors.LayoutError` for a layout that names what the pattern lacks.
+    """
+    outlined, numbers = _outlined(layout, pattern)
+    placed = {
+        placement.patch: (number, placement)
+        for number, sheet in enumerate(layout.sheets)
+        for placement in sheet.placements
+    }
+    if sorted(placed) != list(range(len(layout.patches))):
+        raise LayoutError("The layout does not place each patch once on a sheet.")
+    sheets = np.array([placed[patch.id][0] for patch in layout.patches])
+    places = [placed[patch.id][1] for patch in layout.patches]
+    return outlined, numbers, motion_of(layout.patches, places, sheets)
 
 
 def _outlined(layout: Layout, pattern: CreasePattern) -> tuple[OutlinedPatches, Ints]:

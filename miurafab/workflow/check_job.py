@@ -34,7 +34,7 @@ from miurafab.origami.formats.fold import read_fold
 from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.job_directory import WrittenJob, read_written
 from miurafab.workflow.job_files import LAYOUT, job_material, settle_job
-from miurafab.workflow.manifest import MANIFEST, TOOL, Manifest, read_manifest, sha256
+from miurafab.workflow.manifest import MANIFEST, TOOL, Manifest, pattern_name, read_manifest, sha256
 from miurafab.workflow.patterns import check
 from miurafab.workflow.trace import traced_strokes
 
@@ -168,10 +168,7 @@ def _traced(
         says = "The strokes of a calibration sheet are not traced: no pattern stands behind them."
         yield Finding("not-proven", says)
         return
-    patterns = [name for name in manifest.files if name.endswith(".fold")]
-    if len(patterns) != 1:
-        raise InputError(f"{folder / MANIFEST} names {len(patterns)} patterns; a job has one.")
-    pattern = read_fold(folder / patterns[0])
+    pattern = read_fold(folder / pattern_name(folder, manifest))
     yield from check(pattern).findings
     material = job_material(layout.material, folder)
     options = read_options(LayoutOptions, manifest.options, where=MANIFEST, folder=folder)

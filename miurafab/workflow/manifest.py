@@ -75,6 +75,14 @@ def read_manifest(directory: Path) -> Manifest:
         return Manifest(str(document["tool"]), options, files, profiles)
 
 
+def pattern_name(folder: Path, manifest: Manifest) -> str:
+    """The file name of the pattern of the job in ``folder``."""
+    patterns = [name for name in manifest.files if name.endswith(".fold")]
+    if len(patterns) != 1:
+        raise InputError(f"{folder / MANIFEST} names {len(patterns)} patterns; a job has one.")
+    return patterns[0]
+
+
 def edits(folder: Path, names: Iterable[str]) -> tuple[Finding, ...]:
     """The findings ``edited``: which files of the job in ``folder``, of those ``names`` and of its
     profiles, are not as the manifest says.

@@ -1,0 +1,123 @@
+"""The pieces that a beam has cut and creased, measured from what it burnt alone.
+
+The layout says which edge of the pattern a burnt line is: the one on whose place it lies, within
+:data:`NEAR_MM`. Where the edge then is, its burnt points alone say. They give a line (total least
+squares); a cut line lies half a kerf outside its edge and is moved back. A corner of a patch is the
+point nearest to the lines of all edges that meet there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from miurafab.fabrication.partition.patch_outline import OutlinedPatches
+from miurafab.fabrication.strokes import RigidTransform
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.origami.crease_pattern import CreasePattern
+
+NEAR_MM = 0.15
+"""A burnt line is that of the edge on whose place it lies so near; facets are larger."""
+SHORTEST_MM = 0.1
+"""A shorter burnt segment has no direction worth measuring: a motor step is 0.0125 mm."""
+PARALLEL = 0.05
+"""Radians; lines that differ by less do not fix the point where they meet."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecoveredCorners:
+    """The K corners of all patches: ``patch`` and ``vertex`` (K,) of each, and its ``place``
+    (K, 2) on the sheet in mm, NaN where the burnt lines do not fix it.
+    """
+
+    patch: Ints
+    vertex: Ints
+    place: Floats
+
+
+def recovered_corners(
+    pattern: CreasePattern,
+    outlined: OutlinedPatches,
+    motion: RigidTransform,
+    kerf_mm: float,
+    burnt: list[Floats],
+) -> RecoveredCorners:
+    """The corners of the patches, from the segments (n, 4) that were ``burnt`` on each sheet."""
+    patch, edge, shift = _edges(pattern, outlined, kerf_mm)
+    ends = pattern.vertices_coords[pattern.edges_vertices[edge]] + shift[:, None]
+    placed = np.einsum("nij,nkj->nki", motion.matrix[patch], ends)
+    placed = placed + motion.shift[patch][:, None]
+    middle, along = _lines(placed, motion.sheet[patch], burnt)
+    middle -= np.einsum("nij,nj->ni", motion.matrix[patch], shift)
+    key = np.repeat(patch, 2) * len(pattern.vertices_coords) + pattern.edges_vertices[edge].ravel()
+    corners, corner = np.unique(key, return_inverse=True)
+    line = np.repeat(np.arange(len(edge)), 2)
+    place = _meeting(corner.reshape(-1), middle[line], along[line], len(corners))
+    return RecoveredCorners(*np.divmod(corners, len(pattern.vertices_coords)), place)
+
+
+def _edges(
+    pattern: CreasePattern, outlined: OutlinedPatches, kerf: float
+) -> tuple[Ints, Ints, Floats]:
+    """The (patch, edge) of each side of the patches, and how far its line lies outside, (n, 2)."""
+    beside = pattern.edges_faces
+    owner = np.where(beside >= 0, outlined.face_patch[beside], -1)
+    based = np.full(len(beside), -1)
+    based[outlined.tabs.edge] = outlined.face_patch[outlined.tabs.own_face]
+    ends = pattern.vertices_coords[pattern.edges_vertices]
+    step = ends[:, 1] - ends[:, 0]
+    right = np.stack([step[:, 1], -step[:, 0]], axis=1) / np.linalg.norm(step, axis=1)[:, None]
+    parts = []
+    for side in (0, 1):
+        own, other = owner[:, side], owner[:, 1 - side]
+        chosen = np.flatnonzero((own >= 0) & ((own != other) | (side == 0)))
+        cut = (own != other) & (based != own)
+        out = right if side == 0 else -right  # the facet lies left of its edge
+        parts.append((own[chosen], chosen, (out * (cut * kerf / 2)[:, None])[chosen]))
+    patches, edges, shifts = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return patches, edges, shifts
+
+
+def _lines(placed: Floats, sheet: Ints, burnt: list[Floats]) -> tuple[Floats, Floats]:
+    """A point (n, 2) and the direction (n, 2) of the line burnt where each of the edges ``placed``
+    (n, 2, 2) should be; NaN where nothing was.
+    """
+    sums = np.zeros((len(placed), 6))
+    for number, segments in enumerate(burnt):
+        own = np.flatnonzero(sheet == number)
+        lengths = np.linalg.norm(segments[:, 2:] - segments[:, :2], axis=1)
+        long = segments[lengths > SHORTEST_MM]
+        tree = shapely.STRtree(np.asarray(shapely.linestrings(placed[own]), dtype=object))
+        middles = shapely.points((long[:, :2] + long[:, 2:]) / 2)
+        which, found = tree.query_nearest(middles, max_distance=NEAR_MM, all_matches=False)
+        segment, edge = long[which], own[found]
+        near = shapely.linestrings(placed[edge])
+        for point in (segment[:, :2], segment[:, 2:]):
+            there = shapely.dwithin(shapely.points(point), near, NEAR_MM)
+            x, y = point[there].T
+            terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+            np.add.at(sums, edge[there], terms)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = sums[:, 1:3] / sums[:, :1]
+        xx, xy, yy = (sums[:, 3:] / sums[:, :1]).T - np.stack(
+            [mean[:, 0] ** 2, mean[:, 0] * mean[:, 1], mean[:, 1] ** 2]
+        )
+    angle = np.arctan2(2 * xy, xx - yy) / 2
+    return mean, np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def _meeting(corner: Ints, middle: Floats, along: Floats, count: int) -> Floats:
+    """(count, 2) the point nearest to the lines of each corner; NaN where they are parallel."""
+    known = np.isfinite(middle).all(axis=1)
+    normal = np.stack([-along[:, 1], along[:, 0]], axis=1)[known]
+    away = np.einsum("nk,nk->n", normal, middle[known])
+    square = np.zeros((count, 2, 2))
+    side = np.zeros((count, 2))
+    np.add.at(square, corner[known], normal[:, :, None] * normal[:, None])
+    np.add.at(side, corner[known], normal * away[:, None])
+    fixed = np.linalg.eigvalsh(square)[:, 0] > PARALLEL**2
+    place = np.full((count, 2), np.nan)
+    place[fixed] = np.linalg.solve(square[fixed], side[fixed][..., None])[..., 0]
+    return place
