@@ -250,11 +250,13 @@ def _report_dry_run(
 ) -> int:
     """Say what would be cut, and what the pre-flight checks find; no if they refuse it."""
     from miurafab.machine.preflight import require_known
+    from miurafab.workflow.alignment import draw
     from miurafab.workflow.dry_run import clock_text
     from miurafab.workflow.sheet_plans import rehearsed
 
     require_known(options.send.force)
     prepared, status, notes = rehearsed(prepared, sheet, options)
+    page = draw(prepared)
     of_sheets = (finding for sheet in prepared.dry_runs for finding in sheet.findings)
     findings = [*notes, *prepared.edits, *of_sheets]
     answer = {
@@ -264,7 +266,7 @@ def _report_dry_run(
         "seconds": round(sum(sheet.seconds for sheet in prepared.dry_runs), 3),
         "sheets": [sheet.figures() for sheet in prepared.dry_runs],
         "findings": findings_json(findings),
-    }
+    } | ({} if page is None else {"page": str(page)})
 
     def show() -> None:
         console.rows(
@@ -282,6 +284,8 @@ def _report_dry_run(
             title=f"{prepared.name} on {prepared.machine.title}; no port was opened",
         )
         console.findings(findings)
+        if page is not None:
+            console.line(f"Open {page} in a browser: the sheet where it would be cut.")
 
     console.answer(answer, show)
     return NO if status == "refused" else DONE

@@ -29,6 +29,7 @@ from miurafab.machine.resume import Resumption
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.dry_run import dry_run
+from miurafab.workflow.preview import Preview
 
 Mark = tuple[Point, Point]
 """A mark: its position in the job, and where the head stands over it, mm."""
@@ -89,6 +90,18 @@ def align(prepared: Prepared, sheets: Sequence[int] | None, marks: Sequence[Mark
         dry_runs=tuple(dry_runs),
         aligned=Aligned(number, job, motion, finding),
     )
+
+
+def draw(prepared: Prepared) -> Path | None:
+    """Write the pictures and the page of a sheet that was turned beside its job, as
+    :meth:`~miurafab.workflow.preview.Preview.write` does; returns the page.
+    """
+    aligned = prepared.aligned
+    if aligned is None or prepared.folder is None:
+        return None
+    sheet = prepared.dry_runs[aligned.number - 1]
+    seen = Preview(prepared.name, prepared.machine, (sheet,), None, (aligned.finding,))
+    return seen.write(prepared.folder / "aligned")[-1]
 
 
 def _moved(job: Job, machine: MachineProfile, motion: RigidMotion) -> Job:

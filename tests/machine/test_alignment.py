@@ -18,7 +18,7 @@ from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.options import read_options
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
-from miurafab.workflow.alignment import align
+from miurafab.workflow.alignment import align, draw
 from miurafab.workflow.cut import prepare
 from miurafab.workflow.cut_sheets import CutOptions, cut_prepared, frame
 from miurafab.workflow.sheet_plans import plan_sheets
@@ -116,6 +116,16 @@ def test_a_sheet_that_was_moved_while_interrupted_goes_on(prepared, tmp_path):
     (done,) = cut_prepared(prepared, port="virtual", options=options)
     assert {"aligned", "resumed"} <= {found.code for found in done.findings}
     assert {run.sha256 for run in read_journal(journal)} == {job_digest(prepared.jobs[0])}
+
+
+def test_the_picture_is_that_of_the_moved_sheet(prepared, tmp_path):
+    assert draw(prepared) is None
+    page = draw(align(prepared, None, marks_of(moved_by(math.pi / 2, 300, 50))))
+    assert page == tmp_path / "aligned" / "preview.html"
+    # X and Y of the box, 3 to 130 and 4 to 140, have changed places.
+    picture = (tmp_path / "aligned" / "sheet-01.svg").read_text()
+    assert "X 160 to 296 mm" in picture
+    assert "turned by 90.000 degrees" in page.read_text()
 
 
 def test_marks_that_are_no_turn_and_no_shift_are_refused(prepared):
