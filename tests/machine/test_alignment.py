@@ -122,9 +122,9 @@ def test_the_picture_is_that_of_the_moved_sheet(prepared, tmp_path):
     assert draw(prepared) is None
     page = draw(align(prepared, None, marks_of(moved_by(math.pi / 2, 300, 50))))
     assert page == tmp_path / "aligned" / "preview.html"
-    # X and Y of the box, 3 to 130 and 4 to 140, have changed places.
+    # X and Y of the box, 3 to 130 and 4 to 150, have changed places.
     picture = (tmp_path / "aligned" / "sheet-01.svg").read_text()
-    assert "X 160.0 to 296.0 mm" in picture
+    assert "X 150.0 to 296.0 mm" in picture
     assert "turned by 90.000 degrees" in page.read_text()
 
 
