@@ -41,11 +41,12 @@ class Line:
         """
 
         def tell() -> None:
+            from miurafab.machine.greeting import RESTARTED
+
             console.note(
-                f"The opening of {self.port} restarted the board: an unlocking, an origin set with "
-                "G92 and a position that was not homed are forgotten. A board that every opening "
-                "restarts forgets what this command did too; 'miurafab cut --home' homes and cuts "
-                "in one conversation."
+                f"The opening of {self.port} {RESTARTED}. A board that every opening restarts "
+                "forgets what this command did too; 'miurafab cut --home' homes and cuts in one "
+                "conversation."
             )
 
         return {

@@ -78,7 +78,7 @@ def conversation(
         session = MachineSession(transport, signals)
         try:
             session.open(line.get("wait", WAIT_S), reset=line.get("reset", False))
-            if session.conversation.restarted and transport.blocks and "on_restart" in line:
+            if "on_restart" in line and session.conversation.take_restart():
                 line["on_restart"]()
             yield session
         except KeyboardInterrupt:

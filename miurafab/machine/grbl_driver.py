@@ -17,7 +17,7 @@ from miurafab.findings import Finding
 from miurafab.gcode.program import BEAM_M3, PAUSE
 from miurafab.grbl.events import Error, Ok, StatusReport
 from miurafab.grbl.streamer import LineRefused, Streamer
-from miurafab.machine.greeting import ANSWER_S
+from miurafab.machine.greeting import ANSWER_S, RESTARTED
 from miurafab.machine.judge_words import leaves_air_on
 from miurafab.machine.keys import HOLD, RESUME, NoKeys
 from miurafab.machine.preflight import (
@@ -77,13 +77,14 @@ class GrblDriver(StreamDriver):
         """See :class:`StreamDriver`."""
         plan, session, known = self.plan, self._session, self._known
         known.open(plan.wait, reset=plan.reset)
+        restarted = session.take_restart()
         known.clear_overrides()
         if plan.options.home:
             self.at_risk = True
             session.home()
             self.at_risk = False
         forced = raise_findings(
-            check_status(session.wait_status(), restarted=session.restarted),
+            check_status(session.wait_status(), restarted=restarted),
             plan.options.force,
             ControllerError,
         )
@@ -108,6 +109,8 @@ class GrblDriver(StreamDriver):
         if plan.options.check_mode:
             self.at_risk = True
             session.command("$C")
+        if restarted and not plan.options.home and plan.at is None:
+            modes += (Finding("restarted", f"The opening of {session.name} {RESTARTED}."),)
         return forced + modes
 
     def stream(self) -> None:

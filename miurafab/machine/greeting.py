@@ -22,6 +22,11 @@ from miurafab.grbl.states import State
 if TYPE_CHECKING:
     from miurafab.machine.session import Session
 
+RESTARTED = (
+    "restarted the board: an unlocking, an origin set with G92 and a position that was not homed "
+    "are forgotten"
+)
+"""What the opening of a port did, and what that undid."""
 ANSWER_S = 3.0
 """The longest time until a working controller answers a question."""
 RESET_S = 0.8
@@ -29,7 +34,7 @@ RESET_S = 0.8
 _ASK_AGAIN_S = 1.0  # a boot loader takes no status query
 _PROOF_S = 0.5  # for ? and $I where a banner is missing; they take milliseconds
 _PROBES = 2
-_BUSY = ("Run", "Jog", "Home", "Hold", "Door")
+_BUSY = ("Run", "Jog", "Home", "Hold", "Door", "Tool")  # Tool: grblHAL changes its tool
 _AT_REST = ("Idle", "Alarm")
 _RELEASE = re.compile(r"\d+\.\d+[a-z]?")
 
@@ -86,7 +91,8 @@ def _first_word(session: Session, patience: float) -> Banner | StatusReport | No
     while session.now() < end:
         session.ask_status()
         for event in session.receive(min(end - session.now(), _ASK_AGAIN_S)):
-            if isinstance(event, Banner | StatusReport):
+            boots = isinstance(event, StatusReport) and event.state == "Starting"  # FluidNC
+            if isinstance(event, Banner | StatusReport) and not boots:
                 return event
     return None
 

@@ -100,6 +100,11 @@ class Session:
             return None
         return tuple(w + o for w, o in zip(status.work_position, self.work_offset, strict=False))
 
+    def take_restart(self) -> bool:
+        """Whether the opening of the port reset the board and nobody was told; told then."""
+        restarted, self.restarted = self.restarted, False
+        return restarted and self._transport.blocks
+
     # The wire
 
     def write(self, data: bytes) -> None:

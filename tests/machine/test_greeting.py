@@ -6,11 +6,12 @@ import pytest
 from dashes import dashes
 from wires import FakeWire
 
-from miurafab.errors import JobStopped
+from miurafab.errors import ControllerError, JobStopped
+from miurafab.gcode.job import Job
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Banner
 from miurafab.grbl.replies import parse_reply
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import deliver
 from miurafab.machine.session import Session
 from miurafab.machine.signals import StopSignals
@@ -110,3 +111,36 @@ def test_a_job_on_a_silent_board_is_stopped_and_the_beam_is_known_to_be_off(at: 
 @pytest.mark.parametrize("text", ["Grbl 1.1h ['$' for help]  ", "Grbl 1.1h ['$' for help]\t"])
 def test_blanks_behind_a_banner_say_nothing(text: str) -> None:
     assert parse_reply(text) == Banner("Grbl", "1.1h")
+
+
+@pytest.mark.parametrize(("state", "waits"), [("Starting", True), ("Tool", False)])
+def test_words_of_other_firmwares(state: str, waits: bool) -> None:
+    """FluidNC says that it starts; grblHAL waits for a tool, and is left alone."""
+
+    class Saying(FakeWire):
+        def read(self, timeout: float) -> bytes:
+            data = super().read(timeout)
+            return data.replace(b"<Idle|", f"<{state}|".encode()) if self.calls < 4 else data
+
+    session = Session(wire := Saying(board(dialect="fluidnc")), Connection())
+    if waits:
+        session.greet()
+        assert wire.commands == b"$I\n"
+    else:
+        with pytest.raises(ControllerError, match=r"is at work \(Tool\)"):
+            session.greet()
+        assert wire.commands == b""
+
+
+@pytest.mark.parametrize("options", [{}, {"at": (0.0, 0.0)}])
+@pytest.mark.parametrize("resets", [True, False])
+def test_a_job_says_what_the_opening_of_its_port_undid(
+    resets: bool, options: dict[str, tuple[float, float]]
+) -> None:
+    class Port(FakeWire):
+        blocks = True
+
+    device = VirtualGrbl(virtual_settings(MACHINE), baud=115_200) if resets else board()
+    plan = plan_job(Job("a.nc", "M4 S0\nG1 X1 S9 F600\nM5\n"), MACHINE, SendOptions(**options))
+    findings = deliver(plan, Port(device), StopSignals()).findings
+    assert [f.code for f in findings] == (["restarted"] if resets and not options else [])
