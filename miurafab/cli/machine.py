@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, argument, option, takes
 from miurafab.errors import DONE
+from miurafab.findings import findings_json
 from miurafab.options import Flag, Text, Whole, declared, feed, length, read_options
 from miurafab.profiles.machine import Controller
 
@@ -176,7 +177,10 @@ def _frame_options() -> type:
     return CutOptions
 
 
-@takes(_frame_options, without=("check_mode", "resume", "frame", "allow_m3", "force"))
+_NO_FRAME = ("check_mode", "resume", "frame", "from_stroke", "allow_m3", "force")
+
+
+@takes(_frame_options, without=_NO_FRAME)
 def frame(
     thing: Annotated[str, argument("THING", "A job directory or a G-code file.")],
     /,
@@ -192,10 +196,15 @@ def frame(
 ) -> int:
     """Trace the box around what a sheet burns, with the beam off or as a pointer."""
     from miurafab.workflow import cut_sheets
+    from miurafab.workflow.alignment import align
     from miurafab.workflow.cut import prepare
 
-    prepared = prepare(thing, machine=machine)
     options = read_options(cut_sheets.CutOptions, given)
+    prepared = align(prepare(thing, machine=machine), [sheet], options.align)
+    options = replace(options, align=())  # it lies there now
+    found = () if prepared.aligned is None else (prepared.aligned.finding,)
+    for finding in found:
+        console.note(finding.sentence)
     for each in port:
         if len(port) > 1:
             console.note(f"Tracing the frame at {each}.")
@@ -207,6 +216,7 @@ def frame(
             "pointer_percent": 100 * options.pointer,
             "ports": port,
         }
+        | ({"findings": findings_json(found)} if found else {})
     )
     return DONE
 

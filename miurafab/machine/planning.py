@@ -61,8 +61,9 @@ class SendOptions:
     )
     at: Head | str | None = option(
         Either(Choice(tuple(PLACES)), Pair(length(-math.inf), "X,Y", "0,0 or 10mm,5mm")),
-        "Where the head stands: X,Y in the job's coordinates (0,0 is the job's origin), or a PLACE "
-        f"of the box around what the first sheet burns ({', '.join(PLACES)}).",
+        "Where the head stands: X,Y in the job's coordinates (0,0 is the job's origin), or a "
+        "PLACE, which is X,Y of that place of the box around what the first sheet burns "
+        f"({', '.join(PLACES)}).",
         group="Start",
         default_text="the controller's own work coordinates",
     )

@@ -292,6 +292,12 @@ def test_a_frame_is_traced(run, job):
     assert json.loads(done.stdout)["ports"] == ["virtual"]
     refused = run("machine", "frame", "job", "--port", "virtual", "--pointer", "9", "--quiet")
     assert "it must be between 0 % and 5 %" in sentence(refused, 2)
+    marks = ("--align", "0,0=10,20", "--align", "100,100=110,120")  # given twice, read as two
+    moved = run("machine", "frame", "job", "--port", "virtual", *marks, "--json")
+    x0, y0, x1, y1 = json.loads(done.stdout)["bounds_mm"]
+    wanted = [x0 + 10, y0 + 20, x1 + 10, y1 + 20]
+    assert json.loads(moved.stdout)["bounds_mm"] == pytest.approx(wanted)
+    assert "shifted by X10.000 Y20.000" in json.loads(moved.stdout)["findings"][0]["sentence"]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
