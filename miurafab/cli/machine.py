@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from miurafab.cli import open_session
 from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, argument, option, takes
 from miurafab.errors import DONE
@@ -239,6 +240,7 @@ def talk(*, line: Line, console: Console = Console()) -> int:
 
 HELP = "Look at a machine, keep its settings, home, unlock or move it."
 ACTIONS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {
+    "open": (open_session.open_, open_session.EXAMPLES),
     "list": (list_, ("miurafab machine list",)),
     "info": (info, ("miurafab machine info --port virtual",)),
     "settings": (settings, ("miurafab machine settings --port virtual",)),

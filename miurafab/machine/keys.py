@@ -56,6 +56,17 @@ def session_keys(dialect: str) -> dict[str, bytes]:
     return keys_of(dialect) | ({"c": JOG_CANCEL} if obeys_overrides(dialect) else {})
 
 
+UP, DOWN, RIGHT, LEFT, PAGE_UP, PAGE_DOWN = "\u2191\u2193\u2192\u2190\u21de\u21df"
+_SEQUENCES = {
+    f"\x1b{form}{letter}": key
+    for form in "[O"
+    for letter, key in zip("ABCD", (UP, DOWN, RIGHT, LEFT), strict=True)
+} | {"\x1b[5~": PAGE_UP, "\x1b[6~": PAGE_DOWN}
+"""The sequences of the keys that jog (xterm, "Control Sequences": PC-style function keys)."""
+_CODES = dict(zip("HPMKIQ", (UP, DOWN, RIGHT, LEFT, PAGE_UP, PAGE_DOWN), strict=True))
+"""Their second codes in a Windows console."""
+
+
 class Keys(Protocol):
     """A source of keys."""
 
@@ -72,16 +83,19 @@ class NoKeys:
 
 
 @contextmanager
-def terminal_keys() -> Iterator[Keys]:
-    """The keys of this terminal, or none without one; the terminal is left as it was."""
+def terminal_keys(*, arrows: bool = False) -> Iterator[Keys]:
+    """The keys of this terminal, or none without one; the terminal is left as it was.
+
+    With ``arrows`` the keys that jog are told, as :data:`UP` and its kin.
+    """
     if not sys.stdin.isatty():
         yield NoKeys()
     elif sys.platform == "win32":
         import msvcrt
 
-        yield ConsoleKeys(msvcrt.kbhit, msvcrt.getwch)
+        yield ConsoleKeys(msvcrt.kbhit, msvcrt.getwch, arrows=arrows)
     else:
-        with _posix_keys() as keys:
+        with _posix_keys(arrows) as keys:
             yield keys
 
 
@@ -90,11 +104,19 @@ class Typed:
 
     An arrow, a function key, Alt with a key, a mouse or an answer of the terminal arrives as an
     escape sequence of printable characters (ECMA-48, 5.4; xterm, "Control Sequences"). A sequence
-    is dropped whole, over any number of reads. An escape that nothing follows for ``wait``
-    seconds is the key itself, so that it swallows no later key.
+    is dropped whole, over any number of reads, but for those of the keys that jog, with ``arrows``.
+    An escape that nothing follows for ``wait`` seconds is the key itself, so that it swallows no
+    later key.
     """
 
-    def __init__(self, now: Callable[[], float] = time.monotonic, wait: float = 0.05) -> None:
+    def __init__(
+        self,
+        now: Callable[[], float] = time.monotonic,
+        wait: float = 0.05,
+        *,
+        arrows: bool = False,
+    ) -> None:
+        self._known = _SEQUENCES if arrows else {}
         self._decode = codecs.getincrementaldecoder("utf-8")("surrogateescape").decode
         self._now, self._wait = now, wait
         self._sequence = ""
@@ -115,7 +137,8 @@ class Typed:
         elif self._sequence:
             self._sequence += character
             if _ENDED.fullmatch(self._sequence):
-                self._sequence = ""
+                ended, self._sequence = self._sequence, ""
+                return self._known.get(ended, "")
         else:
             return character
         return ""
@@ -143,11 +166,14 @@ class ConsoleKeys:
     """The keys of a Windows console: ``waiting`` and ``read`` are ``kbhit`` and ``getwch``.
 
     A key without a character is two: NUL or 0xE0, and a code, which may look like a letter
-    (Microsoft C runtime, ``_getch``). Both are dropped.
+    (Microsoft C runtime, ``_getch``). Both are dropped, but for the keys that jog, with ``arrows``.
     """
 
-    def __init__(self, waiting: Callable[[], bool], read: Callable[[], str]) -> None:
+    def __init__(
+        self, waiting: Callable[[], bool], read: Callable[[], str], *, arrows: bool = False
+    ) -> None:
         self._waiting, self._read = waiting, read
+        self._known = _CODES if arrows else {}
 
     def pressed(self) -> str:
         """The keys pressed since the last call; never waits."""
@@ -155,7 +181,7 @@ class ConsoleKeys:
         while self._waiting():
             key = self._read()
             if key in "\0\xe0":
-                self._read()
+                keys += self._known.get(self._read(), "")
             else:
                 keys += key
         return keys
@@ -167,9 +193,9 @@ if sys.platform != "win32":
     import termios
 
     class _PosixKeys:
-        def __init__(self, descriptor: int) -> None:
+        def __init__(self, descriptor: int, arrows: bool) -> None:
             self._descriptor = descriptor
-            self._typed = Typed()
+            self._typed = Typed(arrows=arrows)
 
         def pressed(self) -> str:
             return self._typed.keys(self._read())
@@ -190,14 +216,14 @@ if sys.platform != "win32":
                 return b""
 
     @contextmanager
-    def _posix_keys() -> Iterator[Keys]:
+    def _posix_keys(arrows: bool) -> Iterator[Keys]:
         descriptor = sys.stdin.fileno()
         before = termios.tcgetattr(descriptor)
         raw = termios.tcgetattr(descriptor)
         raw[3] &= ~(termios.ICANON | termios.ECHO)
         termios.tcsetattr(descriptor, termios.TCSAFLUSH, raw)  # what was typed before is not meant
         try:
-            yield _PosixKeys(descriptor)
+            yield _PosixKeys(descriptor, arrows)
         finally:
             with suppress(termios.error):  # it was closed
                 termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

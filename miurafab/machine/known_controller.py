@@ -13,6 +13,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from miurafab.errors import InputError
 from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.events import Event, Modes, Options, Parameter, StartupBlock, Version
@@ -29,6 +30,7 @@ _QUESTIONS = (BUILD, SETTINGS, OFFSETS, MODES, STARTUP)
 _WRITES_SETTING = re.compile(r"\$\s*(?:\d+|N\d|RST|I)\s*=", re.IGNORECASE)
 _ANSWERS_IN = ("Idle", "Alarm")
 """The states in which GRBL answers its questions; ``error:8`` in the others (``system.c``)."""
+_ONLY_JOBS = ("marlin", "hpgl")
 
 
 @dataclass(frozen=True)
@@ -234,4 +236,13 @@ class KnownController:
             pins=(status.pins or "") if status is not None else "",
             loaded=self.loaded,
             settings=self.settings,
+        )
+
+
+def require_talk(dialect: str) -> None:
+    """Raise ``InputError`` for a ``dialect`` whose machines only take jobs."""
+    if dialect in _ONLY_JOBS:
+        raise InputError(
+            f"A machine that speaks {dialect} only takes whole jobs; home it and move it at its "
+            "panel, and send the job with 'miurafab cut'."
         )

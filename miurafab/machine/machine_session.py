@@ -19,7 +19,6 @@ from pathlib import Path
 
 from miurafab.errors import (
     ControllerError,
-    InputError,
     MachineError,
     PersonNeeded,
 )
@@ -30,7 +29,13 @@ from miurafab.machine.console_lines import ConsoleLines
 from miurafab.machine.job_sending import OpenWire, send_job
 from miurafab.machine.jog_pad import JogPad, require_way
 from miurafab.machine.keys import ABORT, Keys, NoKeys, session_keys
-from miurafab.machine.known_controller import STOCK, KnownController, MachineState, PortSetup
+from miurafab.machine.known_controller import (
+    STOCK,
+    KnownController,
+    MachineState,
+    PortSetup,
+    require_talk,
+)
 from miurafab.machine.owner import Owner, claim, this_owner
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import JobAborted, Progress, StreamResult
@@ -44,7 +49,6 @@ _MOST_ON_A_NETWORK = 256
 """Bytes: two lines of a raster at least; a reset behind 1,023 bytes was unheeded for 2.2 s by
 grblHAL's own simulator."""
 _REALTIME = ("?", "!", "~")
-_ONLY_JOBS = ("marlin", "hpgl")
 
 
 class MachineSession:
@@ -92,11 +96,7 @@ class MachineSession:
         Raises what :meth:`~miurafab.machine.session.Session.greet` raises, and
         :class:`~miurafab.errors.InputError` for a machine that only takes jobs.
         """
-        if self._setup.dialect in _ONLY_JOBS:
-            raise InputError(
-                f"A machine that speaks {self._setup.dialect} only takes whole jobs; home it and "
-                "move it at its panel, and send the job with 'miurafab cut'."
-            )
+        require_talk(self._setup.dialect)
         self.known.open(self._setup.wait if wait is None else wait, reset=reset)
         return self.state
 

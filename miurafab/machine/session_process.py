@@ -45,12 +45,15 @@ _STOP_S = 15.0  # for the process to stop the machine, ask it, and end; stopping
 
 @dataclass(frozen=True, slots=True)
 class PortOpening:
-    """The first order: the machine and the port to open, and who is then its owner."""
+    """The first order: the machine and the port to open, who is then its owner, and the
+    ``arguments`` of the command that the person gave.
+    """
 
     machine: MachineProfile
     port: str
-    virtual_speed: float | None = None
-    owner: Owner | None = None
+    virtual_speed: float | None
+    owner: Owner
+    arguments: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +128,7 @@ class SessionProcess:
         ]
         for reader in self._readers:
             reader.start()
-        self._send(PortOpening(machine, port, virtual_speed, this_owner()))
+        self._send(PortOpening(machine, port, virtual_speed, this_owner(), tuple(sys.argv)))
 
     def _read(self, pipe: IO[bytes]) -> None:
         with contextlib.suppress(EOFError, pickle.UnpicklingError):
@@ -168,6 +171,8 @@ class SessionProcess:
             self.begun = True
         elif isinstance(message, MachineState):
             self.state = message
+        elif isinstance(message, Outcome) and isinstance(message.value, MachineState):
+            self.state = message.value
         now = time.monotonic()
         if self._signals.caught is not None and self._give_up_at is None:
             self._give_up_at = now + _STOP_S
@@ -238,6 +243,7 @@ def main() -> None:
         signals.at_once = False
         try:
             opening: PortOpening = _next(parent, signals)
+            sys.argv[:] = opening.arguments  # by which messages call this command
             tell(Begun())
             with _opened(opening, signals, parent, tell) as session:
                 _serve(session, parent, signals, tell)
@@ -262,7 +268,7 @@ def _opened(
 ) -> Any:
     transport = open_machine(opening.machine, opening.port, opening.virtual_speed)
     signals.at_once = transport.blocks
-    owner = opening.owner and replace(opening.owner, holder=os.getpid())
+    owner = replace(opening.owner, holder=os.getpid())
     session = MachineSession(transport, signals, PortSetup.of(opening.machine), parent, owner)
     session.on_state = tell
     session.lines.on_line = lambda text: tell(Heard(text))

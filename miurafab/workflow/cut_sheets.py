@@ -373,6 +373,17 @@ def frame(
     prepared: Prepared, number: int, *, port: str, options: CutOptions = DEFAULT_OPTIONS
 ) -> StreamResult:
     """Trace the box around what sheet ``number`` (from 1) burns, beam off or as a pointer."""
+    plan = frame_plan(prepared, number, options)
+    return _stream(port)(plan, port, virtual_speed=options.virtual_speed)
+
+
+def frame_plan(
+    prepared: Prepared,
+    number: int,
+    options: CutOptions = DEFAULT_OPTIONS,
+    back_to: tuple[float, float] | None = None,
+) -> JobPlan:
+    """The job of :func:`frame`, that goes ``back_to`` a place, or to where the head is put."""
     (number,) = prepared.chosen([number])
     prepared = align(prepared, [number], options.align)
     bounds = prepared.dry_runs[number - 1].bounds_mm
@@ -384,8 +395,7 @@ def frame(
         bounds,
         prepared.machine,
         pointer=options.pointer,
-        back_to=head_at(options.send.at or (0.0, 0.0), bounds, name),
+        back_to=back_to or head_at(options.send.at or (0.0, 0.0), bounds, name),
     )
     start = replace(options.send, check_mode=False, allow_m3=False)
-    plan = plan_job(box, prepared.machine, start, box=bounds)
-    return _stream(port)(plan, port, virtual_speed=options.virtual_speed)
+    return plan_job(box, prepared.machine, start, box=bounds)
