@@ -22,8 +22,9 @@ from miurafab.machine.keys import JOG_CANCEL
 
 _RUN_S = 0.12
 """The longest time between two presses of a held key; a slow keyboard repeats 10 times a second."""
-_RELEASE_S = _RUN_S + 0.08
-"""T above: until the run has ended, was seen to have ended, and the cancel has arrived."""
+_RELEASE_S = _RUN_S + 0.15
+"""T above: until the run has ended, that was seen, and the cancel has come through what the
+controller has prepared (0.05 s of steps, ``stepper.c``)."""
 _RUN = 3  # presses in a row that mean a held key
 _REPORT_S = 0.3  # a status report that says Idle so long after a jog was sent is not from before it
 _NEAR_MM = 0.02

@@ -18,6 +18,7 @@ from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.events import Event, Modes, Options, Parameter, StartupBlock, Version
 from miurafab.grbl.settings import Settings
+from miurafab.grbl.states import State
 from miurafab.machine.keys import OVERRIDES_OFF, obeys_overrides
 from miurafab.machine.modes import SET, TOOL_LENGTH, ControllerModes
 from miurafab.machine.progress import AS_WRITTEN, Overrides
@@ -30,6 +31,8 @@ _QUESTIONS = (BUILD, SETTINGS, OFFSETS, MODES, STARTUP)
 _WRITES_SETTING = re.compile(r"\$\s*(?:\d+|N\d|RST|I)\s*=", re.IGNORECASE)
 _ANSWERS_IN = ("Idle", "Alarm")
 """The states in which GRBL answers its questions; ``error:8`` in the others (``system.c``)."""
+_REPORTS = 20
+"""Of as many reports at rest one tells the overrides and the work offset (``config.h``: 10)."""
 _ONLY_JOBS = ("marlin", "hpgl")
 
 
@@ -102,7 +105,7 @@ class KnownController:
         self._dialect = dialect
         self._offsets: Mapping[str, tuple[float, ...]] = {}
         self._unknown = set(_QUESTIONS)
-        self._opened = self._set = self._told = False
+        self._opened = self._set = self._told = self._astray = False
         self._starts = 0
 
     def open(self, patience: float, *, reset: bool = False) -> None:
@@ -111,7 +114,16 @@ class KnownController:
             self._session.greet(patience, reset=reset)
             self._starts = self._session.starts
             self._opened = True
+            self._learn_overrides()
         self.refresh()
+
+    def _learn_overrides(self) -> None:
+        """Ask until a report tells the overrides: a board that was not reset may have some."""
+        if obeys_overrides(self._dialect):
+            for _ in range(_REPORTS):
+                if self._session.overrides_told:
+                    return
+                self._session.wait_status()
 
     @property
     def opened(self) -> bool:
@@ -125,9 +137,16 @@ class KnownController:
         return min(values[110], values[111]) if {110, 111} <= values.keys() else None
 
     def refresh(self, *questions: str) -> None:
-        """Ask what is not known (of ``questions``, else of everything), if it answers now."""
-        self.note_restart()
+        """Ask what is not known (of ``questions``, else of everything), if it answers now.
+
+        A controller that restarted by itself may hold half a line; only a reset settles that.
+        """
         session = self._session
+        self.note_restart()
+        if self._astray and session.connection.state is State.UNSYNCED:
+            session.stop()
+            self.note_restart()
+        self._astray = False
         wanted = [each for each in questions or _QUESTIONS if each in self._unknown]
         status = session.status
         if not wanted or status is None or status.state not in _ANSWERS_IN:
@@ -137,6 +156,17 @@ class KnownController:
                 return
             self._unknown.discard(question)
             self._learn(question, session.ask(question))
+        if session.work_offset is None:  # a board that was not reset tells it late
+            session.work_offset = self._offset_in_force()
+
+    def _offset_in_force(self) -> tuple[float, ...] | None:
+        """What it adds to work coordinates now, by the last answers; None: it does not say."""
+        own = next((self._offsets[w] for w in self.modes.modes if w in self._offsets), None)
+        if own is None:
+            return None
+        shift = self._offsets.get("G92", (0.0,) * 9)
+        tool = (0.0, 0.0, *self._offsets.get("TLO", (0.0,)))
+        return tuple(a + b + c for a, b, c in zip(own, shift, tool, strict=False))
 
     def _learn(self, question: str, said: list[Event]) -> None:
         if question == BUILD:
@@ -167,6 +197,7 @@ class KnownController:
         if self._starts != self._session.starts:
             self._starts = self._session.starts
             self._set = self._told = False
+            self._astray = True
             self._unknown |= {OFFSETS, MODES}
 
     def may_differ(self, text: str = "") -> None:
@@ -221,6 +252,8 @@ class KnownController:
         word = "" if status is None else status.state
         if status is not None and status.substate is not None:
             word += f":{status.substate}"
+        if session.connection.state is State.ALARMED:
+            word = "Alarm"  # after a hard limit it answers no status query until a reset
         return MachineState(
             port=session.name,
             firmware=f"{session.banner.firmware} {session.banner.version}".strip(),

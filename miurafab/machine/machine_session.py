@@ -154,6 +154,7 @@ class MachineSession:
                 return self.state
 
     def _note(self, report: StatusReport) -> None:
+        self.conversation.restarted &= report.state == "Alarm"  # a later one is not the opening's
         self._at_risk = report.beam_on or report.state not in ("Idle", "Alarm", "Sleep", "Check")
 
     # The keys
@@ -390,7 +391,7 @@ class MachineSession:
 
     @contextmanager
     def _job(self) -> Iterator[None]:
-        """A job leaves the machine safe by itself, and may leave any mode and offset."""
+        """A job leaves the machine safe, and may leave any mode and offset."""
         self._in_job = True
         try:
             yield

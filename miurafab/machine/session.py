@@ -42,7 +42,8 @@ class Session:
     ``check`` is called before every read: it raises the exception that should interrupt the
     conversation. ``on_data`` is called with the bytes as they arrive. ``restarted``: the opening of
     the port reset the board. ``banner`` is what it greeted with, or what its ``$I`` says.
-    ``starts`` grows with each reset that was sent or greeted.
+    ``starts`` grows with each reset that was sent or greeted. ``overrides`` are as written until
+    they are told.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class Session:
         self.status: StatusReport | None = None
         self.work_offset: tuple[float, ...] | None = None
         self.overrides = AS_WRITTEN
+        self.overrides_told = False
         self.mm_per_unit = 1.0
         self.heard = 0.0
         self.starts = 0
@@ -134,11 +136,13 @@ class Session:
                 self.work_offset = event.work_offset or self.work_offset
                 if event.overrides is not None and len(event.overrides) == 3:
                     self.overrides = Overrides(*event.overrides)
+                    self.overrides_told = True
                 self._asked_at = None
             elif isinstance(event, Banner):
                 self.banner = event
                 self.starts += 1
                 self.overrides = AS_WRITTEN
+                self.overrides_told = True
                 self._asked_at = None
             elif isinstance(event, Setting) and event.number == _REPORT_INCHES:
                 inches = Settings.from_events((event,)).values.get(_REPORT_INCHES)

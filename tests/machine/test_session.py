@@ -1,0 +1,221 @@
+"""One session with the virtual controller: what it remembers, what it asks, how it jogs."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+
+import pytest
+from session_walk import HOMING, JOB, MACHINE, Cable, Walk
+
+from miurafab.errors import ControllerError, InputError, PersonNeeded
+from miurafab.machine.jog_pad import JogPad
+from miurafab.machine.keys import JOG_CANCEL
+from miurafab.machine.known_controller import PortSetup
+from miurafab.machine.machine_session import MachineSession
+from miurafab.machine.owner import Owner, claim, holder_of, owner_of, this_owner
+from miurafab.machine.signals import StopSignals
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
+
+
+class Wire(Cable):
+    """Keeps what was sent."""
+
+    def __init__(self, device: VirtualGrbl) -> None:
+        super().__init__(device)
+        self.sent = b""
+
+    def write(self, data: bytes) -> None:
+        self.sent += data.replace(b"?", b"")
+        super().write(data)
+
+    def write_now(self, data: bytes) -> None:
+        self.write(data)
+
+
+def session(**changes: float) -> tuple[MachineSession, Wire]:
+    values = virtual_settings(MACHINE) | {int(name[1:]): value for name, value in changes.items()}
+    wire = Wire(VirtualGrbl(values, baud=115_200))
+    return MachineSession(wire, StopSignals(), PortSetup.of(MACHINE)), wire
+
+
+def test_unlock_home_and_cut_in_one_session_on_a_board_that_locks() -> None:
+    here, wire = session(**{f"s{number}": value for number, value in HOMING.items()})
+    assert here.open().state == "Alarm"
+    with pytest.raises(ControllerError, match="locked until it is homed"):
+        here.cut(JOB)
+    assert here.unlock().state == "Idle"
+    assert here.home().state == "Idle"
+    here.jog(x=-300, y=-300)
+    here.set_origin()
+    assert here.cut(JOB).lines == 15
+    assert here.close()
+    assert wire.sent.count(b"\x18") == 0
+    assert min(s.x0 for s in wire.device.beam_log) == pytest.approx(-303 + 5, abs=0.1)
+
+
+def test_a_controller_is_asked_once_and_again_only_where_it_may_have_changed() -> None:
+    here, wire = session()
+    here.open()
+    assert wire.sent == b"$I\n$$\n$#\n$G\n$N\n"
+    wire.sent = b""
+    here.jog(x=5)
+    here.jog(y=5)
+    assert wire.sent.replace(b"F1000\n", b"\n") == b"$J=G21G91X5.000\n$J=G21G91Y5.000\n"
+    wire.sent = b""
+    here.set_origin()
+    assert wire.sent == b"G21G90G17G94G54\nG92X0.000Y0.000\n$#\n$G\n"
+    wire.sent = b""
+    here.cut(JOB)
+    lines = b"".join(line.data + b"\n" for line in JOB.job.send_lines())
+    assert wire.sent == b"\x90\x95\x99" + lines
+    wire.sent = b""
+    here.watch(0.5)
+    assert wire.sent == b"$#\n$G\n"
+
+
+def test_what_a_person_typed_is_set_right_before_the_next_job() -> None:
+    here, wire = session()
+    here.say("G20 G91 G55 M8")
+    assert {"G20", "G91", "G55", "M8"} <= set(here.state.modes)
+    here.cut(JOB)
+    assert max(s.x1 for s in wire.device.beam_log) == pytest.approx(15, abs=0.1)
+
+
+def test_a_refused_line_or_jog_costs_no_origin() -> None:
+    here, wire = session(s20=1, **{f"s{number}": value for number, value in HOMING.items()})
+    here.unlock()
+    here.home()
+    here.set_origin()
+    with pytest.raises(ControllerError, match=r"error:15"):
+        here.jog(x=900)
+    with pytest.raises(ControllerError, match=r"error:20"):
+        here.say("G99")
+    assert here.look().shift != (0.0, 0.0, 0.0)
+    assert wire.sent.count(b"\x18") == 0
+
+
+def test_a_session_that_is_left_with_the_beam_on_goes_dark() -> None:
+    here, wire = session(s32=0)
+    here.say("M3 S500")
+    assert wire.device.beam_on
+    assert here.close()
+    assert wire.sent.endswith(b"\x18")
+    assert not wire.device.beam_on
+
+
+def test_a_sheet_that_is_burnt_takes_no_second_job() -> None:
+    here, wire = session()
+    wire.blocks = True
+    here.cut(JOB)
+    assert here.state.loaded == "rows.nc"
+    burnt = len(wire.device.beam_log)
+    with pytest.raises(PersonNeeded, match=r"rows\.nc has burnt on the sheet in the machine"):
+        here.cut(JOB)
+    assert len(wire.device.beam_log) == burnt
+    here.load()
+    assert here.cut(JOB).lines == 15
+
+
+@pytest.mark.parametrize("dialect", ["marlin", "hpgl"])
+def test_a_machine_that_only_takes_jobs_says_so(dialect: str) -> None:
+    wire = Wire(VirtualGrbl())
+    with pytest.raises(InputError, match=f"speaks {dialect} only takes whole jobs"):
+        MachineSession(wire, StopSignals(), PortSetup(dialect)).open()
+    assert wire.sent == b""
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_state_is_true_and_no_beam_stands_after_each_of_many_actions(seed: int) -> None:
+    """``benchmarks/session_hour.py`` walks 10,000."""
+    walk = Walk(seed)
+    for _ in range(120):
+        walk.step()
+    assert len(walk.done) > 20
+
+
+# The jog pad
+
+
+def run(here: MachineSession, wire: Wire, presses: list[tuple[float, float, float]]) -> float:
+    """Press at times from now; the time of the last press."""
+    begin = here.conversation.now()
+    for at, x, y in presses:
+        while here.conversation.now() < begin + at:
+            here.watch(min(0.01, begin + at - here.conversation.now()))
+        here.nudge(x, y)
+    return here.conversation.now()
+
+
+def test_a_tap_is_one_step() -> None:
+    here, wire = session()
+    for count in range(1, 4):
+        run(here, wire, [(0.0, 10.0, 0.0)])
+        here.watch(1.0)
+        assert wire.device.position[0] == pytest.approx(10 * count, abs=0.01)
+
+
+@pytest.mark.parametrize("step", [0.1, 1.0, 10.0, 50.0])
+def test_a_held_arrow_moves_on_and_rests_within_a_step_of_release(step: float) -> None:
+    here, wire = session()
+    states = []
+    here.on_state = lambda state: states.append(state.state)
+    run(here, wire, [(0.0, step, 0.0), *((0.5 + 0.033 * n, step, 0.0) for n in range(60))])
+    released = wire.device.position[0]
+    moving = states[len(states) // 3 :]
+    here.watch(3.0)
+    rest = wire.device.position[0]
+    assert set(moving) == {"Jog"}
+    assert released > 2 * step
+    assert 0 <= rest - released <= step + 0.025  # two steps of the motor
+    assert wire.device.state == "Idle"
+
+
+def test_a_storm_of_arrows_queues_up_nothing_and_changes_nothing() -> None:
+    here, wire = session()
+    ways = itertools.cycle(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)))
+    run(here, wire, [(0.001 * n, *next(ways)) for n in range(2000)])
+    jogs, overrides = wire.sent.count(b"$J="), here.state.overrides
+    assert jogs < 100
+    here.watch(1.0)
+    assert wire.sent.count(b"$J=") <= jogs + 1
+    assert wire.device.state == "Idle"
+    assert max(abs(value) for value in wire.device.position) < 10
+    assert overrides == (100, 100, 100)
+
+
+def test_another_direction_cancels_first() -> None:
+    pad = JogPad()
+    pad.press(1.0, 0.0, 0.0)
+    order = pad.next_order(0.0, (0.0, 0.0), True, {})
+    assert order is not None
+    assert order.startswith(b"$J=G21G91X1.000F")
+    pad.press(0.0, 1.0, 0.1)
+    assert pad.next_order(0.1, (0.1, 0.0), False, {}) == JOG_CANCEL
+    assert pad.next_order(0.2, (0.2, 0.0), False, {}) is None
+    order = pad.next_order(0.5, (0.2, 0.0), True, {})
+    assert order is not None
+    assert order.startswith(b"$J=G21G91Y1.000")
+
+
+# Who has the port
+
+
+def test_the_owner_of_a_port_is_known_until_its_process_is_gone(
+    tmp_path: os.PathLike[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setattr(sys, "argv", ["/usr/bin/miurafab", "machine", "jog"])
+    port = "socket://127.0.0.1:4001"
+    assert holder_of(port) == "; do it there"
+    release = claim(port, Owner("miurafab machine open x", 7, this_owner().since, os.getpid()))
+    assert "process 7 (miurafab machine open x), since " in holder_of(port)
+    assert holder_of(port).endswith("jog it in that session with the arrow keys")
+    release()
+    assert owner_of(port) is None
+    with subprocess.Popen([sys.executable, "-c", ""]) as gone:
+        gone.wait()
+    claim(port, Owner("miurafab cut x", gone.pid, this_owner().since, gone.pid))
+    assert owner_of(port) is None
