@@ -11,9 +11,10 @@ from miurafab.findings import RULES, Finding, finding_from_json, findings_json, 
 
 CODE = re.compile(r'Finding\(\s*"([a-z0-9-]+)"')
 MADE_ELSEWHERE = re.compile(
-    r'(?:at_line|of_word|_in_moves|_power|_loss|code, says = )\(\s*"([a-z0-9-]+)"'
+    r'(?:at_line|of_word|_finding|_in_moves|_power|_loss|code, says = )\(\s*"([a-z0-9-]+)"'
 )
 LISTED = {"planarity", "developability", "isometry", "laser-mode", "s-range", "settings"}
+LISTED |= {"assignment", "fold-angle"}
 """Codes that a loop over a table of checks makes."""
 
 
