@@ -38,6 +38,9 @@ EXIT_CODES = {
 }
 """What each exit code of the command line means."""
 
+_LONGEST = 1500
+"""Characters of a sentence; it may quote a line of a file, which has any length."""
+_LONG_WORD = re.compile(r"[^\s/\\]{300,}")
 _OPTION = re.compile(r"`([a-z][a-z0-9_]*)`")
 
 
@@ -53,6 +56,57 @@ def spell_options(sentence: str, spell: Callable[[str], str]) -> str:
     return _OPTION.sub(lambda match: spell(match[1]), sentence)
 
 
+def is_plain(text: str) -> bool:
+    """Whether ``text`` is UTF-8 of one line without control characters.
+
+    A name or a sentence may go to a terminal and into XML, where control characters do harm. The
+    bytes of a file name that are not UTF-8 are lone surrogates in Python.
+
+    >>> is_plain("Sättel 鞍.fold"), is_plain("a\\x1b[2J"), is_plain("caf\\udce9.fold")
+    (True, False, False)
+    """
+    return not any(_is_control(letter) for letter in text)
+
+
+def shown(text: str) -> str:
+    """``text`` for a terminal or an XML file: control characters other than line ends and tabs are
+    written as in Python.
+
+    >>> shown("a\\x1b[2J\\n")
+    'a\\\\x1b[2J\\n'
+    """
+    if is_plain(text):
+        return text
+    return "".join(
+        letter.encode("unicode_escape").decode("ascii")
+        if _is_control(letter) and letter not in "\n\t"
+        else letter
+        for letter in text
+    )
+
+
+def _is_control(letter: str) -> bool:
+    """Control characters (C0, DEL, C1), the signs that turn the direction of text, surrogates, and
+    what XML 1.0 (section 2.2) excludes.
+    """
+    return (
+        letter < " "
+        or "\x7f" <= letter <= "\x9f"
+        or "\u202a" <= letter <= "\u202e"
+        or "\u2066" <= letter <= "\u2069"
+        or "\ud800" <= letter <= "\udfff"
+        or letter in "\u2028\u2029\ufffe\uffff"
+    )
+
+
+def _short(sentence: str) -> str:
+    """``sentence`` with what it quotes from a file cut short."""
+    sentence = _LONG_WORD.sub(lambda match: f"{match[0][:100]}...{match[0][-20:]}", sentence)
+    return (
+        sentence if len(sentence) <= _LONGEST else f"{sentence[: _LONGEST - 40]}...{sentence[-20:]}"
+    )
+
+
 class MiurafabError(Exception):
     """A failure whose message is a complete sentence for the user.
 
@@ -61,6 +115,10 @@ class MiurafabError(Exception):
     """
 
     exit_code = BAD_INPUT
+
+    def __init__(self, sentence: str) -> None:
+        one_line = shown(sentence).replace("\n", "\\n").replace("\t", "\\t")
+        super().__init__(_short(one_line))
 
     @property
     def sentence(self) -> str:

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from miurafab.errors import InputError, MiurafabError
+from miurafab.errors import InputError, MiurafabError, is_plain, shown
 
 AnyPath = str | os.PathLike[str]
 """A path as every public function takes it."""
@@ -52,49 +52,6 @@ def as_path(value: object, what: str) -> Path:
         why = "no path" if not text or "\0" in text else "a name with control or unreadable letters"
         raise InputError(f"{what} is {text!r}, which is {why}.")
     return Path(text)
-
-
-def is_plain(text: str) -> bool:
-    """Whether ``text`` is UTF-8 of one line without control characters.
-
-    A name may go to a terminal and into XML, where control characters do harm. The bytes of a file
-    name that are not UTF-8 are lone surrogates in Python.
-
-    >>> is_plain("Sättel 鞍.fold"), is_plain("a\\x1b[2J"), is_plain("caf\\udce9.fold")
-    (True, False, False)
-    """
-    return not any(_is_control(letter) for letter in text)
-
-
-def shown(text: str) -> str:
-    """``text`` for a terminal or an XML file: control characters other than line ends and tabs are
-    written as in Python.
-
-    >>> shown("a\\x1b[2J\\n")
-    'a\\\\x1b[2J\\n'
-    """
-    if is_plain(text):
-        return text
-    return "".join(
-        letter.encode("unicode_escape").decode("ascii")
-        if _is_control(letter) and letter not in "\n\t"
-        else letter
-        for letter in text
-    )
-
-
-def _is_control(letter: str) -> bool:
-    """Control characters (C0, DEL, C1), the signs that turn the direction of text, surrogates, and
-    what XML 1.0 (section 2.2) excludes.
-    """
-    return (
-        letter < " "
-        or "\x7f" <= letter <= "\x9f"
-        or "\u202a" <= letter <= "\u202e"
-        or "\u2066" <= letter <= "\u2069"
-        or "\ud800" <= letter <= "\udfff"
-        or letter in "\u2028\u2029\ufffe\uffff"
-    )
 
 
 def file_name(name: object, where: str) -> str:

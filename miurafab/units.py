@@ -24,7 +24,7 @@ def _parse(text: str | float, units: dict[str, float], bare: str, what: str) -> 
     if isinstance(text, bool):
         raise UnitError(f"{text!r} is not {what}; write a number with a unit such as {bare!r}.")
     if isinstance(text, int | float):
-        value, unit = float(text), bare
+        value, unit = as_float(text), bare
     else:
         match = _QUANTITY.fullmatch(text)
         if match is None:
@@ -38,6 +38,14 @@ def _parse(text: str | float, units: dict[str, float], bare: str, what: str) -> 
     if not math.isfinite(value):
         raise UnitError(f"{text!r} is not {what}: it is not a finite number.")
     return value * factor
+
+
+def as_float(number: float) -> float:
+    """``number`` as a float; infinite for a whole number with more digits than a float has."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf
 
 
 def _list(units: dict[str, float]) -> str:

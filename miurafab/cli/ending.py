@@ -27,9 +27,10 @@ from miurafab.errors import (
     INTERRUPTED,
     InputError,
     MiurafabError,
+    shown,
     spell_options,
 )
-from miurafab.files import shown, write_text
+from miurafab.files import write_text
 from miurafab.version import __version__
 from miurafab.workflow.json_text import json_text
 

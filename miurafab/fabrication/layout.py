@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from miurafab.errors import LayoutError
+from miurafab.errors import LayoutError, is_plain
 from miurafab.fabrication.borders import OpenBorder
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.sheets import Layout, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
-from miurafab.files import Reading, file_name, is_plain, parse_json
+from miurafab.files import Reading, file_name, parse_json
 from miurafab.findings import finding_from_json, findings_json
 from miurafab.geometry.arrays import Floats
 

@@ -8,6 +8,7 @@ operation. Other instructions are refused by name, because the picture would lac
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 
@@ -69,6 +70,8 @@ class _HpglReader:
         return self.tables.program()
 
     def _do(self, number: int, name: str, values: list[float]) -> None:
+        if not all(map(math.isfinite, values)):
+            raise GcodeError(f"{self.name}, line {number}: a number of {name} is too large.")
         if name == "IN":
             self.down = self.relative = False
         elif name in ("PA", "PR"):

@@ -161,5 +161,5 @@ def look_up(letter: str, number: str, mist: bool) -> tuple[GcodeCommand | Reason
 
 
 def _round_half_away(value: float) -> int:
-    magnitude = int(abs(value) + 0.5)
+    magnitude = int(min(abs(value), 2.0**32) + 0.5)
     return -magnitude if value < 0 else magnitude

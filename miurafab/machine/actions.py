@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TypedDict, Unpack
 
 from miurafab.errors import ControllerError, GcodeError, JobStopped, ProfileError
+from miurafab.files import MOST_TEXT_BYTES, Reading, read_bytes
 from miurafab.grbl.settings import Settings, parse_dump
 from miurafab.machine.jog_pad import require_way
 from miurafab.machine.known_controller import MachineState
@@ -119,11 +120,9 @@ def read_settings(port: str, **line: Unpack[LineOptions]) -> Settings:
 
 def read_dump(path: Path) -> Settings:
     """The settings saved in a file; raises :class:`~miurafab.errors.ProfileError` naming it."""
-    try:
-        text = path.read_text("utf-8", errors="replace")
-    except OSError as fault:
-        raise ProfileError(f"{path} cannot be read: {fault.strerror}.") from None
-    return parse_dump(text, path.name)
+    text = read_bytes(path, ProfileError, MOST_TEXT_BYTES).decode("utf-8", errors="replace")
+    with Reading(path.name, "a list of settings", ProfileError):
+        return parse_dump(text, path.name)
 
 
 def write_settings(port: str, wanted: Settings, **line: Unpack[LineOptions]) -> dict[int, str]:

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError
+from miurafab.files import parse_json, read_bytes
 from miurafab.gcode.job import Job
 from miurafab.machine.append_log import DurableFile
 from miurafab.machine.progress import AS_WRITTEN, Overrides
@@ -137,10 +138,7 @@ def read_journal(path: Path) -> list[JournalRun]:
 
     Raises :class:`~miurafab.errors.InputError` if the file cannot be read or holds no run.
     """
-    try:
-        text = path.read_text("utf-8", errors="replace")
-    except OSError as fault:
-        raise InputError(f"The journal {path} cannot be read: {fault.strerror}.") from None
+    text = read_bytes(path, InputError).decode("utf-8", errors="replace")
     runs: list[dict[str, Any]] = []
     for line in text.splitlines():
         record = _parse(line)
@@ -169,7 +167,7 @@ def _record(values: dict[str, Any]) -> bytes:
 
 def _parse(line: str) -> dict[str, Any]:
     try:
-        record = json.loads(line)
-    except json.JSONDecodeError:
+        record = parse_json(line)
+    except (ValueError, RecursionError):
         return {}
     return record if isinstance(record, dict) else {}

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import UnitError
-from miurafab.units import parse_angle, parse_feed, parse_length, parse_pressure
+from miurafab.units import as_float, parse_angle, parse_feed, parse_length, parse_pressure
 
 
 class Kind:
@@ -129,7 +129,7 @@ def number(
 
 def _plain_number(text: str | float) -> float:
     try:
-        return float(text)
+        return float(text) if isinstance(text, str) else as_float(text)
     except ValueError:
         raise UnitError(f"{text!r} is not a number.") from None
 

@@ -29,6 +29,9 @@ from miurafab.surfaces.frame import origin_in
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+LARGEST_MM = 1e9
+"""No coordinate is farther from the origin: squares of areas stay finite."""
+
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 
 
@@ -89,18 +92,24 @@ class CreasePattern(Shown):
 
     def __post_init__(self) -> None:
         vertices, edges = len(self.vertices_coords), len(self.edges_vertices)
-        if not np.isfinite(self.vertices_coords).all():
-            raise PatternError("The flat pattern holds a coordinate that is not a finite number.")
+        if not (np.abs(self.vertices_coords) < LARGEST_MM).all():
+            raise PatternError(
+                "The flat pattern holds a coordinate that is not a finite number below 1e9 mm."
+            )
         if self.folded_coords is not None:
             if self.folded_coords.shape != (vertices, 3):
                 raise PatternError("The folded form does not have one 3D point for each vertex.")
-            if not np.isfinite(self.folded_coords).all():
-                raise PatternError("The folded form holds a coordinate that is not finite.")
+            if not (np.abs(self.folded_coords) < LARGEST_MM).all():
+                raise PatternError(
+                    "The folded form holds a coordinate that is not a finite number below 1e9 mm."
+                )
         if len(self.edges_assignment) != edges or len(self.edges_fold_angle) != edges:
             raise PatternError("The pattern does not have one assignment and angle for each edge.")
-        if not np.isfinite(self.edges_fold_angle).all():
-            edge = int(np.argmin(np.isfinite(self.edges_fold_angle)))
-            raise PatternError(f"The fold angle of edge {edge} is not a finite number.")
+        wrong = ~(np.abs(self.edges_fold_angle) <= 2 * np.pi)
+        if wrong.any():
+            edge, angle = int(np.argmax(wrong)), np.degrees(self.edges_fold_angle[np.argmax(wrong)])
+            why = "more than a full turn" if np.isfinite(angle) else "not a finite number"
+            raise PatternError(f"The fold angle of edge {edge} is {why}.")
         for name, indices in (
             ("edges_vertices", self.edges_vertices),
             ("faces_vertices", self.faces_vertices),

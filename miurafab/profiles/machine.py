@@ -26,6 +26,7 @@ from miurafab.options import (
 from miurafab.profiles.material import OPERATIONS
 from miurafab.profiles.shipped import find_profile
 from miurafab.profiles.table import Table, read_toml
+from miurafab.units import as_float
 
 DIALECTS = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc", "marlin", "hpgl")
 BAUD = 115_200
@@ -295,13 +296,14 @@ def _tool(table: Table) -> Tool:
 def _settings(table: Table) -> dict[int, float]:
     settings = {}
     for key, value in table.rest().items():
-        if not (key.startswith("$") and key[1:].isdigit()):
+        number = key[1:]
+        if not (key.startswith("$") and number.isascii() and number.isdigit() and len(number) < 6):
             raise table.fault(key, 'is not a setting; write it like "$30" = 1000')
         if (
             isinstance(value, bool)
             or not isinstance(value, int | float)
-            or not math.isfinite(value)
+            or not math.isfinite(as_float(value))
         ):
             raise table.fault(key, f"is {value!r}, not a number")
-        settings[int(key[1:])] = float(value)
+        settings[int(number)] = float(value)
     return settings

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from miurafab.errors import InputError, OptionError, ProfileError, UnitError
-from miurafab.files import read_bytes
+from miurafab.files import MOST_TEXT_BYTES, Reading, read_bytes
 from miurafab.options import Kind, read_options
 from miurafab.units import parse_length
 
@@ -27,10 +27,9 @@ T = TypeVar("T")
 
 def read_toml(path: Path, error: type[InputError] = ProfileError) -> dict[str, Any]:
     """The parsed TOML file at ``path``; raises ``error`` if it is missing or not TOML."""
-    try:
-        return tomllib.loads(read_bytes(path, error).decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
-        raise error(f"{path} is not valid TOML: {fault}.") from None
+    content = read_bytes(path, error, MOST_TEXT_BYTES)
+    with Reading(path, "valid TOML", error):
+        return tomllib.loads(content.decode("utf-8"))
 
 
 def toml_text(values: Mapping[str, Any], heads: tuple[str, ...] = ()) -> str:

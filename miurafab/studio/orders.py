@@ -7,13 +7,13 @@ field on the page (:mod:`~miurafab.studio.form`); none of them names a file.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from miurafab.errors import InputError, TargetError
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.files import parse_json
 from miurafab.options import Declared, Flag, Whole, read_options
 from miurafab.profiles import known_names
 from miurafab.studio.form import FIT, LAYOUT
@@ -111,7 +111,7 @@ def _options(given: Any, fields: Mapping[str, Declared]) -> dict[str, Value]:
 
 def _read(body: bytes, keys: tuple[str, ...]) -> dict[str, Any]:
     try:
-        order = json.loads(body)
+        order = parse_json(body.decode("utf-8"))
     except (ValueError, RecursionError):
         raise InputError("The page sent something that is not JSON; reload it.") from None
     table = _table(order, "The order")

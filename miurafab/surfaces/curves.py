@@ -131,6 +131,8 @@ def spline(points: Sequence[Sequence[float]]) -> ProfileCurve:
         where = int(np.argmin(chords))
         raise TargetError(f"The profile points {where} and {where + 1} are the same point.")
     along = np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum()
+    if not (np.diff(along) > 0).all():
+        raise TargetError("The points of the profile are too far apart, or too near each other.")
     through = CubicSpline(along, given)
 
     def position(t: Floats) -> Floats:

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from miurafab.errors import PatternError, TargetError
+from miurafab.files import MOST_MESH_BYTES, Reading, read_bytes
 from miurafab.findings import Finding
 from miurafab.surfaces.catalogue import make_surface
 from miurafab.surfaces.function import sampled_before
@@ -42,9 +43,11 @@ def described_surface(
         mesh = Path(str(target["mesh"]))
         if not mesh.is_file():
             return None, no_target(f"the target mesh {mesh} is not there")
-        if hashlib.sha256(mesh.read_bytes()).hexdigest() != target.get("sha256"):
+        content = read_bytes(mesh, TargetError, MOST_MESH_BYTES)
+        if hashlib.sha256(content).hexdigest() != target.get("sha256"):
             return None, no_target(f"the target mesh {mesh} has changed since the fit")
-        return load_mesh(mesh, place=dict(target))[0], ()
+        with Reading(mesh.name, "a mesh that can be a target", TargetError):
+            return load_mesh(mesh, place=dict(target))[0], ()
     try:
         if "samples" in target:
             return sampled_before(target), ()

@@ -7,6 +7,7 @@ surface is measured and told.
 
 from __future__ import annotations
 
+import io
 import math
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 from PIL import Image
 
 from miurafab.errors import TargetError
+from miurafab.files import read_bytes
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats
 from miurafab.surfaces.function import SampledSurface, sample
@@ -109,12 +111,11 @@ def read_image(path: Path, height: float | None = None) -> Floats:
     TargetError
         For a file that is no image, and for a ``height`` that is missing or of no use.
     """
+    content = read_bytes(path, TargetError)
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(content)) as image:
             mode = image.mode
             shades = np.asarray(image if mode[0] in "IF" else image.convert("L"), dtype=np.float64)
-    except FileNotFoundError:
-        raise TargetError(f"{path} does not exist.") from None
     except (OSError, ValueError, Image.DecompressionBombError) as fault:
         reason = " ".join(str(fault).split()).rstrip(".")
         raise TargetError(f"{path} cannot be read as an image: {reason}.") from None

@@ -12,15 +12,18 @@ import gzip
 import hashlib
 import importlib
 import io
+import logging
 import tempfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
 from miurafab.errors import TargetError
-from miurafab.files import read_bytes, write_draft
+from miurafab.files import MOST_MESH_BYTES, read_bytes, write_draft
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.surfaces.mesh_formats import read_3mf, read_off, read_ply_strips
 
@@ -34,8 +37,11 @@ FROM_POINTS = (
     "grid, and fit that."
 )
 
-LARGEST = 2 << 30
+LARGEST = 1 << 30
 """A compressed file may unpack to this many bytes."""
+
+LARGEST_MM = 1e15
+"""No coordinate is farther from the origin: the squares of squares of lengths stay finite."""
 
 FLATNESS = 2e-4
 """STEP faces are meshed to this part of the model's size, after a first coarse mesh."""
@@ -59,18 +65,32 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str]:
     if not suffix:
         known = ", ".join(MESH_SUFFIXES)
         raise TargetError(f"{path} is not a mesh file; known are {known}, each also with .gz.")
-    content = read_bytes(path, TargetError)
+    content = read_bytes(path, TargetError, MOST_MESH_BYTES)
     sha256 = hashlib.sha256(content).hexdigest()
     if path.suffix.lower() == PACKED:
         content = _unpacked(content, path)
     try:
-        vertices, faces = _triangles(content, suffix, str(path))
+        vertices, faces = _checked(*_triangles(content, suffix, str(path)))
     except TargetError:
         raise
     except Exception as fault:  # noqa: BLE001 - readers raise whatever their parser does
         reason = " ".join(str(fault).split()) or type(fault).__name__
         raise TargetError(f"{path} cannot be read as a mesh: {reason.rstrip('.')}.") from None
     return vertices, faces, sha256
+
+
+def _checked(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
+    """The mesh, if its arrays are such. Raises ``ValueError``."""
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise ValueError("its vertices do not have three coordinates")
+    if faces.ndim != 2 or faces.shape[1] != 3:
+        raise ValueError("its facets are not triangles")
+    used = vertices[np.unique(faces)] if faces.size and faces.max() < len(vertices) else vertices
+    if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
+        raise ValueError("a facet refers to a vertex that does not exist")
+    if not (np.abs(used) < LARGEST_MM).all():
+        raise ValueError("a coordinate is not a finite number below 1e15 mm")
+    return vertices, faces
 
 
 def is_mesh(value: object) -> bool:
@@ -105,10 +125,23 @@ def _triangles(content: bytes, suffix: str, name: str) -> tuple[Floats, Ints]:
 
 
 def _by_trimesh(content: bytes, kind: str, name: str) -> tuple[Floats, Ints]:
-    mesh: object = trimesh.load_mesh(io.BytesIO(content), file_type=kind, process=False)
-    if not len(getattr(mesh, "faces", ())):  # load_mesh drops the points of a point cloud
-        mesh = trimesh.load(io.BytesIO(content), file_type=kind, process=False)
+    with _silent():
+        mesh: object = trimesh.load_mesh(io.BytesIO(content), file_type=kind, process=False)
+        if not len(getattr(mesh, "faces", ())):  # load_mesh drops the points of a point cloud
+            mesh = trimesh.load(io.BytesIO(content), file_type=kind, process=False)
     return arrays_of(mesh, name)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """trimesh logs tracebacks of what it then reads in another way; here it does not."""
+    log = logging.getLogger("trimesh")
+    before = log.disabled
+    log.disabled = True
+    try:
+        yield
+    finally:
+        log.disabled = before
 
 
 def _unpacked(content: bytes, path: Path) -> bytes:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -23,9 +24,13 @@ from fontTools.pens.recordingPen import RecordingPen
 from fontTools.svgLib.path import parse_path
 
 from miurafab.errors import TargetError
-from miurafab.files import read_bytes, read_text
+from miurafab.files import Reading, read_bytes, read_text
 from miurafab.geometry.arrays import Floats
 
+LARGEST = 1e9
+"""No coordinate of a profile is larger, in its own unit."""
+MOST_POINTS = 100_000
+"""A profile has no more points: a curve flattened to a thousandth has some hundred."""
 PROFILE_SUFFIXES = (".csv", ".txt", ".dxf", ".svg")
 
 _DRAWN = "LWPOLYLINE POLYLINE SPLINE ARC ELLIPSE LINE"
@@ -41,6 +46,11 @@ def read_profile(path: Path) -> list[list[float]]:
     Raises :class:`~miurafab.errors.TargetError` for a file that is missing, of another kind, or
     holds no profile.
     """
+    with Reading(path, "a profile that can be read", TargetError):
+        return _profile(path)
+
+
+def _profile(path: Path) -> list[list[float]]:
     suffix = path.suffix.lower()
     if suffix not in PROFILE_SUFFIXES:
         known = ", ".join(PROFILE_SUFFIXES)
@@ -87,6 +97,8 @@ def _of_dxf(path: Path) -> Iterator[curves.Path]:
 def _of_svg(path: Path) -> Iterator[curves.Path]:
     """The parts of all paths, polylines, polygons and lines, with the second axis upwards."""
     text = read_text(path, TargetError, "an SVG drawing")
+    if "<!ENTITY" in text:
+        raise TargetError(f"{path} cannot be read as an SVG drawing: it declares XML entities.")
     try:
         root = ElementTree.fromstring(text)
         for element in _untransformed(root, path):
@@ -156,8 +168,12 @@ def _longest(path: Path, found: Iterable[curves.Path]) -> list[list[float]]:
         ends = np.array([[p.x, p.y] for p in curve.control_vertices()])
         if len(ends) < 2:
             continue
+        if not (np.abs(ends) < LARGEST).all():
+            raise TargetError(f"{path} holds a coordinate that is no number below 1e9.")
         flat = _FLAT * max(float(np.ptp(ends, axis=0).max()), 1e-12)
-        points = np.array([[p.x, p.y] for p in curve.flattening(flat)])
+        points = np.array([[p.x, p.y] for p in islice(curve.flattening(flat), MOST_POINTS)])
+        if len(points) == MOST_POINTS:
+            raise TargetError(f"{path} holds a curve of more than {MOST_POINTS:,} points.")
         apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 0
         flattened.append(points[np.concatenate([[True], apart])])
     if not flattened:

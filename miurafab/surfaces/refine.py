@@ -8,13 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from miurafab.errors import TargetError
 from miurafab.geometry.arrays import Floats, Ints
 
 _ROUNDS = 24
+_MOST_FACES = 100_000
+"""A mesh gets fewer, or four times as many as it has, unless it is a strip that is thousands of
+times as long as it is wide."""
 
 
 def refine(vertices: Floats, faces: Ints, limit: float) -> tuple[Floats, Ints]:
     """The same surface with no edge longer than ``limit``; the first vertices are the old ones."""
+    most = max(_MOST_FACES, 4 * len(faces))
     for _ in range(_ROUNDS):
         count = len(vertices)
         tail, head = faces, np.roll(faces, -1, axis=1)
@@ -24,6 +29,8 @@ def refine(vertices: Floats, faces: Ints, limit: float) -> tuple[Floats, Ints]:
         long = np.linalg.norm(vertices[a] - vertices[b], axis=1) > limit
         if not long.any():
             break
+        if len(faces) > most:
+            raise TargetError("The mesh is too narrow for its length; cut it into shorter parts.")
         middle = np.full(len(unique), -1, dtype=np.int64)
         middle[long] = count + np.arange(int(long.sum()))
         vertices = np.concatenate([vertices, (vertices[a[long]] + vertices[b[long]]) / 2])

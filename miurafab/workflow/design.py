@@ -20,6 +20,7 @@ import numpy as np
 from miurafab.display import Shown
 from miurafab.errors import OptionError, TargetError
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.files import Reading
 from miurafab.findings import Finding
 from miurafab.options import Text, declared, length, number, read_options, read_value
 from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitOptions, FitRequest
@@ -224,7 +225,8 @@ def _from_file(path: Path, given: Values) -> Design:
     sheets, machine, material = read_layout_table(table.table("layout", {}), path.parent)
     mesh = path.parent / target.value("mesh", Text()) if target.has("mesh") else None
     name = "" if mesh is not None else target.value("surface", Text())
-    known = () if mesh is not None else _parameters(name)
+    with Reading(path.name, "a design", TargetError):
+        known = () if mesh is not None else _parameters(name)
     chosen, changed = _split(given, known, f"the target of {path.name}")
     asked = read_options(
         FitOptions,
@@ -245,6 +247,9 @@ def _from_file(path: Path, given: Values) -> Design:
     except OptionError as fault:
         where = "" if fault.option in given else path.name
         raise OptionError(fault.option, fault.complaint, where) from None
+    except TargetError as fault:
+        where = "" if path.name in fault.sentence else f"{path.name}: "
+        raise TargetError(f"{where}{fault.sentence}") from None
     return replace(design, machine=machine, material=material, layout=sheets)
 
 
@@ -270,9 +275,10 @@ def read_layout_table(
 
 def _from_mesh(path: Path, asked: FitOptions, title: str) -> Design:
     reading = MeshReading(asked.side, asked.holes)
-    surface, sha256 = load_mesh(
-        path, region=asked.region, rotate=asked.rotate, reading=reading, choice=_choice(asked)
-    )
+    with Reading(path.name, "a mesh that can be a target", TargetError):
+        surface, sha256 = load_mesh(
+            path, region=asked.region, rotate=asked.rotate, reading=reading, choice=_choice(asked)
+        )
     return _on_mesh(surface, {"mesh": str(path.resolve()), "sha256": sha256}, asked, title)
 
 

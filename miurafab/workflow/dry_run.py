@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from miurafab.display import Shown
 from miurafab.errors import GcodeError, InputError
+from miurafab.files import read_bytes
 from miurafab.findings import Finding, findings_json, refusals
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program, ProgramBuilder, strokes
@@ -200,10 +201,7 @@ def read_gcode(path: Path) -> Job:
     A file is UTF-8 or UTF-16 by its byte order mark, else UTF-8; one that is neither is Latin-1,
     in which every byte is a character.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as fault:
-        raise InputError(f"{path} cannot be read: {fault.strerror}.") from None
+    data = read_bytes(path, InputError)
     utf_16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
         return Job(path.name, data.decode("utf-16" if utf_16 else "utf-8-sig"))

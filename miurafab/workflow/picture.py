@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import resvg_py
 
+from miurafab.errors import shown
 from miurafab.files import write_bytes, write_text
 from miurafab.geometry.arrays import Bools, Ints
 from miurafab.origami.picture import INK
@@ -87,7 +88,7 @@ def svg_text(sheet: SheetPreview, machine: MachineProfile) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{_n(left)} {_n(top)} '
         f'{_n(width)} {_n(height)}" '
         f'font-family="system-ui, Segoe UI, Helvetica, Arial, sans-serif" fill="{INK}">',
-        f"<title>{html.escape(sheet.name)}</title>",
+        f"<title>{html.escape(shown(sheet.name))}</title>",
         f'<rect x="{_n(left)}" y="{_n(top)}" width="100%" height="100%" fill="#fff"/>',
         _text(0, -5.4 * unit, 2.9 * unit, sheet.program.name),
         _text(0, -2.6 * unit, 1.5 * unit, subtitle, _QUIET),
@@ -272,7 +273,7 @@ def _text(
 ) -> str:
     return (
         f'<text x="{_n(x)}" y="{_n(y)}" font-size="{_n(size)}" fill="{fill}" '
-        f'text-anchor="{anchor}" xml:space="preserve">{html.escape(text)}</text>'
+        f'text-anchor="{anchor}" xml:space="preserve">{html.escape(shown(text))}</text>'
     )
 
 

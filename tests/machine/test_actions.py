@@ -56,7 +56,7 @@ def test_a_refused_setting_is_named(text: dict[int, str], sentence: str) -> None
 
 
 def test_a_missing_backup_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ProfileError, match=r"gone\.txt cannot be read"):
+    with pytest.raises(ProfileError, match=r"gone\.txt does not exist"):
         actions.read_dump(tmp_path / "gone.txt")
 
 

@@ -32,7 +32,12 @@ DEFAULT_FACETS = (20, 20)
 DEFAULT_SIZE_MM = 200.0
 """The longest side of a named surface's folded form; a mesh keeps the size of its file."""
 CLOSINGS = ("sector", "open", "seam")
-FACETS = Pair(Whole(2), "COLSxROWS", "20x20", "x")
+MOST_FACETS = 2_000
+"""Columns or rows: a sheet of 2,000 x 2,000 would take days; one of 316 x 316 takes minutes."""
+MOST_IN_ALL = 400_000
+"""The largest measured fit has 100,000 facets."""
+LARGEST_MM = 1e6
+FACETS = Pair(Whole(2, MOST_FACETS), "COLSxROWS", "20x20", "x")
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,21 +53,21 @@ class FitOptions(Shown):
         page="first",
     )
     size_mm: float | None = option(
-        length(above=True),
+        length(0, LARGEST_MM, above=True),
         "Longest side of the folded bounding box.",
         group="Sheet",
         default_text=f"{DEFAULT_SIZE_MM:g} mm; a mesh keeps its file's size",
         page="first",
     )
     amplitude: float | None = option(
-        number(0, above=True),
+        number(0, 100, above=True),
         "Height of the corrugation over the row spacing.",
         group="Sheet",
         default_text="automatic",
         page="more",
     )
     zigzag: float | None = option(
-        number(0, above=True),
+        number(0, 100, above=True),
         "Zig-zag over the column spacing.",
         group="Sheet",
         default_text="automatic",
@@ -203,6 +208,11 @@ class FitOptions(Shown):
 
     def __post_init__(self) -> None:
         check_options(self)
+        if self.columns * self.rows > MOST_IN_ALL:
+            raise OptionError(
+                "facets",
+                f"is {FACETS.show((self.columns, self.rows))}; in all there may be {MOST_IN_ALL:,}",
+            )
         if self.cut_columns is not None:
             if self.cut_columns[-1] >= self.columns:
                 raise OptionError(

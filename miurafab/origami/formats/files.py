@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from miurafab.errors import InputError, OptionError, PatternError
-from miurafab.files import AnyPath, as_path, new_file, read_bytes, write_bytes, write_text
+from miurafab.files import AnyPath, Reading, as_path, new_file, read_bytes, write_bytes, write_text
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
@@ -109,10 +109,8 @@ def load(
     if ending not in DRAWINGS:
         raise InputError(f"{path} does not end in one of {', '.join(READ)}.")
     text = read_bytes(path, PatternError).decode("utf-8", errors="replace")
-    try:
+    with Reading(path, f"a drawing that can be read ({ending})", PatternError):
         return pattern_from_lines(DRAWINGS[ending](text), tolerance)
-    except InputError as fault:
-        raise PatternError(f"{path}: {fault.sentence}") from None
 
 
 def write_pattern(

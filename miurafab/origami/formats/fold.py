@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
-from miurafab.files import read_text, write_text
+from miurafab.files import Reading, parse_json, read_text, write_text
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import (
     connected_parts,
@@ -156,18 +156,9 @@ def read_fold(path: Path) -> CreasePattern:
     Raises :class:`~miurafab.errors.PatternError` naming the file and what is wrong with it.
     """
     text = read_text(path, PatternError, "a FOLD file")
-    try:
-        document = json.loads(text)
-    except json.JSONDecodeError as fault:
-        raise PatternError(
-            f"{path} is not a FOLD file: line {fault.lineno} is not JSON ({fault.msg})."
-        ) from None
-    except RecursionError:
-        raise PatternError(f"{path} is not a FOLD file: it is nested too deeply.") from None
-    try:
+    with Reading(path, "a FOLD file", PatternError):
+        document = parse_json(text)
         pattern = parse_fold(exact_frames(document, text) if type(document) is dict else document)
-    except PatternError as fault:
-        raise PatternError(f"{path}: {fault}") from None
     mesh = pattern.target.get("mesh")
     if not isinstance(mesh, str):
         return pattern

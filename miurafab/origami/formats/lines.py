@@ -18,7 +18,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from miurafab.errors import PatternError
+from miurafab.errors import PatternError, shown
 from miurafab.origami.formats.planar_graph import CreaseLines
 
 _TYPE_OF_LETTER = {"B": 1, "C": 1, "M": 2, "V": 3, "F": 0, "U": 0, "J": 0}
@@ -39,7 +39,7 @@ def parse_cp(text: str) -> CreaseLines:
         if not words:
             continue
         try:
-            kind, (x0, y0, x1, y1) = int(words[0]), (float(word) for word in words[1:])
+            kind, (x0, y0, x1, y1) = _plain_int(words[0]), map(_plain_float, words[1:])
         except ValueError:
             raise PatternError(
                 f"line {number} is '{line.strip()[:60]}', not a type and four coordinates."
@@ -47,6 +47,19 @@ def parse_cp(text: str) -> CreaseLines:
         # Orihime adds types above 3 for further auxiliary lines
         rows.append((_LETTER_OF_TYPE.get(kind, "F"), x0, -y0, x1, -y1))
     return _lines(rows)
+
+
+def _plain_int(word: str) -> int:
+    """A whole number in ASCII digits alone: Python knows more, such as 1_0."""
+    if not word.isascii() or not word.isdigit() or len(word) > 9:
+        raise ValueError
+    return int(word)
+
+
+def _plain_float(word: str) -> float:
+    if not word.isascii() or "_" in word:
+        raise ValueError
+    return float(word)
 
 
 def opx_text(lines: CreaseLines, title: str = "") -> str:
@@ -70,7 +83,7 @@ def opx_text(lines: CreaseLines, title: str = "") -> str:
         for name, value in zip(("x0", "y0", "x1", "y1"), ends, strict=True):
             _property(line, name, "double", repr(value))
     if title:
-        _property(data, "title", "string", title)
+        _property(data, "title", "string", shown(title))
     ElementTree.indent(java, " ")
     head = '<?xml version="1.0" encoding="UTF-8"?>\n'
     return head + ElementTree.tostring(java, encoding="unicode") + "\n"
@@ -149,6 +162,8 @@ def parse_dxf(text: str) -> CreaseLines:
                 xs, ys = xs[-_vertex_count(tags) :], ys[-_vertex_count(tags) :]
             if int(_first(tags, 70)) & 1:
                 xs, ys = xs + xs[:1], ys + ys[:1]
+            if len(xs) != len(ys):
+                raise PatternError(f"a polyline has {len(xs)} x and {len(ys)} y coordinates.")
             ends = list(zip(xs, ys, strict=True))
             rows.extend((letter, *p, *q) for p, q in itertools.pairwise(ends))
     return _lines(rows)

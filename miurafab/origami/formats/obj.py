@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from miurafab.errors import PatternError
-from miurafab.files import read_text
+from miurafab.files import Reading, read_text
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import connected_parts, next_corners, reversed_faces, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
@@ -26,6 +26,11 @@ def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
 
     Raises :class:`~miurafab.errors.PatternError` naming the file and what is wrong with it.
     """
+    with Reading(flat, "an OBJ file of a flat form", PatternError):
+        return _pattern(flat, folded)
+
+
+def _pattern(flat: Path, folded: Path) -> CreasePattern:
     points, faces = _read_obj(flat)
     shape, same = _read_obj(folded)
     if len(points) != len(shape):
@@ -55,10 +60,7 @@ def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
         folded_coords=shape,
         pieces=piece if pieces > 1 else None,
     )
-    try:
-        return with_angles_of_the_folded_form(pattern)
-    except PatternError as fault:
-        raise PatternError(f"{flat}: {fault}") from None
+    return with_angles_of_the_folded_form(pattern)
 
 
 def _read_obj(path: Path) -> tuple[Floats, Ints]:

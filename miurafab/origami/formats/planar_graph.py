@@ -31,6 +31,7 @@ TOLERANCE = 1e-4
 """The distance within which ends meet, as a part of the median line."""
 
 _FAR = 1e9
+_SAMPLE, _MEETINGS, _FEW_MEETINGS = 200, 100, 1_000_000
 # Of two lines on each other, the line of the higher rank is kept.
 _RANK = {"B": 6, "C": 5, "M": 4, "V": 4, "J": 2, "F": 1, "U": 0}
 
@@ -181,6 +182,7 @@ def oriented(flat: Floats, faces: Ints) -> Ints:
 def _split(ends: Floats, near: float) -> tuple[Floats, Ints, Ints]:
     """Vertices (V, 2), sides (m, 2) between them, and the line (m,) that each side is part of."""
     low, high = ends.min(axis=1) - near, ends.max(axis=1)
+    _refuse_tangle(low, high)
     first, second = meeting_pairs(*(np.pad(corner, ((0, 0), (0, 1))) for corner in (low, high)))
     a, b = ends[first], ends[second]
     along, across = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0]
@@ -212,6 +214,17 @@ def _split(ends: Floats, near: float) -> tuple[Floats, Ints, Ints]:
     lines, cuts = lines[order], cuts[order]
     joined = (lines[1:] == lines[:-1]) & (cuts[1:] != cuts[:-1])
     return points, np.stack([cuts[:-1], cuts[1:]], axis=1)[joined], lines[1:][joined]
+
+
+def _refuse_tangle(low: Floats, high: Floats) -> None:
+    """Refuse lines of which so many cross that they are no crease pattern: in one, few lines meet
+    each line. The boxes ``low`` to ``high`` (n, 2) of some lines tell for all.
+    """
+    count = len(low)
+    some = np.arange(0, count, max(count // _SAMPLE, 1))
+    meet = sum(int(((low[i] <= high) & (low <= high[i])).all(axis=1).sum()) for i in some)
+    if meet / len(some) * count / 2 > max(_FEW_MEETINGS, _MEETINGS * count):
+        raise PatternError("Too many lines of the drawing cross each other for a crease pattern.")
 
 
 def _merged(loose: Floats, near: float) -> tuple[Ints, Floats]:

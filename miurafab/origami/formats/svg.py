@@ -19,7 +19,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from miurafab.errors import PatternError
+from miurafab.errors import PatternError, shown
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import ASSIGNMENTS
 from miurafab.origami.formats.lines import xml_root
@@ -59,7 +59,7 @@ def svg_text(lines: CreaseLines, title: str = "") -> str:
         f'height="{height / scale!r}mm" viewBox="0 0 {width!r} {height!r}">\n'
     ]
     if title:
-        parts.append(f"<title>{escape(title)}</title>\n")
+        parts.append(f"<title>{escape(shown(title))}</title>\n")
     parts.append(f'<g fill="none" stroke-width="{0.15 * _SHORTEST!r}" stroke-linecap="round">\n')
     degrees = np.degrees(lines.fold_angle).tolist()
     for letter, angle, (x0, x1), (y0, y1) in zip(

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from miurafab.errors import PatternError
+from miurafab.errors import PatternError, is_plain
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.surfaces.frame import origin_in
@@ -40,9 +40,25 @@ def target_in(document: Mapping[str, Any]) -> dict[str, Any]:
         raise PatternError("'miurafab:target' is not an object.")
     try:
         origin_in(target)
-    except (TypeError, ValueError) as fault:
+        if not np.isfinite(origin_in(target)).all():
+            raise ValueError("its origin is not finite")
+        _check_texts(target)
+    except (TypeError, ValueError, OverflowError) as fault:
         raise PatternError(f"'miurafab:target' is damaged: {fault}.") from None
     return target
+
+
+def _check_texts(value: object) -> None:
+    """Raise ``ValueError`` for a text in ``value`` that must reach no terminal and no XML file."""
+    if isinstance(value, str) and not is_plain(value):
+        raise ValueError(f"{value[:40]!r} holds control characters")
+    if isinstance(value, dict):
+        for key, item in value.items():
+            _check_texts(key)
+            _check_texts(item)
+    elif isinstance(value, list) and value and not isinstance(value[0], int | float):
+        for item in value:
+            _check_texts(item)
 
 
 def in_own_frame(text: str, pattern: CreasePattern) -> str:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab.errors import InputError
+from miurafab.errors import InputError, shown
 from miurafab.files import write_text
 from miurafab.gcode.program import strokes
 from miurafab.geometry.arrays import Floats, Ints
@@ -89,7 +89,7 @@ def page_text(
             f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; "
             "base-uri 'none'; form-action 'none'"
         ),
-        "title": html.escape(title),
+        "title": html.escape(shown(title)),
         "style": style,
         "data": _json(_data(preview, pattern, motion, slider or Slider())),
         "script": script,

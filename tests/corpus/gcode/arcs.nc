@@ -1,0 +1,11 @@
+%
+G21 G90 G17
+(machine grbl-laser-400)
+M4 S0
+G0 X5 Y5
+G2 X10 Y0 R20 F600 S500
+G3 X15 Y5 I5 J0
+G91 G1 X1.5 Y-2
+G4 P0.5
+M5
+M2
