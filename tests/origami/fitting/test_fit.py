@@ -47,19 +47,19 @@ def check_valid(result: FitResult, name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMED)
 def test_every_named_surface_fits_as_it_stands(name: str) -> None:
-    check_valid(fitted(name, 12, 12), name)
+    check_valid(fitted(name, 8, 8), name)
 
 
 def test_a_helicoid_across_its_axis_fits() -> None:
     surface, _ = make_surface("helicoid", {"pitch": 6})
-    result = fit(FitRequest(surface=surface, facets=(20, 20), size_mm=200.0))
+    result = fit(FitRequest(surface=surface, facets=(12, 12), size_mm=200.0))
     assert result.status == "converged"
     assert result.measurements is not None
     assert result.measurements.self_intersections == 0
 
 
 def test_the_same_request_gives_the_same_sheet() -> None:
-    one, other = fit(request("sphere")), fit(request("sphere"))
+    one, other = fit(request("sphere", 8, 8)), fit(request("sphere", 8, 8))
     assert one.pattern is not None
     assert other.pattern is not None
     assert np.array_equal(one.pattern.vertices_coords, other.pattern.vertices_coords)
@@ -67,7 +67,7 @@ def test_the_same_request_gives_the_same_sheet() -> None:
 
 @pytest.mark.parametrize("name", ["hypar", "saddle", "paraboloid", "catenoid", "cylinder"])
 def test_exact_flat_foldability_costs_no_closeness(name: str) -> None:
-    exact = fit(request(name, 16, 16, flat_foldable=0.0))
+    exact = fit(request(name, 10, 10, flat_foldable=0.0))
     check_valid(exact, name)
     assert exact.measurements is not None
     assert exact.measurements.max_flat_foldability is not None
@@ -225,7 +225,7 @@ class TestRings:
 
 
 def test_a_target_that_bends_too_much_ends_with_a_reason() -> None:
-    surface, _ = make_surface("helicoid", {"turns": 8, "pitch": 0.3})
+    surface, _ = make_surface("helicoid", {"turns": 3, "pitch": 0.3})
     result = fit(
         FitRequest(
             surface=surface,
