@@ -123,16 +123,13 @@ def test_a_job_that_begins_in_a_later_pass_is_at_its_height() -> None:
 
 def test_the_proof_of_a_job_includes_its_heights(tmp_path) -> None:
     machine = tmp_path / "tall.toml"
-    text = (
-        mf.profiles.shipped.shipped_directory("firmware_profiles") / "grbl-laser-400.toml"
-    ).read_text()
+    text = find_file("firmware_profiles", "grbl-laser-400").read_text()
     machine.write_text(text + '[z]\ntravel = "30mm"\nmax_rate = "500mm/min"\nacceleration = 20\n')
     card = tmp_path / "card.toml"
     text = find_file("materials", "card-250").read_text()
     card.write_text(text + 'passes = 2\nz_step = "0.2mm"\nfocus = "0.1mm"\n')
-    mf.sheets(mf.fit("plane", facets=(4, 4), size=60), machine=machine, material=card).write(
-        tmp_path / "job"
-    )
+    sheet = mf.fit("plane", facets=(2, 2), size=40)
+    mf.sheets(sheet, machine=machine, material=card).write(tmp_path / "job")
     found = mf.check_job(tmp_path / "job")
     assert found.valid
     sheet = tmp_path / "job" / "sheet-01.nc"

@@ -138,11 +138,13 @@ def _motion(name: str, program: Program, marks: Sequence[Mark]) -> tuple[RigidMo
             "again."
         )
     motion = RigidMotion.between((a, b), (p, q))
+    turned = abs(motion.angle) > math.pi / 2
+    doubt = " If it does not lie the other way round, the marks are exchanged." if turned else ""
     return motion, Finding(
         "aligned",
         f"{name} is turned by {math.degrees(motion.angle):.3f} degrees about its origin and "
         f"shifted by X{motion.dx:.3f} Y{motion.dy:.3f}; the marks' distance differs by "
-        f"{found - drawn:+.3f} mm, of which each mark gets half.",
+        f"{found - drawn:+.3f} mm, of which each mark gets half.{doubt}",
         name,
     )
 

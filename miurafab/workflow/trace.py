@@ -2,7 +2,8 @@
 
 Both are cut into segments. Each burnt segment must be a segment of a wanted stroke, made by the
 operation of its kind and within :data:`NEAR_MM`, and each of these must be burnt exactly once in
-each pass. A drag knife's segments are those of its tip (:mod:`miurafab.fabrication.knife_tip`).
+each pass, at the height of that pass. A drag knife's segments are those of its tip
+(:mod:`miurafab.fabrication.knife_tip`).
 """
 
 from __future__ import annotations
@@ -132,7 +133,12 @@ def _compared(
     told = np.flatnonzero(away <= near * 2)
     as_told = burnt.operation[told]
     right = np.zeros(len(burnt.ends), dtype=bool)
+    heights, passes = _heights(material)
+    off = np.abs(heights[wanted.operation[found[told]]] - program.end[burnt.stroke[told], 2:])
     right[told] = (as_told < 0) | (as_told == wanted.operation[found[told]])
+    right[told] &= off.min(axis=1) <= near
+    level = np.zeros(len(right), dtype=np.int64)
+    level[told] = off.argmin(axis=1)
     stray = ~right & burnt.sure
     for at in np.flatnonzero(stray)[:_NAMED].tolist():
         line = int(program.line[burnt.stroke[at]])
@@ -145,10 +151,11 @@ def _compared(
         )
     if stray.sum() > _NAMED:
         yield Finding("stroke", f"{path.sheet}: so do {stray.sum() - _NAMED} more segments.")
-    times = np.bincount(found[right], minlength=count)
-    passes = np.array([material.operations[name].passes for name in OPERATIONS])
     due = passes[wanted.operation]
-    for wrong, words in ((times < due, "is not burnt"), (times > due, "is burnt too often")):
+    place = found[right] * passes.shape[1] + level[right]
+    times = np.bincount(place, minlength=due.size).reshape(due.shape)
+    less, more = (times < due).any(axis=1), (times > due).any(axis=1)
+    for wrong, words in ((less, "is not burnt"), (more, "is burnt too often")):
         faulty = np.unique(wanted.stroke[wrong & wanted.sure])
         for stroke in faulty[:_NAMED].tolist():
             x, y = path.starts[stroke].tolist()
@@ -161,8 +168,22 @@ def _compared(
         if len(faulty) > _NAMED:
             yield Finding("stroke", f"{path.sheet}: so of {len(faulty) - _NAMED} more strokes.")
     good = np.ones(len(path), dtype=bool)
-    good[wanted.stroke[(times != due) & wanted.sure]] = False
+    good[wanted.stroke[(less | more) & wanted.sure]] = False
     traced.update(KINDS[kind] for kind in kinds[good].tolist())
+
+
+def _heights(material: Material) -> tuple[Floats, Ints]:
+    """(operations, h) the heights of the head in each operation, filled up with infinity, and how
+    often each stroke is due at each.
+    """
+    found = [
+        np.unique(material.operations[name].heights_mm, return_counts=True) for name in OPERATIONS
+    ]
+    most = max(len(levels) for levels, _ in found)
+    heights, due = np.full((len(found), most), np.inf), np.zeros((len(found), most), np.int64)
+    for row, (levels, counts) in enumerate(found):
+        heights[row, : len(levels)], due[row, : len(levels)] = levels, counts
+    return heights, due
 
 
 def _wanted(path: Toolpath, shortest: float) -> _Segments:

@@ -143,6 +143,15 @@ def test_marks_that_are_no_turn_and_no_shift_are_refused(prepared):
         align(prepared, None, marks_of(still)[:1])
 
 
+def test_marks_that_may_be_exchanged_are_doubted(prepared):
+    still = marks_of(moved_by(0.0, 0.0, 0.0))
+    assert "exchanged" not in str(align(prepared, None, still).aligned.finding)
+    crossed = ((still[0][0], still[1][1]), (still[1][0], still[0][1]))
+    found = str(align(prepared, None, crossed).aligned.finding)
+    assert "turned by" in found
+    assert "the marks are exchanged" in found
+
+
 def test_one_sheet_lies_at_one_place(prepared):
     job = replace(prepared, jobs=2 * prepared.jobs, dry_runs=2 * prepared.dry_runs)
     with pytest.raises(InputError, match="2 would be cut; name its 'sheet'"):

@@ -165,7 +165,7 @@ def test_what_was_left_out_stays_left_out_when_the_job_is_resumed(tmp_path):
 @pytest.mark.parametrize("how", ["done", "stopped", "M9 in the file"])
 def test_the_air_is_shut_on_each_way_out(how):
     """A soft reset shuts it (``mc_reset``), and M9 where the file leaves it on."""
-    text = "G21 G90\nM4 S0\nM8\nG0 X5 Y5\nG1 X50 S300 F600\n" + "G1 X5\nG1 X50\n" * 40 + "M5\n"
+    text = "G21 G90\nM4 S0\nM8\nG0 X5 Y5\nG1 X50 S300 F600\n" + "G1 X5\nG1 X50\n" * 4 + "M5\n"
     job = Job("air.nc", text + ("M9\n" if how == "M9 in the file" else ""))
     blew = []
 
