@@ -120,13 +120,18 @@ class Connection:
         self._enter(Input.RESET if byte == SOFT_RESET else Input.REALTIME)
         return byte
 
+    @property
+    def awaits_proof(self) -> bool:
+        """Whether a banner, or what stands for it, is missing."""
+        return Input.PROBE in TRANSITIONS[self.state]
+
     def probe(self) -> bytes:
         """The question that stands for a banner, for the wire; it is not entered in the books.
 
         Its answer is a :class:`~miurafab.grbl.events.Version` and then the first ``ok`` of all.
         Raises :class:`ProtocolMisuse` in a state that needs no proof, or a reset.
         """
-        if Input.PROBE not in TRANSITIONS[self.state]:
+        if not self.awaits_proof:
             raise ProtocolMisuse(f"cannot send {PROBE!r} in {self.state.name}")
         self._enter(Input.PROBE)
         return PROBE

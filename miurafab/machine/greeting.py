@@ -98,18 +98,23 @@ def _first_word(session: Session, patience: float) -> Banner | StatusReport | No
 
 
 def _prove_rest(session: Session, timeout: float) -> Event | None:
-    """The ``ok`` that proves it, or a banner; an error or None where nothing is proved.
+    """The ``ok`` that proves it, or the banner of a restart; None where nothing is proved.
 
     An error may be the answer to half a line that lay there, so the question is asked again.
     """
+    connection = session.connection
+    answer: Event | None = None
     for _ in range(_PROBES):
-        session.write(session.connection.probe())
-        answer = _answer_to_probe(session, timeout)
+        if connection.awaits_proof:
+            session.write(connection.probe())
+            answer = _answer_to_probe(session, timeout)
         if not isinstance(answer, Error):
             break
-    if isinstance(answer, Ok):
-        session.connection.prove()
-    return answer
+    if connection.state in (State.GREETED, State.LOCKED):
+        return session.banner
+    if isinstance(answer, Ok) and connection.awaits_proof:
+        connection.prove()
+    return answer if connection.state is State.READY else None
 
 
 def _answer_to_probe(session: Session, timeout: float) -> Event | None:

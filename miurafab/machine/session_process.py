@@ -40,7 +40,7 @@ from miurafab.profiles import MachineProfile
 
 _LOOK_S = 0.005  # between two looks at keys and signals
 _WATCH_S = 0.02  # between two looks at the orders while the machine is watched
-_STOP_S = 15.0  # for the process to stop the machine, ask it, and end; stopping takes 6 s at most
+_STOP_S = 15.0  # for the process to stop the machine, ask it, and end; stopping takes 10 s at most
 
 
 @dataclass(frozen=True, slots=True)

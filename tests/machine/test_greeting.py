@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 from dashes import dashes
 from wires import FakeWire
 
-from miurafab.errors import ControllerError, JobStopped
+from miurafab.errors import ControllerError, JobStopped, MiurafabError, PortError
 from miurafab.gcode.job import Job
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Banner
 from miurafab.grbl.replies import parse_reply
+from miurafab.grbl.states import State
 from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import deliver
 from miurafab.machine.session import Session
@@ -144,3 +147,59 @@ def test_a_job_says_what_the_opening_of_its_port_undid(
     plan = plan_job(Job("a.nc", "M4 S0\nG1 X1 S9 F600\nM5\n"), MACHINE, SendOptions(**options))
     findings = deliver(plan, Port(device), StopSignals()).findings
     assert [f.code for f in findings] == (["restarted"] if resets and not options else [])
+
+
+SAID = (
+    b"<Idle|MPos:0.000,0.000,0.000|FS:0,0>\r\n",
+    b"<Alarm|MPos:0.000,0.000,0.000|FS:0,0>\r\n",
+    b"<Run|MPos:0.000,0.000,0.000|FS:100,5>\r\n",
+    b"\r\nGrbl 1.1h ['$' for help]\r\n",
+    b"[MSG:'$H'|'$X' to unlock]\r\n",
+    b"[VER:1.1h.20190830:]\r\n[OPT:V,15,128]\r\nok\r\n",
+    b"ok\r\n",
+    b"error:8\r\n",
+    b"ALARM:1\r\n",
+    b"[VER:1.1h.201",
+    b"\xff\x00o\x80k\r\n",
+)
+
+
+class Babbling:
+    """A wire at whose other end anything may be said at any time, in any pieces."""
+
+    name, blocks, time = "babble", False, 0.0
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+        self.written = b""
+
+    def now(self) -> float:
+        return self.time
+
+    def write(self, data: bytes) -> None:
+        self.written += data
+
+    write_now = write
+
+    def read(self, timeout: float) -> bytes:
+        self.time += min(max(timeout, 0.01), 0.3)
+        return b"".join(self._random.choices(SAID, k=self._random.choice((0, 0, 1, 1, 2, 3))))
+
+    def close(self) -> None:
+        pass
+
+
+def test_whatever_is_said_a_greeting_ends_in_a_state_that_is_known_or_a_sentence() -> None:
+    ends = set()
+    for seed in range(1500):
+        wire = Babbling(seed)
+        session = Session(wire, Connection())
+        try:
+            session.greet(1.0)
+            ends.add(session.connection.state)
+            assert session.banner != Banner("", "")
+        except MiurafabError as error:
+            ends.add(type(error))
+        assert set(wire.written) <= set(b"?$I\n\x18")
+        session.stop()  # never raises
+    assert {State.GREETED, State.READY, State.LOCKED, ControllerError, PortError} <= ends
