@@ -317,9 +317,11 @@ def _carry_out(
         tell(Outcome(order.action, error=JobStopped(f"Stopped by {signals.reason}.")))
         raise
     except MiurafabError as error:
+        tell(session.state)
         tell(Outcome(order.action, error=error))
         if isinstance(error, PortError):
             raise
         signals.release()
     else:
+        tell(session.state)
         tell(Outcome(order.action, value))

@@ -373,8 +373,8 @@ def frame(
     prepared: Prepared, number: int, *, port: str, options: CutOptions = DEFAULT_OPTIONS
 ) -> StreamResult:
     """Trace the box around what sheet ``number`` (from 1) burns, beam off or as a pointer."""
-    plan = frame_plan(prepared, number, options)
-    return _stream(port)(plan, port, virtual_speed=options.virtual_speed)
+    speed = options.virtual_speed
+    return _stream(port)(frame_plan(prepared, number, options), port, virtual_speed=speed)
 
 
 def frame_plan(
@@ -384,8 +384,7 @@ def frame_plan(
     back_to: tuple[float, float] | None = None,
 ) -> JobPlan:
     """The job of :func:`frame`, that goes ``back_to`` a place, or to where the head is put."""
-    (number,) = prepared.chosen([number])
-    prepared = align(prepared, [number], options.align)
+    prepared = align(prepared, prepared.chosen([number]), options.align)
     bounds = prepared.dry_runs[number - 1].bounds_mm
     name = prepared.jobs[number - 1].name
     if bounds is None:
