@@ -154,7 +154,6 @@ class MachineSession:
                 return self.state
 
     def _note(self, report: StatusReport) -> None:
-        self.conversation.restarted &= report.state == "Alarm"  # a later one is not the opening's
         self._at_risk = report.beam_on or report.state not in ("Idle", "Alarm", "Sleep", "Check")
 
     # The keys

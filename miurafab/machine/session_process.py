@@ -30,6 +30,7 @@ from typing import IO, Any
 from miurafab.child import python_command
 from miurafab.errors import JobStopped, MachineError, MiurafabError, PortError
 from miurafab.machine.dialects import make_safe, open_machine
+from miurafab.machine.greeting import RESTARTED
 from miurafab.machine.known_controller import MachineState, PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.owner import Owner, this_owner
@@ -323,5 +324,7 @@ def _carry_out(
             raise
         signals.release()
     else:
+        if order.action == "open" and session.conversation.take_restart():
+            tell(Heard(f"The opening of {session.state.port} {RESTARTED}."))
         tell(session.state)
         tell(Outcome(order.action, value))
