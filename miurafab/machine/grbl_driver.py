@@ -77,7 +77,7 @@ class GrblDriver(StreamDriver):
         """See :class:`StreamDriver`."""
         plan, session, known = self.plan, self._session, self._known
         known.open(plan.wait, reset=plan.reset)
-        restarted = session.take_restart()
+        restarted, untold = session.restarted, session.take_restart()
         known.clear_overrides()
         if plan.options.home:
             self.at_risk = True
@@ -109,7 +109,7 @@ class GrblDriver(StreamDriver):
         if plan.options.check_mode:
             self.at_risk = True
             session.command("$C")
-        if restarted and not plan.options.home and plan.at is None:
+        if untold and not plan.options.home and plan.at is None:
             modes += (Finding("restarted", f"The opening of {session.name} {RESTARTED}."),)
         return forced + modes
 

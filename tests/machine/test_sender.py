@@ -500,7 +500,9 @@ def test_a_machine_with_homing_is_homed_first_if_asked() -> None:
     job = Job("job.nc", "G90\nG53 G0 X-5\n")
     wire = FakeWire(new_device(**homing))
     force = frozenset({"bounds", "program"})
-    with pytest.raises(ControllerError, match=r"in state Alarm, not Idle.*'force' idle"):
+    with pytest.raises(
+        ControllerError, match=r"restarted the board, which is locked.*'force' idle"
+    ):
         send(job, wire, force=force)
     assert b"$X" not in wire.bytes_written
     assert b"$H" not in wire.bytes_written
