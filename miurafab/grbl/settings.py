@@ -88,6 +88,10 @@ class Settings:
         return "".join(f"${number}={text}\n" for number, text in self.texts.items())
 
 
+_MOST = 1e9
+"""No setting of a controller is larger; a damaged dump may hold any number."""
+
+
 def parse_dump(text: str, name: str) -> Settings:
     """Read a saved ``$$`` dump without its blank lines, comments (``;``) and final ``ok``.
 
@@ -103,6 +107,11 @@ def parse_dump(text: str, name: str) -> Settings:
         if not isinstance(event, Setting):
             raise ProfileError(
                 f"{name}, line {number}: {code!r} is not a setting such as '$110=6000'."
+            )
+        value = _number(event.text)
+        if value is not None and abs(value) > _MOST:
+            raise ProfileError(
+                f"{name}, line {number}: ${event.number} is {value:g}, more than a controller has."
             )
         texts[event.number] = event.text
     if not texts:

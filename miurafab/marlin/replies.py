@@ -51,7 +51,7 @@ class MarlinError(Reply):
     """The controller did not execute the line in flight, or has stopped."""
 
 
-_RESEND = re.compile(r"(?:Resend|rs)\s*:?\s*N?(\d+)", re.IGNORECASE)
+_RESEND = re.compile(r"(?:Resend|rs)\s*:?\s*N?(\d{1,9})", re.IGNORECASE)
 _OK = re.compile(r"ok(?![A-Za-z0-9])", re.IGNORECASE)
 _KILLED = re.compile(r"(?:Error:.*(?:kill\(\)|halted))|!!.*(?:KILL|HALT)", re.IGNORECASE)
 _WANTS_AGAIN = re.compile(r"Last Line", re.IGNORECASE)

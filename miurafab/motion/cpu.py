@@ -45,9 +45,13 @@ def words_cost(words: int, characters: int, points: int) -> int:
     return words * _WORD + digits * _DIGIT + points * _DECIMALS
 
 
+_LONGEST_DWELL = 1e30
+"""More seconds are as good as these: both are taken modulo 2^16 steps."""
+
+
 def dwell_steps(seconds: float) -> int:
     """The number of 50 ms units in a dwell of ``seconds``."""
-    return math.ceil(single(20.0 * single(seconds))) & 0xFFFF
+    return math.ceil(single(20.0 * single(min(seconds, _LONGEST_DWELL)))) & 0xFFFF
 
 
 PLAN_LINE = 4800

@@ -29,6 +29,12 @@ from miurafab.motion.stepper import Processor, Stepper
 
 _OK_BYTES = 4
 _FOREVER = 1 << 62
+_LEAST_FEED = 1.0  # mm/min (``MINIMUM_FEED_RATE`` of ``config.h``)
+_LONGEST_MOVE = 72_000.0
+"""Seconds. In a longer move the way of one segment is below the last digit of the length left, a
+32-bit float (2^23 segments of 10 ms are 84,000 s): the firmware would never arrive. It is timed by
+length over feed, as is a job of days, which is a slip of the decimal point."""
+_LONGEST_JOB = 1e6
 _BLOCK = 4096  # lines held as Python objects at a time
 
 
@@ -50,9 +56,26 @@ def estimate(program: Program, parameters: MotionParameters, link: Link | None =
 
     ``link`` None is the usual link of GRBL: 115200 baud, 1 ms, 128 bytes.
     """
+    plain = _plain_seconds(program, parameters)
+    if plain.max(initial=0.0) > _LONGEST_MOVE or plain.sum() > _LONGEST_JOB:
+        return _plain(program, plain)
     run = _Run(program, parameters, link or Link())
     run.lines()
     return run.result()
+
+
+def _plain_seconds(program: Program, parameters: MotionParameters) -> Floats:
+    """(n,) the length of each move over its feed, without acceleration."""
+    fastest = min(parameters.max_rate_mm_min[:2])
+    feed = np.where(program.motion == RAPID, fastest, program.feed_mm_min)
+    seconds: Floats = 60.0 * program.lengths / np.clip(feed, _LEAST_FEED, max(fastest, _LEAST_FEED))
+    return seconds
+
+
+def _plain(program: Program, seconds: Floats) -> Estimate:
+    end = np.cumsum(seconds)
+    burning = float(seconds[program.beam_on].sum())
+    return Estimate(float(end[-1]), burning, end - seconds, end)
 
 
 class _Wire:
@@ -98,7 +121,7 @@ class _Run:
                 strict=True,
             )
         )
-        self.generator = SegmentGenerator(self.planner, _burns)
+        self.generator = SegmentGenerator(self.planner, _burns, whole_holds=True)
         self.stepper = Stepper()
         self.stepper.idle_lock = round((parameters.idle_lock or 0.0) * cpu.CLOCK)
         self.stepper.on_segment = self._segment

@@ -31,6 +31,8 @@ _SMOOTHING = (2000, 4000, 8000)
 MICRO = 8
 """Micro-steps per step; progress within a move is counted in micro-steps."""
 
+_LONG_HOLD, _HOLD_REST = 100 * SEGMENT_TIME, 20 * SEGMENT_TIME
+
 RISE, HOLD, FALL, FALL_TO_TOP = range(4)
 
 
@@ -60,12 +62,20 @@ class SegmentGenerator:
     """Divides the first planned move into segments, one per call of :meth:`next`.
 
     ``to_pwm`` converts an S value, or None for a spindle that is off, to the PWM value 0..255.
-    ``cycles`` accumulates the processor's work.
+    ``cycles`` accumulates the processor's work. With ``whole_holds`` a long stretch at constant
+    speed is one segment instead of many, so that a move of days costs no more to time than another.
     """
 
-    def __init__(self, planner: Planner, to_pwm: Callable[[float | None], int]) -> None:
+    def __init__(
+        self,
+        planner: Planner,
+        to_pwm: Callable[[float | None], int],
+        *,
+        whole_holds: bool = False,
+    ) -> None:
         self.planner = planner
         self.to_pwm = to_pwm
+        self.whole_holds = whole_holds
         self.cycles = 0
         planner.on_replan = self.replan
         self.reset()
@@ -115,7 +125,7 @@ class SegmentGenerator:
         if move is None:
             return None
         segment = Segment(move, self._done, 0, self._follows)
-        length, duration, rounds = self._travel(move)
+        length, duration, rounds = self._hold(move) or self._travel(move)
         if self._follows or self.refresh_power:
             self._set_power(move)
         segment.power = self._power
@@ -219,6 +229,18 @@ class SegmentGenerator:
                     self._ramp = HOLD
                 else:
                     self.rise_end -= per_speed_sqr * (nominal_sqr - entry_sqr)
+
+    def _hold(self, move: Move) -> tuple[float, float, int] | None:
+        """Most of a long stretch at constant speed, as :meth:`_travel` gives a segment; else None.
+
+        Its end is left to segments of the usual length: a line that comes may change its plan.
+        """
+        if not self.whole_holds or self._ramp != HOLD:
+            return None
+        span = (move.length - self.fall_start) / self.top - _HOLD_REST
+        if span < _LONG_HOLD:
+            return None
+        return move.length - self.top * span, span, 1
 
     def _travel(self, move: Move) -> tuple[float, float, int]:
         """Follow the profile for one segment: the length left, the time, the loop rounds."""

@@ -159,6 +159,11 @@ def dry_run(
         if not unread:
             raise
         judged, program = judge_job(job, machine), ProgramBuilder(job.name).program()
+    findings = (
+        tuple(judge_program(job, program, machine, most_power=most_power))
+        if judged is None
+        else judged.findings
+    )
     times = estimate(program, MotionParameters.from_profile(machine), Link.from_profile(machine))
     burning = program.beam_on
     layer = np.where(burning, _layers(program), np.int8(_TRAVEL))
@@ -174,11 +179,7 @@ def dry_run(
         cut_mm=float(lengths[burning].sum()),
         travel_mm=float(lengths[~burning].sum()),
         bounds_mm=_box(burnt.points) if len(burnt) else None,
-        findings=(
-            tuple(judge_program(job, program, machine, most_power=most_power))
-            if judged is None
-            else judged.findings
-        ),
+        findings=findings,
         program=program,
         layer=layer,
         end_seconds=times.end,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
@@ -38,6 +40,39 @@ def test_recorded_jobs_are_timed_as_the_firmware_ran_them(name: str, within: flo
 
 def test_one_move_takes_its_trapezoid() -> None:
     assert time("G1 X100 F6000").seconds == pytest.approx(1.1, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G1 X9999999 Y5 F100",
+        "G1 X100000 F0.1\nG1 X0\nG1 X1",
+        "G0 X1 Y1\nG2 X10 Y0 R100000000 F100",
+        "G4 P1000000",
+        f"G4 P{'9' * 40}",
+    ],
+)
+def test_a_slip_of_the_decimal_point_costs_no_more_than_another_move(text: str) -> None:
+    """Nor does a move of days: the work is that of its moves (5 s would be 1,000 h at 100 Hz)."""
+    begun = process_time()
+    assert time(text).seconds >= 0
+    if text.startswith("G1 X9"):
+        assert time(text).seconds == pytest.approx(9999999 / 100 * 60, rel=1e-3)
+    assert process_time() - begun < 15
+
+
+@pytest.mark.parametrize("laser", [0, 1])
+def test_a_long_move_is_timed_as_by_short_segments(
+    laser: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where lines arrive while it holds its speed, and where the beam follows the speed."""
+    text = "M4 S500\nG1 X400 F600\nY2 F500\nX0\n" + "".join(f"X{x} F900\n" for x in range(1, 60))
+    quick = time(text, laser=bool(laser))
+    monkeypatch.setattr("miurafab.motion.segments._LONG_HOLD", math.inf)
+    slow = time(text, laser=bool(laser))
+    assert quick.seconds == pytest.approx(slow.seconds, rel=2e-4)
+    assert quick.beam_on_seconds == pytest.approx(slow.beam_on_seconds, rel=2e-4)
+    np.testing.assert_allclose(quick.end, slow.end, atol=0.02)
 
 
 def test_a_dwell_is_rounded_up_to_50_ms() -> None:
