@@ -73,7 +73,7 @@ RULES = {
     "fold-angle": Rule("refusal", "a fold angle that is not that of the folded form"),
     "facets": Rule("refusal", "a facet that is missing, or is not in its place in the grid"),
     "turned-over": Rule("refusal", "a facet that lies turned over in the flat pattern"),
-    "scale": Rule("refusal", "a folded form that lies on the target in another size than given"),
+    "scale": Rule("refusal", "a target or its scale that is not that of the fit"),
     "closure": Rule("refusal", "a vertex that the given fold angles do not close"),
     "flat-folding": Rule(
         "refusal", "a vertex that cannot fold flat, where all folds are 180 degrees"

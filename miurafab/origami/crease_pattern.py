@@ -67,6 +67,9 @@ class CreasePattern(Shown):
         The folded form lies on ``scale`` times the target, relative to :attr:`origin`.
     target : dict
         The surface and its parameters (:mod:`miurafab.surfaces.description`).
+    target_kept : bool, optional
+        Whether target and scale are those that the file of the pattern was written with. None
+        where the file does not tell.
     angles_assumed : bool
         Whether the fold angles are not known, and taken as 180 degrees.
 
@@ -88,6 +91,7 @@ class CreasePattern(Shown):
     cells: Ints | None = None
     scale: float = 1.0
     target: dict[str, Any] = field(default_factory=dict)
+    target_kept: bool | None = True
     angles_assumed: bool = False
 
     def __post_init__(self) -> None:

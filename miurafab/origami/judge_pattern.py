@@ -26,22 +26,15 @@ from miurafab.origami.judge_creases import (
     measured_folds,
     unmeasured,
 )
-from miurafab.origami.nearness import scale_misfit
 
 if TYPE_CHECKING:
     from miurafab.origami.verify import Measurements
-    from miurafab.surfaces.surface import TargetSurface
 
 STEEP_FOLD = math.radians(165)
 """A crease beyond this angle nearly lies on its neighbour."""
 
 MUCH_PAPER = 4.0
 """From this area ratio on, the paper lies in more than four layers on average."""
-
-WRONG_SCALE, BETTER_SHARE, ON_TARGET = 0.01, 0.3, 0.005
-"""A scale is wrong if one that differs by 1 % takes away 30 % of the mean square distance and the
-sheet then lies within 0.5 % of its diagonal. On the named surfaces the best scale is within 0.8 %
-of the given one, or the sheet lies farther away."""
 
 LITTLE_COVERED, MUCH_OVERHANG = 0.95, 0.01
 
@@ -97,16 +90,19 @@ def judge_quality(measured: Measurements) -> Iterator[Finding]:
         )
 
 
-def judge_scale(pattern: CreasePattern, surface: TargetSurface) -> Iterator[Finding]:
-    """Whether the folded form lies on the target of the size that the pattern gives."""
-    found = scale_misfit(pattern, surface)
-    if found is None or abs(found.better) <= WRONG_SCALE:
-        return
-    if found.share >= BETTER_SHARE and found.left <= ON_TARGET:
+def _target(pattern: CreasePattern) -> Iterator[Finding]:
+    """Whether the target and its scale are known to be those of the folded form."""
+    if pattern.target_kept is None:
+        yield Finding(
+            "not-proven",
+            "The file has no `miurafab:target_sha256`, so it is not known whether its target and "
+            "`miurafab:scale` are those of the folded form.",
+        )
+    elif not pattern.target_kept:
         yield Finding(
             "scale",
-            f"The folded form lies on {pattern.scale * (1 + found.better):.6g} times the target, "
-            f"and its scale is given as {pattern.scale:.6g}: scale or target have changed.",
+            "The target or its scale is not the one that the pattern was written with, and "
+            "distances to it would be untrue; fit again, or take `miurafab:target` out.",
         )
 
 
@@ -123,6 +119,7 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
             tuple(short.tolist()),
         )
     yield from _shapes(pattern)
+    yield from _target(pattern)
     yield from judge_creases(pattern, evidence.folds)
     if evidence.folds is None:
         yield from judge_flat_folding(pattern)

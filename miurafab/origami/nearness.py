@@ -39,18 +39,6 @@ class Nearness:
         return max(self.sheet_to_target, self.target_to_sheet)
 
 
-@dataclass(frozen=True)
-class ScaleMisfit:
-    """What another scale would do: ``better`` is the part by which the target had to be larger,
-    ``share`` how much of the mean square distance that takes away, and ``left`` the distance that
-    stays (root mean square), over the diagonal.
-    """
-
-    better: float
-    share: float
-    left: float
-
-
 def nearness(pattern: CreasePattern, surface: TargetSurface, tiles: Floats) -> Nearness:
     """The distances of the folded ``pattern`` from ``surface`` and its ``tiles``, in its frame."""
     assert pattern.folded_coords is not None
@@ -65,36 +53,6 @@ def nearness(pattern: CreasePattern, surface: TargetSurface, tiles: Floats) -> N
         scale * farthest_from_mesh(tiles, sheet),
         scale * float(off),
         float(diagonal),
-    )
-
-
-def scale_misfit(pattern: CreasePattern, surface: TargetSurface) -> ScaleMisfit | None:
-    """By how much another ``scale`` would bring ``surface`` nearer to the folded ``pattern``.
-
-    The mean m of a facet lies at distance r from the nearest point q of the target, in direction n.
-    A target larger by the part x has r - x (q . n) there, so the least squares are at
-    x = sum r (q . n) / sum (q . n)^2. None where no scale is better than another, as for a plane.
-    """
-    assert pattern.folded_coords is not None
-    folded = pattern.folded_coords / pattern.scale
-    means = facet_means(folded, pattern.faces_vertices[_uncut(pattern)])
-    nearest = surface.nearest(means)
-    away = means - nearest
-    distance = np.linalg.norm(away, axis=1)
-    with np.errstate(invalid="ignore"):
-        along = np.einsum("nk,nk->n", nearest, away) / distance
-    far = distance > 0
-    distance, along = distance[far], along[far]
-    lever = float(along @ along)
-    if lever == 0.0:
-        return None
-    better = float(distance @ along) / lever
-    left = float(np.square(distance - better * along).sum())
-    diagonal = float(np.linalg.norm(np.ptp(folded, axis=0)))
-    return ScaleMisfit(
-        better,
-        1 - left / float(distance @ distance),
-        float(np.sqrt(left / len(distance))) / diagonal,
     )
 
 

@@ -26,7 +26,6 @@ from miurafab.origami.judge_pattern import (
     gather,
     judge,
     judge_quality,
-    judge_scale,
     proved,
 )
 from miurafab.origami.nearness import nearness
@@ -163,8 +162,7 @@ def audit(pattern: CreasePattern, surface: TargetSurface | None = None) -> Audit
     started = time.perf_counter()
     evidence = gather(pattern)
     measured = _measured(pattern, surface, evidence)
-    of_scale = () if surface is None or evidence.folds is None else judge_scale(pattern, surface)
-    findings = (*judge(pattern, evidence), *judge_quality(measured), *of_scale)
+    findings = (*judge(pattern, evidence), *judge_quality(measured))
     seconds = time.perf_counter() - started
     return Audit(measured, findings, seconds, proved(pattern, evidence, findings))
 

@@ -217,13 +217,27 @@ def test_the_rotations_around_each_vertex_of_a_folded_sheet_close():
     assert flat.gap == pytest.approx(2 * flat.kawasaki)
 
 
-def test_a_scale_that_is_not_that_of_the_folded_form_is_found(tmp_path):
-    pattern = fitted("hypar").pattern
-    for factor, codes in ((1.0, set()), (1.05, {"scale"}), (0.9, {"scale"})):
-        replace(pattern, scale=factor * pattern.scale).save(tmp_path / "a.fold")
-        checked = mf.check(tmp_path / "a.fold")
-        assert {each.code for each in refusals(checked.findings)} == codes
-        assert bool(checked.proved)
+@pytest.mark.parametrize(
+    ("change", "codes"),
+    [
+        (lambda file: None, set()),
+        (lambda file: file["miurafab:target"].update(mesh="elsewhere.stl"), set()),
+        (lambda file: file.pop("miurafab:target_sha256"), {"not-proven"}),
+        (
+            lambda file: file.update({"miurafab:scale": 1.000001 * file["miurafab:scale"]}),
+            {"scale"},
+        ),
+        (lambda file: file["miurafab:target"]["parameters"].update(height=0.6), {"scale"}),
+    ],
+)
+def test_a_target_that_is_not_the_one_of_the_fit_is_found(tmp_path, change, codes):
+    path = tmp_path / "a.fold"
+    fitted("hypar", 6, 6).pattern.save(path)
+    file = json.loads(path.read_text())
+    change(file)
+    path.write_text(json.dumps(file))
+    findings = audit(parse_fold(json.loads(path.read_text()))).findings
+    assert {each.code for each in findings} & {"scale", "not-proven"} == codes
 
 
 def test_nothing_is_made_of_a_pattern_that_contradicts_itself(tmp_path):

@@ -43,6 +43,8 @@ from miurafab.origami.formats.target_frame import (
     relative,
     scale_in,
     target_in,
+    target_kept,
+    target_seal,
 )
 from miurafab.origami.unfold import with_angles_of_the_folded_form
 from miurafab.surfaces.frame import origin_in
@@ -103,6 +105,7 @@ def fold_text(pattern: CreasePattern, title: str = "", motion: FoldingMotion | N
     if pattern.target:
         keys["miurafab:target"] = pattern.target
         keys["miurafab:scale"] = pattern.scale
+        keys["miurafab:target_sha256"] = target_seal(pattern.target, pattern.scale)
     if not title:
         del keys["file_title"]
     lines = (
@@ -192,6 +195,7 @@ def parse_fold(document: Any) -> CreasePattern:
         cells=_numbers(document, "miurafab:cells", 2),
         scale=scale_in(document),
         target=target_in(document),
+        target_kept=target_kept(document),
         angles_assumed=document.get("miurafab:angles") == ASSUMED,
     )
     pattern = replace(pattern, faces_vertices=oriented(flat, faces))

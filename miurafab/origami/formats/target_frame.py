@@ -1,4 +1,7 @@
-"""The target in a FOLD file: ``miurafab:target``, ``miurafab:scale``, and its frame.
+"""The target in a FOLD file: ``miurafab:target``, ``miurafab:scale``, their seal, and its frame.
+
+Nothing else in the file tells how large the target is, and a coarse sheet lies as near to a target
+that is larger by a hundredth. So the file holds the SHA-256 of both, ``miurafab:target_sha256``.
 
 In the file the folded form lies in the frame of the target. Where the target has an ``origin``
 (:mod:`miurafab.surfaces.frame`), the folded form of a pattern is relative to it. A 64-bit number
@@ -8,6 +11,7 @@ file is read: the same numbers come back, bit for bit.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -46,6 +50,22 @@ def target_in(document: Mapping[str, Any]) -> dict[str, Any]:
     except (TypeError, ValueError, OverflowError) as fault:
         raise PatternError(f"'miurafab:target' is damaged: {fault}.") from None
     return target
+
+
+def target_seal(target: Mapping[str, Any], scale: float) -> str:
+    """The SHA-256 of ``target`` and ``scale``, whatever folder its mesh lies in."""
+    told = {key: value for key, value in target.items() if key != "mesh"}
+    return hashlib.sha256(json.dumps([told, scale], sort_keys=True).encode("ascii")).hexdigest()
+
+
+def target_kept(document: Mapping[str, Any]) -> bool | None:
+    """Whether target and scale are those that the file was written with, None if it has no seal."""
+    if "miurafab:target" not in document:
+        return True
+    seal = document.get("miurafab:target_sha256")
+    return (
+        None if seal is None else bool(seal == target_seal(target_in(document), scale_in(document)))
+    )
 
 
 def _check_texts(value: object) -> None:
