@@ -69,7 +69,7 @@ if TYPE_CHECKING:
     from miurafab.workflow.check_job import check_job as check_job
     from miurafab.workflow.convert import Conversion as Conversion
     from miurafab.workflow.convert import convert as convert
-    from miurafab.workflow.cut_sheets import CutOptions as CutOptions
+    from miurafab.workflow.cut_options import CutOptions as CutOptions
     from miurafab.workflow.cut_sheets import CutSheet as CutSheet
     from miurafab.workflow.cut_sheets import cut as cut
     from miurafab.workflow.design import Design as Design

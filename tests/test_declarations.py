@@ -33,7 +33,7 @@ from miurafab.options import (
 from miurafab.origami.fitting.kinds import CutColumns, FlatFoldability, Pieces, Poles
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.studio.form import FIT, LAYOUT, filled
-from miurafab.workflow.cut_sheets import CutOptions
+from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.design import design
 from miurafab.workflow.energy import EnergyOptions
 from miurafab.workflow.fold import FoldOptions

@@ -30,7 +30,8 @@ from miurafab.profiles.own import own_defaults
 if TYPE_CHECKING:
     from miurafab.machine.signals import StopSignals
     from miurafab.workflow.cut import Prepared
-    from miurafab.workflow.cut_sheets import CutOptions, CutSheet
+    from miurafab.workflow.cut_options import CutOptions
+    from miurafab.workflow.cut_sheets import CutSheet
     from miurafab.workflow.timeline import SheetProgress
 
 _LOOK_S = 0.05  # between two looks at the keyboard
@@ -60,7 +61,7 @@ PauseOption = Annotated[
 
 def cut_options() -> type[CutOptions]:
     """The class that declares how sheets are sent."""
-    from miurafab.workflow.cut_sheets import CutOptions
+    from miurafab.workflow.cut_options import CutOptions
 
     return CutOptions
 

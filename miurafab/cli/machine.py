@@ -173,7 +173,7 @@ def jog(
 
 
 def _frame_options() -> type:
-    from miurafab.workflow.cut_sheets import CutOptions
+    from miurafab.workflow.cut_options import CutOptions
 
     return CutOptions
 
@@ -199,8 +199,9 @@ def frame(
     from miurafab.workflow import cut_sheets
     from miurafab.workflow.alignment import align
     from miurafab.workflow.cut import prepare
+    from miurafab.workflow.cut_options import CutOptions
 
-    options = read_options(cut_sheets.CutOptions, given)
+    options = read_options(CutOptions, given)
     prepared = align(prepare(thing, machine=machine), [sheet], options.align)
     options = replace(options, align=())  # it lies there now
     found = () if prepared.aligned is None else (prepared.aligned.finding,)

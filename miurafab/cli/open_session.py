@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from miurafab.machine.known_controller import MachineState
     from miurafab.machine.signals import StopSignals
     from miurafab.workflow.at_machine import Operator
-    from miurafab.workflow.cut_sheets import CutOptions
+    from miurafab.workflow.cut_options import CutOptions
 
 EXAMPLES = (
     "miurafab machine open /dev/ttyUSB0 jobs/hypar",
@@ -52,7 +52,7 @@ _WORDS = ", ".join((*_OTHERS, *_ACTIONS, *_AT_ONCE))
 
 
 def _session_options() -> type[CutOptions]:
-    from miurafab.workflow.cut_sheets import CutOptions
+    from miurafab.workflow.cut_options import CutOptions
 
     return CutOptions
 

@@ -16,7 +16,8 @@ from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.session_process import Heard, Outcome, SessionProcess
 from miurafab.machine.transport import VIRTUAL
 from miurafab.workflow.cut import Prepared
-from miurafab.workflow.cut_sheets import CutOptions, frame_plan
+from miurafab.workflow.cut_options import CutOptions
+from miurafab.workflow.cut_sheets import frame_plan
 from miurafab.workflow.dry_run import clock_text
 from miurafab.workflow.sheet_plans import beside, journal_path, plan_sheets
 from miurafab.workflow.timeline import SheetProgress, Timeline

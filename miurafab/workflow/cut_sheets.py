@@ -7,9 +7,8 @@ each go beside it, and by its journal a sheet that was interrupted goes on.
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -19,31 +18,32 @@ from miurafab.files import AnyPath
 from miurafab.findings import Finding
 from miurafab.machine.job_process import stream_apart
 from miurafab.machine.keys import Keys
-from miurafab.machine.planning import JobPlan, SendOptions, head_at, plan_job
+from miurafab.machine.planning import JobPlan, head_at, plan_job
 from miurafab.machine.sender import StreamResult, stream_plan
-from miurafab.machine.trace_box import MOST_POINTER, frame_job
+from miurafab.machine.trace_box import frame_job
 from miurafab.machine.transport import VIRTUAL, require_port
 from miurafab.options import (
-    Flag,
-    Pair,
     Several,
     Text,
     Whole,
-    check_options,
     declared,
-    length,
-    option,
-    percent,
     read_options,
     read_value,
 )
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.profiles import MachineProfile
-from miurafab.workflow.alignment import Mark, align
+from miurafab.workflow.alignment import align
 from miurafab.workflow.cut import Prepared, prepare
+from miurafab.workflow.cut_options import DEFAULT_OPTIONS, CutOptions
 from miurafab.workflow.material_change import at_pause, needs_person
-from miurafab.workflow.sheet_plans import beside, journal_path, plan_sheets, start_findings
+from miurafab.workflow.sheet_plans import (
+    beside,
+    journal_path,
+    plan_sheets,
+    start_findings,
+    what_is_sent,
+)
 from miurafab.workflow.timeline import SheetProgress, placed
 
 
@@ -56,9 +56,9 @@ class CutSheet(Shown):
     name : str
         The name of the sheet.
     lines : int
-        The lines of its G-code.
+        The lines of its G-code that were sent.
     cut_mm, travel_mm : float
-        The length of the burnt strokes and of the dark moves.
+        The length of the burnt strokes and of the dark moves in them.
     estimated_s : float
         The time that the dry run gave before the cut.
     result : StreamResult
@@ -78,79 +78,6 @@ class CutSheet(Shown):
 
     def _summary(self) -> str:
         return f"{self.name}: {self.lines} lines in {self.result.seconds:.1f} s"
-
-
-@dataclass(frozen=True, repr=False)
-class CutOptions(Shown):
-    """How sheets are cut; :func:`cut` names each option.
-
-    Attributes
-    ----------
-    send : SendOptions
-        How the sender starts and watches the machine.
-    resume : bool
-        Whether to continue an interrupted job.
-    frame : bool
-        Whether to trace the box around each sheet first.
-    pointer : float
-        The beam power of the frame, as a fraction of full power.
-    from_stroke : int or None
-        The stroke, from 1, that the first sheet begins with.
-    align : tuple of pairs of points
-        Two marks of the one sheet: their position in the job, and where the head stands over them.
-    virtual_speed : float or None
-        How much faster than real time the virtual machine runs.
-    """
-
-    send: SendOptions = field(default_factory=SendOptions)
-    resume: bool = option(
-        Flag(),
-        "Continue an interrupted job; needs `home` or `at`, since the position was lost.",
-        False,
-        group="Start",
-    )
-    frame: bool = option(
-        Flag(), "Trace the box around each sheet first, then wait.", False, group="Start"
-    )
-    pointer: float = option(
-        percent(0, 100 * MOST_POINTER),
-        "Beam power of the frame in percent; 0 keeps the beam off.",
-        0.0,
-        group="Start",
-    )
-    from_stroke: int | None = option(
-        Whole(1),
-        "The stroke that the first sheet begins with, as the progress and the preview count them; "
-        "those before it are left out.",
-        group="Start",
-    )
-    align: tuple[Mark, ...] = option(
-        Several(
-            Pair(Pair(length(-math.inf), "X,Y"), "X,Y=X2,Y2", "10,10=12.3,9.8", "="), separator=";"
-        ),
-        "A mark of the sheet, X,Y in the job, and X2,Y2 where the head stands over it; give two, "
-        "and the sheet is cut where it lies.",
-        (),
-        group="Start",
-    )
-    virtual_speed: float | None = None
-
-    def __post_init__(self) -> None:
-        check_options(self)
-        if self.align and isinstance(self.send.at, str):
-            raise OptionError(
-                "at",
-                f"is {self.send.at}, and `align` says where the sheet lies; give `at` as X,Y, in "
-                "the coordinates in which the marks were measured, or leave it out",
-            )
-
-    @property
-    def unread(self) -> bool:
-        """Whether a program may be sent that this computer cannot read."""
-        return self.send.check_mode or "program" in self.send.force
-
-
-DEFAULT_OPTIONS = CutOptions()
 
 
 @verb
@@ -338,12 +265,13 @@ def cut_sheet(
             on_progress, number, expected, prepared.machine.controller.planner_blocks
         ),
     )
+    sent = what_is_sent(prepared, number, plan.resumption)
     return CutSheet(
-        expected.name,
+        sent.name,
         result.lines,
-        expected.cut_mm,
-        expected.travel_mm,
-        expected.seconds,
+        sent.cut_mm,
+        sent.travel_mm,
+        sent.seconds,
         result,
         (
             *(found for found in expected.findings if found.severity != "refusal"),

@@ -19,11 +19,8 @@ from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import Head, JobPlan
 from miurafab.machine.signals import StopSignals
 from miurafab.workflow.cut import Prepared
-from miurafab.workflow.cut_sheets import (
-    CutOptions,
-    cut_sheet,
-    head_after,
-)
+from miurafab.workflow.cut_options import CutOptions
+from miurafab.workflow.cut_sheets import cut_sheet, head_after
 from miurafab.workflow.material_change import WAITS, MaterialChange
 from miurafab.workflow.sheet_plans import journal_path, plan_sheets
 

@@ -20,10 +20,10 @@ from miurafab.machine.preflight import raise_findings, require_known
 from miurafab.machine.resume import Resumption, from_stroke, resume
 from miurafab.workflow.alignment import align
 from miurafab.workflow.cut import Prepared
-from miurafab.workflow.dry_run import readiness
+from miurafab.workflow.dry_run import SheetPreview, dry_run, readiness
 
 if TYPE_CHECKING:
-    from miurafab.workflow.cut_sheets import CutOptions
+    from miurafab.workflow.cut_options import CutOptions
 
 
 def plan_sheets(
@@ -110,6 +110,16 @@ def start_findings(
     return tuple(found)
 
 
+def what_is_sent(prepared: Prepared, number: int, resumption: Resumption | None) -> SheetPreview:
+    """The dry run of sheet ``number``, or of the rest of it."""
+    whole = prepared.dry_runs[number - 1]
+    if resumption is None:
+        return whole
+    return dry_run(
+        whole.name, resumption.job, prepared.machine, whole.paper_mm, prepared.most_power
+    )
+
+
 def rehearsed(
     prepared: Prepared, sheets: Sequence[int] | None, options: CutOptions
 ) -> tuple[Prepared, str, tuple[Finding, ...]]:
@@ -121,12 +131,15 @@ def rehearsed(
     resumption = None
     if options.from_stroke is not None:
         resumption = from_stroke(prepared.jobs[first - 1], prepared.machine, options.from_stroke)
+    notes = start_findings(prepared, first, resumption, options.send.at)
+    dry_runs = list(prepared.dry_runs)
+    dry_runs[first - 1] = what_is_sent(prepared, first, resumption)
+    prepared = replace(prepared, dry_runs=tuple(dry_runs))
     send, machine = options.send, prepared.machine
     ready = readiness(prepared.edits, send.force) == "ready" and all(
         readiness(each.findings, send.force | passed_checks(send, machine, each.program)) == "ready"
         for each in prepared.dry_runs
     )
-    notes = start_findings(prepared, first, resumption, options.send.at)
     return prepared, "ready" if ready else "refused", notes
 
 

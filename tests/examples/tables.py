@@ -16,7 +16,7 @@ from miurafab.options import declared
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.profiles.machine import Bed, Controller, Knife, MotionLimits, ZAxis
 from miurafab.profiles.material import Operation, Perforation, TabRule
-from miurafab.workflow.cut_sheets import CutOptions
+from miurafab.workflow.cut_options import CutOptions
 
 _PLACE = re.compile(r"(<!-- table: (\w+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 

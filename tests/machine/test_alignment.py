@@ -20,7 +20,8 @@ from miurafab.options import read_options
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.workflow.alignment import align, draw
 from miurafab.workflow.cut import prepare
-from miurafab.workflow.cut_sheets import CutOptions, cut_prepared, frame
+from miurafab.workflow.cut_options import CutOptions
+from miurafab.workflow.cut_sheets import cut_prepared, frame
 from miurafab.workflow.sheet_plans import plan_sheets
 
 JOB = """G21 G90

@@ -21,7 +21,8 @@ from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.workflow.cut import prepare
-from miurafab.workflow.cut_sheets import CutOptions, cut_prepared
+from miurafab.workflow.cut_options import CutOptions
+from miurafab.workflow.cut_sheets import cut_prepared
 from miurafab.workflow.dry_run import dry_run, read_gcode
 
 MACHINE = load_machine("grbl-laser-400")

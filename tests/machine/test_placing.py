@@ -20,7 +20,8 @@ from miurafab.options import read_options
 from miurafab.profiles import load_machine
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.workflow.cut import prepare
-from miurafab.workflow.cut_sheets import CutOptions, cut_prepared, frame
+from miurafab.workflow.cut_options import CutOptions
+from miurafab.workflow.cut_sheets import cut_prepared, frame
 from miurafab.workflow.sheet_plans import plan_sheets, rehearsed
 
 MACHINE = load_machine("grbl-laser-400")
@@ -119,6 +120,18 @@ def test_a_job_begins_at_the_stroke_that_was_asked_for(style, number):
     left = f"strokes 1 to {number - 1} are" if number > 2 else "stroke 1 is"
     assert f"begins at stroke {number} of 200" in str(rest.finding)
     assert f"{left} left out" in str(rest.finding)
+
+
+def test_the_figures_are_those_of_what_is_sent(tmp_path):
+    path = tmp_path / "a.nc"
+    path.write_text(dashes("absolute").text)
+    prepared, options = prepare(str(path)), CutOptions(from_stroke=151)
+    seen, _, _ = rehearsed(prepared, None, options)
+    (done,) = cut_prepared(prepared, port="virtual", options=options)
+    assert prepared.dry_runs[0].cut_mm == pytest.approx(400)  # 200 strokes of 2 mm
+    assert seen.dry_runs[0].cut_mm == done.cut_mm == pytest.approx(100)
+    assert done.result.seconds == pytest.approx(done.estimated_s, abs=1)
+    assert done.estimated_s < prepared.dry_runs[0].seconds / 2
 
 
 def test_strokes_that_meet_are_parted_at_the_stroke_that_was_asked_for():

@@ -11,7 +11,8 @@ from miurafab.errors import GcodeError, InputError
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import SendOptions
 from miurafab.workflow.cut import prepare
-from miurafab.workflow.cut_sheets import CutOptions, cut_prepared, frame
+from miurafab.workflow.cut_options import CutOptions
+from miurafab.workflow.cut_sheets import cut_prepared, frame
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,8 @@ from miurafab.machine.planning import SendOptions
 from miurafab.machine.sender import stream_plan
 from miurafab.workflow import multi_machine
 from miurafab.workflow.cut import prepare
-from miurafab.workflow.cut_sheets import CutOptions, cut_prepared
+from miurafab.workflow.cut_options import CutOptions
+from miurafab.workflow.cut_sheets import cut_prepared
 from miurafab.workflow.material_change import WAITS, at_pause, needs_person
 from miurafab.workflow.multi_machine import share_sheets
 
