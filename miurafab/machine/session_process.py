@@ -185,6 +185,18 @@ class SessionProcess:
             self._beat_at = now + BEAT_S
         return message
 
+    def stop(self) -> None:
+        """Have whatever runs, and the session, ended by a reset now."""
+        self._tell(STOPS["SIGTERM"])
+
+    def close(self) -> None:
+        """Have the session closed after its last order, and wait for its end, but not for ever."""
+        self.order("close")
+        give_up_at = time.monotonic() + _STOP_S
+        while not self.over and time.monotonic() < give_up_at:
+            self.poll()
+        self.end()
+
     def end(self) -> None:
         """Close the pipe, on every way out; that stops the machine if it still runs."""
         with contextlib.suppress(OSError):

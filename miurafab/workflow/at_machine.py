@@ -214,12 +214,13 @@ class Operator:
     # The end
 
     def close(self) -> str:
-        """End the session, the machine dark; returns how that ended where it did not end well."""
-        if not self._process.over:
-            self._process.order("close")
-        while not self._process.over:
-            self.take()
-        self._process.end()
+        """End the session, the machine dark; returns how that ended where it did not end well.
+
+        What still runs is stopped by a reset at once.
+        """
+        if self.busy:
+            self._process.stop()
+        self._process.close()
         if self._process.death == "ended with code 0":
             return ""
         return f"The process that held the port {self._process.death}; {self._process.make_safe()}."

@@ -101,6 +101,15 @@ def test_the_screen_is_killed(bench: Bench, screen: Terminal, tmp_path: Path) ->
     bench.assert_dark_from(dark)
 
 
+def test_leaving_in_mid_job_stops_it(bench: Bench, screen: Terminal, tmp_path: Path) -> None:
+    process = burning(bench, screen, tmp_path)
+    screen.type(b"x")
+    bench.run(lambda: b"\x18" in bench.bytes_came)
+    dark = bench.came[-1][1]
+    assert ended(bench, process) == 0
+    bench.assert_dark_from(dark)
+
+
 def test_the_process_that_holds_the_port_is_killed(
     bench: Bench, screen: Terminal, tmp_path: Path
 ) -> None:
