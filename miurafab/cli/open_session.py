@@ -63,7 +63,7 @@ def _session_options() -> type[CutOptions]:
 )
 def open_(
     place: Annotated[
-        str | None, argument("PORT", "As --port; the default is that of 'miurafab use'.")
+        str | None, argument("PORT", "As --port. Without either it is that of 'miurafab use'.")
     ] = None,
     thing: Annotated[
         str | None, argument("THING", "A job directory or a G-code file to frame and to cut.")
@@ -78,7 +78,7 @@ def open_(
     console: Console = Console(),
     **given: str,
 ) -> int:
-    """Hold one session with a machine: jog, home, set the origin, frame and cut without a reset.
+    """Hold one session with a machine: jog, home, frame, cut without a reset.
 
     In a terminal it is a small screen, and ? lists its keys. Else it reads words, one action a
     line, and ends at the end of the input: jog x10 y-5, jog to x0 y0, home, unlock, origin, go,

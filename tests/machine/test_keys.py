@@ -21,7 +21,18 @@ from miurafab.gcode.job import Job
 from miurafab.machine.actions import talk
 from miurafab.machine.journal import read_journal
 from miurafab.machine.judge_job import judge_job
-from miurafab.machine.keys import KEYS, ConsoleKeys, NoKeys, Typed, terminal_keys
+from miurafab.machine.keys import (
+    DOWN,
+    KEYS,
+    LEFT,
+    PAGE_UP,
+    RIGHT,
+    UP,
+    ConsoleKeys,
+    NoKeys,
+    Typed,
+    terminal_keys,
+)
 from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import StreamResult, deliver
 from miurafab.machine.signals import StopSignals
@@ -334,3 +345,16 @@ def test_a_hold_of_ones_own_is_no_pause_of_the_program() -> None:
 def test_a_pause_is_a_finding() -> None:
     (finding,) = judge_job(PAUSED, MACHINE).findings
     assert (finding.code, finding.severity) == ("pauses", "note")
+
+
+def test_the_keys_that_jog_are_told_only_to_who_asks() -> None:
+    """In both forms of a terminal, over two reads, and as a Windows console codes them."""
+    typed = b"\x1b[A\x1bOB\x1b[5~\x1b[1;5Cq\x1b[20~"
+    assert Typed(arrows=True).keys(typed) == f"{UP}{DOWN}{PAGE_UP}q"
+    assert Typed().keys(typed) == "q"
+    halves = Typed(arrows=True)
+    assert halves.keys(b"\x1b[") + halves.keys(b"C") == RIGHT
+    for arrows, told in ((True, f"{LEFT}x"), (False, "x")):
+        waiting = list("\xe0K\0Dx")
+        keys = ConsoleKeys(lambda w=waiting: bool(w), lambda w=waiting: w.pop(0), arrows=arrows)
+        assert keys.pressed() == told
