@@ -1,0 +1,34 @@
+"""A change in one place of a pattern file is found, and a file only written otherwise is not
+blamed. ``benchmarks/corruptions.py`` does the same with 200 files of ten kinds."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from corruptions import KINDS, corrupted, rewritten, verdict
+from piece_problems import gores, trimmed
+from problems import regular
+
+WHOLE = {
+    "grid": regular,
+    "trimmed": trimmed,
+    "gores": gores,
+}
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_changes_of_every_kind_are_found_and_whole_files_are_not_blamed(name, tmp_path):
+    random = np.random.default_rng(7)
+    WHOLE[name]().save(tmp_path / "whole.fold")
+    whole = json.loads((tmp_path / "whole.fold").read_text())
+    for number in range(12):
+        again = rewritten(json.loads(json.dumps(whole)), random)
+        refused, said = verdict(again, tmp_path / "again.fold")
+        assert not refused, said
+        kind = KINDS[number % len(KINDS)]
+        change = corrupted(again, kind, random)
+        if change is not None:
+            refused, _ = verdict(change[0], tmp_path / "changed.fold")
+            assert refused, change[1]
