@@ -1,9 +1,11 @@
 """The wheel carries the shipped files and finds them, as the checkout does."""
 
 import ast
+import importlib.util
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -14,6 +16,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+BUILD = (sys.executable, "-m", "build", "--wheel", "--sdist", "--no-isolation")
 KINDS = ("firmware_profiles", "materials", "patterns")
 
 
@@ -22,7 +25,7 @@ def installed(tmp_path_factory):
     """The wheel, unpacked as an installer would."""
     folder = tmp_path_factory.mktemp("wheel")
     subprocess.run(
-        [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", folder, ROOT],
+        [*BUILD, "--outdir", folder, ROOT],
         check=True,
         capture_output=True,
     )
@@ -30,6 +33,59 @@ def installed(tmp_path_factory):
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "site")
     return folder / "site"
+
+
+def test_the_same_source_gives_the_same_packages(installed, tmp_path):
+    """Built from a copy at another place, whose files are of another time."""
+    named = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    for name in filter(None, named.split("\0")):
+        copy = tmp_path / "copy" / name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / name, copy)
+        os.utime(copy, (1e9, 1e9))
+        copy.chmod((ROOT / name).stat().st_mode & 0o777)
+    subprocess.run(
+        [*BUILD, "--outdir", tmp_path, tmp_path / "copy"], check=True, capture_output=True
+    )
+    for kind in ("*.whl", "*.tar.gz"):
+        (first,), (second,) = installed.parent.glob(kind), tmp_path.glob(kind)
+        assert first.read_bytes() == second.read_bytes(), kind
+
+
+@pytest.mark.parametrize(("lock", "extra"), [("run", None), ("dev", "dev")])
+def test_the_lock_files_pin_what_is_declared(lock, extra):
+    """Each dependency by its version, at least the declared one, with hashes."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = project["dependencies"] + (project["optional-dependencies"][extra] if extra else [])
+    text = (ROOT / "locks" / f"{lock}.txt").read_text()
+    pins = dict(re.findall(r"^([\w.-]+)==([\w.]+)", text, re.MULTILINE))
+    for line in wanted:
+        name, _, least = line.partition(">=")
+        pinned = [int(part) for part in re.findall(r"\d+", pins[_plain(name).replace("_", "-")])]
+        assert pinned >= [int(part) for part in least.split(".")], line
+    entries = re.split(r"^(?=[\w.-]+==)", text, flags=re.MULTILINE)[1:]
+    assert all("--hash=sha256:" in entry for entry in entries)
+
+
+def test_the_bill_of_materials_lists_every_library_of_the_lock_file():
+    spec = importlib.util.spec_from_file_location("sbom", ROOT / "locks" / "sbom.py")
+    sbom = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sbom)
+    text = (ROOT / "locks" / "run.txt").read_text()
+    bill = sbom.bill(text, "1.2.3")
+    assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.6")
+    refs = [each["bom-ref"] for each in bill["components"]]
+    assert len(refs) == len(set(refs)) == len(re.findall(r"^[\w.-]+==", text, re.MULTILINE))
+    assert all(re.fullmatch(r"[0-9a-f]{64}", h["content"])
+               for each in bill["components"] for h in each["hashes"])  # fmt: skip
+    (ours, *_) = bill["dependencies"]
+    assert {ref.partition("@")[0] for ref in ours["dependsOn"]} >= {
+        "pkg:pypi/numpy",
+        "pkg:pypi/rich",
+    }
+    assert {ref for each in bill["dependencies"] for ref in each["dependsOn"]} <= set(refs)
 
 
 def test_the_wheel_holds_what_the_checkout_holds(installed):

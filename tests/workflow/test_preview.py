@@ -231,7 +231,7 @@ def test_what_is_no_job_is_refused(tmp_path):
         preview(tmp_path)
     folder = write_folder(tmp_path / "job")
     (folder / "sheet-02.nc").unlink()
-    with pytest.raises(InputError, match=r"sheet-02\.nc cannot be read"):
+    with pytest.raises(InputError, match=r"sheet-02\.nc does not exist"):
         preview(folder)
 
 
