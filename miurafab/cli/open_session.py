@@ -158,6 +158,8 @@ def _by_words(operator: Operator, console: Console) -> None:
             error = operator.failures.popleft()
             if not isinstance(error, JobStopped) or operator.over:
                 raise error
+            _answer(console, said=str(error))
+            asked = ""
         if asked and not operator.busy:
             _answer(console, line=asked, state=operator.state)
             asked = ""
