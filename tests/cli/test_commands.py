@@ -83,7 +83,7 @@ def test_every_option_has_help_and_says_what_a_value_is(row):
             assert not re.search(r"\bdefault\b", text), text
             is_flag = bool in (entry.hint, *getattr(entry.hint, "__args__", ()))
             if entry.name.startswith("-") and not is_flag:
-                assert re.fullmatch(r"[A-Zxa-z0-9|:,.@=\[\]]+", entry.parameter.metavar), entry.name
+                assert re.fullmatch(r"[A-Zxa-z0-9|:;,.@=\[\]]+", entry.parameter.metavar), entry.name
 
 
 def test_no_default_is_typed_into_a_help_text():
@@ -117,7 +117,7 @@ def test_bare_miurafab_is_its_help_with_the_exit_codes(run):
 
 def test_the_examples_name_commands_and_options_that_exist():
     for example in examples():
-        program, *arguments = example.split()
+        program, *arguments = example.rpartition(" | ")[2].split()
         assert program == "miurafab"
         assert len(example) <= 76
         app.parse_args(arguments, exit_on_error=False, print_error=False)
