@@ -83,7 +83,8 @@ def test_every_option_has_help_and_says_what_a_value_is(row):
             assert not re.search(r"\bdefault\b", text), text
             is_flag = bool in (entry.hint, *getattr(entry.hint, "__args__", ()))
             if entry.name.startswith("-") and not is_flag:
-                assert re.fullmatch(r"[A-Zxa-z0-9|:;,.@=\[\]]+", entry.parameter.metavar), entry.name
+                shape = entry.parameter.metavar
+                assert re.fullmatch(r"[A-Zxa-z0-9|:;,.@=\[\]]+", shape), entry.name
 
 
 def test_no_default_is_typed_into_a_help_text():
