@@ -288,7 +288,7 @@ BESIDES = {
     "miurafab/workflow/whole_folder.py": "moves what was written up",
     "miurafab/machine/append_log.py": "a log grows",
     "miurafab/machine/virtual_server.py": "a log grows",
-    "miurafab/machine/job_process.py": "writes to a pipe",
+    "miurafab/machine/session_process.py": "writes to a pipe",
     "miurafab/studio/work.py": "writes to the studio's own temporary folder",
     "miurafab/studio/worker.py": "writes to a pipe",
     "miurafab/studio/door.py": "needs a mode of its own",

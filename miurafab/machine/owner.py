@@ -21,6 +21,9 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from miurafab.errors import InputError
+from miurafab.files import write_text
+
 _IN_SESSION = {
     "jog": "jog it in that session with the arrow keys",
     "home": "home it in that session with h",
@@ -80,9 +83,9 @@ def claim(port: str, owner: Owner) -> Callable[[], None]:
     path = _file(port)
     if "://" not in port and not Path(port).exists() and os.name == "posix":
         return lambda: None
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, InputError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(asdict(owner)), encoding="utf-8")
+        write_text(path, json.dumps(asdict(owner)))
 
     def release() -> None:
         with contextlib.suppress(OSError):
