@@ -71,7 +71,7 @@ def test_what_the_controller_refuses_is_exit_3(run):
         (("virtual", "--settings", "no-such-machine"), 2, "'no-such-machine' is not a known"),
         (("virtual", "--speed", "0"), 2, "speed"),
         (("virtual", "--beam-log", "no/such/folder/x.csv"), 2, "no/such/folder/x.csv"),
-        (("machine", "restore", "gone.txt", "--port", "virtual"), 2, "gone.txt cannot be read"),
+        (("machine", "restore", "gone.txt", "--port", "virtual"), 2, "gone.txt does not exist"),
         (("machine", "jog", "--port", "virtual"), 2, "distance along X"),
         (("machine", "jog", "--x", "1 parsec", "--port", "virtual"), 2, "parsec"),
     ],

@@ -95,7 +95,7 @@ def test_what_is_no_journal_is_named(tmp_path: Path, text: str) -> None:
     path.write_text(text)
     with pytest.raises(InputError, match="holds no run"):
         read_journal(path)
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="does not exist"):
         read_journal(tmp_path / "gone")
 
 
