@@ -50,6 +50,7 @@ class Operator:
         self.failures: deque[MiurafabError] = deque(maxlen=_MOST_SAID)
         self._process, self._options = process, options
         self._timeline: Timeline | None = None
+        self._has_origin = False
         process.order("open", wait=options.send.wait, reset=options.send.reset)
 
     @property
@@ -83,7 +84,15 @@ class Operator:
             self._place(message)
         elif isinstance(message, Outcome):
             self._end(message)
+        self._watch_origin()
         return message is not None
+
+    def _watch_origin(self) -> None:
+        """Say that an origin is gone: a reset ends G92, and a job would begin elsewhere."""
+        has_origin = self.state is not None and any(self.state.shift)
+        if self._has_origin and not has_origin and self.busy != "set_origin":
+            self.said.append("The origin that was set (G92) is forgotten; set it again.")
+        self._has_origin = has_origin
 
     def _place(self, now: Progress) -> None:
         if self._timeline is not None:
