@@ -120,7 +120,7 @@ def spline(points: Sequence[Sequence[float]]) -> ProfileCurve:
     """
     try:
         given = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise TargetError("A profile must be a list of [x, y] points.") from None
     if given.ndim != 2 or given.shape[1] != 2 or len(given) < 2:
         raise TargetError("A profile must be a list of two or more [x, y] points.")

@@ -43,6 +43,7 @@ CASES = {
     "two.obj": "v 1 2\nv 3 4\nv 5 6\nf 1 2 3\n",
     "digits.toml": f"facets = {'9' * 5000}\n[target]\nsurface = 'plane'\n",
     "big.toml": f"size = {'9' * 400}\n[target]\nsurface = 'plane'\n",
+    "curve.toml": f"[target]\nsurface = 'revolution'\nprofile = [[30, 0], [{'9' * 400}, 9]]\n",
     "deep.toml": "a = " + "[" * 5000 + "]" * 5000,
 }
 COMMAND = {".toml": ("fit", "-o", "x.fold"), ".obj": ("fit", "-o", "x.fold")}
