@@ -89,7 +89,7 @@ class Studio:
             if text is not None and self.bench.pattern is not None:
                 name = f"{self.bench.pattern['name']}{DESIGN_SUFFIX}"
                 saved = {"Content-Disposition": f'attachment; filename="{name}"'}
-                return Response(200, "text/plain; charset=utf-8", text.encode("ascii"), saved)
+                return Response(200, "text/plain; charset=utf-8", text.encode("utf-8"), saved)
         kind, _, rest = route.partition("/")
         number, _, name = rest.partition("/")
         path = self.bench.files.get((number, unquote(name))) if kind == "files" else None

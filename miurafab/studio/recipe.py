@@ -64,8 +64,8 @@ def design_text(
 
 
 def _lines(values: Mapping[str, Value]) -> list[str]:
-    # In ASCII, texts, numbers and truth values are written in TOML as in JSON.
-    return [f"{key} = {json.dumps(value)}" for key, value in values.items()]
+    # Texts, numbers and truth values are written in TOML as in JSON, but for surrogate pairs.
+    return [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items()]
 
 
 def _words(options: Mapping[str, Value]) -> list[str]:

@@ -146,3 +146,9 @@ def test_the_design_file_asks_for_the_same(tmp_path):
         )
         for name in ("target", "columns", "rows", "size_mm", "amplitude", "flat_foldable"):
             assert getattr(written.request, name) == getattr(asked.request, name)
+
+
+def test_a_design_file_holds_any_letter():
+    """JSON writes letters beyond 16 bits as pairs, which are no characters of TOML."""
+    text = design_text("Fläche 😀", {"mesh": "a😀.stl"}, {}, {})
+    assert tomllib.loads(text) == {"title": "Fläche 😀", "target": {"mesh": "a😀.stl"}}
