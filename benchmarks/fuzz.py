@@ -78,7 +78,7 @@ def _pattern(path: Path) -> None:
     lines = lines_of(pattern)
     svg_text(lines, "title")
     opx_text(lines, "title")
-    mf.check(pattern)
+    mf.check(path if path.suffix == ".fold" else pattern)
 
 
 def _pair(path: Path) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import math
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,10 @@ def from_heights(
     )
 
 
+_IMAGE_FAULTS = (OSError, ValueError, SyntaxError, EOFError, LookupError, TypeError, struct.error)
+"""What Pillow raises on damaged images; a broken PNG is a ``SyntaxError``."""
+
+
 def read_image(path: Path, height: float | None = None) -> Floats:
     """The grey values of an image as heights, its lowest row of pixels first.
 
@@ -116,7 +121,7 @@ def read_image(path: Path, height: float | None = None) -> Floats:
         with Image.open(io.BytesIO(content)) as image:
             mode = image.mode
             shades = np.asarray(image if mode[0] in "IF" else image.convert("L"), dtype=np.float64)
-    except (OSError, ValueError, Image.DecompressionBombError) as fault:
+    except (*_IMAGE_FAULTS, Image.DecompressionBombError) as fault:
         reason = " ".join(str(fault).split()).rstrip(".")
         raise TargetError(f"{path} cannot be read as an image: {reason}.") from None
     upright = shades[::-1]

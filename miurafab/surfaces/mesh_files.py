@@ -135,7 +135,7 @@ def _by_trimesh(content: bytes, kind: str, name: str) -> tuple[Floats, Ints]:
 @contextmanager
 def _silent() -> Iterator[None]:
     """trimesh logs tracebacks of what it then reads in another way; here it does not."""
-    log = logging.getLogger("trimesh")
+    log = logging.getLogger("trimesh.util")
     before = log.disabled
     log.disabled = True
     try:

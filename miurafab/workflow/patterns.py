@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from miurafab.errors import InputError, PatternError
-from miurafab.files import AnyPath
+from miurafab.files import AnyPath, Reading
 from miurafab.findings import Finding, refusals
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
@@ -121,7 +121,9 @@ def check(pattern: PatternLike) -> Audit:
     <Audit valid: 16 facets>
     """
     found = as_pattern(pattern)
-    surface, missing = described_surface(found.target)
+    named = os.fspath(pattern) if isinstance(pattern, str | os.PathLike) else "The pattern"
+    with Reading(named, "a pattern with a target", PatternError):
+        surface, missing = described_surface(found.target)
     checked = audit(found, surface)
     if not found.target:
         missing = (Finding("no-target", "The pattern names no target, so distances are left out."),)

@@ -32,6 +32,8 @@ CASES = {
     "nested.fold": "[" * 100_000,
     "escape.fold": json.dumps(FOLD | {"miurafab:target": {"mesh": "\x1b]0;owned\x07"}}),
     "surrogate.fold": json.dumps(FOLD | {"miurafab:target": {"surface": "\ud800"}}),
+    "vertex.fold": json.dumps(FOLD).replace("[0, 2, 3]]", "[0, 2147483648, 3]]"),
+    "target.fold": json.dumps(FOLD | {"miurafab:target": {"surface": "hypar", "at": [[1e400]]}}),
     "far.fold": json.dumps(FOLD).replace("[1, 1]", "[1, 1e300]"),
     "deep.svg": "<svg>" + "<g>" * 3000 + "</g>" * 3000 + "</svg>",
     "rgb.svg": '<svg><line x1="0" y1="0" x2="9" y2="9" stroke="rgb(1e999,0,0)"/></svg>',
@@ -57,6 +59,14 @@ def test_a_hostile_file_is_one_sentence(run, tmp_path, name):
     assert name in said
     assert said.isprintable()
     assert not (tmp_path / "x.fold").exists()
+
+
+def test_a_damaged_image_is_one_sentence(tmp_path):
+    """Pillow raises a ``SyntaxError`` for a broken PNG."""
+    png = (Path(__file__).parent.parent / "corpus/image/a.png").read_bytes()
+    (tmp_path / "a.png").write_bytes(png.replace(b"IDAT", b"[[[["))
+    with pytest.raises(MiurafabError, match=r"a\.png cannot be read as an image"):
+        mf.design(tmp_path / "a.png", height=1.0)
 
 
 @pytest.mark.parametrize("option", ["--facets=²x3", "--seed=²", "--facets=100000x100000",

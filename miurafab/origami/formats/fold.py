@@ -181,6 +181,8 @@ def parse_fold(document: Any) -> CreasePattern:
     assignment = _assignments(key, len(edges))
     given = "faces_vertices" in key
     faces = _face_indices(key) if given else enclosed_facets(flat, edges, assignment)
+    if faces.max() >= len(flat):  # before something is made as large as that number
+        raise PatternError("'faces_vertices' refers to a vertex that does not exist.")
     others = [frame for frame in frames if frame is not key]
     pattern = CreasePattern(
         vertices_coords=flat,

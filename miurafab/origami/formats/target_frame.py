@@ -46,7 +46,7 @@ def target_in(document: Mapping[str, Any]) -> dict[str, Any]:
         origin_in(target)
         if not np.isfinite(origin_in(target)).all():
             raise ValueError("its origin is not finite")
-        _check_texts(target)
+        _check_values(target)
     except (TypeError, ValueError, OverflowError) as fault:
         raise PatternError(f"'miurafab:target' is damaged: {fault}.") from None
     return target
@@ -68,17 +68,21 @@ def target_kept(document: Mapping[str, Any]) -> bool | None:
     )
 
 
-def _check_texts(value: object) -> None:
-    """Raise ``ValueError`` for a text in ``value`` that must reach no terminal and no XML file."""
+def _check_values(value: object) -> None:
+    """Raise ``ValueError`` for a text in ``value`` that must reach no terminal and no XML file, and
+    for a number that is none.
+    """
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"it holds {value}")
     if isinstance(value, str) and not is_plain(value):
         raise ValueError(f"{value[:40]!r} holds control characters")
     if isinstance(value, dict):
         for key, item in value.items():
-            _check_texts(key)
-            _check_texts(item)
-    elif isinstance(value, list) and value and not isinstance(value[0], int | float):
+            _check_values(key)
+            _check_values(item)
+    elif isinstance(value, list):
         for item in value:
-            _check_texts(item)
+            _check_values(item)
 
 
 def in_own_frame(text: str, pattern: CreasePattern) -> str:
