@@ -191,11 +191,18 @@ def _off_the_grid(faces: Ints, grid: QuadGrid) -> Iterator[Finding]:
 
 
 def _off_their_cells(pattern: CreasePattern, cells: Ints) -> Iterator[Finding]:
-    """Facets whose neighbours are not beside them in the lattice, unless it closes on itself."""
+    """Facets whose neighbours are not beside them in the lattice, unless their piece of it closes
+    on itself.
+    """
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
     one, other = pattern.edges_faces[inner].T
+    piece = np.zeros(len(cells), dtype=np.int64) if pattern.pieces is None else pattern.pieces
+    low = np.full((int(piece.max()) + 1, 2), np.iinfo(np.int64).max)
+    high = -low
+    np.minimum.at(low, piece, cells)
+    np.maximum.at(high, piece, cells)
     step = np.abs(cells[one] - cells[other])
-    step = np.minimum(step, np.ptp(cells, axis=0) + 1 - step)
+    step = np.minimum(step, (high - low + 1)[piece[one]] - step)
     apart = inner[step.sum(axis=1) > 1]
     beside = pattern.edges_faces
     strange = {

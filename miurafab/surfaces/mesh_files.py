@@ -85,11 +85,14 @@ def _checked(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
         raise ValueError("its vertices do not have three coordinates")
     if faces.ndim != 2 or faces.shape[1] != 3:
         raise ValueError("its facets are not triangles")
-    used = vertices[np.unique(faces)] if faces.size and faces.max() < len(vertices) else vertices
     if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
         raise ValueError("a facet refers to a vertex that does not exist")
-    if not (np.abs(used) < LARGEST_MM).all():
-        raise ValueError("a coordinate is not a finite number below 1e15 mm")
+    used = np.unique(faces) if faces.size else np.arange(len(vertices))
+    wild = used[~(np.abs(vertices[used]) < LARGEST_MM).all(axis=1)]
+    if len(wild):
+        raise ValueError(
+            f"vertex {wild[0]} has a coordinate that is not a finite number below 1e15 mm"
+        )
     return vertices, faces
 
 

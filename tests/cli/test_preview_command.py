@@ -114,7 +114,7 @@ def test_a_dump_says_how_fast_the_machine_is(run, file, tmp_path):
         (("empty",), "empty holds no G-code"),
         (("bad.nc",), "bad.nc, line 2"),
         (("good.nc", "--machine", "gone"), "'gone'"),
-        (("good.nc", "--settings", "gone.txt"), "gone.txt cannot be read"),
+        (("good.nc", "--settings", "gone.txt"), "gone.txt does not exist"),
         (("good.nc", "--settings", "bad.nc"), "bad.nc"),
     ],
 )

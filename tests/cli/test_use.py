@@ -12,6 +12,7 @@ from command_line import sentence
 import miurafab
 from miurafab.profiles import shipped_directory
 from miurafab.profiles.own import OwnDefaults, configuration_folder, own_defaults
+from miurafab.simulate.grbl.controller import virtual_settings
 
 
 @pytest.fixture(autouse=True)
@@ -80,22 +81,23 @@ def test_a_file_is_found_from_any_folder(run, tmp_path):
 
 
 def test_a_machine_of_ones_own_is_made_from_its_board(run, tmp_path, configuration):
-    """The virtual board is set up as the firmware comes: 200 mm of travel at 500 mm/min."""
+    """The virtual board is set up as the profile says that it is made like."""
     done = run("profiles", "add", "mine", "--port", "virtual", "--json")
     made = json.loads(done.stdout)
     assert made["file"] == str(configuration / "machines" / "mine.toml")
     own = miurafab.load_machine("mine")
-    assert (own.bed.width_mm, own.bed.height_mm) == (200, 200)
-    assert own.motion.max_rate_mm_min == (500, 500)
-    assert own.motion.acceleration_mm_s2 == (10, 10)
-    assert own.settings[32] == 1, "a laser needs laser mode, which the stock firmware has not"
+    like = miurafab.load_machine("grbl-laser-400")
+    assert (own.bed, own.motion) == (like.bed, like.motion)
+    assert own.settings[32] == 1
     assert "exists already" in sentence(run("profiles", "add", "mine", "--port", "virtual"), 2)
     assert run("use", "mine").returncode == 0
     assert miurafab.profiles.read_machine(None) == own
 
 
 def test_a_dump_makes_the_same_machine(run, tmp_path):
-    assert run("machine", "backup", "saved.txt", "--port", "virtual").returncode == 0
+    values = virtual_settings(miurafab.load_machine("grbl-laser-400"))
+    text = "".join(f"${number}={value:.3f}\n" for number, value in values.items())
+    (tmp_path / "saved.txt").write_text(text)
     run("profiles", "add", "one", "--port", "virtual")
     run("profiles", "add", "two", "--settings", "saved.txt", "--title", "one, like grbl-laser-400")
     one, two = (miurafab.load_machine(name) for name in ("one", "two"))

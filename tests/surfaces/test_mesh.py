@@ -191,7 +191,7 @@ def test_files_that_hold_no_mesh(tmp_path, name):
 
 def test_a_folder_is_no_mesh(tmp_path):
     (tmp_path / "mesh.stl").mkdir()
-    with pytest.raises(TargetError, match="cannot be read"):
+    with pytest.raises(TargetError, match="is a folder and not a file"):
         load_mesh(tmp_path / "mesh.stl")
 
 

@@ -77,6 +77,7 @@ def test_travels_are_dashed_and_gaps_stay_open(tmp_path):
 
 def test_both_pictures_of_every_sheet_are_written_and_the_same_again(tmp_path):
     seen = preview(write_folder(tmp_path / "job"))
+    (tmp_path / "out").mkdir()
     files = write_pictures(seen, tmp_path / "out")
     assert [file.name for file in files] == [
         *("sheet-01.png", "sheet-01.svg", "sheet-02.png", "sheet-02.svg")

@@ -245,7 +245,10 @@ def test_a_target_that_bends_too_much_ends_with_a_reason() -> None:
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"facets": (1, 12)}, "'facets' is 1x12, of which a part is 1; it must be 2 or more"),
+        (
+            {"facets": (1, 12)},
+            "'facets' is 1x12, of which a part is 1; it must be between 2 and 2000",
+        ),
         ({"min_edge_mm": -1.0}, "'min_edge' is -1 mm"),
         ({"flat_foldable": 4.0}, "'flat_foldable' is 229.183 deg"),
         ({"follow": "inside"}, "'follow' is 'inside'"),
