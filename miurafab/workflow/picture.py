@@ -37,7 +37,7 @@ _MOVES_AT_ONCE, _MOST_MOVES = 16_384, 30_000
 
 
 def write_pictures(preview: Preview, out_dir: Path) -> tuple[Path, ...]:
-    """Write ``NAME.png`` and ``NAME.svg`` for every sheet into the folder ``out_dir``; their paths."""
+    """Write ``NAME.png`` and ``NAME.svg`` for every sheet into the folder ``out_dir``."""
     written = []
     for sheet in preview.sheets:
         png, svg = (out_dir / f"{sheet.name}.{ending}" for ending in ("png", "svg"))
