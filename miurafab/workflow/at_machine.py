@@ -51,6 +51,7 @@ class Operator:
         self._process, self._options = process, options
         self._timeline: Timeline | None = None
         self._has_origin = False
+        self._described: dict[int, str] = {}
         process.order("open", wait=options.send.wait, reset=options.send.reset)
 
     @property
@@ -161,7 +162,14 @@ class Operator:
         return name if count == 1 else f"{name} (sheet {self.number} of {count})"
 
     def describe(self) -> str:
-        """What will burn: the sheet, its strokes, time, and place."""
+        """What will burn: the sheet, its strokes, time, and place. A screen asks at each drawing,
+        so it is found once a sheet.
+        """
+        if self.number not in self._described:
+            self._described[self.number] = self._description()
+        return self._described[self.number]
+
+    def _description(self) -> str:
         expected = self._job().dry_runs[self.number - 1]
         strokes = Timeline(expected, 0).strokes
         box = expected.bounds_mm

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from miurafab.machine.known_controller import MachineState
+from miurafab.workflow import at_machine
 from miurafab.workflow.at_machine import Operator
+from miurafab.workflow.cut import prepare
 from miurafab.workflow.cut_options import CutOptions
 
 HERE = MachineState("port", "Grbl 1.1h", "Idle", (0.0, 0.0), (30.0, 20.0), (30.0, 20.0), (), ())
@@ -46,3 +48,16 @@ def test_an_origin_that_is_moved_is_not_forgotten():
     process.state = replace(HERE, shift=(0.0, 0.0, 0.0))
     operator.take()
     assert list(operator.said) == []
+
+
+def test_what_will_burn_is_found_once_a_sheet(tmp_path, monkeypatch):
+    """A screen asks for it ten times a second, and a raster has a million moves."""
+    job = tmp_path / "line.nc"
+    job.write_text("M4 S0\nG0 X5\nG1 X15 S500 F3000\nM5\n")
+    operator = Operator(Held(), prepare(job), CutOptions())
+    asked = []
+    real = at_machine.Timeline
+    monkeypatch.setattr(at_machine, "Timeline", lambda *given: asked.append(given) or real(*given))
+    told = {operator.describe() for _ in range(3)}
+    assert len(told) == len(asked) == 1
+    assert told.pop().startswith("line.nc: 1 strokes, about 0:0")
