@@ -135,7 +135,10 @@ def write_settings(port: str, wanted: Settings, **line: Unpack[LineOptions]) -> 
         before = session.known.settings
         differing = [n for n, text in wanted.texts.items() if before.texts.get(n) != text]
         for number in sorted(differing, key=lambda n: (n != 22, n)):
-            session.command(f"${number}={wanted.texts[number]}")
+            setting = f"${number}={wanted.texts[number]}"
+            session.conversation.command(setting)
+            session.known.may_differ(setting)
+        session.look()
         after = session.known.settings
     left = after.differences({n: v for n, v in wanted.values.items() if n in differing})
     if left:
