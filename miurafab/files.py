@@ -54,6 +54,16 @@ def as_path(value: object, what: str) -> Path:
     return Path(text)
 
 
+def state_folder() -> Path:
+    """Where logs and the like are kept for this user; it need not exist.
+
+    It is ``$XDG_STATE_HOME/miurafab``, ``~/.local/state/miurafab`` without that variable (XDG Base
+    Directory Specification), and ``%LOCALAPPDATA%\\miurafab`` on Windows.
+    """
+    home = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA")
+    return Path(home or Path.home() / ".local" / "state") / "miurafab"
+
+
 def file_name(name: object, where: str) -> str:
     """``name`` if it is the name of a file and no path; ``where`` begins the sentence if not.
 

@@ -30,7 +30,7 @@ from miurafab.errors import (
     shown,
     spell_options,
 )
-from miurafab.files import write_text
+from miurafab.files import state_folder, write_text
 from miurafab.version import __version__
 from miurafab.workflow.json_text import json_text
 
@@ -128,7 +128,7 @@ def _write_log(trace: str) -> Path | None:
         )
     )
     name = f"defect-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.log"
-    for folder in (_state_folder(), Path(tempfile.gettempdir())):
+    for folder in (state_folder(), Path(tempfile.gettempdir())):
         try:
             folder.mkdir(parents=True, exist_ok=True)
             path = folder / name
@@ -137,12 +137,6 @@ def _write_log(trace: str) -> Path | None:
             continue
         return path
     return None
-
-
-def _state_folder() -> Path:
-    """Where programs keep logs for this user (XDG Base Directory Specification; Windows)."""
-    home = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA")
-    return Path(home or Path.home() / ".local" / "state") / "miurafab"
 
 
 def _fail(sentence: str, kind: str, exit_code: int, more: Mapping[str, Any] | None = None) -> int:

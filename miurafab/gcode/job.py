@@ -88,6 +88,13 @@ def bare_code(name: str, number: int, line: str, *, begun: bool = True) -> str:
     return "" if frame else code
 
 
+def plain_code(name: str, number: int, line: str, *, begun: bool = True) -> str:
+    """``line`` as the firmware reads it: :func:`bare_code` in capitals, without the ``/`` of block
+    delete, which it skips.
+    """
+    return bare_code(name, number, line, begun=begun).upper().replace("/", "")
+
+
 def _why_forbidden(character: str) -> str:
     if character in _REALTIME:
         return (

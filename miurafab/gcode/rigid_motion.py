@@ -25,7 +25,7 @@ import numpy as np
 from miurafab.errors import GcodeError
 from miurafab.gcode.dialect_words import adapt
 from miurafab.gcode.execution import execute
-from miurafab.gcode.job import Job, bare_code
+from miurafab.gcode.job import Job, plain_code
 from miurafab.gcode.marlin import grbl_words
 from miurafab.gcode.parser import Block, ModalState, ReaderRules, parse_block
 from miurafab.gcode.program import Program
@@ -81,10 +81,8 @@ class RigidMotion:
 
     def __call__(self, x: float, y: float) -> Point:
         """Where the point ``x``, ``y`` comes to lie."""
-        return (
-            x * self.cosine - y * self.sine + self.dx,
-            x * self.sine + y * self.cosine + self.dy,
-        )
+        across, along = self.turned(x, y)
+        return across + self.dx, along + self.dy
 
     def turned(self, x: float, y: float) -> Point:
         """The vector ``x``, ``y`` after the turn."""
@@ -133,7 +131,7 @@ class _Writer:
             yield match[0] if number > self._last_burnt else self._line(number, match[0])
 
     def _line(self, number: int, line: str) -> str:
-        code = bare_code(self._name, number, line, begun=self._begun).upper().replace("/", "")
+        code = plain_code(self._name, number, line, begun=self._begun)
         if not code:
             return line
         self._begun = True

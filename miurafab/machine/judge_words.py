@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from miurafab.errors import GcodeError
 from miurafab.findings import Finding
 from miurafab.gcode.dialect_words import OUTPUT
-from miurafab.gcode.job import Job, bare_code
+from miurafab.gcode.job import Job, plain_code
 from miurafab.profiles import MachineProfile
 
 # Between the letter and the digits of a word may stand blanks, a sign, zeros and comments.
@@ -60,22 +60,15 @@ def constant_beam(job: Job, machine: MachineProfile) -> Iterator[Finding]:
 
 def armed_at_the_end(job: Job) -> Iterator[Finding]:
     """The last word that arms or disarms decides; M2 and M30 end the program and disarm."""
-    for match in reversed(list(_SPINDLE_ANYWHERE.finditer(job.text))):
-        words = _SPINDLE.findall(_code(_line_at(job.text, match.start())[1]))
-        if words:
-            if words[-1] in ("3", "4"):
-                sentence = f"{job.name} ends with M{words[-1]} in force; end it with M5."
-                yield Finding("armed", sentence, job.name)
-            return
+    word = _last_word(job, _SPINDLE_ANYWHERE, _SPINDLE)
+    if word in ("3", "4"):
+        sentence = f"{job.name} ends with M{word} in force; end it with M5."
+        yield Finding("armed", sentence, job.name)
 
 
 def leaves_air_on(job: Job) -> bool:
     """Whether the last word that opens or shuts the air opens it; M2 and M30 shut it."""
-    for match in reversed(list(_AIR_ANYWHERE.finditer(job.text))):
-        words = _AIR.findall(_code(_line_at(job.text, match.start())[1]))
-        if words:
-            return words[-1] in ("7", "8")
-    return False
+    return _last_word(job, _AIR_ANYWHERE, _AIR) in ("7", "8")
 
 
 def characters(job: Job) -> Iterator[Finding]:
@@ -135,6 +128,15 @@ def _first_line(job: Job, anywhere: re.Pattern[str], word: re.Pattern[str]) -> i
     return None
 
 
+def _last_word(job: Job, anywhere: re.Pattern[str], word: re.Pattern[str]) -> str:
+    """What the last ``word`` holds, empty if there is none; see :func:`_first_line`."""
+    for match in reversed(list(anywhere.finditer(job.text))):
+        words = word.findall(_code(_line_at(job.text, match.start())[1]))
+        if words:
+            return str(words[-1])
+    return ""
+
+
 def _line_at(text: str, place: int) -> tuple[int, str]:
     """The line of ``text`` that holds the character at ``place``, and its number."""
     begin = max(text.rfind("\n", 0, place), text.rfind("\r", 0, place)) + 1
@@ -144,7 +146,7 @@ def _line_at(text: str, place: int) -> tuple[int, str]:
 
 def _code(line: str) -> str:
     try:
-        return bare_code("", 0, line).upper().replace("/", "")
+        return plain_code("", 0, line)
     except GcodeError:  # the finding 'lines' or 'program' says so
         return ""
 

@@ -5,8 +5,7 @@ process has no name that a person knows, either. So a session writes who holds t
 that a person typed, its process, since when, and the process that has the port open. The file goes
 when the session is closed. One whose process is gone counts for nothing, so a crash leaves no lie.
 
-The folder is ``$XDG_STATE_HOME/miurafab/ports``, ``~/.local/state/miurafab/ports`` without that
-variable (XDG Base Directory Specification), and in ``%LOCALAPPDATA%`` on Windows.
+The folder is ``ports`` in that of :func:`~miurafab.files.state_folder`.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from miurafab.errors import InputError
-from miurafab.files import write_text
+from miurafab.files import state_folder, write_text
 
 _IN_SESSION = {
     "jog": "jog it in that session with the arrow keys",
@@ -126,8 +125,7 @@ def holder_of(port: str) -> str:
 def _file(port: str) -> Path:
     place = port if "://" in port else os.path.realpath(port)
     name = hashlib.sha256(place.encode("utf-8")).hexdigest()[:16]
-    home = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA")
-    return Path(home or Path.home() / ".local" / "state") / "miurafab" / "ports" / f"{name}.json"
+    return state_folder() / "ports" / f"{name}.json"
 
 
 def _lives(process: int) -> bool:

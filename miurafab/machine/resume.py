@@ -33,7 +33,7 @@ from miurafab.findings import Finding
 from miurafab.gcode.dialect_words import adapt
 from miurafab.gcode.execution import Jog, OffsetsChanged, Probe, Store, execute
 from miurafab.gcode.interpreter import parse_program
-from miurafab.gcode.job import Job, bare_code
+from miurafab.gcode.job import Job, plain_code
 from miurafab.gcode.parser import ModalState, ReaderRules, parse_block
 from miurafab.gcode.program import RAPID, Program, Strokes, strokes
 from miurafab.gcode.reading import read_program
@@ -270,7 +270,7 @@ def _state_before(job: Job, line: int, dialect: str) -> ModalState:
     state, rules = ModalState(), ReaderRules()
     begun = False
     for number, text in zip(range(1, line), job.iter_lines(), strict=False):
-        code = bare_code(job.name, number, text, begun=begun).upper().replace("/", "")
+        code = plain_code(job.name, number, text, begun=begun)
         if not code:
             continue
         begun, adapted = True, adapt(code, dialect)

@@ -50,7 +50,7 @@ def burning(bench: Bench, screen: Terminal, folder: Path) -> subprocess.Popen[by
         screen.type(b"a")
         bench.run(lambda: "Armed. To burn: long.nc: 400 strokes" in screen.shown, 20)
         screen.type(b"s")
-        bench.run(lambda: bench.bytes_came.count(b"\n") > 30 and bench.device.beam_on, 40)
+        bench.until_burning(process)
     except BaseException:
         process.kill()
         process.wait()
