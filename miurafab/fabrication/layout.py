@@ -1,7 +1,8 @@
 """``layout.json``: a layout written down, and read back, so that others can rely on it.
 
 The schema is ``miurafab-layout/1``: machine, material, sheets with placements, patches with
-outlines and tabs in the patch frame, and totals. Lengths are mm,
+outlines and tabs in the patch frame, the folder's kit (rows in the order of creasing, wedges of the
+gauge; angles in degrees), and totals. Lengths are mm,
 rotations degrees, counter-clockwise; lists of points are [[x, y], ...] and closed curves do not
 repeat their first point. Toolpaths are not in it: they are in the drawings and the G-code.
 """
@@ -19,6 +20,7 @@ import numpy as np
 
 from miurafab.errors import LayoutError, is_plain
 from miurafab.fabrication.borders import OpenBorder
+from miurafab.fabrication.kit.plan import kit_table, read_kit
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.sheets import Layout, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
@@ -41,6 +43,7 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
         "sheets": [dataclasses.asdict(sheet) for sheet in layout.sheets],
         "patches": [_patch_table(patch) for patch in layout.patches],
         "borders": [dataclasses.asdict(border) for border in layout.borders],
+        **({} if layout.kit is None else {"kit": kit_table(layout.kit)}),
         "totals": dataclasses.asdict(layout.totals),
         "findings": findings_json(layout.findings),
     }
@@ -85,6 +88,7 @@ def read_layout(text: str, where: object = "The layout") -> Layout:
             totals=_totals(document["totals"]),
             findings=tuple(map(finding_from_json, document.get("findings", ()))),
             borders=tuple(map(_border, document.get("borders", ()))),
+            kit=read_kit(document["kit"]) if "kit" in document else None,
         )
 
 

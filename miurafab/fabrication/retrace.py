@@ -18,6 +18,7 @@ import shapely
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.kerf import cut_lines
+from miurafab.fabrication.kit.plan import folders_kit
 from miurafab.fabrication.nesting import turned
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.boundary import boundaries
@@ -74,6 +75,8 @@ def retraced(
         for each in ([] if back is None else [back]) + [front]
     ]
     faults = [*_tab_faults(pattern, outlined, numbers), *_seam_faults(layout, pattern, outlined)]
+    if layout.kit is not None and layout.kit != folders_kit(pattern):
+        faults.append("The rows and angles of the folder's kit are not those of the pattern.")
     right = cut_lines([made.rings for made in outlined.patches], material.kerf_mm)
     for patch, made, lines in zip(layout.model.patches, outlined.patches, right, strict=True):
         told, own = (shapely.Polygon(each[0], each[1:]) for each in (made.cut_lines, lines))

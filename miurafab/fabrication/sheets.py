@@ -19,6 +19,7 @@ import shapely
 from miurafab.display import Shown
 from miurafab.fabrication.borders import OpenBorder, open_borders
 from miurafab.fabrication.caps import capped
+from miurafab.fabrication.kit.plan import FoldersKit, folders_kit
 from miurafab.fabrication.layout_findings import layout_findings
 from miurafab.fabrication.nesting import Nesting, Problem, Ring, nest, turned
 from miurafab.fabrication.open_ring import opened
@@ -127,6 +128,8 @@ class Layout(Shown):
         For the assembly: options that could not be honoured, and everything that has no room.
     borders : tuple of OpenBorder
         The borders that the glued shell leaves open.
+    kit : FoldersKit or None
+        The rows to fold and the gauge of their angles; None for a layout without a pattern.
     """
 
     machine: str
@@ -136,6 +139,7 @@ class Layout(Shown):
     totals: Totals
     findings: tuple[Finding, ...] = ()
     borders: tuple[OpenBorder, ...] = ()
+    kit: FoldersKit | None = None
 
     def _summary(self) -> str:
         totals = self.totals
@@ -264,6 +268,7 @@ def lay_out(
         totals=_totals(pattern, outlined, patches, nesting, toolpaths + behind, usable),
         findings=layout_findings(pattern, framed, nesting, lettering, drawn, material, options),
         borders=open_borders(pattern),
+        kit=folders_kit(pattern),
         toolpaths=toolpaths,
         backs=behind,
         pattern=pattern,

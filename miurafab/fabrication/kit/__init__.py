@@ -1,0 +1,1 @@
+"""The folder's kit: rows, fold angles and folded states, for the person who folds."""
