@@ -19,7 +19,7 @@ def trimmed(pattern: CreasePattern, keep: np.ndarray) -> CreasePattern:
     """``pattern`` with the facets ``keep`` alone and its cells told facet by facet."""
     columns = pattern.grid[0] - 1
     number = np.arange(len(pattern.faces_vertices))
-    cells = np.stack([number % columns, number // columns], axis=1) + [4, 7]
+    cells = np.stack([number % columns + 4, number // columns + 7], axis=1)
     beside = np.where(pattern.edges_faces >= 0, keep[pattern.edges_faces], False)
     letters = np.where(beside.all(axis=1), pattern.edges_assignment, "B")
     used = beside.any(axis=1)

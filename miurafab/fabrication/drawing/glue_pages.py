@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from reportlab.lib.colors import Color
 from reportlab.lib.units import mm
-from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.assembly import GlueStep, assembly_order
 from miurafab.fabrication.drawing.instructions import (
@@ -30,6 +29,7 @@ from miurafab.fabrication.drawing.page import (
     text,
     wrapped,
 )
+from miurafab.fabrication.drawing.svg_canvas import Pen
 from miurafab.fabrication.drawing.views import Views
 from miurafab.fabrication.sheets import Layout
 
@@ -71,14 +71,14 @@ class GluePages:
         first = 3 * int((top - taken - BOTTOM) // height)
         later = 3 * int((top - BOTTOM) // height)
 
-        def draw(canvas: Canvas, part: list[tuple[int, GlueStep]], y: float) -> None:
+        def draw(canvas: Pen, part: list[tuple[int, GlueStep]], y: float) -> None:
             for place, (number, step) in enumerate(part):
                 row, column = divmod(place, 3)
                 box = (MARGIN + column * (_STEP + 6), y - row * height, _STEP, height)
                 before = {earlier.patch for earlier in steps[:number]}
                 self.step(canvas, number, step, before, box)
 
-        def front(canvas: Canvas) -> None:
+        def front(canvas: Pen) -> None:
             words = (
                 ("folding and glueing", f"Fold first, then glue{each}") if glue else ("folding", "")
             )
@@ -90,7 +90,7 @@ class GluePages:
         for start in range(first, len(shown), later):
 
             def more(
-                canvas: Canvas, part: list[tuple[int, GlueStep]] = shown[start : start + later]
+                canvas: Pen, part: list[tuple[int, GlueStep]] = shown[start : start + later]
             ) -> None:
                 heading(canvas, f"{self.title}: glueing", f"In this order{each}, continued")
                 draw(canvas, part, top)
@@ -110,7 +110,7 @@ class GluePages:
 
     def step(
         self,
-        canvas: Canvas,
+        canvas: Pen,
         number: int,
         step: GlueStep,
         before: set[int],

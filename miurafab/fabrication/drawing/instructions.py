@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 from reportlab.lib.colors import Color
 from reportlab.lib.units import mm
-from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.drawing.page import (
     INK,
@@ -23,6 +22,7 @@ from miurafab.fabrication.drawing.page import (
     tint,
     wrapped,
 )
+from miurafab.fabrication.drawing.svg_canvas import Pen
 from miurafab.geometry.arrays import Floats
 
 _FOLDING = (
@@ -66,9 +66,7 @@ def height_of_instructions(notes: Sequence[str], glue: Sequence[str]) -> float:
     return 48.0 + max(columns) + below + 6.0
 
 
-def draw_instructions(
-    canvas: Canvas, top: float, notes: Sequence[str], glue: Sequence[str]
-) -> None:
+def draw_instructions(canvas: Pen, top: float, notes: Sequence[str], glue: Sequence[str]) -> None:
     """How to fold, how to ``glue`` (:func:`glueing`), and ``notes``, from ``top`` down."""
     columns: list[tuple[float, str, Sequence[str]]] = [(MARGIN, "Fold", _FOLDING)]
     _draw_folds(canvas, MARGIN, top - 34)
@@ -98,7 +96,7 @@ def _solid(x: float, y: float, size: float, points: Sequence[tuple[float, float,
     return np.asarray(seen * size + np.array([x, y]))
 
 
-def _draw_folds(canvas: Canvas, x: float, y: float) -> None:
+def _draw_folds(canvas: Pen, x: float, y: float) -> None:
     """A mountain and a valley: two facets that meet in a coloured line."""
     size = 15.0
     for place, (name, colour, lift) in enumerate(
@@ -121,7 +119,7 @@ def _draw_folds(canvas: Canvas, x: float, y: float) -> None:
         text(canvas, left + 8, y - 1.5, name, 8.5, colour=colour, bold=True, align="middle")
 
 
-def _draw_tab(canvas: Canvas, x: float, y: float) -> None:
+def _draw_tab(canvas: Pen, x: float, y: float) -> None:
     """A tab with its number and letter, and the facet under which it goes."""
     left = np.array([[0, 0], [30, 0], [26, 24], [-4, 24]]) + np.array([x + 6, y + 4])
     tab = np.array([[29.6, 2.5], [38.5, 5], [35.2, 20], [26.6, 21.5]]) + np.array([x + 6, y + 4])
@@ -141,7 +139,7 @@ def _draw_tab(canvas: Canvas, x: float, y: float) -> None:
     text(canvas, x + _COLUMN / 2, y - 1.5, words, 8.5, colour=QUIET, align="middle")
 
 
-def _line(canvas: Canvas, ends: Floats, colour: Color) -> None:
+def _line(canvas: Pen, ends: Floats, colour: Color) -> None:
     """A crease, drawn heavier than outlines."""
     canvas.setStrokeColor(colour)
     canvas.setLineWidth(0.7 * mm)

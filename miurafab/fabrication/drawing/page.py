@@ -15,6 +15,7 @@ from reportlab.pdfbase.pdfmetrics import stringWidth
 from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.drawing.colours import patch_colour
+from miurafab.fabrication.drawing.svg_canvas import Pen
 from miurafab.fabrication.wording import runs
 from miurafab.geometry.arrays import Floats
 from miurafab.origami import picture
@@ -45,7 +46,7 @@ def tint(number: int, strength: float = 1.0) -> Color:
 
 
 def text(
-    canvas: Canvas,
+    canvas: Pen,
     x: float,
     y: float,
     words: str,
@@ -83,7 +84,7 @@ def wrapped(words: str, width: float, size: float, *, bold: bool = False) -> lis
 
 
 def paragraph(
-    canvas: Canvas,
+    canvas: Pen,
     x: float,
     y: float,
     words: str,
@@ -101,7 +102,7 @@ def paragraph(
     return y
 
 
-def heading(canvas: Canvas, title: str, subtitle: str) -> float:
+def heading(canvas: Pen, title: str, subtitle: str) -> float:
     """The head of a page; returns the top of the content."""
     top = HEIGHT - MARGIN
     text(canvas, MARGIN, top - 5, title, 18, bold=True)
@@ -112,19 +113,19 @@ def heading(canvas: Canvas, title: str, subtitle: str) -> float:
     return top - 19
 
 
-def foot(canvas: Canvas, title: str, page: int, pages: int) -> None:
+def foot(canvas: Pen, title: str, page: int, pages: int) -> None:
     """The foot of a page."""
     text(canvas, MARGIN, 10, f"{title}, made with miurafab", 7.5, colour=QUIET)
     numbers = f"{page} of {pages}"
     text(canvas, WIDTH - MARGIN, 10, numbers, 7.5, colour=QUIET, align="right")
 
 
-def caption(canvas: Canvas, words: str, x: float, y: float) -> None:
+def caption(canvas: Pen, words: str, x: float, y: float) -> None:
     """The name of a drawing, its top at ``y``."""
     text(canvas, x, y - 3.2, words, 10, bold=True)
 
 
-def scale_bar(canvas: Canvas, scale: float, x: float, y: float) -> None:
+def scale_bar(canvas: Pen, scale: float, x: float, y: float) -> None:
     """A bar of a round length at ``scale`` (page mm per pattern mm)."""
     length = next(
         size for size in (500, 200, 100, 50, 20, 10, 5, 2, 1, 0.5) if size * scale <= 45 or size < 1
@@ -137,7 +138,7 @@ def scale_bar(canvas: Canvas, scale: float, x: float, y: float) -> None:
     text(canvas, x + length * scale + 2, y - 1, f"{length:g} mm", 8, colour=QUIET)
 
 
-def legend(canvas: Canvas, entries: Sequence[tuple[str, Color, float]], x: float, y: float) -> None:
+def legend(canvas: Pen, entries: Sequence[tuple[str, Color, float]], x: float, y: float) -> None:
     """Names, each behind a stroke of its colour and weight (mm), right-aligned at ``x``."""
     for name, colour, weight in reversed(entries):
         text(canvas, x, y - 1, name, 8, colour=QUIET, align="right")
@@ -148,7 +149,7 @@ def legend(canvas: Canvas, entries: Sequence[tuple[str, Color, float]], x: float
         x -= 12
 
 
-def chip(canvas: Canvas, words: str, x: float, y: float, fill: Color, size: float = 7.0) -> None:
+def chip(canvas: Pen, words: str, x: float, y: float, fill: Color, size: float = 7.0) -> None:
     """A short word on a rounded rectangle, centred at (``x``, ``y``)."""
     wide = stringWidth(words, "Helvetica-Bold", size) / mm + 0.32 * size
     tall = 0.52 * size
@@ -161,7 +162,7 @@ def chip(canvas: Canvas, words: str, x: float, y: float, fill: Color, size: floa
     text(canvas, x, y - 0.125 * size, words, size, bold=True, align="middle")
 
 
-def disk(canvas: Canvas, words: str, x: float, y: float, fill: Color) -> None:
+def disk(canvas: Pen, words: str, x: float, y: float, fill: Color) -> None:
     """One or two letters in a disk around (``x``, ``y``)."""
     canvas.setFillColor(fill)
     canvas.setStrokeColor(white)
@@ -170,7 +171,7 @@ def disk(canvas: Canvas, words: str, x: float, y: float, fill: Color) -> None:
     text(canvas, x, y - 0.85, words, 6.5, bold=True, colour=white, align="middle")
 
 
-def polygon(canvas: Canvas, points: Floats, *, stroke: bool = False) -> None:
+def polygon(canvas: Pen, points: Floats, *, stroke: bool = False) -> None:
     """A filled closed polygon (n, 2) in the current colours."""
     path = canvas.beginPath()
     path.moveTo(points[0, 0] * mm, points[0, 1] * mm)
@@ -189,7 +190,7 @@ def fitted(points: Floats, box: Box) -> tuple[Floats, float]:
     return (points - low) * scale + shift, scale
 
 
-def line_above(canvas: Canvas, x: float, y: float, width: float) -> None:
+def line_above(canvas: Pen, x: float, y: float, width: float) -> None:
     """A rule between two parts of a page."""
     canvas.setStrokeColor(RULE)
     canvas.setLineWidth(0.2 * mm)

@@ -15,6 +15,7 @@ from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.drawing.page import CREASE_COLOURS, INK
 from miurafab.fabrication.drawing.svg import COLOURS
+from miurafab.fabrication.drawing.svg_canvas import Pen
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.geometry.arrays import Bools, Ints
 from miurafab.profiles import OPERATIONS
@@ -67,7 +68,7 @@ def draw_strokes(canvas: Canvas, toolpath: Toolpath, line_mm: float = LINE_MM) -
 
 
 def draw_for_people(
-    canvas: Canvas,
+    canvas: Pen,
     toolpath: Toolpath,
     letters: NDArray[np.str_],
     scale: float = 1.0,

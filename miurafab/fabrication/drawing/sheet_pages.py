@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 from reportlab.lib.units import mm
 from reportlab.pdfbase.pdfmetrics import stringWidth
-from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.drawing.page import (
     BOTTOM,
@@ -37,6 +36,7 @@ from miurafab.fabrication.drawing.page import (
     wrapped,
 )
 from miurafab.fabrication.drawing.pdf import draw_for_people
+from miurafab.fabrication.drawing.svg_canvas import Pen
 from miurafab.fabrication.drawing.views import OUTLINED, Views, named
 from miurafab.fabrication.sheets import DrawnLayout, Placement, Sheet
 from miurafab.fabrication.toolpath import Toolpath
@@ -113,7 +113,7 @@ class SheetPages:
         # Cards below the drawing, and cards on a page of their own.
         first = max(int((under - BOTTOM) // _CARD), 0) * 2
 
-        def front(canvas: Canvas) -> None:
+        def front(canvas: Pen) -> None:
             heading(canvas, f"{self.title}: {sheet.name}", subtitle)
             self.draw_sheet(canvas, top, scale)
             if len(placed) == 1:
@@ -121,7 +121,7 @@ class SheetPages:
             else:
                 self.cards(canvas, placed[:first], under)
 
-        def more(canvas: Canvas) -> None:
+        def more(canvas: Pen) -> None:
             heading(canvas, f"{self.title}: {sheet.name}", "Its patches, continued")
             self.cards(canvas, placed[first:], top)
 
@@ -151,14 +151,14 @@ class SheetPages:
             pages[-1].append((MARGIN + column * (width + 6), y, label, lines))
             y -= tall
 
-        def draw(canvas: Canvas, part: list[_Words]) -> None:
+        def draw(canvas: Pen, part: list[_Words]) -> None:
             for x, upper, label, lines in part:
                 line_above(canvas, x, upper, width)
                 text(canvas, x, upper - 4.2, label, 8.5, bold=True)
                 for number, line in enumerate(lines):
                     text(canvas, x, upper - 8 - 3.6 * number, line, 7.5)
 
-        def front(canvas: Canvas) -> None:
+        def front(canvas: Pen) -> None:
             heading(canvas, f"{self.title}: {self.sheet.name}", subtitle)
             self.draw_sheet(canvas, top, scale)
             draw(canvas, pages[0])
@@ -166,13 +166,13 @@ class SheetPages:
         yield front
         for part in pages[1:]:
 
-            def more(canvas: Canvas, part: list[_Words] = part) -> None:
+            def more(canvas: Pen, part: list[_Words] = part) -> None:
                 heading(canvas, f"{self.title}: {self.sheet.name}", "Its patches, continued")
                 draw(canvas, part)
 
             yield more
 
-    def draw_sheet(self, canvas: Canvas, top: float, scale: float) -> None:
+    def draw_sheet(self, canvas: Pen, top: float, scale: float) -> None:
         """The sheet with its strokes, in the middle of the page."""
         sheet, toolpath = self.sheet, self.toolpath
         x = MARGIN + (ROOM - sheet.width_mm * scale) / 2
@@ -221,7 +221,7 @@ class SheetPages:
             paragraph(canvas, MARGIN, low - 17.5, words, ROOM, 9, bold=True)
 
     def draw_names(
-        self, canvas: Canvas, placed: Placement, corner: tuple[float, float], scale: float
+        self, canvas: Pen, placed: Placement, corner: tuple[float, float], scale: float
     ) -> None:
         """The name of a patch, and along each of its seams the name of the neighbour."""
         patch = self.layout.patches[placed.patch]
@@ -269,7 +269,7 @@ class SheetPages:
                     found.setdefault(other.id, []).append(tab.mate_edge)
         return found
 
-    def cards(self, canvas: Canvas, patches: list[int], top: float) -> None:
+    def cards(self, canvas: Pen, patches: list[int], top: float) -> None:
         """The cards of the patches, in two columns."""
         rows = math.ceil(len(patches) / 2)
         if not rows:
@@ -285,7 +285,7 @@ class SheetPages:
             self.views.map(canvas, (x, y - 4 - tall, beside, tall), shown=(self.views.base(patch),))
             self.say(canvas, patch, (x + beside + 5, y, width - beside - 5, height))
 
-    def one_card(self, canvas: Canvas, patch: int, top: float) -> None:
+    def one_card(self, canvas: Pen, patch: int, top: float) -> None:
         """The card of a single patch on its page, with its place in the folded form."""
         third = (ROOM - 12) / 3
         room = min(top - BOTTOM, 80.0)
@@ -299,7 +299,7 @@ class SheetPages:
             self.views.folded_view(canvas, box, shown=(self.views.base(patch),))
         self.say(canvas, patch, (MARGIN + 2 * third + 12, top, third, room))
 
-    def say(self, canvas: Canvas, patch: int, box: Box) -> None:
+    def say(self, canvas: Pen, patch: int, box: Box) -> None:
         """The name of a patch and its neighbours, in the upper part of ``box``."""
         x, top, width, height = box
         facets = count(len(self.layout.patches[patch].faces), "facet", "facets")

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from reportlab.lib.colors import Color, HexColor, white
 from reportlab.lib.units import mm
-from reportlab.pdfgen.canvas import Canvas
 from reportlab.pdfgen.pathobject import PDFPathObject
 
 from miurafab.fabrication.borders import OpenBorder
@@ -29,6 +28,7 @@ from miurafab.fabrication.drawing.page import (
     text,
     tint,
 )
+from miurafab.fabrication.drawing.svg_canvas import Pen, SvgPath
 from miurafab.fabrication.partition.boundary import boundaries
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.seams import with_seams
@@ -133,7 +133,7 @@ class Views:
         edges = set(border.edges)
         return tuple(tab.number for p in self.patches for tab in p.tabs if tab.edge in edges)
 
-    def folded_view(self, canvas: Canvas, box: Box, shown: Collection[int] | None = None) -> float:
+    def folded_view(self, canvas: Pen, box: Box, shown: Collection[int] | None = None) -> float:
         """An orthographic view, far facets first, lit from the upper left; returns its scale. If
         ``shown`` is given, other patches are pale.
         """
@@ -148,7 +148,7 @@ class Views:
         return scale
 
     def step(
-        self, canvas: Canvas, box: Box, patch: int, done: Collection[int], edges: Collection[int]
+        self, canvas: Pen, box: Box, patch: int, done: Collection[int], edges: Collection[int]
     ) -> None:
         """``patch`` in colour and the patches ``done`` lighter, folded, seen from outside with the
         pattern edges ``edges`` in front; these are heavy.
@@ -194,7 +194,7 @@ class Views:
         rise = math.atan2(out[2], across) + _ABOVE
         return azimuth, min(max(rise, -math.pi / 6), math.pi / 3)
 
-    def _facet(self, canvas: Canvas, seen: Floats, view: View, face: int, fill: Color) -> None:
+    def _facet(self, canvas: Pen, seen: Floats, view: View, face: int, fill: Color) -> None:
         """One facet of a ``view``, at its places ``seen`` on the page."""
         level = min(float(view.shade[face]), 1.0)
         shaded = Color(fill.red * level, fill.green * level, fill.blue * level)
@@ -206,7 +206,7 @@ class Views:
         corners = faces[face][faces[face] >= 0]
         polygon(canvas, seen[corners], stroke=len(faces) <= OUTLINED)
 
-    def flat_view(self, canvas: Canvas, box: Box) -> float:
+    def flat_view(self, canvas: Pen, box: Box) -> float:
         """The flat pattern with its creases, its seams with their numbers and the names of its
         patches; returns its scale.
         """
@@ -244,19 +244,19 @@ class Views:
                 disk(canvas, f"B{border.number}", x, y, INK)
         return scale
 
-    def _filled(self, canvas: Canvas, points: Floats, patch: int) -> None:
+    def _filled(self, canvas: Pen, points: Floats, patch: int) -> None:
         """A patch in the current colour; its holes stay open."""
         path = _closed(canvas, [points[ring] for ring in self.rings[patch]])
         canvas.drawPath(path, stroke=0, fill=1, fillMode=_EVEN_ODD)
 
-    def _around(self, canvas: Canvas, points: Floats, weight: float, colour: Color) -> None:
+    def _around(self, canvas: Pen, points: Floats, weight: float, colour: Color) -> None:
         canvas.setStrokeColor(colour)
         canvas.setLineWidth(weight * mm)
         canvas.setLineJoin(1)
         path = _closed(canvas, [points[ring] for rings in self.rings for ring in rings])
         canvas.drawPath(path, stroke=1, fill=0)
 
-    def _name(self, canvas: Canvas, points: Floats, patch: int, size: float) -> None:
+    def _name(self, canvas: Pen, points: Floats, patch: int, size: float) -> None:
         """The name of a patch in its middle."""
         corners = self.pattern.faces_vertices[self.patches[patch].faces]
         x, y = points[corners[corners >= 0]].mean(axis=0)
@@ -264,7 +264,7 @@ class Views:
 
     def map(
         self,
-        canvas: Canvas,
+        canvas: Pen,
         box: Box,
         shown: Collection[int],
         done: Collection[int] = (),
@@ -290,7 +290,7 @@ class Views:
             self._name(canvas, points, patch, size)
 
 
-def _closed(canvas: Canvas, rings: Iterable[Floats]) -> PDFPathObject:
+def _closed(canvas: Pen, rings: Iterable[Floats]) -> PDFPathObject | SvgPath:
     """One path around all ``rings`` (n, 2)."""
     path = canvas.beginPath()
     for ring in rings:
@@ -300,19 +300,14 @@ def _closed(canvas: Canvas, rings: Iterable[Floats]) -> PDFPathObject:
     return path
 
 
-def named(canvas: Canvas, label: str, x: float, y: float, size: float) -> None:
+def named(canvas: Pen, label: str, x: float, y: float, size: float) -> None:
     """A label centred on a point of a drawing, with a white rim."""
-    at = canvas.beginText()
+    width = canvas.stringWidth(label, "Helvetica-Bold", size)
+    canvas.setFont("Helvetica-Bold", size)
     canvas.setLineWidth(0.14 * size / 72 * 25.4 * mm)
     canvas.setLineJoin(1)
-    at.setFont("Helvetica-Bold", size)
-    width = canvas.stringWidth(label, "Helvetica-Bold", size)
-    at.setTextOrigin(x * mm - width / 2, y * mm - 0.35 * size)
-    at.setTextRenderMode(1)
     canvas.setStrokeColor(white)
-    at.textOut(label)
-    at.setTextRenderMode(0)
-    canvas.drawText(at)
+    canvas.drawString(x * mm - width / 2, y * mm - 0.35 * size, label, mode=1)
     text(canvas, x, y - 0.35 * size / 72 * 25.4, label, size, bold=True, align="middle")
 
 
