@@ -9,10 +9,9 @@ where v is u turned by a right angle. So the largest s is the least of the quoti
 would be too small to read is left out. For a polygon that is not convex the rule is stricter than
 necessary.
 
-The number of a tab is engraved on the tab, followed by M or V if its fold is a mountain or a
-valley, and on the facet to which it is glued, at the place that the tab covers. A patch name is
-engraved where no tab will be. If there is no room for number and letter, the letter is left out
-first.
+The label of a tab is engraved on the tab, followed by M or V if its fold is a mountain or a valley,
+and on the facet to which it is glued, at the place that the tab covers. A patch name is engraved
+where no tab will be. If there is no room for label and M or V, this letter is left out first.
 """
 
 from __future__ import annotations
@@ -33,12 +32,12 @@ CLEARANCE_MM = 0.5
 NAME_MM = (1.5, 5.0)
 """Least and greatest height of a patch name in mm (judged)."""
 
-NUMBER_MM = (1.2, 3.0)
-"""Least and greatest height of a tab number in mm (judged)."""
+LABEL_MM = (1.2, 3.0)
+"""Least and greatest height of the label of a tab in mm (judged)."""
 
 
 MARKED = ("M", "V")
-"""The assignments of folds that are engraved after the number of a tab."""
+"""The assignments of folds that are engraved after the label of a tab."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,16 +87,16 @@ def place_texts(
     face_patch: Ints,
     names: Sequence[str],
     tabs: TabRegions,
-    numbers: Ints,
+    labels: Sequence[str],
     turns: Floats,
 ) -> Lettering:
     """The texts of all patches.
 
     ``face_patch`` (F,) is the patch of each facet, ``names`` are the names of the P patches,
-    ``numbers`` (N,) the numbers of the ``tabs``, and ``turns`` (P,) the angles by which patches are
+    ``labels`` (N) the labels of the ``tabs``, and ``turns`` (P,) the angles by which patches are
     turned later: texts are upright after that.
     """
-    texts, left_out, unmarked = _tab_numbers(face_patch, tabs, numbers, turns)
+    texts, left_out, unmarked = _tab_labels(face_patch, tabs, labels, turns)
     spots = _facet_spots(pattern, tabs, turns[face_patch])
     width = np.array([text_width(name) for name in names])
     height = np.minimum(spots.height(width[face_patch]), NAME_MM[1])
@@ -114,17 +113,17 @@ def place_texts(
     return Lettering(texts, left_out, unmarked)
 
 
-def _tab_numbers(
-    face_patch: Ints, tabs: TabRegions, numbers: Ints, turns: Floats
+def _tab_labels(
+    face_patch: Ints, tabs: TabRegions, labels: Sequence[str], turns: Floats
 ) -> tuple[list[PlacedText], int, int]:
-    """The number of each tab on the tab and on the facet under it, the count of numbers without
+    """The label of each tab on the tab and on the facet under it, the count of labels without
     room, and the count of tabs without room for the letter.
     """
     texts: list[PlacedText] = []
     left_out = unmarked = 0
     if not len(tabs):
         return texts, left_out, unmarked
-    words = [str(number) for number in numbers.tolist()]
+    words = list(labels)
     folds = tabs.seams.fold.tolist()
     marked = [w + f if f in MARKED else w for w, f in zip(words, folds, strict=True)]
     glued = np.flatnonzero(tabs.mate_face >= 0)
@@ -136,13 +135,13 @@ def _tab_numbers(
         patch, base = face_patch[faces], points[:, 1] - points[:, 0]
         spots = _spots(points, present, _upright(base, turns[patch]))
         shown, height = list(wanted), spots.height(np.array([text_width(word) for word in wanted]))
-        numbers_alone = [word.rstrip("MV") for word in wanted]
-        bare = spots.height(np.array([text_width(word) for word in numbers_alone]))
-        for tab in np.flatnonzero((height < NUMBER_MM[0]) & (bare >= NUMBER_MM[0])).tolist():
-            shown[tab], height[tab] = numbers_alone[tab], bare[tab]
+        alone = [word.rstrip("MV") for word in wanted]
+        bare = spots.height(np.array([text_width(word) for word in alone]))
+        for tab in np.flatnonzero((height < LABEL_MM[0]) & (bare >= LABEL_MM[0])).tolist():
+            shown[tab], height[tab] = alone[tab], bare[tab]
             unmarked += 1
-        height = np.minimum(height, NUMBER_MM[1])
-        room = height >= NUMBER_MM[0]
+        height = np.minimum(height, LABEL_MM[1])
+        room = height >= LABEL_MM[0]
         left_out += int((~room).sum())
         for tab in np.flatnonzero(room).tolist():
             centre, along = spots.centre[tab], spots.along[tab]

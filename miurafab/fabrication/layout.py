@@ -135,6 +135,7 @@ def _patch_table(patch: Patch) -> dict[str, Any]:
         "tabs": [
             {
                 "number": tab.number,
+                "label": tab.label,
                 "edge": tab.edge,
                 "mate_edge": tab.mate_edge,
                 "mate_patch": tab.mate_patch,
@@ -158,6 +159,7 @@ def _patch(table: dict[str, Any]) -> Patch:
         tabs=tuple(
             Tab(
                 number=int(tab["number"]),
+                label=_text(tab.get("label", str(tab["number"]))),
                 edge=int(tab["edge"]),
                 mate_edge=_mate(tab.get("mate_edge", tab["edge"])),
                 mate_patch=_mate(tab["mate_patch"]),

@@ -13,7 +13,7 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_frame import FramedPatches
 from miurafab.fabrication.strokes import Drawn
 from miurafab.fabrication.tabs import MIN_BASE_MM
-from miurafab.fabrication.wording import count
+from miurafab.fabrication.wording import count, in_order
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Ints
 from miurafab.geometry.polygons import edge_lengths
@@ -34,15 +34,15 @@ def layout_findings(
     options: LayoutOptions,
 ) -> tuple[Finding, ...]:
     """The findings on one layout; ``where`` of ``untabbed`` is the edges of the pattern."""
-    tabs, numbers = framed.outlined.tabs, framed.numbers
+    tabs, labels = framed.outlined.tabs, framed.labels
     findings = []
-    weak = np.sort(numbers[tabs.areas < material.tabs.min_area_mm2]).tolist()
+    weak = in_order(labels[k] for k in np.flatnonzero(tabs.areas < material.tabs.min_area_mm2))
     if weak:
-        named = ", ".join(str(number) for number in weak[:_NAMED])
+        named = ", ".join(weak[:_NAMED])
         more = f" and {len(weak) - _NAMED} more" if len(weak) > _NAMED else ""
         sentence = (
-            f"{len(weak)} of {count(len(numbers), 'tab has', 'tabs have')} less than "
-            f"{material.tabs.min_area_mm2:g} mm2 of glue: number {named}{more}."
+            f"{len(weak)} of {count(len(labels), 'tab has', 'tabs have')} less than "
+            f"{material.tabs.min_area_mm2:g} mm2 of glue: {named}{more}."
         )
         findings.append(Finding("weak-tabs", sentence))
     if lettering.unmarked:

@@ -1,7 +1,8 @@
 """Single-line lettering for engraving: one stroke of the beam per pen stroke of a letter.
 
 The letters are drawn on a grid 4 wide and 6 high, two digits "xy" a point, spaces between the
-points of a stroke and commas between strokes. Capital letters, digits and ``- . / %``.
+points of a stroke and commas between strokes. Capital letters, small letters without a part below
+the line, digits and ``- . / %``.
 """
 
 from __future__ import annotations
@@ -52,6 +53,22 @@ _LETTERS = {
     "X": "00 46,06 40",
     "Y": "06 23 46,23 20",
     "Z": "06 46 00 40",
+    "a": "43 34 14 03 01 10 30 41,44 40",
+    "b": "06 00,03 14 34 43 41 30 10 01",
+    "c": "43 34 14 03 01 10 30 41",
+    "d": "43 34 14 03 01 10 30 41,46 40",
+    "e": "02 42 43 34 14 03 01 10 30 41",
+    "f": "46 36 25 20,04 44",
+    "h": "06 00,03 14 34 43 40",
+    "k": "06 00,34 02 40",
+    "n": "04 00,03 14 34 43 40",
+    "r": "04 00,03 14 34",
+    "s": "43 34 14 03 12 32 41 30 10 01",
+    "t": "26 21 30 40,04 44",
+    "u": "04 01 10 30 41,44 40",
+    "w": "04 10 23 30 44",
+    "x": "04 40,00 44",
+    "z": "04 44 00 40",
     "-": "13 33",
     ".": "20 21",
     "/": "00 46",
@@ -73,7 +90,7 @@ def text_width(text: str) -> float:
 
 
 def text_strokes(text: str) -> list[Floats]:
-    """The strokes (n, 2) of ``text``, of height 1 and centred on the origin.
+    """The strokes (n, 2) of ``text``, its capitals of height 1, and centred on the origin.
 
     Raises :class:`~miurafab.errors.LayoutError` for a character that has no letter.
     """
@@ -82,7 +99,7 @@ def text_strokes(text: str) -> list[Floats]:
         if letter not in _STROKES:
             raise LayoutError(
                 f"The label '{text}' holds '{letter}', which cannot be engraved; use capital "
-                "letters, digits and '-./%'."
+                "letters, the small letters 'abcdefhknrstuwxz', digits and '-./%'."
             )
         middle = np.array([text_width(text) / 2, 0.5])
         shift = np.array([place * _ADVANCE / _HEIGHT, 0.0]) - middle

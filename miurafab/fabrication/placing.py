@@ -39,18 +39,18 @@ def motion_of(
 def texts_of(
     pattern: CreasePattern,
     outlined: OutlinedPatches,
-    numbers: Ints,
+    labels: Sequence[str],
     patches: Sequence[Patch],
     motion: RigidTransform,
 ) -> Lettering:
-    """The texts of all copies, upright on their sheets; ``numbers`` (N,) are those of the tabs."""
+    """The texts of all copies, upright on their sheets; ``labels`` (N) are those of the tabs."""
     count = len(outlined.patches)
     turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
     texts, left_out, unmarked = [], 0, 0
     for first in range(0, len(patches), count):
         names = [patch.label for patch in patches[first : first + count]]
         own = turns[first : first + count]
-        found = place_texts(pattern, outlined.face_patch, names, outlined.tabs, numbers, own)
+        found = place_texts(pattern, outlined.face_patch, names, outlined.tabs, labels, own)
         texts += [replace(text, patch=text.patch + first) for text in found.texts]
         left_out += found.left_out
         unmarked += found.unmarked

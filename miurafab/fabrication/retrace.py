@@ -57,13 +57,13 @@ def retraced(
     Raises :class:`~miurafab.errors.LayoutError` for a layout that names what the pattern lacks.
     """
     material = worked(material, machine, options)
-    outlined, numbers, motion = patches_on_sheets(layout, pattern)
+    outlined, labels, motion = patches_on_sheets(layout, pattern)
     margin = options.nesting.margin_mm
     margin = machine.bed.margin_mm if margin is None else margin
     drawn = sheet_strokes(
         pattern,
         outlined,
-        texts_of(pattern, outlined, numbers, layout.patches, motion).texts,
+        texts_of(pattern, outlined, labels, layout.patches, motion).texts,
         motion,
         material,
         [Blank(each.name, each.width_mm, each.height_mm, margin) for each in layout.sheets],
@@ -74,7 +74,7 @@ def retraced(
         for back, front in zip(drawn.backs, drawn.fronts, strict=True)
         for each in ([] if back is None else [back]) + [front]
     ]
-    faults = [*_tab_faults(pattern, outlined, numbers), *_seam_faults(layout, pattern, outlined)]
+    faults = [*_tab_faults(pattern, outlined, labels), *_seam_faults(layout, pattern, outlined)]
     if layout.kit is not None and layout.kit != folders_kit(pattern):
         faults.append("The rows and angles of the folder's kit are not those of the pattern.")
     right = cut_lines([made.rings for made in outlined.patches], material.kerf_mm)
@@ -87,13 +87,13 @@ def retraced(
 
 def patches_on_sheets(
     layout: Layout, pattern: CreasePattern
-) -> tuple[OutlinedPatches, Ints, RigidTransform]:
-    """The patches of the first model in the plane of the pattern, the numbers of their tabs, and
+) -> tuple[OutlinedPatches, tuple[str, ...], RigidTransform]:
+    """The patches of the first model in the plane of the pattern, the labels of their tabs, and
     the motions of all patches to their sheets.
 
     Raises :class:`~miurafab.errors.LayoutError` for a layout that names what the pattern lacks.
     """
-    outlined, numbers = _outlined(layout, pattern)
+    outlined, labels = _outlined(layout, pattern)
     placed = {
         placement.patch: (number, placement)
         for number, sheet in enumerate(layout.sheets)
@@ -103,11 +103,11 @@ def patches_on_sheets(
         raise LayoutError("The layout does not place each patch once on a sheet.")
     sheets = np.array([placed[patch.id][0] for patch in layout.patches])
     places = [placed[patch.id][1] for patch in layout.patches]
-    return outlined, numbers, motion_of(layout.patches, places, sheets)
+    return outlined, labels, motion_of(layout.patches, places, sheets)
 
 
-def _outlined(layout: Layout, pattern: CreasePattern) -> tuple[OutlinedPatches, Ints]:
-    """The patches of the first model in the plane of the pattern, and the numbers of their tabs."""
+def _outlined(layout: Layout, pattern: CreasePattern) -> tuple[OutlinedPatches, tuple[str, ...]]:
+    """The patches of the first model in the plane of the pattern, and the labels of their tabs."""
     patches = layout.model.patches
     facets = np.concatenate([patch.faces for patch in patches])
     count = len(pattern.faces_vertices)
@@ -121,8 +121,8 @@ def _outlined(layout: Layout, pattern: CreasePattern) -> tuple[OutlinedPatches, 
         OutlinedPatch(patch.faces, own, outline, _lines(patch))
         for patch, own, outline in zip(patches, standing, rings, strict=True)
     ]
-    numbers = np.array([tab.number for patch in patches for tab in patch.tabs], dtype=np.int64)
-    return OutlinedPatches(made, face_patch, tabs, np.array(layout.untabbed)), numbers
+    labels = tuple(tab.label for patch in patches for tab in patch.tabs)
+    return OutlinedPatches(made, face_patch, tabs, np.array(layout.untabbed)), labels
 
 
 def _lines(patch: Patch) -> list[Floats]:
@@ -145,11 +145,11 @@ def _tabs(patches: tuple[Patch, ...], pattern: CreasePattern, face_patch: Ints) 
             if edge is None or owner is None:
                 continue
             if not 0 <= edge < len(pattern.edges_faces):
-                raise LayoutError(f"Tab {tab.number} names edge {edge}, which is not there.")
+                raise LayoutError(f"Tab {tab.label} names edge {edge}, which is not there.")
             beside = pattern.edges_faces[edge]
             own = beside[(beside >= 0) & (face_patch[beside] == owner)]
             if not len(own):
-                raise LayoutError(f"Tab {tab.number} stands on edge {edge}, of another patch.")
+                raise LayoutError(f"Tab {tab.label} stands on edge {edge}, of another patch.")
             edges[row, side], faces[row, side] = edge, own[0]
         inner = tab.edge == tab.mate_edge
         fold[row] = pattern.edges_assignment[tab.edge] if inner else _LETTERS.get(tab.fold, "F")
@@ -171,23 +171,25 @@ def _glued(pattern: CreasePattern, seams: Seams, points: Floats) -> Floats:
     return glued
 
 
-def _tab_faults(pattern: CreasePattern, outlined: OutlinedPatches, numbers: Ints) -> Iterator[str]:
+def _tab_faults(
+    pattern: CreasePattern, outlined: OutlinedPatches, labels: tuple[str, ...]
+) -> Iterator[str]:
     """What is wrong with the tabs."""
     tabs = outlined.tabs
-    for row, number in enumerate(numbers.tolist()):
+    for row, label in enumerate(labels):
         ends = pattern.vertices_coords[pattern.edges_vertices[tabs.edge[row]]]
         base = shapely.LineString(tabs.polygon(row)[:2])
         if not base.covered_by(shapely.LineString(ends).buffer(NEAR_MM)):
-            yield f"Tab {number} does not stand on its edge."
+            yield f"Tab {label} does not stand on its edge."
         glued = shapely.Polygon(tabs.glued[row, : tabs.count[row]])
         mate = int(tabs.mate_face[row])
         corners = pattern.faces_vertices[mate if mate >= 0 else tabs.own_face[row]]
         facet = shapely.Polygon(pattern.vertices_coords[corners[corners >= 0]])
         if mate < 0:
             if glued.intersection(facet).area > NEAR_MM * glued.length:
-                yield f"Tab {number} lies over the facet that bears it."
+                yield f"Tab {label} lies over the facet that bears it."
         elif not glued.covered_by(facet.buffer(NEAR_MM)):
-            yield f"Tab {number} does not fit the facet that it is glued to."
+            yield f"Tab {label} does not fit the facet that it is glued to."
 
 
 def _seam_faults(

@@ -239,7 +239,7 @@ def lay_out(
     )
     sheets, placements = _sheets(nesting, patches, stock)
     motion = motion_of(patches, placements, np.array([slot.sheet for slot in nesting.slots]))
-    lettering = texts_of(pattern, outlined, framed.numbers, patches, motion)
+    lettering = texts_of(pattern, outlined, framed.labels, patches, motion)
     drawn = sheet_strokes(
         pattern,
         outlined,

@@ -57,14 +57,16 @@ NO_LIMIT = -1e12
 
 @dataclass(frozen=True, eq=False)
 class Tab:
-    """A tab of one patch. ``number`` is engraved on both sides of the seam. ``edge`` is the pattern
-    edge on which the tab stands and ``mate_edge`` the edge that it is joined to: the same edge,
+    """A tab of one patch. ``label`` (:mod:`~miurafab.fabrication.seam_names`) is engraved on both
+    sides of the seam; ``number`` counts the tabs of the model. ``edge`` is the pattern edge on
+    which the tab stands and ``mate_edge`` the edge that it is joined to: the same edge,
     unless two borders of the pattern are joined. ``mate_patch`` is the id of the patch to which it
     is glued; both are None on an open border. ``polygon_mm`` (n, 2) is its outline in the patch
     frame, counter-clockwise from the base. ``fold`` is one of :data:`FOLDS`, or flat.
     """
 
     number: int
+    label: str
     edge: int
     mate_edge: int | None
     mate_patch: int | None

@@ -288,14 +288,14 @@ def test_the_fold_of_a_tab_is_that_of_its_crease():
         assert tab.fold == words[str(pattern.edges_assignment[tab.edge])]
 
 
-def test_weak_tabs_are_told_by_number():
+def test_weak_tabs_are_told_by_label():
     material = card()
     material = dataclasses.replace(
         material, tabs=dataclasses.replace(material.tabs, min_area_mm2=70.0)
     )
     layout = lay_out(PATTERNS["miura"], MACHINE, material)
     weak = [
-        tab.number
+        tab.label
         for patch in layout.patches
         for tab in patch.tabs
         if shapely.Polygon(tab.polygon_mm).area < 70.0
@@ -305,7 +305,7 @@ def test_weak_tabs_are_told_by_number():
     assert finding.code == "weak-tabs"
     total = layout.totals.tabs
     assert finding.sentence.startswith(
-        f"{len(weak)} of {total} tabs have less than 70 mm2 of glue: number "
+        f"{len(weak)} of {total} tabs have less than 70 mm2 of glue: a1, "
     )
     assert set(CREASE_KINDS) == {"mountain", "valley", "tab"}
 

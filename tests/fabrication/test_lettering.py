@@ -14,10 +14,11 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.labels import CLEARANCE_MM, place_texts
 from miurafab.fabrication.lettering import text_strokes, text_width
 from miurafab.fabrication.partition.patch_outline import outline_patches
+from miurafab.fabrication.seam_names import LETTERS, tab_labels
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tab_choice import choose_tabs
 
-ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ-./%"
+ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ-./%" + LETTERS
 
 
 def test_every_letter_is_within_its_box_and_unlike_every_other():
@@ -58,12 +59,12 @@ def test_a_character_that_cannot_be_engraved_is_named():
 def test_no_text_touches_a_crease_a_cut_or_another_text(pattern):
     outlined = outline_patches(pattern, 190.0, 140.0, card())
     names = [f"P{k}" for k in range(len(outlined.patches))]
-    numbers = np.arange(len(outlined.tabs)) + 1
+    labels = tab_labels(pattern, outlined.face_patch, outlined.tabs)
     turns = np.linspace(-1.5, 1.5, len(names))
-    lettering = place_texts(pattern, outlined.face_patch, names, outlined.tabs, numbers, turns)
+    lettering = place_texts(pattern, outlined.face_patch, names, outlined.tabs, labels, turns)
     texts, left_out = lettering.texts, lettering.left_out
-    assert len(texts) + left_out == len(names) + 2 * len(numbers)
-    assert len(texts) > 0.8 * (len(names) + 2 * len(numbers))
+    assert len(texts) + left_out == len(names) + 2 * len(labels)
+    assert len(texts) > 0.8 * (len(names) + 2 * len(labels))
     creases = shapely.STRtree(shapely.linestrings(pattern.vertices_coords[pattern.edges_vertices]))
     for patch, piece in enumerate(outlined.patches):
         own = [text for text in texts if text.patch == patch]
@@ -85,13 +86,13 @@ def test_no_text_touches_a_crease_a_cut_or_another_text(pattern):
             np.testing.assert_allclose(across, [-along[1], along[0]], atol=1e-9)
             tilted = turns[patch] - np.radians(10.0)
             assert along @ np.array([np.cos(tilted), -np.sin(tilted)]) > -1e-6
-    folds = dict(zip(numbers.tolist(), outlined.tabs.seams.fold.tolist(), strict=True))
-    marked = {f"{number}{fold}" for number, fold in folds.items()}
+    folds = dict(zip(labels, outlined.tabs.seams.fold.tolist(), strict=True))
+    marked = {f"{label}{fold}" for label, fold in folds.items()}
     found = Counter(text.text for text in texts if text.text not in names)
-    # Each number stands on its tab with the letter of its fold, and bare on the facet under it.
-    assert set(found) <= marked | set(map(str, numbers))
-    bare = sum(found[str(number)] == 2 for number in numbers)
-    assert bare == lettering.unmarked < 0.1 * len(numbers)
+    # Each label stands on its tab with the letter of its fold, and bare on the facet under it.
+    assert set(found) <= marked | set(labels)
+    bare = sum(found[label] == 2 for label in labels)
+    assert bare == lettering.unmarked < 0.1 * len(labels)
     assert all(times == 1 for text, times in found.items() if text in marked)
 
 
@@ -108,8 +109,8 @@ def test_a_patch_whose_facets_are_all_glued_upon_is_named_beside_its_tabs():
     pattern = miura(9, 3, 24.0, 24.0)
     face_patch = np.repeat([0, 0, 1], 9)
     tabs, _, _ = choose_tabs(pattern, face_patch, card())
-    numbers, turns = np.arange(len(tabs)) + 1, np.zeros(2)
-    lettering = place_texts(pattern, face_patch, ["P1", "P2"], tabs, numbers, turns)
+    labels, turns = tab_labels(pattern, face_patch, tabs), np.zeros(2)
+    lettering = place_texts(pattern, face_patch, ["P1", "P2"], tabs, labels, turns)
     assert lettering.left_out == 0
     (name,) = [text for text in lettering.texts if text.text == "P2"]
     shape = shapely.MultiLineString([stroke.tolist() for stroke in name.strokes])

@@ -16,6 +16,7 @@ from miurafab.fabrication.labels import place_texts
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_outline import outline_patches
+from miurafab.fabrication.seam_names import tab_labels
 from miurafab.fabrication.seams import border_seams
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tabs import inset_of
@@ -166,21 +167,21 @@ def test_the_layout_of_a_ring_tells_its_seam(closed, size):
     assert not set(seams.edges[:, 1].tolist()) & made
 
 
-def test_both_edges_of_a_ring_seam_are_numbered(closed):
+def test_both_edges_of_a_ring_seam_are_labelled(closed):
     outlined = outline_patches(closed, *BEDS["one patch"], card())
     tabs, facets = outlined.tabs, facet_polygons(closed)
-    numbers = np.arange(len(tabs)) + 1
-    lettering = place_texts(closed, outlined.face_patch, ["P1"], tabs, numbers, np.zeros(1))
+    labels = tab_labels(closed, outlined.face_patch, tabs)
+    lettering = place_texts(closed, outlined.face_patch, ["P1"], tabs, labels, np.zeros(1))
     assert lettering.left_out == lettering.unmarked == 0
     where = {
         text.text: shapely.MultiLineString([stroke.tolist() for stroke in text.strokes])
         for text in lettering.texts
     }
-    for k, number in enumerate(numbers.tolist()):
-        marked = where[f"{number}{tabs.seams.fold[k]}"]
+    for k, label in enumerate(labels):
+        marked = where[f"{label}{tabs.seams.fold[k]}"]
         assert shapely.Polygon(tabs.polygon(k)).contains(marked)
-        assert facets[tabs.mate_face[k]].contains(where[str(number)])
-        assert shapely.Polygon(tabs.glued[k, : tabs.count[k]]).contains(where[str(number)])
+        assert facets[tabs.mate_face[k]].contains(where[label])
+        assert shapely.Polygon(tabs.glued[k, : tabs.count[k]]).contains(where[label])
 
 
 @pytest.mark.parametrize("size", BEDS)

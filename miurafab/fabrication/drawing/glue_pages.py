@@ -135,7 +135,9 @@ class GluePages:
         else:
             title = f"Begin with {label}"
         text(canvas, x + 8.5, top - 6.8, title, 9.5, bold=True)
-        words = tabs_called(step.tabs).capitalize() if step.tabs else ""
+        words = (
+            tabs_called([self.views.labels[n] for n in step.tabs]).capitalize() if step.tabs else ""
+        )
         if step.onto and not step.tabs:
             words = "No tabs: use tape on the seam"
         if step.all_round:

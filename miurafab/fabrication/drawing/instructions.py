@@ -32,8 +32,9 @@ _FOLDING = (
     "towards you, seen from the side with the names.",
 )
 _GLUEING = (
-    "On each tab stands its number and the way its own fold goes: M for mountain, V for valley.",
-    "It goes under the facet that bears the same number, edge to edge with the line.",
+    "On each tab stands its label, the letter of its seam and a number, and the way its own fold "
+    "goes: M for mountain, V for valley.",
+    "It goes under the facet that bears the same label, edge to edge with the line.",
     "Patches are glued best half way unfolded, while the seam is nearly flat. Press until it "
     "holds, then take the next tab.",
 )
@@ -131,11 +132,11 @@ def _draw_tab(canvas: Pen, x: float, y: float) -> None:
         canvas.setFillColor(fill)
         polygon(canvas, corners, stroke=True)
     _line(canvas, left[1:3], VALLEY)
-    text(canvas, x + 38.6, y + 14.8, "7V", 9, bold=True, align="middle")
-    text(canvas, x + 55, y + 14.8, "7", 9, bold=True, align="middle")
+    text(canvas, x + 38.6, y + 14.8, "a7V", 9, bold=True, align="middle")
+    text(canvas, x + 55, y + 14.8, "a7", 9, bold=True, align="middle")
     text(canvas, x + 17, y + 14.8, "P1", 9, colour=QUIET, align="middle")
     text(canvas, x + 66, y + 14.8, "P2", 9, colour=QUIET, align="middle")
-    words = "tab 7 folds as a valley and goes under the facet marked 7"
+    words = "tab a7 folds as a valley and goes under the facet marked a7"
     text(canvas, x + _COLUMN / 2, y - 1.5, words, 8.5, colour=QUIET, align="middle")
 
 

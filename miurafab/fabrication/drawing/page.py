@@ -197,6 +197,6 @@ def line_above(canvas: Pen, x: float, y: float, width: float) -> None:
     canvas.line(x * mm, y * mm, (x + width) * mm, y * mm)
 
 
-def tabs_called(numbers: tuple[int, ...]) -> str:
-    """``tabs 1-4, 7``."""
-    return f"{'tab' if len(numbers) == 1 else 'tabs'} {runs(numbers)}"
+def tabs_called(labels: Sequence[str]) -> str:
+    """``tabs a1-a4, b7``."""
+    return f"{'tab' if len(labels) == 1 else 'tabs'} {runs(labels)}"

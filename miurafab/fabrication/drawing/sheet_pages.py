@@ -314,23 +314,23 @@ class SheetPages:
 
     def relations(self, patch: int) -> list[str]:
         """A sentence for each neighbour of a patch and each side that bears the tabs."""
-        own: dict[int, list[int]] = {}
-        others: dict[int, list[int]] = {}
-        free = tuple(t.number for t in self.layout.patches[patch].tabs if t.mate_patch is None)
+        own: dict[int, list[str]] = {}
+        others: dict[int, list[str]] = {}
+        free = [t.label for t in self.layout.patches[patch].tabs if t.mate_patch is None]
         for tab in self.layout.patches[patch].tabs:
             if tab.mate_patch is not None:
-                own.setdefault(tab.mate_patch, []).append(tab.number)
+                own.setdefault(tab.mate_patch, []).append(tab.label)
         for other in self.layout.patches:
             for tab in other.tabs:
                 if tab.mate_patch == patch and other.id != patch:
-                    others.setdefault(other.id, []).append(tab.number)
+                    others.setdefault(other.id, []).append(tab.label)
         found = []
-        for mate, numbers in sorted(own.items()):
+        for mate, labels in sorted(own.items()):
             under = "its own far border" if mate == patch else self.label(mate)
-            found.append(f"{tabs_called(tuple(numbers)).capitalize()} under {under}")
+            found.append(f"{tabs_called(labels).capitalize()} under {under}")
         found += [
-            f"Over {tabs_called(tuple(numbers))} of {self.label(mate)}"
-            for mate, numbers in sorted(others.items())
+            f"Over {tabs_called(labels)} of {self.label(mate)}"
+            for mate, labels in sorted(others.items())
         ]
         if free:
             found.append(f"{tabs_called(free).capitalize()} to the base or frame")

@@ -128,10 +128,15 @@ class Views:
         """(E,) as :func:`edge_letters`."""
         return edge_letters(self.layout, self.pattern)
 
-    def standing(self, border: OpenBorder) -> tuple[int, ...]:
-        """The numbers of the tabs on an open border."""
+    @cached_property
+    def labels(self) -> dict[int, str]:
+        """The label of each tab by its number."""
+        return {tab.number: tab.label for patch in self.patches for tab in patch.tabs}
+
+    def standing(self, border: OpenBorder) -> tuple[str, ...]:
+        """The labels of the tabs on an open border."""
         edges = set(border.edges)
-        return tuple(tab.number for p in self.patches for tab in p.tabs if tab.edge in edges)
+        return tuple(tab.label for p in self.patches for tab in p.tabs if tab.edge in edges)
 
     def folded_view(self, canvas: Pen, box: Box, shown: Collection[int] | None = None) -> float:
         """An orthographic view, far facets first, lit from the upper left; returns its scale. If

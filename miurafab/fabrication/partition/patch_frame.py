@@ -20,6 +20,7 @@ from miurafab.fabrication.partition.patch_outline import (
     OutlinedPatches,
     outline_patches,
 )
+from miurafab.fabrication.seam_names import tab_labels
 from miurafab.fabrication.stock import LaidStock
 from miurafab.fabrication.tabs import FOLDS, Tab
 from miurafab.geometry.arrays import Floats, Ints
@@ -58,11 +59,11 @@ class Patch:
 @dataclass(frozen=True, eq=False)
 class FramedPatches:
     """The patches of one copy of the model: ``outlined`` in the pattern's plane, ``patches`` in
-    their own frames, and the ``numbers`` (N,) int64 of their tabs.
+    their own frames, and the ``labels`` of the N tabs.
     """
 
     outlined: OutlinedPatches
-    numbers: Ints
+    labels: tuple[str, ...]
     patches: tuple[Patch, ...]
 
 
@@ -77,13 +78,14 @@ def frame_patches(
     kind = stock.kinds.kinds[stock.main]
     turns = tuple(sorted({turn // 90 % 2 for turn in kind.rotations})) if stock.upright else None
     outlined = outline_patches(pattern, kind.width, kind.height, material, options, turns=turns)
+    labels = tab_labels(pattern, outlined.face_patch, outlined.tabs)
     numbers = _numbers(outlined)
     space = Space(kind.width, kind.height, turns)
     patches = (
-        _patch(number, patch, outlined, numbers, space)
+        _patch(number, patch, outlined, numbers, labels, space)
         for number, patch in enumerate(outlined.patches)
     )
-    return FramedPatches(outlined, numbers, tuple(patches))
+    return FramedPatches(outlined, labels, tuple(patches))
 
 
 def copied(patches: tuple[Patch, ...], quantity: int) -> tuple[Patch, ...]:
@@ -118,7 +120,12 @@ def _numbers(outlined: OutlinedPatches) -> Ints:
 
 
 def _patch(
-    number: int, patch: OutlinedPatch, outlined: OutlinedPatches, numbers: Ints, space: Space
+    number: int,
+    patch: OutlinedPatch,
+    outlined: OutlinedPatches,
+    numbers: Ints,
+    labels: tuple[str, ...],
+    space: Space,
 ) -> Patch:
     line = patch.cut_lines[0]
     angle = space.turn(line)
@@ -144,6 +151,7 @@ def _patch(
         tabs=tuple(
             Tab(
                 number=int(numbers[tab]),
+                label=labels[tab],
                 edge=int(tabs.edge[tab]),
                 mate_edge=_mate(tabs.seams.edges[tab, 1]),
                 mate_patch=_mate(mates[tab]),
