@@ -148,12 +148,8 @@ def bend_of(pattern: CreasePattern, lines: Sequence[CreaseLine]) -> float:
 
 def named(names: Sequence[str]) -> str:
     """``C1-C4, C7, R2``: names of lines, runs of them drawn together."""
-    parts = []
-    for family in FAMILIES:
-        numbers = [int(name[1:]) for name in names if name[0] == family]
-        for part in runs(numbers).split(", ") if numbers else ():
-            parts.append("-".join(f"{family}{number}" for number in part.split("-")))
-    return ", ".join(parts)
+    families = ([name for name in names if name[0] == family] for family in FAMILIES)
+    return ", ".join(runs(own) for own in families if own)
 
 
 def numbered(numbers: Sequence[int], family: str) -> str:
