@@ -29,7 +29,7 @@ from miurafab.fabrication.borders import OpenBorder, chosen
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.pieces import lattice_cells
 from miurafab.fabrication.seams import border_seams, shell_points
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.unfold import with_angles_of_the_folded_form
 from miurafab.origami.verify import measure
@@ -142,7 +142,7 @@ def _apex(pattern: CreasePattern, rim: Floats, border: OpenBorder) -> Floats:
         normal = -normal
     arms = rim - middle
     steps = np.roll(arms, -1, axis=0)
-    ahead = np.arctan2(np.cross(arms, steps) @ normal, _flat_dot(arms, steps, normal))
+    ahead = np.arctan2(vector_product(arms, steps) @ normal, _flat_dot(arms, steps, normal))
     round_ = abs(ahead.sum())
     if not (np.abs(np.sign(ahead).sum()) == len(rim) and abs(round_ - 2 * math.pi) < 1e-6):
         raise LayoutError(
@@ -168,5 +168,5 @@ def _flat_dot(a: Floats, b: Floats, normal: Floats) -> Floats:
 def _angles(arms: Floats) -> Floats:
     """(n,) the angles between each of ``arms`` (n, 3) and the next, the last and the first."""
     ahead = np.roll(arms, -1, axis=0)
-    across = np.linalg.norm(np.cross(arms, ahead), axis=1)
+    across = np.linalg.norm(vector_product(arms, ahead), axis=1)
     return np.asarray(np.arctan2(across, (arms * ahead).sum(axis=1)))

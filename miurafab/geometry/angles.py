@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 
 
 def angle_between(a: Floats, b: Floats) -> Floats:
@@ -12,7 +12,7 @@ def angle_between(a: Floats, b: Floats) -> Floats:
 
     atan2(|a x b|, a . b), which keeps its accuracy near 0 and pi, unlike arccos.
     """
-    cross = np.linalg.norm(np.cross(a, b), axis=-1)
+    cross = np.linalg.norm(vector_product(a, b), axis=-1)
     return np.asarray(np.arctan2(cross, np.einsum("...k,...k->...", a, b)))
 
 
@@ -21,12 +21,12 @@ def sectors(a: Floats, b: Floats) -> tuple[Floats, Floats, Floats]:
 
     With n = a x b / |a x b|: d alpha / d a = (a x n) / |a|^2 and d alpha / d b = (n x b) / |b|^2.
     """
-    cross = np.cross(a, b)
+    cross = vector_product(a, b)
     sine = np.linalg.norm(cross, axis=-1)
     angle = np.arctan2(sine, np.einsum("...k,...k->...", a, b))
     n = cross / sine[..., None]
-    to_a = np.cross(a, n) / np.einsum("...k,...k->...", a, a)[..., None]
-    to_b = np.cross(n, b) / np.einsum("...k,...k->...", b, b)[..., None]
+    to_a = vector_product(a, n) / np.einsum("...k,...k->...", a, a)[..., None]
+    to_b = vector_product(n, b) / np.einsum("...k,...k->...", b, b)[..., None]
     return angle, to_a, to_b
 
 
@@ -48,5 +48,5 @@ def fold_angles(points: Floats, edges: Ints, left: Floats, right: Floats) -> Flo
     """
     along = points[edges[:, 1]] - points[edges[:, 0]]
     along = along / np.linalg.norm(along, axis=1, keepdims=True)
-    sine = np.einsum("ek,ek->e", np.cross(left, right), along)
+    sine = np.einsum("ek,ek->e", vector_product(left, right), along)
     return np.asarray(-np.arctan2(sine, np.einsum("ek,ek->e", left, right)))

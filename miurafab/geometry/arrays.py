@@ -22,3 +22,16 @@ def run_starts(counts: Ints) -> Ints:
 def places_in_runs(counts: Ints) -> Ints:
     """(sum of counts,) the place of each item in its own run: 0, 1, 0, 1, 2 for counts 2, 0, 3."""
     return np.arange(counts.sum()) - np.repeat(run_starts(counts), counts)
+
+
+def vector_product(a: Floats, b: Floats) -> Floats:
+    """(..., 3) the vector product of ``a`` and ``b``, of which the last axis holds x, y, z.
+
+    The numbers of ``numpy.cross``, which spends most of its time on the choice of axes where the
+    arrays are small: it took a tenth of a fit.
+    """
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.multiply(a[..., i], b[..., j], out=product[..., k])
+        product[..., k] -= a[..., j] * b[..., i]
+    return product

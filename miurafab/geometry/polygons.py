@@ -14,7 +14,7 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 
 
 def filled(faces: Ints) -> Ints:
@@ -77,10 +77,10 @@ def facet_normals(points: Floats, faces: Ints) -> Floats:
     """
     corners = points[filled(faces)]
     if corners.shape[1] == 4:
-        normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+        normal = vector_product(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     else:
         spokes = corners - corners[:, :1]
-        normal = np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
+        normal = vector_product(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
@@ -91,7 +91,7 @@ def facet_areas(points: Floats, faces: Ints) -> Floats:
     """
     corners = points[filled(faces)]
     spokes = corners - corners[:, :1]
-    vector = np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
+    vector = vector_product(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
     return np.asarray(np.linalg.norm(vector, axis=1) / 2)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 
 _LEAF = 8
 _AT_ONCE = 4096
@@ -93,12 +93,12 @@ def _meet(starts: Floats, directions: Floats, triangles: Floats) -> Floats:
     """(n,) where each ray meets its triangle, inf where it does not."""
     a = triangles[:, 0]
     e1, e2 = triangles[:, 1] - a, triangles[:, 2] - a
-    p = np.cross(directions, e2)
+    p = vector_product(directions, e2)
     det = np.einsum("nk,nk->n", e1, p)
     with np.errstate(divide="ignore", invalid="ignore"):
         s = starts - a
         u = np.einsum("nk,nk->n", s, p) / det
-        q = np.cross(s, e1)
+        q = vector_product(s, e1)
         v = np.einsum("nk,nk->n", directions, q) / det
         t = np.einsum("nk,nk->n", e2, q) / det
         # the sides belong to both triangles, so that no ray slips between them

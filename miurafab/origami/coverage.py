@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 from miurafab.geometry.distances import closest_triangles
 from miurafab.geometry.hausdorff import in_four
 from miurafab.geometry.polygons import facet_means, next_corners
@@ -109,12 +109,12 @@ class Shell:
     def on_border(self, feet: Floats, triangle: Ints) -> Bools:
         """(n,) whether ``feet`` (n, 3), each on its ``triangle`` (n,), lie on the border."""
         a, b, c = self.triangles[triangle].transpose(1, 0, 2)
-        normal = np.cross(b - a, c - a)
+        normal = vector_product(b - a, c - a)
         whole = np.einsum("nk,nk->n", normal, normal)
         with np.errstate(invalid="ignore", divide="ignore"):
             weights = np.stack(
                 [
-                    np.einsum("nk,nk->n", np.cross(q - p, feet - p), normal) / whole
+                    np.einsum("nk,nk->n", vector_product(q - p, feet - p), normal) / whole
                     for p, q in ((b, c), (c, a), (a, b))
                 ],
                 axis=1,
@@ -248,4 +248,4 @@ def _sides(triangles: Floats) -> Floats:
 
 def _area_vectors(triangles: Floats) -> Floats:
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    return np.asarray(np.cross(b - a, c - a) / 2)
+    return np.asarray(vector_product(b - a, c - a) / 2)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.geometry.angles import angle_between
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.polygons import (
     edge_lengths,
     next_corners,
@@ -170,7 +170,7 @@ def facet_planarity(pattern: CreasePattern, points: Floats) -> Floats:
         real = faces[:, corner] >= 0
         p = points[faces[real][:, [0, 1, 2, corner]]]
         a, b, c = (p[:, n] - p[:, 0] for n in (1, 2, 3))
-        volume = np.abs(np.einsum("fk,fk->f", a, np.cross(b, c)))
+        volume = np.abs(np.einsum("fk,fk->f", a, vector_product(b, c)))
         worst[real] = np.maximum(worst[real], volume / mean**3)
     return worst
 

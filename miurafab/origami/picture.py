@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 from miurafab.geometry.polygons import facet_normals, filled
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.seam_lines import SEAM_WORDS, SeamLine, seam_lines
@@ -207,7 +207,7 @@ def azimuth_of(points: Floats, faces: Ints) -> float:
     """The azimuth from which an upright sheet shows its front, a little from the side."""
     corners = points[np.where(faces >= 0, faces, faces[:, :1])]
     spokes = corners - corners[:, :1]
-    x, y, z = np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=(0, 1)).tolist()
+    x, y, z = vector_product(spokes, np.roll(spokes, -1, axis=1)).sum(axis=(0, 1)).tolist()
     return math.atan2(y, x) - _ASIDE if math.hypot(x, y) > abs(z) else AZIMUTH
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.surfaces.outline import WholeMesh
@@ -149,7 +149,7 @@ def bend(
     """
     uv = target.feet(np.stack([start, end]))
     sides = target.outline.nearest(uv)[2].tolist()
-    normal = np.cross(corners[2] - corners[0], corners[-1] - corners[1])
+    normal = vector_product(corners[2] - corners[0], corners[-1] - corners[1])
     normal /= np.linalg.norm(normal)
     facing = float(normal @ target.normal(uv.mean(axis=0)))
     one, other = (sides[0], uv[0]), (sides[1], uv[1])
@@ -197,6 +197,6 @@ def _bends(path: Floats, first: int, last: int, tolerance: float) -> list[int]:
 def _depth(point: Floats, corners: Floats, normal: Floats) -> float:
     """How far ``point`` lies inside the convex facet, negative outside."""
     along = np.roll(corners, -1, axis=0) - corners
-    inward = np.cross(normal, along)
+    inward = vector_product(normal, along)
     inward /= np.linalg.norm(inward, axis=1, keepdims=True)
     return float(np.einsum("ck,ck->c", point - corners, inward).min())

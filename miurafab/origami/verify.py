@@ -15,7 +15,7 @@ import numpy as np
 
 from miurafab.display import Shown
 from miurafab.findings import Finding, findings_json, refusals
-from miurafab.geometry.arrays import Floats
+from miurafab.geometry.arrays import Floats, vector_product
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami import invariants
 from miurafab.origami.coverage import coverage
@@ -235,7 +235,7 @@ def with_distances(
         measured = with_nearness(measured, pattern, surface, tiles)
     cover = coverage(pattern, tiles)
     a, b, c = pattern.folded_coords[triangulate(pattern.faces_vertices)[0]].transpose(1, 0, 2)
-    paper = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+    paper = float(np.linalg.norm(vector_product(b - a, c - a), axis=1).sum() / 2)
     return replace(
         measured,
         coverage=cover.covered,

@@ -17,7 +17,7 @@ import numpy as np
 
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.surfaces.frame import origin_in
 from miurafab.surfaces.mesh_repair import SMALL_HOLE, Holes, doubled_areas, even_triangles
 from miurafab.surfaces.parameterise import border_loops
@@ -299,7 +299,9 @@ def _volume(vertices: Floats, faces: Ints) -> float:
             lids.append(np.stack([np.roll(rim, -1, axis=0), rim, middle], axis=1))
         corners = np.concatenate([corners, *lids])
     corners = corners - vertices.mean(axis=0)
-    return float(np.einsum("fk,fk->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6
+    return (
+        float(np.einsum("fk,fk->", corners[:, 0], vector_product(corners[:, 1], corners[:, 2]))) / 6
+    )
 
 
 def _has_border(faces: Ints) -> bool:

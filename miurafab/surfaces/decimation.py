@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs
+from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs, vector_product
 
 FAIR = 0.15
 """The least quality of a new triangle; 1 is equilateral, 0 has no area."""
@@ -181,13 +181,13 @@ def _best_fans(vertices: Floats, middle: Ints, ring: Ints) -> tuple[Ints, Bools]
     degree = ring.shape[1]
     rim = vertices[ring]
     spokes = rim - vertices[middle][:, None]
-    normal = np.cross(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
+    normal = vector_product(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
     best = np.full(len(ring), -np.inf)
     apex = np.zeros(len(ring), dtype=np.int64)
     for k in range(degree):
         others = np.roll(rim, -k, axis=1)
         side = others[:, 1:] - others[:, :1]
-        cross = np.cross(side[:, :-1], side[:, 1:])
+        cross = vector_product(side[:, :-1], side[:, 1:])
         squares = (side**2).sum(axis=2)
         across = ((others[:, 2:] - others[:, 1:-1]) ** 2).sum(axis=2)
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -20,7 +20,7 @@ from scipy.interpolate import NdBSpline, make_interp_spline
 
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Floats
+from miurafab.geometry.arrays import Floats, vector_product
 from miurafab.surfaces.frame import described, origin_for, origin_in
 from miurafab.surfaces.smoothing import continued
 from miurafab.surfaces.surface import (
@@ -140,7 +140,7 @@ def through(points: Floats, span: Domain, domain: Domain | None = None) -> Sampl
     surface = SampledSurface(rounded(points - origin), span, domain or span, origin)
     lattice = surface.domain.lattice(33, 33)
     along, across = tangents(surface, lattice)
-    area = np.linalg.norm(np.cross(along, across), axis=-1)
+    area = np.linalg.norm(vector_product(along, across), axis=-1)
     if not area.min() > _DEGENERATE * area.max():
         u, v = lattice.reshape(-1, 2)[int(np.argmin(area))].tolist()
         raise TargetError(

@@ -15,7 +15,7 @@ import trimesh
 
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.surfaces.topology import Topology, one_sheet, pieces_of, used_alone
 from miurafab.surfaces.welding import weld
 
@@ -221,4 +221,4 @@ def side_lengths(points: Floats, faces: Ints) -> Floats:
 def doubled_areas(points: Floats, faces: Ints) -> Floats:
     """(F,) twice the areas of triangles in space."""
     p = points[faces]
-    return np.asarray(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1))
+    return np.asarray(np.linalg.norm(vector_product(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1))

@@ -22,7 +22,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 from miurafab.geometry.rays import first_hits
 from miurafab.surfaces.topology import classify, neighbours, one_sheet, used_alone
 
@@ -181,7 +181,7 @@ def _weighted_median(values: Floats, weights: Floats) -> float:
 def _cross(vertices: Floats, faces: Ints) -> Floats:
     """(F, 3) the normals of the triangles, as long as twice their areas."""
     p = vertices[faces]
-    return np.asarray(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
+    return np.asarray(vector_product(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
 
 
 def _at_vertices(count: int, faces: Ints, values: Floats) -> Floats:

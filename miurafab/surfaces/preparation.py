@@ -15,7 +15,7 @@ import numpy as np
 
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.surfaces.frame import described, origin_for, origin_in
 from miurafab.surfaces.mesh_repair import Holes, clean, mended, size_findings
 from miurafab.surfaces.plates import Side, judge_plate
@@ -118,5 +118,5 @@ def refuse_other_than_a_disk(mesh: PreparedMesh) -> None:
 def _outwards(vertices: Floats, faces: Ints) -> Ints:
     """The triangles of a closed mesh turned so that they face outwards."""
     p = vertices[faces] - vertices.mean(axis=0)
-    volume = np.einsum("fk,fk->", p[:, 0], np.cross(p[:, 1], p[:, 2]))
+    volume = np.einsum("fk,fk->", p[:, 0], vector_product(p[:, 1], p[:, 2]))
     return faces[:, ::-1] if volume < 0 else faces

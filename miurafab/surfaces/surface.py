@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from miurafab.geometry.arrays import Bools, Floats
+from miurafab.geometry.arrays import Bools, Floats, vector_product
 
 CHORD = 2e-4
 """Tiles leave the target by no more than this part of its diagonal. The distances that are reported
@@ -151,7 +151,7 @@ def unit(vectors: Floats) -> Floats:
 
 def normal_to(along: Floats, across: Floats) -> Floats:
     """(..., 3) the unit normal to two tangents (..., 3), with which they are right-handed."""
-    return unit(np.cross(along, across))
+    return unit(vector_product(along, across))
 
 
 def _steps(domain: Domain) -> tuple[Floats, Floats]:

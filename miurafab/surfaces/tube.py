@@ -23,7 +23,7 @@ import numpy as np
 from scipy.interpolate import NdBSpline, PchipInterpolator
 
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.distances import closest_on_mesh
 from miurafab.surfaces.harmonic import CylinderMap, cylinder_map
 from miurafab.surfaces.smoothing import continued, smooth
@@ -131,7 +131,7 @@ def tube_chart(vertices: Floats, faces: Ints, low: Ints, high: Ints) -> TubeChar
     mapped = cylinder_map(vertices, faces, low, high)
     places, length = _places(vertices, faces, mapped)
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = vector_product(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(cross, axis=1)
     girth = float(doubled.sum()) / 2 / length
     turns = _from_fullest(mapped, faces, doubled)
@@ -156,7 +156,7 @@ def _places(vertices: Floats, faces: Ints, mapped: CylinderMap) -> tuple[PchipIn
     """
     corners = vertices[faces]
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    cross = np.cross(e1, e2)
+    cross = vector_product(e1, e2)
     doubled = np.linalg.norm(cross, axis=1)
     v = mapped.height[faces]
     v1, v2 = (v[:, 1] - v[:, 0])[:, None], (v[:, 2] - v[:, 0])[:, None]

@@ -26,7 +26,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from miurafab.errors import PatternError
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.hinges import hinge_angles
@@ -170,7 +170,7 @@ def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:
     base = points[hinges[:, 1]] - points[hinges[:, 0]]
     for wing in (2, 3):
         out = points[hinges[:, wing]] - points[hinges[:, 0]]
-        area = np.linalg.norm(np.cross(base, out), axis=1)
+        area = np.linalg.norm(vector_product(base, out), axis=1)
         thin = np.flatnonzero(area < DEGENERATE * np.linalg.norm(base, axis=1))
         if len(thin):
             raise PatternError(f"A facet at vertex {hinges[thin[0], wing]} has no width.")

@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.sparse import Factor, factor_symmetric, minimum_degree
 from miurafab.origami.energy.bar_hinge import BarHingeModel
 from miurafab.origami.energy.hinges import hinge_angles, hinge_derivatives, hinge_gradients
@@ -128,9 +128,9 @@ class Driven:
         """
         p = self.model.points[self._held]
         x = (p[1] - p[0]) / np.linalg.norm(p[1] - p[0])
-        z = np.cross(x, p[2] - p[0])
+        z = vector_product(x, p[2] - p[0])
         z /= np.linalg.norm(z)
-        return np.stack([x, np.cross(z, x), z], axis=1)
+        return np.stack([x, vector_product(z, x), z], axis=1)
 
     def value(self, points: Floats) -> float:
         """The driven quantity at ``points`` (V, 3)."""

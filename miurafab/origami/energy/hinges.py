@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 
 
 class _Frames(NamedTuple):
@@ -75,7 +75,7 @@ def _frames(points: Floats, hinges: Ints) -> _Frames:
     m = wings - along[..., None] * t[:, None]
     h = np.sqrt(np.einsum("hwk,hwk->hw", m, m))
     m = m / h[..., None]
-    n = np.cross(t[:, None], m)
+    n = vector_product(t[:, None], m)
     n[:, 1] *= -1.0
     return _Frames(length, t, along / length[:, None], h, m, n)
 

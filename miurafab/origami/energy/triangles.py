@@ -11,7 +11,7 @@ import itertools
 
 import numpy as np
 
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.polygons import edge_lengths, facet_normals
 
 _THIN = 1e-9
@@ -43,9 +43,10 @@ def split_facets(points: Floats, faces: Ints) -> tuple[Ints, Ints]:
 def _turned(points: Floats, q: Ints) -> Ints:
     """The quads ``q`` (n, 4), turned until their diagonal runs from the first to the third."""
     p = points[q]
-    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    normal = vector_product(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     turn = np.stack(
-        [np.cross(p[:, k] - p[:, k - 1], p[:, (k + 1) % 4] - p[:, k]) for k in range(4)], axis=1
+        [vector_product(p[:, k] - p[:, k - 1], p[:, (k + 1) % 4] - p[:, k]) for k in range(4)],
+        axis=1,
     )
     reflex = np.einsum("qck,qk->qc", turn, normal) < 0
     first, second = edge_lengths(points, q[:, [0, 2]]), edge_lengths(points, q[:, [1, 3]])
@@ -81,4 +82,4 @@ def _ears(points: Floats, rest: list[int]) -> list[list[int]]:
 def _areas(points: Floats, triangles: Ints, normal: Floats) -> Floats:
     """(n,) twice the areas of ``triangles`` (n, 3), positive where they run round ``normal``."""
     p = points[triangles]
-    return np.asarray(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) @ normal)
+    return np.asarray(vector_product(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) @ normal)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from miurafab.geometry.angles import sectors
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.quads import QuadCharts
 
 Block = tuple[Floats, Ints, Floats]
@@ -69,7 +69,8 @@ def kawasaki(points: Floats, charts: QuadCharts) -> Block:
 
 
 def folds(points: Floats, charts: QuadCharts) -> Block:
-    """The fold angle at each of the :attr:`QuadCharts.neighbouring_facets` (f, g), in (-pi, pi].
+    """The fold angle at each of the :attr:`QuadCharts.neighbouring_facets` (f, g), in (-pi, pi],
+    by its six vertices: the four of f, and the two of g that are not in f.
 
     With n_f and n_g the normals and e the direction of the crease, f to its left:
     rho = atan2(s, c), s = (n_f x n_g) . e, c = n_f . n_g, so that
@@ -82,31 +83,34 @@ def folds(points: Floats, charts: QuadCharts) -> Block:
     faces = charts.faces_vertices
     p = points[faces]
     a, b = p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]
-    vector = np.cross(a, b)
+    vector = vector_product(a, b)
     size = np.linalg.norm(vector, axis=1)
     normal = vector / size[:, None]
     f, g = charts.neighbouring_facets.T
-    beside = faces[f, 1] == faces[g, 0]
-    ends = np.stack([np.where(beside, faces[f, 1], faces[f, 3]), faces[f, 2]], axis=1)
-    along = points[ends[:, 1]] - points[ends[:, 0]]
+    # the crease goes from the corner ``begin`` of f, the corner 0 of g, to the corner 2 of f
+    is_beside = faces[f, 1] == faces[g, 0]
+    begin = np.where(is_beside, 1, 3)
+    along = points[faces[f, 2]] - points[faces[f, begin]]
     length = np.linalg.norm(along, axis=1)[:, None]
     e, n, m = along / length, normal[f], normal[g]
-    both = np.cross(n, m)
+    both = vector_product(n, m)
     c, s = (np.einsum("nk,nk->n", *pair)[:, None] for pair in ((n, m), (both, e)))
     whole = c**2 + s**2
-    parts = []
+    by_diagonals = []
     for one, own, change in (
-        (f, n, c * np.cross(m, e) - s * m),
-        (g, m, c * np.cross(e, n) - s * n),
+        (f, n, c * vector_product(m, e) - s * m),
+        (g, m, c * vector_product(e, n) - s * n),
     ):
         change = change - own * np.einsum("nk,nk->n", own, change)[:, None]
         change = change / whole / size[one][:, None]
-        by_a, by_b = np.cross(b[one], change), np.cross(change, a[one])
-        parts += [-by_a, -by_b, by_a, by_b]
+        by_diagonals.append((vector_product(b[one], change), vector_product(change, a[one])))
+    (by_a, by_b), (of_a, of_b) = by_diagonals
     turn = c * (both - s * e) / whole / length
-    vertices = np.concatenate([faces[f], faces[g], ends], axis=1)
-    rho = np.arctan2(s[:, 0], c[:, 0])
-    return rho, vertices, np.stack([*parts, -turn, turn], axis=1)
+    of_b = np.where(is_beside[:, None], of_b, -of_b)  # by the corner of g at the end of the crease
+    by_vertex = np.stack([-by_a, -by_b, by_a + turn + of_b, by_b, of_a, -of_b], axis=1)
+    by_vertex[np.arange(len(f)), begin] -= turn + of_a
+    vertices = np.concatenate([faces[f], faces[g, 2][:, None], faces[g, begin][:, None]], axis=1)
+    return np.arctan2(s[:, 0], c[:, 0]), vertices, by_vertex
 
 
 def stacked(blocks: list[Block], size: int) -> tuple[Floats, sparse.csr_array]:

@@ -22,7 +22,7 @@ import numpy as np
 from scipy import sparse
 
 from miurafab.geometry.angles import sector_angles, sectors
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.quads import QuadCharts, QuadGrid
 
 
@@ -81,7 +81,7 @@ class OrigamiConstraints:
     def _planarity(self, points: Floats) -> tuple[Floats, Floats]:
         p = points[self.grid.faces_vertices]
         a, b, c = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]
-        bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
+        bc, ca, ab = vector_product(b, c), vector_product(c, a), vector_product(a, b)
         residual = np.einsum("fk,fk->f", a, bc) / self.length**3
         gradient = np.stack([-(bc + ca + ab), bc, ca, ab], axis=1) / self.length**3
         return residual, gradient

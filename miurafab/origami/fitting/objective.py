@@ -47,7 +47,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.fitting.blocks import (
@@ -71,8 +71,11 @@ from miurafab.origami.fitting.reach import Reach
 from miurafab.surfaces.surface import TargetSurface
 
 INACTIVE = 1e-30
-"""The weight of an inactive hinge: nothing, but not zero, so that the products of the Jacobian keep
-their pattern of entries and the order of elimination is found once."""
+"""The weight of a fold within its limits: nothing, but not zero. Every two vertices of a facet or
+of two neighbouring facets stand in the row of a fold, so that the products of the Jacobian keep
+their pattern of entries, and the order of elimination is found once. Other inactive hinges have no
+row.
+"""
 
 KAWASAKI = 10.0
 """The weight of Kawasaki's residual over that of a sector."""
@@ -158,7 +161,7 @@ class FairObjective:
             rim = rim_of_domain(surface, charts, nominal, cells)
         corners = start[charts.faces_vertices]
         area = np.linalg.norm(
-            np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1
+            vector_product(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1
         )
         if follow == "middle":
             followers, places, feet = charts.faces_vertices, nominal.centres, nominal.parameters
@@ -233,8 +236,8 @@ class FairObjective:
         alpha, corners, rows = corner_angles(points, faces)
         w = self.weights
         low, high = w.least_sector - alpha, alpha - w.greatest_sector
-        sign = np.where(high > 0, w.sectors, np.where(low > 0, -w.sectors, INACTIVE))
-        return sign * np.where(high > 0, high, -low), corners, sign[:, None, None] * rows
+        over = np.maximum(low, high)
+        return _hinge(w.sectors, over, corners, np.where(high > low, 1, -1)[:, None, None] * rows)
 
     def _folds(self, points: Floats) -> Iterator[Block]:
         """The fold in its own sense: one pressed past 180 degrees reads as more than that, and not
@@ -244,18 +247,19 @@ class FairObjective:
         rows = self.sense[:, None, None] * rows
         fold = (self.sense * rho + np.pi / 2) % (2 * np.pi) - np.pi / 2
         w = self.weights
-        yield _hinge(w.folds, w.least_fold - fold, vertices, -rows)
-        yield _hinge(w.folds, fold - w.greatest_fold, vertices, rows)
+        low, high = w.least_fold - fold, fold - w.greatest_fold
+        sign = np.where(high > 0, w.folds, np.where(low > 0, -w.folds, INACTIVE))
+        yield sign * np.where(high > 0, high, -low), vertices, sign[:, None, None] * rows
         yield _hinge(w.closed, fold - w.closed_fold, vertices, rows)
 
     def _convexity(self, points: Floats, faces: Ints) -> Block:
         p = points[faces]
         u, v, w = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]
-        a, b = np.cross(u, v), np.cross(v, w)
+        a, b = vector_product(u, v), vector_product(v, w)
         scale = (self.area / 2) ** 2
         h = _dot(a, b) / scale
-        by_u, by_w = np.cross(v, b), np.cross(a, v)
-        by_v = np.cross(b, u) + np.cross(w, a)
+        by_u, by_w = vector_product(v, b), vector_product(a, v)
+        by_v = vector_product(b, u) + vector_product(w, a)
         rows = np.stack([-(by_u + by_v + by_w), by_u, by_v, by_w], axis=1) / scale[:, None, None]
         return _hinge(self.weights.convexity / 4, 4 * self.weights.convex - h, faces, -rows)
 
@@ -293,9 +297,9 @@ def sense_of_folds(points: Floats, charts: QuadCharts) -> Floats:
 
 
 def _hinge(weight: float, over: Floats, vertices: Ints, gradient: Floats) -> Block:
-    """max(0, ``over``) times ``weight``; ``gradient`` is that of ``over``."""
-    active = np.where(over > 0, weight, INACTIVE)
-    return active * over, vertices, active[:, None, None] * gradient
+    """``weight`` times ``over`` where it is positive; ``gradient`` is that of ``over``."""
+    active = over > 0
+    return weight * over[active], vertices[active], weight * gradient[active]
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

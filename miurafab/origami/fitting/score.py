@@ -25,7 +25,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from miurafab.geometry.angles import angle_between
-from miurafab.geometry.arrays import Floats
+from miurafab.geometry.arrays import Floats, vector_product
 from miurafab.geometry.polygons import edge_lengths, facet_normals
 from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.fitting.nominal import Rim
@@ -77,7 +77,7 @@ def score(charts: QuadCharts, points: Floats, rim: Rim, deviation: float) -> Sco
     sectors = np.degrees(angle_between(ahead, behind))
     outside = np.maximum(45 - sectors, sectors - 135)
     area = np.linalg.norm(
-        np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1
+        vector_product(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1
     )
     normals = facet_normals(points, faces)
     f, g = charts.neighbouring_facets.T
@@ -109,5 +109,5 @@ def bow_ties(corners: Floats) -> Floats:
     for turn in (0, 1):
         p = np.roll(corners, -turn, axis=1)
         u, v, w = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]
-        crossed |= np.einsum("fk,fk->f", np.cross(u, v), np.cross(v, w)) <= 0
+        crossed |= np.einsum("fk,fk->f", vector_product(u, v), vector_product(v, w)) <= 0
     return crossed

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs, run_starts
+from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs, run_starts, vector_product
 from miurafab.geometry.boxes import meeting_pairs
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
@@ -91,7 +91,7 @@ class _Triangles:
     @classmethod
     def of(cls, points: Floats, triangles: Ints) -> _Triangles:
         corners = points[triangles]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = vector_product(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         size = float(sides.mean()) if len(sides) else 0.0
@@ -128,7 +128,7 @@ class _Triangles:
 
     def _cross(self, one: Ints, other: Ints, above: Floats, below: Floats) -> Bools:
         """Whether triangles that straddle each other's planes cross."""
-        line = np.cross(self.normals[one], self.normals[other])
+        line = vector_product(self.normals[one], self.normals[other])
         with np.errstate(invalid="ignore", divide="ignore"):
             line /= np.linalg.norm(line, axis=1, keepdims=True)
         origin = self.corners[one][:, :1]
@@ -146,7 +146,7 @@ class _Triangles:
         for here, there in ((one, other), (other, one)):
             for start, end in _SIDES:
                 a, b = self.corners[here[left]], self.corners[there[left]]
-                inward = np.cross(self.normals[here[left]], a[:, end] - a[:, start])
+                inward = vector_product(self.normals[here[left]], a[:, end] - a[:, start])
                 length = np.linalg.norm(inward, axis=1)
                 reach = np.einsum("nck,nk->nc", b - a[:, start][:, None], inward).max(axis=1)
                 left = left[reach > TOUCH * self.size * length]

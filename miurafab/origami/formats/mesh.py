@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.version import __version__
 
 FRONT, BACK = (0.90, 0.81, 0.62), (0.21, 0.40, 0.55)
@@ -38,7 +38,7 @@ def obj_text(points: Floats, faces: Ints, title: str = "") -> str:
 def stl_bytes(points: Floats, triangles: Ints) -> bytes:
     """The ``triangles`` (n, 3) of ``points`` (V, 3), mm, as a binary STL file."""
     corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = vector_product(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     record = np.dtype([("facet", "<f4", (4, 3)), ("attribute", "<u2")])
     rows = np.zeros(len(triangles), dtype=record)

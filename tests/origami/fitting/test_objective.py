@@ -33,7 +33,8 @@ def test_gradients_are_those_of_central_differences(term: str) -> None:
             for sign in (1, -1)
         )
         slope = (after - before) / (2 * step)
-        assert np.abs(jacobian @ move.ravel() - slope).max() < 1e-6 * max(1, np.abs(slope).max())
+        allowed = 1e-6 * max(1, np.abs(slope).max(initial=0))
+        assert np.abs(jacobian @ move.ravel() - slope).max(initial=0) < allowed
         active += int((values != 0).any())
     assert active >= 2
 
@@ -63,12 +64,30 @@ def test_a_fold_past_180_degrees_reads_as_more(kept: tuple[int, int], turned: fl
     values = [float(np.abs(value).sum()) for value, _, _ in objective._folds(at(angle))]
     assert values == pytest.approx(
         [
-            w.folds * max(0.0, w.least_fold - angle),
-            w.folds * max(0.0, angle - w.greatest_fold),
+            w.folds * max(0.0, w.least_fold - angle, angle - w.greatest_fold),
             w.closed * max(0.0, angle - w.closed_fold),
         ],
         abs=1e-9,
     )
+
+
+def test_a_fold_depends_on_six_vertices_that_differ() -> None:
+    _, vertices, _ = folds(SHAKEN, CHARTS)
+    assert vertices.shape == (len(CHARTS.neighbouring_facets), 6)
+    assert (np.diff(np.sort(vertices, axis=1), axis=1) > 0).all()
+
+
+def test_what_rests_within_its_limits_has_no_row() -> None:
+    """But the product of the Jacobian keeps an entry for every two vertices of neighbouring facets:
+    the order of elimination is found once.
+    """
+    values = [value for value, _, _ in OBJECTIVE._hinges(SHAKEN)]
+    assert len(values.pop(1)) == len(CHARTS.neighbouring_facets)
+    assert (np.concatenate(values) != 0).all()
+    _, jacobian = stacked(list(OBJECTIVE._hinges(SHAKEN)), SHAKEN.size)
+    product = (abs(jacobian).T @ abs(jacobian)).toarray().reshape(len(SHAKEN), 3, -1, 3)
+    six = folds(SHAKEN, CHARTS)[1]
+    assert (product[six[:, :, None], :, six[:, None, :]] > 0).all()
 
 
 def test_folds_have_the_sense_of_a_miura_tessellation() -> None:
