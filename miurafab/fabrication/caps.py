@@ -22,7 +22,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import scipy.optimize
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.borders import OpenBorder, chosen
@@ -156,6 +155,8 @@ def _apex(pattern: CreasePattern, rim: Floats, border: OpenBorder) -> Floats:
     if excess(0.0) <= 1e-12:
         return np.asarray(middle)
     far = FARTHEST * float(np.linalg.norm(arms, axis=1).max())
+    import scipy.optimize
+
     height = scipy.optimize.brentq(excess, 0.0, far, xtol=1e-13, rtol=1e-15)
     return np.asarray(middle + height * normal)
 

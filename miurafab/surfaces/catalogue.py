@@ -14,7 +14,6 @@ from typing import Any
 from miurafab.errors import TargetError
 from miurafab.options import Quantity, angle, number
 from miurafab.surfaces import analytic, curves
-from miurafab.surfaces.profile_files import read_profile
 from miurafab.surfaces.surface import TargetSurface
 
 
@@ -265,6 +264,8 @@ def make_surface(name: str, given: Mapping[str, Any]) -> tuple[TargetSurface, di
     written: dict[str, Any] = {key: p.default for key, p in entry.parameters.items()}
     for key, text in given.items():
         if key == "profile" and entry.profile_axes is not None:
+            from miurafab.surfaces.profile_files import read_profile
+
             written["profile"] = read_profile(Path(text)) if isinstance(text, str) else text
             continue
         if key not in entry.parameters:

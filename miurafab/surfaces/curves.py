@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from miurafab.errors import TargetError
 from miurafab.geometry.arrays import Floats
@@ -133,6 +132,8 @@ def spline(points: Sequence[Sequence[float]]) -> ProfileCurve:
     along = np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum()
     if not (np.diff(along) > 0).all():
         raise TargetError("The points of the profile are too far apart, or too near each other.")
+    from scipy.interpolate import CubicSpline
+
     through = CubicSpline(along, given)
 
     def position(t: Floats) -> Floats:

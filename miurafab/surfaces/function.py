@@ -13,10 +13,9 @@ import reprlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import NdBSpline, make_interp_spline
 
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
@@ -31,6 +30,9 @@ from miurafab.surfaces.surface import (
     patch_tiles,
     tangents,
 )
+
+if TYPE_CHECKING:
+    from scipy.interpolate import NdBSpline
 
 SAMPLES = (17, 33, 65)
 """Samples to a side that are tried in turn, until the spline follows the function."""
@@ -73,6 +75,8 @@ class SampledSurface:
     @cached_property
     def spline(self) -> NdBSpline:
         """The spline from (u, v) to space."""
+        from scipy.interpolate import NdBSpline, make_interp_spline
+
         span, (rows, columns) = self.span, self.points.shape[:2]
         across = make_interp_spline(np.linspace(span.v0, span.v1, rows), self.points)
         along = make_interp_spline(np.linspace(span.u0, span.u1, columns), across.c, axis=1)

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import NdBSpline
 
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
@@ -55,6 +54,8 @@ from miurafab.surfaces.topology import classify
 from miurafab.surfaces.tube import TubeSurface
 
 if TYPE_CHECKING:
+    from scipy.interpolate import NdBSpline
+
     from miurafab.surfaces.outline import WholeMesh
 
 ROUGH = 0.03

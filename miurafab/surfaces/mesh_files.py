@@ -13,6 +13,7 @@ import hashlib
 import importlib
 import io
 import logging
+import sys
 import tempfile
 import zlib
 from collections.abc import Iterator
@@ -20,7 +21,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-import trimesh
 
 from miurafab.errors import TargetError
 from miurafab.files import MOST_MESH_BYTES, read_bytes, write_draft
@@ -98,7 +98,8 @@ def _checked(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
 
 def is_mesh(value: object) -> bool:
     """Whether ``value`` comes from trimesh: a mesh, a scene or a point cloud."""
-    return isinstance(value, trimesh.parent.Geometry)
+    trimesh = sys.modules.get("trimesh")  # whoever holds its mesh has imported it
+    return trimesh is not None and isinstance(value, trimesh.parent.Geometry)
 
 
 def arrays_of(mesh: object, name: str) -> tuple[Floats, Ints]:
@@ -106,6 +107,8 @@ def arrays_of(mesh: object, name: str) -> tuple[Floats, Ints]:
 
     Raises :class:`~miurafab.errors.TargetError` for a point cloud and for a scene.
     """
+    import trimesh
+
     if isinstance(mesh, trimesh.PointCloud):
         raise TargetError(f"{name} is a point cloud and not a surface; {FROM_POINTS}")
     if not isinstance(mesh, trimesh.Trimesh):
@@ -128,6 +131,8 @@ def _triangles(content: bytes, suffix: str, name: str) -> tuple[Floats, Ints]:
 
 
 def _by_trimesh(content: bytes, kind: str, name: str) -> tuple[Floats, Ints]:
+    import trimesh
+
     with _silent():
         mesh: object = trimesh.load_mesh(io.BytesIO(content), file_type=kind, process=False)
         if not len(getattr(mesh, "faces", ())):  # load_mesh drops the points of a point cloud

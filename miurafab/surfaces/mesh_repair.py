@@ -11,7 +11,6 @@ import math
 from typing import Literal
 
 import numpy as np
-import trimesh
 
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
@@ -208,6 +207,8 @@ def even_triangles(vertices: Floats, faces: Ints) -> Floats:
     limit = max(3 * float(np.median(longest)), extent / 80)
     if longest.max() <= limit:
         return corners
+    import trimesh
+
     points, split = trimesh.remesh.subdivide_to_size(vertices, faces, limit, max_iter=24)
     return np.asarray(np.asarray(points, dtype=np.float64)[np.asarray(split)])
 

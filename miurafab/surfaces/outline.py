@@ -21,9 +21,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import NdBSpline
 from scipy.spatial import cKDTree
 
 from miurafab.errors import TargetError
@@ -36,6 +36,9 @@ from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.placement import turned
 from miurafab.surfaces.smoothing import continued, smooth
 from miurafab.surfaces.surface import Domain, gauss_newton, normal_to, unit
+
+if TYPE_CHECKING:
+    from scipy.interpolate import NdBSpline
 
 LEAST_SHARE = 0.05
 """A cell with a smaller part inside the outline is not kept."""

@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import trimesh
 from scipy import sparse
 
 from miurafab.geometry.arrays import Floats, Ints
@@ -109,6 +108,8 @@ def open_at(
     """
     for k in range(len(distances)):
         vertices, faces, distances = _cut_at(vertices, faces, distances, k, radius)
+    import trimesh
+
     neighbours = trimesh.graph.face_adjacency(faces)
     label = trimesh.graph.connected_component_labels(neighbours, node_count=len(faces))
     largest = faces[label == np.argmax(np.bincount(label))]

@@ -13,14 +13,17 @@ Simul. 18, 1989). Exact data give almost no stiffness.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
-from scipy.interpolate import BSpline, NdBSpline
 
 from miurafab.geometry.arrays import Floats
 from miurafab.geometry.sparse import factor_symmetric
 from miurafab.surfaces.surface import Domain
+
+if TYPE_CHECKING:
+    from scipy.interpolate import NdBSpline
 
 _DEGREE = 3
 _PROBES = 8
@@ -61,6 +64,8 @@ def smooth(
         else _knots(domain.u0, domain.u1, spans[0]),
         _knots(domain.v0, domain.v1, spans[1]),
     ]
+    from scipy.interpolate import BSpline, NdBSpline
+
     basis = _rows_of_products(
         *(BSpline.design_matrix(places[:, k], knots[k], _DEGREE) for k in (0, 1))
     )
@@ -151,6 +156,8 @@ def _products(knots: Floats) -> list[sparse.csr_array]:
     at = (edges[:-1, None] + half * (1 + nodes)).ravel()
     weight = (half * weights).ravel()
     count = len(knots) - _DEGREE - 1
+    from scipy.interpolate import BSpline
+
     basis = BSpline(knots, np.eye(count), _DEGREE)
     derivatives = [basis(at, nu=order) for order in range(3)]
     return [sparse.csr_array(d.T @ (weight[:, None] * d)) for d in derivatives]

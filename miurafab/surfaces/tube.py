@@ -17,10 +17,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import NdBSpline, PchipInterpolator
 
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints, vector_product
@@ -29,6 +28,9 @@ from miurafab.surfaces.harmonic import CylinderMap, cylinder_map
 from miurafab.surfaces.smoothing import continued, smooth
 from miurafab.surfaces.surface import Domain, ParametricSurface, normal_to, tangents
 from miurafab.surfaces.tube_figures import TubeFigures, figures
+
+if TYPE_CHECKING:
+    from scipy.interpolate import NdBSpline, PchipInterpolator
 
 NARROWING = 0.5
 """The row spacing grows like the girth to this power. Gores of a pin, 8 x (4 x 36), lie 0.46 % of
@@ -154,6 +156,8 @@ def _places(vertices: Floats, faces: Ints, mapped: CylinderMap) -> tuple[PchipIn
     The mean of 1 / |grad v| over one turn is summed at levels of v that part the area evenly. In a
     triangle the level is a line, and its share of the turn is the part of u along it.
     """
+    from scipy.interpolate import PchipInterpolator
+
     corners = vertices[faces]
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     cross = vector_product(e1, e2)

@@ -295,6 +295,18 @@ def test_the_module_runs_as_a_process_and_starts_light():
     assert done.stderr == "miurafab: gone.fold does not exist.\n"
 
 
+def test_slow_libraries_are_loaded_when_they_are_needed():
+    """Each takes a tenth of a second or more, and most commands need none of them."""
+    code = (
+        "import sys, miurafab as mf\n"
+        "mf.fit, mf.check, mf.sheets, mf.preview, mf.cut, mf.fold, mf.convert\n"
+        "slow = {'trimesh', 'ezdxf', 'scipy.interpolate', 'scipy.optimize', 'matplotlib'}\n"
+        "print(slow & set(sys.modules))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("set()\n", "")
+
+
 def test_every_drawing_is_reached_by_sheets_and_goes_with_its_job(run, tmp_path):
     fold, job = tmp_path / "small.fold", tmp_path / "job"
     assert run("fit", "plane", "--facets", "6x6", "--size", "80mm", "-o", fold).returncode == 0

@@ -10,9 +10,6 @@ from __future__ import annotations
 import io
 
 import numpy as np
-from ezdxf import units
-from ezdxf.addons.r12writer import r12writer
-from ezdxf.filemanagement import new
 
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.profiles import OPERATIONS
@@ -45,6 +42,8 @@ def _r12(toolpath: Toolpath) -> str:
     points = np.round(toolpath.points, _DECIMALS)
     lines = np.concatenate([points[:-1][within], points[1:][within]], axis=1).tolist()
     heads = [f"0\nLINE\n8\n{name}\n62\n{_COLOUR_INDEX[name]}\n" for name in OPERATIONS]
+    from ezdxf.addons.r12writer import r12writer
+
     stream = io.StringIO()
     with r12writer(stream):
         # The writer's add_line takes three times as long.
@@ -58,6 +57,9 @@ def _r12(toolpath: Toolpath) -> str:
 
 
 def _r2010(toolpath: Toolpath) -> str:
+    from ezdxf import units
+    from ezdxf.filemanagement import new
+
     document = new("R2010", units=units.MM)
     for name in OPERATIONS:
         document.layers.add(name, color=_COLOUR_INDEX[name])

@@ -21,7 +21,6 @@ the facets between them, so unused room moves to where room is missing.
 from __future__ import annotations
 
 import numpy as np
-import scipy.optimize
 import scipy.spatial
 
 from miurafab.fabrication.partition.fit_box import boxes_at
@@ -234,6 +233,8 @@ class Relaxation:
 
     def descended(self, rectangles: Floats, steps: int) -> Floats:
         """The rectangles at a minimum of L over the rectangles that are near each facet now."""
+        import scipy.optimize
+
         found = scipy.optimize.minimize(
             self._loss,
             (rectangles / UNITS).ravel(),

@@ -25,7 +25,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
 import scipy.sparse
 from scipy.sparse.csgraph import connected_components
 
@@ -97,6 +96,8 @@ def match(nodes: Ints, positions: Floats) -> tuple[Ints, float]:
     """Pairs (n / 2, 2) of an even number of ``nodes`` (n,), and a lower bound of their length in
     mm (0 where the nodes were halved).
     """
+    import scipy.optimize
+
     if len(nodes) > _ASSIGNED:
         points = positions[nodes]
         axis = int(np.argmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
