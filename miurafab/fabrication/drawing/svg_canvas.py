@@ -46,7 +46,7 @@ class SvgPath:
 
 
 @dataclass(frozen=True)
-class _Look:
+class _Brush:
     """The state of a canvas that is kept and restored."""
 
     fill: str = "#000000"
@@ -65,8 +65,8 @@ class SvgCanvas:
     def __init__(self) -> None:
         self._parts: list[str] = []
         self._open: list[int] = []
-        self._look = _Look()
-        self._kept: list[_Look] = []
+        self._look = _Brush()
+        self._kept: list[_Brush] = []
 
     def text(self, x: float, y: float, width: float, height: float, title: str) -> str:
         """The SVG of what lies in a box of the page, in mm; ``title`` says what it shows."""
