@@ -167,8 +167,7 @@ class MeshChart:
 @dataclass(frozen=True, eq=False)
 class MeshSurface:
     """A rectangle of a mesh. ``spline`` maps a little more than ``domain`` to space; ``triangles``
-    (T, 3, 3) are the mesh itself. ``findings`` are about the mesh and its repair;
-    ``free`` whether the rectangle may be laid elsewhere.
+    (T, 3, 3) are the mesh itself. ``free`` says whether the rectangle may be laid elsewhere.
     """
 
     spline: NdBSpline
