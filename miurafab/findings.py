@@ -107,7 +107,7 @@ RULES = {
     "untabbed": Rule(
         "warning", "edges of seams, or of open borders with tabs, without room for one"
     ),
-    "unlettered": Rule("warning", "names and numbers without room on the sheets"),
+    "unlettered": Rule("warning", "names and labels without room on the sheets"),
     # A job, judged without a machine (miurafab.machine.judge_job)
     "lines": Rule("refusal", "a line too long for the controller, or not printable ASCII"),
     "program": _check(

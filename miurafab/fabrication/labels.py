@@ -12,16 +12,22 @@ necessary.
 The label of a tab is engraved on the tab, followed by M or V if its fold is a mountain or a valley,
 and on the facet to which it is glued, at the place that the tab covers. A patch name is engraved
 where no tab will be. If there is no room for label and M or V, this letter is left out first.
+
+The front of a sheet is the show side. A tab goes behind the facet that it is glued to, so its own
+front and the back of that facet are hidden once it is glued. What is engraved on the back runs the
+other way, so that it reads from there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from miurafab.fabrication.lettering import text_strokes, text_width
+from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.tabs import NO_LIMIT, TabRegions, clip_convex
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
@@ -40,22 +46,70 @@ MARKED = ("M", "V")
 """The assignments of folds that are engraved after the label of a tab."""
 
 
+@dataclass(frozen=True)
+class Sides:
+    """Whether the names of patches, the labels of tabs, and those on the facets over them are
+    engraved on the front or the back; None: not at all.
+    """
+
+    names: str | None
+    tabs: str | None
+    facets: str | None
+
+
+def sides_of(options: LayoutOptions) -> Sides:
+    """The sides that ``options`` ask for."""
+    if options.marks == "tabs":
+        return Sides(None, "front", "back" if options.two_sided else None)
+    side = None if options.marks == "none" else options.marks
+    return Sides(side, side, side)
+
+
 @dataclass(frozen=True, eq=False)
 class PlacedText:
-    """A text on a patch, its ``strokes`` (n, 2) in mm in the pattern's plane."""
+    """A ``text`` on a patch, in mm in the pattern's plane: centred on ``centre`` (2,), written
+    along the unit vector ``along`` (2,), its capitals ``height`` mm high, 0 where it has no room.
+    ``side`` is ``front`` or ``back``, or None if it is not engraved.
+    """
 
     patch: int
     text: str
-    strokes: tuple[Floats, ...]
+    centre: Floats
+    along: Floats
+    height: float
+    side: str | None
+
+    @cached_property
+    def strokes(self) -> tuple[Floats, ...]:
+        """The strokes (n, 2) of its letters."""
+        across = np.array([-self.along[1], self.along[0]]) * (-1.0 if self.side == "back" else 1.0)
+        frame = self.height * np.stack([self.along, across])
+        return tuple(self.centre + stroke @ frame for stroke in text_strokes(self.text))
+
+
+@dataclass(frozen=True)
+class AbsentLabel:
+    """A text that is not engraved, for the guide: its place in the frame of its patch in mm, the
+    direction in which it would run, and the height of its capitals, 0 where it has no room.
+    """
+
+    patch: int
+    text: str
+    x_mm: float
+    y_mm: float
+    rotation_deg: float
+    height_mm: float
 
 
 @dataclass(frozen=True, eq=False)
 class Lettering:
-    """The ``texts`` of all patches, the number ``left_out`` for lack of room, and the number of
-    tabs ``unmarked``, without the letter of their fold.
+    """The ``texts`` that are engraved, those that are ``absent`` from the sheets, the number
+    ``left_out`` for lack of room, and the number of tabs ``unmarked``, without the letter of their
+    fold. An absent text with the letter of a fold may stand on the sheet without it.
     """
 
     texts: list[PlacedText]
+    absent: list[PlacedText]
     left_out: int
     unmarked: int
 
@@ -89,6 +143,7 @@ def place_texts(
     tabs: TabRegions,
     labels: Sequence[str],
     turns: Floats,
+    sides: Sides,
 ) -> Lettering:
     """The texts of all patches.
 
@@ -96,68 +151,84 @@ def place_texts(
     ``labels`` (N) the labels of the ``tabs``, and ``turns`` (P,) the angles by which patches are
     turned later: texts are upright after that.
     """
-    texts, left_out, unmarked = _tab_labels(face_patch, tabs, labels, turns)
-    spots = _facet_spots(pattern, tabs, turns[face_patch])
+    found, bare = _tab_labels(face_patch, tabs, labels, turns, sides)
+    found += _patch_names(pattern, face_patch, names, tabs, turns, sides.names)
+    return Lettering(
+        texts=[text for text in found if text.side and text.height],
+        absent=[text for text in found if not text.side or not text.height] + bare,
+        left_out=sum(text.side is not None and not text.height for text in found),
+        unmarked=len(bare),
+    )
+
+
+def _patch_names(
+    pattern: CreasePattern,
+    face_patch: Ints,
+    names: Sequence[str],
+    tabs: TabRegions,
+    turns: Floats,
+    side: str | None,
+) -> list[PlacedText]:
+    """The name of each patch on its roomiest facet."""
+    spots = _facet_spots(pattern, tabs, turns[face_patch], side)
     width = np.array([text_width(name) for name in names])
     height = np.minimum(spots.height(width[face_patch]), NAME_MM[1])
+    texts = []
     for patch, name in enumerate(names):
         faces = np.flatnonzero(face_patch == patch)
         far = np.linalg.norm(spots.centre[faces] - spots.centre[faces].mean(axis=0), axis=1)
         # Of places equal up to rounding the first is taken, so that rounding decides nothing.
         face = int(faces[np.lexsort((np.round(far, 3), -np.round(height[faces], 3)))[0]])
-        if height[face] < NAME_MM[0]:
-            left_out += 1
-            continue
-        centre, along = spots.centre[face], spots.along[face]
-        texts.append(_written(patch, name, centre, along, float(height[face])))
-    return Lettering(texts, left_out, unmarked)
+        size = float(height[face]) if height[face] >= NAME_MM[0] else 0.0
+        texts.append(PlacedText(patch, name, spots.centre[face], spots.along[face], size, side))
+    return texts
 
 
 def _tab_labels(
-    face_patch: Ints, tabs: TabRegions, labels: Sequence[str], turns: Floats
-) -> tuple[list[PlacedText], int, int]:
-    """The label of each tab on the tab and on the facet under it, the count of labels without
-    room, and the count of tabs without room for the letter.
+    face_patch: Ints, tabs: TabRegions, labels: Sequence[str], turns: Floats, sides: Sides
+) -> tuple[list[PlacedText], list[PlacedText]]:
+    """The label of each tab on the tab and on the facet over it, and the whole labels of the tabs
+    on which the letter of the fold has no room.
     """
     texts: list[PlacedText] = []
-    left_out = unmarked = 0
+    bare: list[PlacedText] = []
     if not len(tabs):
-        return texts, left_out, unmarked
-    words = list(labels)
+        return texts, bare
     folds = tabs.seams.fold.tolist()
-    marked = [w + f if f in MARKED else w for w, f in zip(words, folds, strict=True)]
+    marked = [w + f if f in MARKED else w for w, f in zip(labels, folds, strict=True)]
     glued = np.flatnonzero(tabs.mate_face >= 0)
-    mates = tabs.take(glued)
-    for faces, points, present, wanted in (
-        (tabs.own_face, tabs.points, tabs.present, marked),
-        (mates.mate_face, mates.glued, mates.present, [words[tab] for tab in glued.tolist()]),
+    mates, under = tabs.take(glued), [labels[k] for k in glued.tolist()]
+    for side, faces, points, present, whole, short in (
+        (sides.tabs, tabs.own_face, tabs.points, tabs.present, marked, list(labels)),
+        (sides.facets, mates.mate_face, mates.glued, mates.present, under, under),
     ):
         patch, base = face_patch[faces], points[:, 1] - points[:, 0]
-        spots = _spots(points, present, _upright(base, turns[patch]))
-        shown, height = list(wanted), spots.height(np.array([text_width(word) for word in wanted]))
-        alone = [word.rstrip("MV") for word in wanted]
-        bare = spots.height(np.array([text_width(word) for word in alone]))
-        for tab in np.flatnonzero((height < LABEL_MM[0]) & (bare >= LABEL_MM[0])).tolist():
-            shown[tab], height[tab] = alone[tab], bare[tab]
-            unmarked += 1
-        height = np.minimum(height, LABEL_MM[1])
-        room = height >= LABEL_MM[0]
-        left_out += int((~room).sum())
-        for tab in np.flatnonzero(room).tolist():
-            centre, along = spots.centre[tab], spots.along[tab]
-            texts.append(_written(int(patch[tab]), shown[tab], centre, along, float(height[tab])))
-    return texts, left_out, unmarked
+        spots = _spots(points, present, _upright(base, turns[patch], side))
+        room = spots.height(np.array([text_width(word) for word in whole]))
+        without = spots.height(np.array([text_width(word) for word in short]))
+        shorter = (room < LABEL_MM[0]) & (without >= LABEL_MM[0])
+        height = np.minimum(np.where(shorter, without, room), LABEL_MM[1])
+        height[height < LABEL_MM[0]] = 0.0
+        for tab, size in enumerate(height.tolist()):
+            word = short[tab] if shorter[tab] else whole[tab]
+            place = spots.centre[tab], spots.along[tab]
+            texts.append(PlacedText(int(patch[tab]), word, *place, size, side))
+            if shorter[tab]:
+                bare.append(replace(texts[-1], text=whole[tab], height=0.0))
+    return texts, bare
 
 
-def _facet_spots(pattern: CreasePattern, tabs: TabRegions, turns: Floats) -> _Spots:
+def _facet_spots(
+    pattern: CreasePattern, tabs: TabRegions, turns: Floats, side: str | None
+) -> _Spots:
     """A place in each facet, along its longest side, outside of the tabs that cover it."""
     corners = pattern.faces_vertices
     points, count = pattern.vertices_coords[corners], (corners >= 0).sum(axis=1)
     ends = pattern.vertices_coords[pattern.edges_vertices[pattern.faces_edges]]
-    side = ends[:, :, 1] - ends[:, :, 0]
+    step = ends[:, :, 1] - ends[:, :, 0]
     # Of sides equal up to rounding the first is taken, so that rounding decides nothing.
-    length = np.where(corners >= 0, np.round(np.linalg.norm(side, axis=2), 6), -1.0)
-    longest = side[np.arange(len(corners)), length.argmax(axis=1)]
+    length = np.where(corners >= 0, np.round(np.linalg.norm(step, axis=2), 6), -1.0)
+    longest = step[np.arange(len(corners)), length.argmax(axis=1)]
 
     left = np.flatnonzero(tabs.mate_face >= 0)
     while len(left):
@@ -173,7 +244,7 @@ def _facet_spots(pattern: CreasePattern, tabs: TabRegions, turns: Floats) -> _Sp
         points, count = clip_convex(points, count, normal, limit)
         left = np.delete(left, first)
     present = np.arange(points.shape[1]) < count[:, None]
-    return _spots(points, present, _upright(longest, turns))
+    return _spots(points, present, _upright(longest, turns, side))
 
 
 def _spots(points: Floats, present: Bools, along: Floats) -> _Spots:
@@ -192,16 +263,12 @@ def _spots(points: Floats, present: Bools, along: Floats) -> _Spots:
     return _Spots(centre, along, normal, depth)
 
 
-def _upright(along: Floats, turns: Floats) -> Floats:
+def _upright(along: Floats, turns: Floats, side: str | None) -> Floats:
     """The unit directions of ``along`` (N, 2), reversed if the text, turned by ``turns`` (N,),
-    would run to the left. Within 10 degrees of vertical it runs upwards.
+    would run to the left as seen from its ``side``. Within 10 degrees of vertical it runs upwards.
     """
     along = along / np.linalg.norm(along, axis=1)[:, None]
-    tilted = turns - np.radians(10.0)
-    forward = np.cos(tilted) * along[:, 0] - np.sin(tilted) * along[:, 1]
+    seen = -1.0 if side == "back" else 1.0
+    tilted = turns - seen * np.radians(10.0)
+    forward = seen * (np.cos(tilted) * along[:, 0] - np.sin(tilted) * along[:, 1])
     return np.where(forward[:, None] < -1e-9, -along, along)
-
-
-def _written(patch: int, text: str, centre: Floats, along: Floats, height: float) -> PlacedText:
-    frame = height * np.stack([along, np.array([-along[1], along[0]])])
-    return PlacedText(patch, text, tuple(centre + stroke @ frame for stroke in text_strokes(text)))

@@ -21,6 +21,7 @@ import numpy as np
 from miurafab.errors import LayoutError, is_plain
 from miurafab.fabrication.borders import OpenBorder
 from miurafab.fabrication.kit.plan import kit_table, read_kit
+from miurafab.fabrication.labels import AbsentLabel
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.sheets import Layout, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
@@ -43,6 +44,7 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
         "sheets": [dataclasses.asdict(sheet) for sheet in layout.sheets],
         "patches": [_patch_table(patch) for patch in layout.patches],
         "borders": [dataclasses.asdict(border) for border in layout.borders],
+        "absent_labels": [dataclasses.asdict(label) for label in layout.absent],
         **({} if layout.kit is None else {"kit": kit_table(layout.kit)}),
         "totals": dataclasses.asdict(layout.totals),
         "findings": findings_json(layout.findings),
@@ -88,6 +90,7 @@ def read_layout(text: str, where: object = "The layout") -> Layout:
             totals=_totals(document["totals"]),
             findings=tuple(map(finding_from_json, document.get("findings", ()))),
             borders=tuple(map(_border, document.get("borders", ()))),
+            absent=tuple(map(_absent, document.get("absent_labels", ()))),
             kit=read_kit(document["kit"]) if "kit" in document else None,
         )
 
@@ -199,6 +202,11 @@ def _totals(table: dict[str, Any]) -> Totals:
 
 def _border(table: dict[str, Any]) -> OpenBorder:
     return OpenBorder(**{**table, "edges": tuple(map(int, table["edges"]))})
+
+
+def _absent(table: dict[str, Any]) -> AbsentLabel:
+    numbers = (_number(table[key]) for key in ("x_mm", "y_mm", "rotation_deg", "height_mm"))
+    return AbsentLabel(int(table["patch"]), _text(table["text"]), *numbers)
 
 
 def _text(value: object) -> str:

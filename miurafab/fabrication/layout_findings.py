@@ -73,8 +73,8 @@ def layout_findings(
         findings.append(Finding("unassigned-creases", sentence))
     findings += _untabbed(pattern, framed.outlined.untabbed, options)
     if lettering.left_out:
-        names = count(lettering.left_out, "name or number", "names and numbers")
-        sentence = f"{names} found no room on the sheets: go by the pictures of the assembly guide."
+        names = count(lettering.left_out, "name or label", "names and labels")
+        sentence = f"{names} found no room on the sheets: the guide shows them at the sheets."
         findings.append(Finding("unlettered", sentence))
     return tuple(findings)
 

@@ -29,6 +29,7 @@ from miurafab.options import (
 from miurafab.profiles import GRAINS
 
 TAB_SIDES = ("lower", "upper", "alternate")
+MARKS = ("front", "back", "tabs", "none")
 BRIDGE_MM = 0.5
 LINES = Whole(1, 10**6)
 """A line of the vertex grid, from 1: the number of facets before it."""
@@ -201,6 +202,14 @@ class LayoutOptions(Shown):
         "report gives.",
         (),
         group="Tabs",
+        page="more",
+    )
+    marks: str = option(
+        Choice(MARKS),
+        "Where names and labels are engraved. The front is the show side; back: from a file of "
+        "its own for the back; tabs: only where gluing hides them; none: in the guide alone.",
+        MARKS[0],
+        group="Cutting",
         page="more",
     )
     two_sided: bool = option(

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from miurafab.fabrication.labels import Lettering, place_texts
-from miurafab.fabrication.partition.patch_frame import Patch
+from miurafab.fabrication.labels import AbsentLabel, Lettering, place_texts, sides_of
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.partition.patch_frame import DIGITS, Patch
 from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.strokes import RigidTransform
 from miurafab.geometry.arrays import Ints
@@ -42,16 +43,31 @@ def texts_of(
     labels: Sequence[str],
     patches: Sequence[Patch],
     motion: RigidTransform,
+    options: LayoutOptions,
 ) -> Lettering:
     """The texts of all copies, upright on their sheets; ``labels`` (N) are those of the tabs."""
+    sides = sides_of(options)
     count = len(outlined.patches)
     turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
-    texts, left_out, unmarked = [], 0, 0
+    texts, absent, left_out, unmarked = [], [], 0, 0
     for first in range(0, len(patches), count):
         names = [patch.label for patch in patches[first : first + count]]
         own = turns[first : first + count]
-        found = place_texts(pattern, outlined.face_patch, names, outlined.tabs, labels, own)
+        found = place_texts(pattern, outlined.face_patch, names, outlined.tabs, labels, own, sides)
         texts += [replace(text, patch=text.patch + first) for text in found.texts]
+        absent += [replace(text, patch=text.patch + first) for text in found.absent]
         left_out += found.left_out
         unmarked += found.unmarked
-    return Lettering(texts, left_out, unmarked)
+    return Lettering(texts, absent, left_out, unmarked)
+
+
+def absent_labels(lettering: Lettering, patches: Sequence[Patch]) -> tuple[AbsentLabel, ...]:
+    """The absent texts of ``lettering`` in the frames of their ``patches``, in order."""
+    found = []
+    for text in lettering.absent:
+        patch = patches[text.patch]
+        (x, y), ahead = patch.from_pattern(np.stack([text.centre, text.centre + text.along]))
+        angle = float(np.degrees(np.arctan2(ahead[1] - y, ahead[0] - x)))
+        place = (round(float(value), DIGITS) for value in (x, y, angle, text.height))
+        found.append(AbsentLabel(text.patch, text.text, *place))
+    return tuple(sorted(found, key=lambda each: (each.patch, each.text, each.x_mm, each.y_mm)))

@@ -19,6 +19,7 @@ import shapely
 from miurafab.errors import LayoutError
 from miurafab.fabrication.kerf import cut_lines
 from miurafab.fabrication.kit.plan import folders_kit
+from miurafab.fabrication.labels import AbsentLabel
 from miurafab.fabrication.nesting import turned
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.boundary import boundaries
@@ -28,7 +29,7 @@ from miurafab.fabrication.partition.patch_outline import (
     OutlinedPatches,
     rings_of,
 )
-from miurafab.fabrication.placing import motion_of, texts_of
+from miurafab.fabrication.placing import absent_labels, motion_of, texts_of
 from miurafab.fabrication.route.order import StrokeSet
 from miurafab.fabrication.seams import Seams, all_seams
 from miurafab.fabrication.sheets import Layout, worked
@@ -60,10 +61,11 @@ def retraced(
     outlined, labels, motion = patches_on_sheets(layout, pattern)
     margin = options.nesting.margin_mm
     margin = machine.bed.margin_mm if margin is None else margin
+    lettering = texts_of(pattern, outlined, labels, layout.patches, motion, options)
     drawn = sheet_strokes(
         pattern,
         outlined,
-        texts_of(pattern, outlined, labels, layout.patches, motion).texts,
+        lettering.texts,
         motion,
         material,
         [Blank(each.name, each.width_mm, each.height_mm, margin) for each in layout.sheets],
@@ -77,12 +79,23 @@ def retraced(
     faults = [*_tab_faults(pattern, outlined, labels), *_seam_faults(layout, pattern, outlined)]
     if layout.kit is not None and layout.kit != folders_kit(pattern):
         faults.append("The rows and angles of the folder's kit are not those of the pattern.")
+    if not _same_labels(layout.absent, absent_labels(lettering, layout.patches)):
+        faults.append("The labels that the layout calls absent are not those without room.")
     right = cut_lines([made.rings for made in outlined.patches], material.kerf_mm)
     for patch, made, lines in zip(layout.model.patches, outlined.patches, right, strict=True):
         told, own = (shapely.Polygon(each[0], each[1:]) for each in (made.cut_lines, lines))
         if not told.is_valid or told.symmetric_difference(own).area > NEAR_MM * own.length:
             faults.append(f"The outline of {patch.label} does not surround its facets and tabs.")
     return passes, faults
+
+
+def _same_labels(told: tuple[AbsentLabel, ...], own: tuple[AbsentLabel, ...]) -> bool:
+    names, places = (
+        [[(each.patch, each.text) for each in labels] for labels in (told, own)],
+        [[(each.x_mm, each.y_mm, each.height_mm) for each in labels] for labels in (told, own)],
+    )
+    near = names[0] == names[1] and np.allclose(places[0], places[1], rtol=0, atol=NEAR_MM)
+    return bool(near)
 
 
 def patches_on_sheets(

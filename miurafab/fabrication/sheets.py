@@ -20,6 +20,7 @@ from miurafab.display import Shown
 from miurafab.fabrication.borders import OpenBorder, open_borders
 from miurafab.fabrication.caps import capped
 from miurafab.fabrication.kit.plan import FoldersKit, folders_kit
+from miurafab.fabrication.labels import AbsentLabel
 from miurafab.fabrication.layout_findings import layout_findings
 from miurafab.fabrication.nesting import Nesting, Problem, Ring, nest, turned
 from miurafab.fabrication.open_ring import opened
@@ -31,7 +32,7 @@ from miurafab.fabrication.partition.patch_frame import (
     frame_patches,
 )
 from miurafab.fabrication.partition.patch_outline import OutlinedPatches
-from miurafab.fabrication.placing import motion_of, texts_of
+from miurafab.fabrication.placing import absent_labels, motion_of, texts_of
 from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
 from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.stock import LaidStock, lay_stock
@@ -128,6 +129,8 @@ class Layout(Shown):
         For the assembly: options that could not be honoured, and everything that has no room.
     borders : tuple of OpenBorder
         The borders that the glued shell leaves open.
+    absent : tuple of AbsentLabel
+        The names and labels that are not engraved, for the guide.
     kit : FoldersKit or None
         The rows to fold and the gauge of their angles; None for a layout without a pattern.
     """
@@ -139,6 +142,7 @@ class Layout(Shown):
     totals: Totals
     findings: tuple[Finding, ...] = ()
     borders: tuple[OpenBorder, ...] = ()
+    absent: tuple[AbsentLabel, ...] = ()
     kit: FoldersKit | None = None
 
     def _summary(self) -> str:
@@ -239,7 +243,7 @@ def lay_out(
     )
     sheets, placements = _sheets(nesting, patches, stock)
     motion = motion_of(patches, placements, np.array([slot.sheet for slot in nesting.slots]))
-    lettering = texts_of(pattern, outlined, framed.labels, patches, motion)
+    lettering = texts_of(pattern, outlined, framed.labels, patches, motion, options)
     drawn = sheet_strokes(
         pattern,
         outlined,
@@ -268,6 +272,7 @@ def lay_out(
         totals=_totals(pattern, outlined, patches, nesting, toolpaths + behind, usable),
         findings=layout_findings(pattern, framed, nesting, lettering, drawn, material, options),
         borders=open_borders(pattern),
+        absent=absent_labels(lettering, patches),
         kit=folders_kit(pattern),
         toolpaths=toolpaths,
         backs=behind,

@@ -11,7 +11,8 @@ is cut in full.
 
 Scored paper folds away from its score, so valleys may be scored from the back. The back of a sheet
 is the sheet turned over about its vertical axis: x becomes width - x. The back is worked first,
-with three registration holes in the margin that locate the sheet after it is turned.
+with three registration holes in the margin that locate the sheet after it is turned. Texts may
+be engraved there, too.
 """
 
 from __future__ import annotations
@@ -93,11 +94,12 @@ def sheet_strokes(
 
     ``motion`` moves the patches of all copies of the model, copy by copy; ``texts`` are the texts
     of all copies. Raises :class:`~miurafab.errors.LayoutError` if two-sided work is asked for and
-    the material does not score valleys or the margin has no room for registration holes.
+    the material does not score valleys, or if the margin of a sheet with a back has no room for
+    registration holes.
     """
     options = options or LayoutOptions()
-    if options.two_sided:
-        _check_two_sided(material, sheets)
+    if options.two_sided or options.marks == "back":
+        _check_two_sided(material, sheets, options)
     creases, holes = _creases(pattern, outlined, material)
     outlines, unbridged = _outlines(outlined, options, material.kerf_mm)
     drawn_once = [
@@ -122,6 +124,7 @@ def sheet_strokes(
     steps = np.cumsum([0, *(int(part.group.max(initial=-1)) + 1 for part in parts)])
     group = np.concatenate([part.group + step for part, step in zip(parts, steps, strict=False)])
     behind = np.zeros(len(patch), dtype=bool)
+    behind[: len(parts[0].count)] = [t.side == "back" for t in texts for _ in t.strokes]
     if options.two_sided:
         scored = operation == OPERATIONS.index("score")
         folds = pattern.edges_assignment.copy()
@@ -159,8 +162,8 @@ def sheet_strokes(
     return Drawn(fronts, backs, holes.left_out, unbridged)
 
 
-def _check_two_sided(material: Material, sheets: Sequence[Blank]) -> None:
-    if material.creases["valley"].mode != "score":
+def _check_two_sided(material: Material, sheets: Sequence[Blank], options: LayoutOptions) -> None:
+    if options.two_sided and material.creases["valley"].mode != "score":
         raise LayoutError(
             "Two-sided working scores the valleys from the back, but the material "
             f"'{material.name}' does not score them; write mode = 'score' under [creases.valley]."

@@ -8,14 +8,17 @@ import ezdxf
 import numpy as np
 import pypdf
 import pytest
+import shapely
 from problems import regular
 from readers import POINT_MM, assert_same, read_dxf, read_hpgl, read_pdf, read_svg, segments
+from reportlab.pdfgen.canvas import Canvas
 from rings import tube
 from scipy.spatial import cKDTree
 
 from miurafab.errors import InputError
 from miurafab.fabrication.assembly import assembly_order
 from miurafab.fabrication.drawing.assembly_guide import assembly_guide
+from miurafab.fabrication.drawing.callouts import Callout, Taken, draw_callouts
 from miurafab.fabrication.drawing.dxf import VERSIONS, sheet_dxf
 from miurafab.fabrication.drawing.hpgl import POINTS_A_LINE, UNITS_PER_MM, sheet_hpgl
 from miurafab.fabrication.drawing.page import INK, tint
@@ -319,3 +322,14 @@ def test_each_patch_is_glued_onto_what_is_assembled(layout):
         done.add(step.patch)
     numbers = sorted(n for step in steps for n in step.tabs)
     assert numbers == sorted(tab.number for patch in layout.patches for tab in patch.tabs)
+
+
+def test_labels_on_leader_lines_cover_neither_each_other_nor_the_patch():
+    patch = np.array([[50.0, 50.0], [110.0, 50.0], [110.0, 60.0], [50.0, 60.0]])
+    labels = [Callout(f"a{k}M", 52.0 + 2.0 * k, 51.0, 0.0, 0.0) for k in range(28)]
+    taken = Taken()
+    draw_callouts(Canvas(io.BytesIO()), labels, [patch], taken)
+    boxes = shapely.box(*np.array(taken.boxes).T)
+    assert len(boxes) == len(labels)
+    assert not any(boxes[k].intersects(boxes[k + 1 :]).any() for k in range(len(boxes)))
+    assert not shapely.intersects(shapely.Polygon(patch), boxes).any()

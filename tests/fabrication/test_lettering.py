@@ -11,13 +11,14 @@ import shapely
 from flat_patterns import bed, card, miura, triangles, zigzag
 
 from miurafab.errors import LayoutError
-from miurafab.fabrication.labels import CLEARANCE_MM, place_texts
+from miurafab.fabrication.labels import CLEARANCE_MM, Sides, place_texts
 from miurafab.fabrication.lettering import text_strokes, text_width
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.seam_names import LETTERS, tab_labels
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tab_choice import choose_tabs
 
+FRONT = Sides("front", "front", "front")
 ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ-./%" + LETTERS
 
 
@@ -61,7 +62,9 @@ def test_no_text_touches_a_crease_a_cut_or_another_text(pattern):
     names = [f"P{k}" for k in range(len(outlined.patches))]
     labels = tab_labels(pattern, outlined.face_patch, outlined.tabs)
     turns = np.linspace(-1.5, 1.5, len(names))
-    lettering = place_texts(pattern, outlined.face_patch, names, outlined.tabs, labels, turns)
+    lettering = place_texts(
+        pattern, outlined.face_patch, names, outlined.tabs, labels, turns, FRONT
+    )
     texts, left_out = lettering.texts, lettering.left_out
     assert len(texts) + left_out == len(names) + 2 * len(labels)
     assert len(texts) > 0.8 * (len(names) + 2 * len(labels))
@@ -110,7 +113,7 @@ def test_a_patch_whose_facets_are_all_glued_upon_is_named_beside_its_tabs():
     face_patch = np.repeat([0, 0, 1], 9)
     tabs, _, _ = choose_tabs(pattern, face_patch, card())
     labels, turns = tab_labels(pattern, face_patch, tabs), np.zeros(2)
-    lettering = place_texts(pattern, face_patch, ["P1", "P2"], tabs, labels, turns)
+    lettering = place_texts(pattern, face_patch, ["P1", "P2"], tabs, labels, turns, FRONT)
     assert lettering.left_out == 0
     (name,) = [text for text in lettering.texts if text.text == "P2"]
     shape = shapely.MultiLineString([stroke.tolist() for stroke in name.strokes])

@@ -12,7 +12,7 @@ from flat_patterns import bed, card, facet_polygons, miura, without_grid
 from rings import revolved, tube
 
 from miurafab.fabrication.assembly import assembly_order
-from miurafab.fabrication.labels import place_texts
+from miurafab.fabrication.labels import Sides, place_texts
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_outline import outline_patches
@@ -167,11 +167,14 @@ def test_the_layout_of_a_ring_tells_its_seam(closed, size):
     assert not set(seams.edges[:, 1].tolist()) & made
 
 
+FRONT = Sides("front", "front", "front")
+
+
 def test_both_edges_of_a_ring_seam_are_labelled(closed):
     outlined = outline_patches(closed, *BEDS["one patch"], card())
     tabs, facets = outlined.tabs, facet_polygons(closed)
     labels = tab_labels(closed, outlined.face_patch, tabs)
-    lettering = place_texts(closed, outlined.face_patch, ["P1"], tabs, labels, np.zeros(1))
+    lettering = place_texts(closed, outlined.face_patch, ["P1"], tabs, labels, np.zeros(1), FRONT)
     assert lettering.left_out == lettering.unmarked == 0
     where = {
         text.text: shapely.MultiLineString([stroke.tolist() for stroke in text.strokes])

@@ -96,7 +96,7 @@ class _Overview:
             scale = self.views.folded_view(canvas, (MARGIN, top - 104, ROOM, 98))
             scale_bar(canvas, scale, MARGIN, top - 108)
             top -= 118
-        caption(canvas, "Flat, seen from the side with the names", MARGIN, top)
+        caption(canvas, "Flat, seen from the front", MARGIN, top)
         beside = 106.0
         tall = min(top - BOTTOM - 22, beside * self.views.aspect)
         scale = self.views.flat_view(canvas, (MARGIN, top - 8 - tall, beside, tall))

@@ -29,7 +29,7 @@ _FOLDING = (
     "Crease every line both ways, one row after another.",
     "Fold all rows together, a little at a time: the sheet moves as one. Lines that are red in the "
     "pictures of the sheets are mountains and fold away from you, blue ones are valleys and fold "
-    "towards you, seen from the side with the names.",
+    "towards you, seen from the front, the show side.",
 )
 _GLUEING = (
     "On each tab stands its label, the letter of its seam and a number, and the way its own fold "

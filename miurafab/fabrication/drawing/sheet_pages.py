@@ -11,6 +11,7 @@ import numpy as np
 from reportlab.lib.units import mm
 from reportlab.pdfbase.pdfmetrics import stringWidth
 
+from miurafab.fabrication.drawing.callouts import Callout, Taken, draw_callouts
 from miurafab.fabrication.drawing.page import (
     BOTTOM,
     HEIGHT,
@@ -49,6 +50,8 @@ _CARD = 33.0
 _PICTURED = 12
 """With more patches on a sheet, cards have no picture: the sheet is the picture."""
 _COLUMNS = 3
+_CHIP, _CHIP_MM = 6.5, (9.0, 5.0)
+"""The type size of the name of a neighbour, and its distances from the seam that are tried."""
 _MADE = {"cut": "cut", "perforate": "perforated", "score": "scored"}
 """The operations whose lengths are shown, and their verbs."""
 
@@ -194,8 +197,10 @@ class SheetPages:
         canvas.setLineWidth(0.3 / scale * mm)
         canvas.rect(0, 0, sheet.width_mm * mm, sheet.height_mm * mm)
         canvas.restoreState()
+        written = Taken()
         for placed in sheet.placements:
-            self.draw_names(canvas, placed, (x, low), scale)
+            self.draw_names(canvas, placed, (x, low), scale, written)
+        self.draw_absent(canvas, (x, low), scale, written)
         scale_bar(canvas, scale, MARGIN, low - 6)
         entries = [
             ("mountain", MOUNTAIN, 0.3),
@@ -220,8 +225,32 @@ class SheetPages:
             )
             paragraph(canvas, MARGIN, low - 17.5, words, ROOM, 9, bold=True)
 
+    def draw_absent(
+        self, canvas: Pen, corner: tuple[float, float], scale: float, written: Taken
+    ) -> None:
+        """The labels that are not on the sheet. Names are in the drawing anyway."""
+        placed = {each.patch: each for each in self.sheet.placements}
+        labels = []
+        for label in self.layout.absent:
+            if label.patch in placed and label.text != self.label(label.patch):
+                place = placed[label.patch]
+                at = np.array([[label.x_mm, label.y_mm]])
+                ((x, y),) = (place.from_patch(at) * scale + corner).tolist()
+                angle = math.radians(label.rotation_deg + place.rotation_deg)
+                labels.append(Callout(label.text, x, y, angle, label.height_mm * scale))
+        outlines = [
+            place.from_patch(self.layout.patches[patch].outline_mm) * scale + corner
+            for patch, place in placed.items()
+        ]
+        draw_callouts(canvas, labels, outlines, written)
+
     def draw_names(
-        self, canvas: Pen, placed: Placement, corner: tuple[float, float], scale: float
+        self,
+        canvas: Pen,
+        placed: Placement,
+        corner: tuple[float, float],
+        scale: float,
+        written: Taken,
     ) -> None:
         """The name of a patch, and along each of its seams the name of the neighbour."""
         patch = self.layout.patches[placed.patch]
@@ -235,26 +264,33 @@ class SheetPages:
         points = on_page(pattern.vertices_coords[corners[corners >= 0]])
         middle, span = points.mean(axis=0), float(np.ptp(points, axis=0).min())
         size = min(max(span / 2.2, 4.0), 16.0)
-        path = self.toolpath
-        engraved = (path.operation == OPERATIONS.index("engrave")) & (path.patch == patch.id)
-        strokes = path.points[np.repeat(engraved, np.diff(path.offsets))] * scale + corner
+        strokes = self.engraved(patch.id) * scale + corner
         at = _clear_place(np.vstack([middle, points]), strokes, patch.label, size)
-        named(canvas, patch.label, float(at[0]), float(at[1]), size)
+        name = float(at[0]), float(at[1])
+        named(canvas, patch.label, *name, size)
+        written.take(*name, stringWidth(patch.label, "Helvetica-Bold", size) / mm + 1, 0.35 * size)
         if span < 26:
             return
         for mate, edges in self.seams_of(patch.id).items():
             ends = on_page(pattern.vertices_coords[pattern.edges_vertices[edges]].mean(axis=1))
-            at = ends[np.argmin(np.linalg.norm(ends - ends.mean(axis=0), axis=1))]
-            way = middle - at
-            at = at + way / max(float(np.linalg.norm(way)), 1e-9) * 9.0
-            chip(
-                canvas,
-                self.label(mate),
-                float(at[0]),
-                float(at[1]),
-                tint(self.views.base(mate)),
-                6.5,
-            )
+            near = np.argsort(np.linalg.norm(ends - ends.mean(axis=0), axis=1), kind="stable")
+            way = middle - ends[near]
+            way /= np.maximum(np.linalg.norm(way, axis=1), 1e-9)[:, None]
+            # The middle of the seam first, then along it; inside the patch, clear of its name.
+            places = np.concatenate([ends[near] + deep * way for deep in _CHIP_MM])
+            wide = stringWidth(self.label(mate), "Helvetica-Bold", _CHIP) / mm + 0.32 * _CHIP
+            x, y = places[int(np.argmax(written.clear(places, wide, 0.52 * _CHIP)))].tolist()
+            written.take(x, y, wide, 0.52 * _CHIP)
+            chip(canvas, self.label(mate), x, y, tint(self.views.base(mate)), _CHIP)
+
+    def engraved(self, patch: int) -> Floats:
+        """The points (n, 2) of what is engraved on a patch, seen from the front."""
+        found = []
+        for path in (self.toolpath, self.behind):
+            if path is not None:
+                own = (path.operation == OPERATIONS.index("engrave")) & (path.patch == patch)
+                found.append(path.points[np.repeat(own, np.diff(path.offsets))])
+        return np.concatenate(found)
 
     def seams_of(self, patch: int) -> dict[int, list[int]]:
         """The glued pattern edges of a patch, by neighbour."""
