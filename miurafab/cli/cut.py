@@ -226,6 +226,7 @@ def _share(
             options,
             pause=pause,
             before_sheet=None if isinstance(keys, NoKeys) else before,
+            on_start=lambda port, finding: console.note(f"{port}: {finding.sentence}"),
             on_progress=bar,
         )
     rows = [(each.sheet, each.port, "done" if each.done else each.why) for each in outcome]

@@ -88,15 +88,16 @@ MaterialOption = Annotated[
 
 
 def takes(
-    *classes: Callable[[], type], without: Collection[str] = ()
+    *classes: Callable[[], type], without: Collection[str] = (), only: Collection[str] = ()
 ) -> Callable[[Callable[..., int]], Callable[..., int]]:
-    """Add the options that ``classes`` declare, but those ``without``, to a command.
+    """Add the options that ``classes`` declare, but those ``without``, or these ``only``, to a
+    command.
 
     They stand in place of its ``**given``. Each of ``classes`` is a function that imports the
     class. It is called when the options are first needed: ``miurafab --help`` must not wait for the
     rooms that hold the classes.
     """
-    return lambda command: _Command(command, classes, without)
+    return lambda command: _Command(command, classes, without, only)
 
 
 class _Command:
@@ -107,10 +108,11 @@ class _Command:
         command: Callable[..., int],
         classes: Sequence[Callable[[], type]],
         without: Collection[str],
+        only: Collection[str],
     ) -> None:
         self._command = command
         self._classes = classes
-        self._without = without
+        self._without, self._only = without, only
         self.__doc__ = command.__doc__
         self.__name__ = command.__name__
         self.__module__ = command.__module__
@@ -132,6 +134,7 @@ class _Command:
             for each in self._classes
             for parameter in _parameters(each(), groups)
             if parameter.name not in self._without
+            and (not self._only or parameter.name in self._only)
         ]
         return own.replace(parameters=parameters)
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import miurafab
 from miurafab.cli.console import Console
-from miurafab.cli.declared import MachineOption, argument, option
+from miurafab.cli.declared import MachineOption, argument, option, takes
 from miurafab.errors import DONE, NO
-from miurafab.options import File
+from miurafab.options import File, Whole
 
 if TYPE_CHECKING:
     from miurafab.workflow.dry_run import SheetPreview
@@ -17,9 +17,17 @@ if TYPE_CHECKING:
 EXAMPLES = (
     "miurafab preview jobs/hypar",
     "miurafab preview jobs/hypar/sheet-01.nc --machine grbl-laser-400",
+    "miurafab preview jobs/hypar --sheet 1 --align 20,20=22,21 --align 180,180=182,181",
 )
 
 
+def _cut_options() -> type:
+    from miurafab.workflow.cut_options import CutOptions
+
+    return CutOptions
+
+
+@takes(_cut_options, only=("align",))
 def preview(
     job: Annotated[Path, argument("JOB", "A job directory or a G-code file.")],
     /,
@@ -42,7 +50,9 @@ def preview(
             default_text="JOB/preview",
         ),
     ] = None,
+    sheet: Annotated[int | None, option(Whole(1), "Only this sheet, from 1.")] = None,
     console: Console = Console(),
+    **given: str,
 ) -> int:
     """Show what a job would do, without opening a port.
 
@@ -50,7 +60,9 @@ def preview(
     would be refused.
     """
     with console.progress("dry run") as progress:
-        seen = miurafab.preview(job, machine=machine, settings=settings, on_progress=progress)
+        seen = miurafab.preview(
+            job, machine=machine, settings=settings, sheet=sheet, on_progress=progress, **given
+        )
         progress(0.9, "pictures")
         folder = out or (job / "preview" if job.is_dir() else job.with_name(f"{job.stem}-preview"))
         files = seen.write(folder)

@@ -60,6 +60,7 @@ class GrblDriver(StreamDriver):
             collect_refusals=plan.options.check_mode,
         )
         self.refusals = self._streamer.refusals
+        self._doubtful_reports = 0  # that may tell whether a resume was heard
 
     @property
     def acknowledged(self) -> int:
@@ -136,6 +137,7 @@ class GrblDriver(StreamDriver):
                 if isinstance(event, Ok | Error):
                     answered = session.now()
                 elif isinstance(event, StatusReport):
+                    self._resume_a_late_hold(event)
                     self.tell(
                         self._attend_pause(event) or event.state,
                         session.position,
@@ -160,7 +162,7 @@ class GrblDriver(StreamDriver):
         Raises :class:`~miurafab.errors.PersonNeeded` if nobody is there.
         """
         program = self.plan.program
-        if program is None or report.state != "Hold" or report.substate != 0 or self.held:
+        if program is None or not _rests(report) or self.held:
             return None
         pauses = program.event_line[program.event_kind == PAUSE]
         line = next((int(n) for n in pauses if n > self.line), None)
@@ -178,11 +180,24 @@ class GrblDriver(StreamDriver):
 
     def obey(self) -> None:
         """Send ``orders``, unless the controller is deaf while it writes its EEPROM."""
-        if not self._session.connection.writing_eeprom:
+        session = self._session
+        if not session.connection.writing_eeprom:
             for order in self.orders:
-                self._session.write(self._session.connection.send_realtime(order))
+                session.write(session.connection.send_realtime(order))
+                # GRBL forgets a resume that comes before the hold has come to rest (protocol.c).
+                if order in (HOLD, RESUME):
+                    early = order == RESUME and self.held and not _rests(session.status)
+                    self._doubtful_reports = early * (1 + session.awaits_status)
                 self.held = order == HOLD or (self.held and order != RESUME)
             self.orders.clear()
+
+    def _resume_a_late_hold(self, report: StatusReport) -> None:
+        """Send the resume again that came while the hold still braked."""
+        if self._doubtful_reports and _rests(report):
+            self._doubtful_reports = 0
+            self.orders.append(RESUME)
+        elif self._doubtful_reports and report.state != "Hold":
+            self._doubtful_reports -= 1  # it was heard, or the report is of before
 
     def finish(self) -> tuple[Finding, ...]:
         """See :class:`StreamDriver`."""
@@ -225,3 +240,8 @@ class GrblDriver(StreamDriver):
         program = self.plan.program
         laser = self.plan.machine.tool.kind == "laser"
         return laser and (program is None or bool((program.spindle == BEAM_M3).any()))
+
+
+def _rests(report: StatusReport | None) -> bool:
+    """Whether a hold has come to its end."""
+    return report is not None and report.state == "Hold" and report.substate == 0

@@ -71,6 +71,12 @@ def leaves_air_on(job: Job) -> bool:
     return _last_word(job, _AIR_ANYWHERE, _AIR) in ("7", "8")
 
 
+def air_after(line: bytes, air: bool) -> bool:
+    """Whether the air is open after ``line``, a line as it is sent, if it was ``air`` before."""
+    words = _AIR.findall(line.decode("ascii"))
+    return words[-1] in ("7", "8") if words else air
+
+
 def characters(job: Job) -> Iterator[Finding]:
     """Bytes in comments that a sender which strips no comments would hand to the controller."""
     match = _PASSED_ON.search(job.text)

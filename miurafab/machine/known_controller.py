@@ -93,7 +93,10 @@ STOCK = PortSetup()
 
 
 class KnownController:
-    """What is known of the controller at the other end of ``session``; mutable, for one thread."""
+    """What is known of the controller at the other end of ``session``; mutable, for one thread.
+
+    ``greeted``: one that is asked for jobs alone has answered an earlier job.
+    """
 
     def __init__(self, session: Session, dialect: str) -> None:
         self.version: Version | None = None
@@ -101,6 +104,7 @@ class KnownController:
         self.settings = Settings({})
         self.modes = ControllerModes((), {})
         self.loaded: str | None = None
+        self.greeted = False
         self._session = session
         self._dialect = dialect
         self._offsets: Mapping[str, tuple[float, ...]] = {}

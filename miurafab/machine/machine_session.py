@@ -17,18 +17,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from miurafab.errors import (
-    ControllerError,
-    MachineError,
-    PersonNeeded,
-)
+from miurafab.errors import ControllerError, MachineError, PersonNeeded
 from miurafab.gcode.job import Job
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import StatusReport
 from miurafab.machine.console_lines import ConsoleLines
 from miurafab.machine.job_sending import OpenWire, send_job
 from miurafab.machine.jog_pad import JogPad, require_way
-from miurafab.machine.keys import ABORT, Keys, NoKeys, session_keys
+from miurafab.machine.keys import ABORT, RESUME, Keys, NoKeys, session_keys
 from miurafab.machine.known_controller import (
     STOCK,
     KnownController,
@@ -308,9 +304,13 @@ class MachineSession:
         return state
 
     def load(self) -> MachineState:
-        """Somebody has put in fresh material."""
+        """Somebody has put in fresh material; a lid that was opened for that is shut again."""
         self.known.loaded = None
-        return self.state
+        status = self.conversation.status
+        if status is None or (status.state, status.substate) != ("Door", 0):
+            return self.state
+        self.realtime(RESUME)  # nothing runs: the controller leaves the state Door
+        return self.look()
 
     def abort(self) -> bool:
         """Stop whatever runs by a reset, after a dark motion has come to rest; whether the

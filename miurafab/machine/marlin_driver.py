@@ -10,6 +10,9 @@ stops the motion too, but leaves the laser on until a later ``M5``, so the drive
 it. A board without ``EMERGENCY_PARSER`` reads even M112 only between two commands; a finding says
 so.
 
+M112 shuts the beam and the motors; an air assist stays on (Marlin 2.1: ``minkill`` ends the cutter,
+and only ``M9`` or a reset shuts the pin of ``AIR_ASSIST``), so the last words say that.
+
 Marlin has no feed hold: the driver pauses by sending nothing more, and the machine still makes the
 moves that it has planned.
 """
@@ -23,7 +26,7 @@ from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
 from miurafab.machine.greeting import ANSWER_S
 from miurafab.machine.judge_job import longest_line
-from miurafab.machine.judge_words import leaves_air_on
+from miurafab.machine.judge_words import air_after, leaves_air_on
 from miurafab.machine.session import HOMING_S
 from miurafab.machine.stream_driver import JobContext, StreamDriver
 from miurafab.machine.transcript import Transcript
@@ -38,6 +41,7 @@ NOT_CONFIRMED = (
 )
 SET = (b"G21", b"G90")
 """mm and absolute moves, as after power-up: a board that was not reset keeps its last modes."""
+AIR_IS_ON = ", and the air stays on: shut it at the machine"
 _LOOK_S = 0.05  # between two reads of the keys
 _SILENCES = 3  # the line is sent again after each silence but the last
 _KILL_S = 0.8  # from M112 to its answer
@@ -57,6 +61,7 @@ class MarlinDriver(StreamDriver):
         self._wire = MarlinWire(context.transport, context.transcript, context.check)
         self._taken = 0
         self._last = 0
+        self._air = False
 
     @property
     def acknowledged(self) -> int:
@@ -75,6 +80,7 @@ class MarlinDriver(StreamDriver):
             while self.held:
                 self.attend_and_tell()
                 wire.receive(_LOOK_S)
+            self._air = air_after(line.data, self._air)
             wire.send(line, self.attend_and_tell, self._where)
             self._taken, self._last = self._taken + 1, line.number
             self.attend_and_tell()
@@ -89,7 +95,9 @@ class MarlinDriver(StreamDriver):
     def prepare(self) -> tuple[Finding, ...]:
         """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         plan, wire = self.plan, self._wire
-        wire.greet(plan.wait)
+        known = self._context.known
+        wire.greet(0.0 if known.greeted else plan.wait)
+        known.greeted = True
         said = wire.send(SendLine(0, b"M115"))
         if plan.options.home:
             self.at_risk = True
@@ -111,7 +119,8 @@ class MarlinDriver(StreamDriver):
 
     def stop(self, error: MiurafabError | None) -> str:
         """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
-        return WAS_HALTED if self._wire.kill() else NOT_CONFIRMED
+        outcome = WAS_HALTED if self._wire.kill() else NOT_CONFIRMED
+        return outcome + AIR_IS_ON * self._air
 
 
 class MarlinWire:
@@ -153,13 +162,14 @@ class MarlinWire:
         """Wait until the controller has started, if the opening of the port resets it, and set the
         count.
 
-        It may take ``patience`` seconds to start. Raises :class:`~miurafab.errors.PortError` if
-        nothing that speaks Marlin answers.
+        It may take ``patience`` seconds to start; none if an earlier job has greeted it. Raises
+        :class:`~miurafab.errors.PortError` if nothing that speaks Marlin answers.
         """
         end = self.now() + patience
         started = False
-        while not started and self.now() < end:
-            started = any(isinstance(reply, Started) for reply in self.receive(end - self.now()))
+        while not started:
+            left = max(0.0, end - self.now())
+            started = any(isinstance(reply, Started) for reply in self.receive(left)) or not left
         try:
             self._exchange(self._connection.restart_count(), ANSWER_S, lambda: None, "")
         except ControllerError as error:

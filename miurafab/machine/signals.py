@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -56,6 +58,16 @@ class StopSignals:
     def release(self) -> None:
         """Heed signals again: what was being stopped has been stopped."""
         self._held = False
+
+    @contextmanager
+    def raising(self) -> Iterator[None]:
+        """A block in which a signal raises at once, whatever is waited for."""
+        before, self.at_once = self.at_once, True
+        try:
+            self.check()
+            yield
+        finally:
+            self.at_once = before
 
     def __enter__(self) -> StopSignals:
         if threading.current_thread() is threading.main_thread():

@@ -52,6 +52,7 @@ _LOWERS_LINES = os.name == "nt"  # at the close of a port
 _QUIET_S = 0.7  # from the opening to the raising of the lines; a running board answers in 0.1 s
 _SLICE = 0.005  # s; how late a key is seen, and pyserial on Windows cannot be interrupted within
 _WRITE_TIMEOUT = 1.0  # s; far beyond the 90 ms that a full 1024-byte buffer takes at 115200 baud
+_MOST_BEHIND = 1.0  # s; a busy computer catches up with less
 _INSTANT = 1e-6  # s; the least that a virtual clock moves, far above its rounding
 
 
@@ -319,6 +320,8 @@ class VirtualTransport:
             ahead = self.device.now / self._speed - (time.monotonic() - self._start)
             if ahead > 0:
                 time.sleep(ahead)
+            elif ahead < -_MOST_BEHIND:  # nobody has read for a while, so no time has passed
+                self._start -= ahead
 
     def now(self) -> float:
         """The controller's clock."""

@@ -16,6 +16,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,9 +28,10 @@ from miurafab.gcode.reading import read_program
 from miurafab.gcode.rigid_motion import Point, RigidMotion, moved
 from miurafab.machine.resume import Resumption
 from miurafab.profiles import MachineProfile
-from miurafab.workflow.cut import Prepared
-from miurafab.workflow.dry_run import dry_run
-from miurafab.workflow.preview import Preview
+from miurafab.workflow.dry_run import SheetPreview, dry_run
+
+if TYPE_CHECKING:
+    from miurafab.workflow.cut import Prepared
 
 Mark = tuple[Point, Point]
 """A mark: its position in the job, and where the head stands over it, mm."""
@@ -65,31 +67,49 @@ def align(prepared: Prepared, sheets: Sequence[int] | None, marks: Sequence[Mark
     """
     if not marks:
         return prepared
-    numbers = prepared.chosen(sheets)
+    number = the_one(prepared.chosen(sheets))
+    jobs, dry_runs = list(prepared.jobs), list(prepared.dry_runs)
+    jobs[number - 1], dry_runs[number - 1], aligned = lay(
+        jobs[number - 1],
+        prepared.machine,
+        dry_runs[number - 1],
+        marks,
+        number=number,
+        most_power=prepared.most_power,
+    )
+    return replace(prepared, jobs=tuple(jobs), dry_runs=tuple(dry_runs), aligned=aligned)
+
+
+def the_one(numbers: Sequence[int]) -> int:
+    """The number of the one sheet that marks are of; raises ``InputError`` for several."""
     if len(numbers) != 1:
         raise InputError(
-            f"`align` says where one sheet lies, and {len(numbers)} would be cut; name its `sheet`."
+            f"`align` says where one sheet lies, and there are {len(numbers)}; name its `sheet`."
         )
-    (number,) = numbers
-    job, machine = prepared.jobs[number - 1], prepared.machine
+    return numbers[0]
+
+
+def lay(
+    job: Job,
+    machine: MachineProfile,
+    expected: SheetPreview,
+    marks: Sequence[Mark],
+    *,
+    number: int = 1,
+    most_power: float = 1.0,
+) -> tuple[Job, SheetPreview, Aligned]:
+    """``job`` turned and shifted to where its ``marks`` are, its dry run there, and how;
+    ``expected`` is its dry run as it is written. Raises what :func:`align` raises.
+    """
     if machine.dialect == "hpgl":
         raise InputError(
             f"{machine.name} speaks hpgl, whose programs are not turned; lay it flush."
         )
-    expected = prepared.dry_runs[number - 1]
     motion, finding = _motion(job.name, expected.program, marks)
     there = _moved(job, machine, motion)
-    jobs, dry_runs = list(prepared.jobs), list(prepared.dry_runs)
-    jobs[number - 1] = there
-    dry_runs[number - 1] = dry_run(
-        Path(job.name).stem, there, machine, expected.paper_mm, prepared.most_power
-    )
-    return replace(
-        prepared,
-        jobs=tuple(jobs),
-        dry_runs=tuple(dry_runs),
-        aligned=Aligned(number, job, motion, finding),
-    )
+    stem = Path(job.name).stem
+    seen = dry_run(stem, there, machine, expected.paper_mm, most_power)
+    return there, seen, Aligned(number, job, motion, finding)
 
 
 def draw(prepared: Prepared) -> Path | None:
@@ -99,6 +119,8 @@ def draw(prepared: Prepared) -> Path | None:
     aligned = prepared.aligned
     if aligned is None or prepared.folder is None:
         return None
+    from miurafab.workflow.preview import Preview  # which lays sheets, too
+
     sheet = prepared.dry_runs[aligned.number - 1]
     seen = Preview(prepared.name, prepared.machine, (sheet,), None, (aligned.finding,))
     return seen.write(prepared.folder / "aligned")[-1]
@@ -142,11 +164,16 @@ def _motion(name: str, program: Program, marks: Sequence[Mark]) -> tuple[RigidMo
     doubt = " If it does not lie the other way round, the marks are exchanged." if turned else ""
     return motion, Finding(
         "aligned",
-        f"{name} is turned by {math.degrees(motion.angle):.3f} degrees about its origin and "
-        f"shifted by X{motion.dx:.3f} Y{motion.dy:.3f}; the marks' distance differs by "
-        f"{found - drawn:+.3f} mm, of which each mark gets half.{doubt}",
+        f"{name} is turned by {_signed(math.degrees(motion.angle))} degrees about its origin and "
+        f"shifted by X{_signed(motion.dx)} Y{_signed(motion.dy)}; the marks' distance differs by "
+        f"{_signed(found - drawn, '+')} mm, of which each mark gets half.{doubt}",
         name,
     )
+
+
+def _signed(value: float, plus: str = "") -> str:
+    """Three decimals without a minus before zero."""
+    return f"{round(value, 3) + 0.0:{plus}.3f}"
 
 
 def _far(reach: float, apart: float) -> str:

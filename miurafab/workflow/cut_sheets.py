@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 from miurafab.display import Shown
 from miurafab.errors import InputError, OptionError, PersonNeeded
 from miurafab.files import AnyPath
 from miurafab.findings import Finding
-from miurafab.machine.job_process import stream_apart
+from miurafab.machine.job_process import session_apart
 from miurafab.machine.keys import Keys
-from miurafab.machine.planning import JobPlan, head_at, plan_job
-from miurafab.machine.sender import StreamResult, stream_plan
+from miurafab.machine.planning import Head, JobPlan, head_at, plan_job
+from miurafab.machine.sender import SheetSession, StreamResult, session_here
 from miurafab.machine.trace_box import frame_job
 from miurafab.machine.transport import VIRTUAL, require_port
 from miurafab.options import (
@@ -202,42 +202,49 @@ def cut_prepared(
     """Stream the sheets of ``prepared`` (or those numbered in ``sheets``, from 1) to ``port``.
 
     Every sheet is checked before the first is started. The other arguments are those of
-    :func:`cut`. A process of its own sends a sheet to a real port
-    (:func:`~miurafab.machine.job_process.stream_apart`). Raises what
-    :func:`~miurafab.machine.sender.stream_plan` raises.
+    :func:`cut`. One session with the machine holds from the first frame to the last sheet, for a
+    real port in a process of its own (:func:`~miurafab.machine.job_process.session_apart`). Raises
+    what :func:`~miurafab.machine.sender.stream_plan` raises.
     """
     done: list[CutSheet] = []
     prepared = align(prepared, sheets, options.align)
     plans = plan_sheets(prepared, sheets, options)
     at = plans[0][1].at
     waits = needs_person(prepared, port, pause)
-    for number, plan in plans:
-        further = bool(done) or (options.resume and plan.resumption is None)
-        if further and waits:
-            if before_sheet is not None:
-                before_sheet(number, len(prepared.jobs))
-            elif done:
-                raise PersonNeeded(
-                    f"{prepared.jobs[number - 1].name} needs fresh material, and nobody is here to "
-                    f"put it in; then go on with `sheet` {number}. Done: "
-                    f"{', '.join(sheet.name for sheet in done)}."
-                )
-        placed_at = None if done else options.send.at
-        notes = start_findings(prepared, number, plan.resumption, placed_at)
-        if on_start is not None:
-            for each in notes:
-                on_start(each)
-        if options.frame:
-            head = replace(options.send, at=at)
-            frame(prepared, number, port=port, options=replace(options, send=head, align=()))
-            if after_frame is not None:
-                after_frame(number)
-        send = partial(_stream(port), keys=keys, virtual_speed=options.virtual_speed)
-        plan = replace(plan.with_head_at(at), at_pause=at_pause(waits, keys))
-        done.append(
-            cut_sheet(prepared, number, plan, port, send, notes=notes, on_progress=on_progress)
-        )
-        at = head_after(prepared, number, at)
+    with _session(prepared, port, options, keys) as session:
+        for number, plan in plans:
+            further = bool(done) or (options.resume and plan.resumption is None)
+            if further and waits:
+                if before_sheet is not None:
+                    with session.waits():
+                        before_sheet(number, len(prepared.jobs))
+                elif done:
+                    raise PersonNeeded(
+                        f"{prepared.jobs[number - 1].name} needs fresh material, and nobody is "
+                        f"here to put it in; then go on with `sheet` {number}. Done: "
+                        f"{', '.join(sheet.name for sheet in done)}."
+                    )
+            if done:
+                session.load()
+            placed_at = None if done else options.send.at
+            notes = start_findings(prepared, number, plan.resumption, placed_at)
+            if on_start is not None:
+                for each in notes:
+                    on_start(each)
+            plan = replace(plan.with_head_at(at), at_pause=at_pause(waits, keys))
+            if options.frame:
+                head = replace(options, send=replace(options.send, at=at), align=())
+                session.frame(frame_plan(prepared, number, head))
+                if after_frame is not None:
+                    with session.waits():
+                        after_frame(number)
+            # A frame has homed the machine.
+            home = plan.options.home and not options.frame
+            sent = replace(plan, options=replace(plan.options, home=home))
+            done.append(
+                cut_sheet(prepared, number, sent, session, notes=notes, on_progress=on_progress)
+            )
+            at = head_after(prepared, number, plan)
     return tuple(done)
 
 
@@ -245,20 +252,18 @@ def cut_sheet(
     prepared: Prepared,
     number: int,
     plan: JobPlan,
-    port: str,
-    send: Callable[..., StreamResult],
+    session: SheetSession,
     *,
     notes: tuple[Finding, ...] = (),
     on_progress: Callable[[SheetProgress], None] | None = None,
 ) -> CutSheet:
-    """``send`` the ``plan`` of sheet ``number``, with its journal and transcript beside the job.
+    """Send the ``plan`` of sheet ``number``, with its journal and transcript beside the job.
 
     ``notes`` are the findings on where it begins and lies.
     """
     job, expected = prepared.jobs[number - 1], prepared.dry_runs[number - 1]
-    result = send(
+    result = session.cut(
         plan,
-        port,
         journal_path=journal_path(prepared, job),
         transcript_path=beside(prepared, job, ".transcript"),
         on_progress=placed(
@@ -281,28 +286,32 @@ def cut_sheet(
     )
 
 
-def head_after(
-    prepared: Prepared, number: int, at: tuple[float, float] | None
-) -> tuple[float, float] | None:
-    """The position of the head after sheet ``number``; a closed port forgets it."""
+def head_after(prepared: Prepared, number: int, plan: JobPlan) -> Head | None:
+    """The position of the head after the ``plan`` of sheet ``number``, if it was stated before; for
+    a machine that homes before each sheet, where it stands then.
+    """
     program = prepared.dry_runs[number - 1].program
-    if at is None or not len(program):
-        return at
+    if plan.at is None or plan.options.home or not len(program):
+        return plan.at
     x, y, _ = program.end[-1].tolist()
     return x, y
 
 
-def _stream(port: str) -> Callable[..., StreamResult]:
-    """The sender for ``port``: the controller in memory needs no process of its own."""
-    return stream_plan if port == VIRTUAL else stream_apart
+def _session(
+    prepared: Prepared, port: str, options: CutOptions, keys: Keys | None
+) -> AbstractContextManager[SheetSession]:
+    """A session at ``port``: the controller in memory needs no process of its own."""
+    begin = session_here if port == VIRTUAL else session_apart
+    speed = options.virtual_speed
+    return begin(prepared.machine, port, prepared.name, keys=keys, virtual_speed=speed)
 
 
 def frame(
     prepared: Prepared, number: int, *, port: str, options: CutOptions = DEFAULT_OPTIONS
 ) -> StreamResult:
     """Trace the box around what sheet ``number`` (from 1) burns, beam off or as a pointer."""
-    speed = options.virtual_speed
-    return _stream(port)(frame_plan(prepared, number, options), port, virtual_speed=speed)
+    with _session(prepared, port, options, None) as session:
+        return session.frame(frame_plan(prepared, number, options))
 
 
 def frame_plan(

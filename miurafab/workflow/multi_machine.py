@@ -1,8 +1,8 @@
 """Several machines share the sheets of one job: each takes the next sheet when it is free.
 
-Every sheet is cut by a process of its own (:mod:`miurafab.machine.job_process`), so that no machine
-can disturb another. A machine that fails gets no more sheets; its current sheet can be resumed
-there. The other machines cut the remaining sheets.
+Every machine has a session in a process of its own (:mod:`miurafab.machine.job_process`), so that
+no machine can disturb another. A machine that fails gets no more sheets; its current sheet can be
+resumed there. The other machines cut the remaining sheets.
 """
 
 from __future__ import annotations
@@ -11,18 +11,19 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 from miurafab.errors import InputError, JobStopped, MiurafabError
-from miurafab.machine.job_process import stream_apart
+from miurafab.findings import Finding
+from miurafab.machine.job_process import session_apart
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import Head, JobPlan
+from miurafab.machine.sender import SheetSession
 from miurafab.machine.signals import StopSignals
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.cut_sheets import cut_sheet, head_after
 from miurafab.workflow.material_change import WAITS, MaterialChange
-from miurafab.workflow.sheet_plans import journal_path, plan_sheets
+from miurafab.workflow.sheet_plans import journal_path, plan_sheets, start_findings
 
 _LOOK_S = 0.1
 
@@ -47,6 +48,7 @@ def share_sheets(
     *,
     pause: bool | None = None,
     before_sheet: Callable[[int, str, StopSignals], bool] | None = None,
+    on_start: Callable[[str, Finding], None] | None = None,
     on_progress: Callable[[float, str], None],
 ) -> tuple[Shared, ...]:
     """Cut the sheets of a job directory on the machines at ``ports``; returns the outcomes in the
@@ -54,6 +56,7 @@ def share_sheets(
 
     Before each further sheet of a machine ``before_sheet`` waits for fresh material there, in a
     thread of that machine; False (or no such function) leaves the sheet to another machine.
+    ``on_start`` gets the port and each finding on where a sheet lies and begins there.
     ``on_progress`` gets the fraction done and a note when a sheet is done or has failed. A machine
     that fails is part of the answer. With ``options.resume`` each machine first resumes the sheet
     that it was interrupted at. Raises :class:`~miurafab.errors.InputError` for a job that cannot be
@@ -81,7 +84,7 @@ def share_sheets(
     with StopSignals() as signals:
         signals.at_once = False
         material = MaterialChange(prepared, ports, pause, before_sheet, signals)
-        work = _Work(prepared, options, plans, ports, signals, material, on_progress)
+        work = _Work(prepared, options, plans, ports, signals, material, on_start, on_progress)
         threads = [threading.Thread(target=work.at_machine, args=(port,)) for port in ports]
         for thread in threads:
             thread.start()
@@ -106,6 +109,7 @@ class _Work:
         ports: Sequence[str],
         signals: StopSignals,
         material: MaterialChange,
+        on_start: Callable[[str, Finding], None] | None,
         on_progress: Callable[[float, str], None],
     ) -> None:
         self.outcome: dict[int, Shared] = {}
@@ -114,6 +118,7 @@ class _Work:
         self._plans = plans
         self._signals = signals
         self._material = material
+        self._on_start = on_start
         self._on_progress = on_progress
         self._own = {port: _begun_at(prepared, plans, port) for port in ports}
         begun = {number for numbers in self._own.values() for number in numbers}
@@ -132,35 +137,58 @@ class _Work:
 
     def at_machine(self, port: str) -> None:
         """Cut sheets at ``port`` until none is left, or the machine has failed."""
-        at: Head | None = None
-        send = partial(
-            stream_apart, signals=self._signals, virtual_speed=self._options.virtual_speed
-        )
-        done = False
-        while self._signals.caught is None:
-            try:
-                number = (self._own[port] or self._left).popleft()
-            except IndexError:
-                return
-            if done and not self._material.is_in(number, port):
-                self._left.appendleft(number)
-                return
-            at = at if done else self._plans[number].at
-            done = True
-            name, why = self._prepared.dry_runs[number - 1].name, ""
-            try:
-                plan = replace(
-                    self._plans[number].with_head_at(at), at_pause=self._material.at_pause(port)
-                )
-                cut_sheet(self._prepared, number, plan, port, send)
-            except MiurafabError as error:
-                why = str(error)
-            self.outcome[number] = Shared(name, port, not why, why)
-            note = f"{name} at {port} {'failed' if why else 'is done'}"
-            self._on_progress(len(self.outcome) / len(self._plans), note)
-            if why:
-                return
-            at = head_after(self._prepared, number, at)
+        with session_apart(
+            self._prepared.machine,
+            port,
+            self._prepared.name,
+            virtual_speed=self._options.virtual_speed,
+            signals=self._signals,
+        ) as session:
+            at: Head | None = None
+            done = False
+            while self._signals.caught is None:
+                try:
+                    number = (self._own[port] or self._left).popleft()
+                except IndexError:
+                    return
+                if done and not self._fresh_is_in(number, port, session):
+                    self._left.appendleft(number)
+                    return
+                self._tell_start(number, port, first=not done)
+                plan = self._plans[number]
+                plan = replace(plan, at=at if done else plan.at)
+                plan = replace(plan, at_pause=self._material.at_pause(port))
+                done = True
+                why = ""
+                try:
+                    cut_sheet(self._prepared, number, plan, session)
+                except MiurafabError as error:
+                    why = str(error)
+                self._note(number, port, why)
+                if why:
+                    return
+                at = head_after(self._prepared, number, plan)
+
+    def _fresh_is_in(self, number: int, port: str, session: SheetSession) -> bool:
+        with session.waits():
+            is_in = self._material.is_in(number, port)
+        session.load()
+        return is_in
+
+    def _tell_start(self, number: int, port: str, *, first: bool) -> None:
+        """Say where the sheet lies and begins; each machine is told where its head stands once."""
+        if self._on_start is not None:
+            at = self._options.send.at if first else None
+            for finding in start_findings(
+                self._prepared, number, self._plans[number].resumption, at
+            ):
+                self._on_start(port, finding)
+
+    def _note(self, number: int, port: str, why: str) -> None:
+        name = self._prepared.dry_runs[number - 1].name
+        self.outcome[number] = Shared(name, port, not why, why)
+        note = f"{name} at {port} {'failed' if why else 'is done'}"
+        self._on_progress(len(self.outcome) / len(self._plans), note)
 
 
 def _begun_at(prepared: Prepared, plans: dict[int, JobPlan], port: str) -> deque[int]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import re
 import reprlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +17,13 @@ from miurafab.files import AnyPath, as_path, new_folder, read_text
 from miurafab.findings import Finding, findings_json
 from miurafab.gcode.job import Job
 from miurafab.grbl.settings import parse_dump
+from miurafab.options import Whole, declared, read_value
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, read_machine
 from miurafab.profiles.board import with_settings
+from miurafab.workflow.alignment import Mark, lay, the_one
+from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.dry_run import (
     SheetPreview,
     clock_text,
@@ -133,6 +136,8 @@ def preview(
     *,
     machine: MachineProfile | AnyPath | None = None,
     settings: AnyPath | None = None,
+    sheet: int | None = None,
+    align: Sequence[Mark] | str = (),
     on_progress: Progress | None = None,
 ) -> Preview:
     """Dry-run a job; no port is opened.
@@ -146,6 +151,10 @@ def preview(
     settings : str or os.PathLike, optional
         A file with the answer of a controller to ``$$``. Its rates, accelerations, S range and
         travel replace those of the profile.
+    sheet : int, optional
+        The number of the one sheet to show, from 1. The default is all.
+    align : sequence of pairs of points, optional
+        Two marks of the one sheet, as those of :func:`cut`: it is shown where it lies.
     on_progress : callable, optional
         Called with a fraction in 0..1 and a short text.
 
@@ -171,8 +180,10 @@ def preview(
     1
     """
     profile = None if machine is None else read_machine(machine)
+    marks = read_value("align", declared(CutOptions)["align"].kind, align)
+    chosen = None if sheet is None else read_value("sheet", Whole(1), sheet)
     if not isinstance(job, str | os.PathLike):
-        return _of_value(job, profile, settings)
+        return _chosen(*_of_value(job, profile, settings), chosen, marks)
     path = as_path(job, "The job")
     if not path.exists():
         raise InputError(f"{path} does not exist.")
@@ -197,17 +208,39 @@ def preview(
         if on_progress is not None:
             on_progress(number / len(files), file.name)
         sheets.append(dry_run(file.stem, gcode, profile, papers.get(file.stem, bed), most_power))
-    return Preview(
+    seen = Preview(
         name=path.resolve().name,
         machine=profile,
         sheets=tuple(sheets),
         pattern=None if layout is None else _pattern(path, layout, findings),
         findings=tuple(findings),
     )
+    return _chosen(seen, jobs, most_power, chosen, marks)
 
 
-def _of_value(job: object, machine: MachineProfile | None, settings: AnyPath | None) -> Preview:
-    """The preview of a job in memory, or of one that was read."""
+def _chosen(
+    seen: Preview,
+    jobs: Sequence[Job],
+    most_power: float,
+    sheet: int | None,
+    marks: Sequence[Mark],
+) -> Preview:
+    """The one ``sheet`` of a preview, where its ``marks`` are; None: all of them."""
+    if sheet is not None:
+        if sheet > len(jobs):
+            raise InputError(f"{seen.name} has no sheet {sheet}; it has {len(jobs)}.")
+        seen, jobs = replace(seen, sheets=(seen.sheets[sheet - 1],)), jobs[sheet - 1 : sheet]
+    if not marks:
+        return seen
+    the_one(range(len(jobs)))
+    _, there, aligned = lay(jobs[0], seen.machine, seen.sheets[0], marks, most_power=most_power)
+    return replace(seen, sheets=(there,), findings=(*seen.findings, aligned.finding))
+
+
+def _of_value(
+    job: object, machine: MachineProfile | None, settings: AnyPath | None
+) -> tuple[Preview, Sequence[Job], float]:
+    """The preview of a job in memory or of one that was read, its programs and most power."""
     from miurafab.workflow.job_directory import JobDirectory  # slow to load
     from miurafab.workflow.sheets import SheetJob
 
@@ -230,7 +263,7 @@ def _of_value(job: object, machine: MachineProfile | None, settings: AnyPath | N
         )
     else:
         profile = job.machine
-    return Preview(name, profile, dry_runs, pattern, edited)
+    return Preview(name, profile, dry_runs, pattern, edited), job.jobs, job.most_power
 
 
 def _as_dumped(machine: MachineProfile, dump: Path) -> MachineProfile:

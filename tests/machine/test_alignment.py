@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from wires import FakeWire
 
+import miurafab
 from miurafab.errors import InputError, OptionError
 from miurafab.gcode.program import strokes
 from miurafab.gcode.rigid_motion import RigidMotion
@@ -129,6 +130,27 @@ def test_the_picture_is_that_of_the_moved_sheet(prepared, tmp_path):
     assert "turned by 90.000 degrees" in page.read_text()
 
 
+def test_the_preview_shows_a_moved_sheet_as_the_cut_would(prepared, tmp_path):
+    marks = marks_of(moved_by(math.pi / 2, 300, 50))
+    there = align(prepared, None, marks)
+    words = ";".join(f"{a[0]},{a[1]}={b[0]},{b[1]}" for a, b in marks)
+    for given in (marks, words):
+        seen = miurafab.preview(tmp_path / "sheet-01.nc", align=given)
+        assert seen.sheets[0].bounds_mm == there.dry_runs[0].bounds_mm
+        assert seen.findings[-1] == there.aligned.finding
+    plain = miurafab.preview(tmp_path / "sheet-01.nc").sheets[0]
+    assert plain.bounds_mm == prepared.dry_runs[0].bounds_mm
+    with pytest.raises(InputError, match="has no sheet 2; it has 1"):
+        miurafab.preview(tmp_path / "sheet-01.nc", sheet=2)
+
+
+def test_no_minus_stands_before_zero(prepared):
+    marks = [((20.0, 20.0), (19.9999, 20.0)), ((120.0, 120.0), (119.9998, 120.0))]
+    finding = str(align(prepared, None, marks).aligned.finding)
+    assert "-0.000" not in finding
+    assert "+0.000 mm" in finding
+
+
 def test_marks_that_are_no_turn_and_no_shift_are_refused(prepared):
     still = moved_by(0.0, 0.0, 0.0)
     with pytest.raises(InputError, match=r"142\.13 mm apart in the job and 143\.13 mm.*\+0\.70 %"):
@@ -155,7 +177,7 @@ def test_marks_that_may_be_exchanged_are_doubted(prepared):
 
 def test_one_sheet_lies_at_one_place(prepared):
     job = replace(prepared, jobs=2 * prepared.jobs, dry_runs=2 * prepared.dry_runs)
-    with pytest.raises(InputError, match="2 would be cut; name its 'sheet'"):
+    with pytest.raises(InputError, match="there are 2; name its 'sheet'"):
         align(job, None, marks_of(moved_by(0.0, 1, 1)))
     second = align(job, [2], marks_of(moved_by(0.0, 1, 2)))
     assert second.jobs[0] == job.jobs[0]

@@ -88,6 +88,18 @@ def test_a_hold_is_dark_and_a_resume_loses_nothing() -> None:
     assert not any(hold + 0.2 < s.t1 and s.t0 < resume for s in wire.device.beam_log)
 
 
+@pytest.mark.parametrize("keys", [[(4.0, " r")], [(4.0, " "), (4.005, "r")]])
+def test_a_resume_while_the_hold_still_brakes_is_not_lost(keys: list[tuple[float, str]]) -> None:
+    """GRBL forgets a cycle start that comes with the hold or before its end (``protocol.c``)."""
+    _, undisturbed = run()
+    wire, result = run(*keys)
+    assert isinstance(undisturbed, StreamResult)
+    assert isinstance(result, StreamResult)
+    assert result.seconds == pytest.approx(undisturbed.seconds + 0.3, abs=0.4)
+    assert wire.commands.count(b"!") == 1
+    assert wire.commands.count(b"~") == 2
+
+
 @pytest.mark.parametrize("keys", [[(4.0, "q")], [(4.0, " "), (6.0, "q")]])
 def test_an_abort_comes_to_rest_and_resets(keys: list[tuple[float, str]]) -> None:
     wire, said = run(*keys)

@@ -18,6 +18,8 @@ from miurafab.gcode.job import Job
 from miurafab.machine.dialects import make_safe
 from miurafab.machine.faulty import FaultyDevice
 from miurafab.machine.journal import read_journal
+from miurafab.machine.known_controller import PortSetup
+from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
 from miurafab.machine.signals import StopSignals
@@ -177,6 +179,31 @@ def test_a_refused_line_halts_the_controller_and_is_named() -> None:
     assert wire.written.endswith(b"\nM112\n")
     assert device.killed
     assert_dark(device)
+
+
+@pytest.mark.parametrize(("air", "end"), [("M8", ": shut it at the machine."), ("M9", "again.")])
+def test_the_last_words_tell_of_the_air_that_stays_on(air: str, end: str) -> None:
+    job = Job("bad.nc", dashes().text.replace("G90", f"G90\nM8\n{air}").replace("M5 I", "G17"))
+    with pytest.raises(ControllerError, match=r"refused line 87 \('G17'\)") as fault:
+        send(job, Wire(new_device()), force=frozenset({"program"}))
+    assert str(fault.value).endswith(end)
+
+
+def test_a_further_job_of_a_session_is_not_waited_for_again() -> None:
+    device = new_device()
+    wire = Wire(device)
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    plan = plan_job(dashes(), MACHINE)
+    took = []
+    for _ in range(2):
+        begun = device.now
+        took.append((session.cut(plan).seconds, device.now - begun))
+        session.load()
+    assert burnt(device) == 2 * WHOLE
+    (first, _), (second, again) = took
+    assert second == pytest.approx(first, abs=0.1)
+    assert again - second < 0.2
+    assert wire.written.count(b"M115") == 2
 
 
 @pytest.mark.parametrize("emergency_parser", [True, False])

@@ -21,7 +21,7 @@ from miurafab.profiles import load_machine
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.workflow.cut import prepare
 from miurafab.workflow.cut_options import CutOptions
-from miurafab.workflow.cut_sheets import cut_prepared, frame
+from miurafab.workflow.cut_sheets import cut_prepared, frame_plan
 from miurafab.workflow.sheet_plans import plan_sheets, rehearsed
 
 MACHINE = load_machine("grbl-laser-400")
@@ -88,14 +88,10 @@ def test_the_dry_run_says_how_far_the_head_goes(box):
     assert rehearsed(box, None, CutOptions())[1] == "refused"
 
 
-def test_the_frame_begins_and_ends_where_the_head_stands(box, monkeypatch):
-    seen = []
-    monkeypatch.setattr(
-        "miurafab.workflow.cut_sheets.stream_plan", lambda plan, port, **more: seen.append(plan)
-    )
-    frame(box, 1, port="virtual", options=CutOptions(send=SendOptions(at="centre")))
-    assert seen[0].at == (-40.0, -35.0)
-    assert seen[0].job.text.endswith("G0 X-40.000 Y-35.000\n")
+def test_the_frame_begins_and_ends_where_the_head_stands(box):
+    plan = frame_plan(box, 1, CutOptions(send=SendOptions(at="centre")))
+    assert plan.at == (-40.0, -35.0)
+    assert plan.job.text.endswith("G0 X-40.000 Y-35.000\n")
 
 
 def test_further_sheets_lie_in_the_frame_of_the_first(box):

@@ -1,10 +1,8 @@
 """Time left that holds, journals beside what was cut, and further sheets from where the head is."""
 
-import json
-
 import pytest
 from sealing import seal
-from small_jobs import dashes, known_toolpath, write_nc
+from small_jobs import dashes, known_toolpath, write_job, write_nc
 
 import miurafab
 from miurafab.errors import GcodeError, InputError
@@ -27,16 +25,7 @@ def pattern(tmp_path_factory):
 @pytest.fixture
 def folder(pattern, tmp_path):
     """A job directory with three sheets, all alike."""
-    path = tmp_path / "job"
-    miurafab.sheets(pattern).write(path)
-    layout = json.loads((path / "layout.json").read_text())
-    (first,) = layout["sheets"]
-    for n in (2, 3):
-        layout["sheets"].append({**first, "name": f"sheet-0{n}", "placements": []})
-        (path / f"sheet-0{n}.nc").write_bytes((path / "sheet-01.nc").read_bytes())
-    (path / "layout.json").write_text(json.dumps(layout))
-    seal(path)
-    return path
+    return write_job(tmp_path / "job", 3, pattern)
 
 
 @pytest.mark.parametrize("toolpath", [known_toolpath(), dashes(1500)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
 
 import pytest
@@ -12,7 +13,7 @@ from miurafab.errors import WAITING, InputError, PersonNeeded
 from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import NoKeys
 from miurafab.machine.planning import SendOptions
-from miurafab.machine.sender import stream_plan
+from miurafab.machine.sender import session_here
 from miurafab.workflow import multi_machine
 from miurafab.workflow.cut import prepare
 from miurafab.workflow.cut_options import CutOptions
@@ -93,10 +94,13 @@ def test_a_resumed_job_asks_too(job):
 
 @pytest.mark.parametrize("ready", [{"A", "B"}, {"B"}, set()])
 def test_machines_that_share_a_job_wait_each_for_its_material(job, monkeypatch, ready):
-    def apart(plan, port, *, signals, virtual_speed, **files):
-        return stream_plan(plan, "virtual", signals=signals, **files)
+    opened = []
 
-    monkeypatch.setattr(multi_machine, "stream_apart", apart)
+    def apart(machine, port, name, *, signals, virtual_speed):
+        opened.append(port)
+        return session_here(machine, "virtual", name, signals=signals)
+
+    monkeypatch.setattr(multi_machine, "session_apart", apart)
     monkeypatch.setattr(multi_machine, "StopSignals", lambda: NoSignals())
     job = dataclasses.replace(job, directory=SimpleNamespace(most_power=1.0, edits=()))
     asked = []
@@ -115,6 +119,7 @@ def test_machines_that_share_a_job_wait_each_for_its_material(job, monkeypatch, 
     assert all(each.why == WAITS for each in outcome if not each.done)
     # Each machine cut one sheet unasked; for each other sheet somebody said that it is in.
     assert len([a for a in asked if a[1] in ready]) == len(cut) - len(firsts)
+    assert sorted(opened) == ["A", "B"]
 
 
 class NoSignals:
@@ -128,6 +133,9 @@ class NoSignals:
 
     def __exit__(self, *why):
         pass
+
+    def raising(self):
+        return nullcontext()
 
     def check(self):
         pass
@@ -146,17 +154,39 @@ def test_what_is_said_of_one_sheet_is_not_said_to_several_machines(job, name):
 
 
 def test_each_of_several_machines_begins_where_its_head_stands(job, monkeypatch):
-    seen = {}
+    seen, told = {}, []
 
-    def apart(plan, port, *, signals, virtual_speed, **files):
-        seen.setdefault(port, []).append(plan.at)
-        return stream_plan(plan, "virtual", signals=signals, **files)
+    class Recorded:
+        def __init__(self, session, port):
+            self.waits, self.load, self._session, self._port = (
+                session.waits,
+                session.load,
+                session,
+                port,
+            )
 
-    monkeypatch.setattr(multi_machine, "stream_apart", apart)
+        def cut(self, plan, **files):
+            seen.setdefault(self._port, []).append(plan.at)
+            return self._session.cut(plan, **files)
+
+    @contextmanager
+    def apart(machine, port, name, *, signals, virtual_speed):
+        with session_here(machine, "virtual", name, signals=signals) as session:
+            yield Recorded(session, port)
+
+    monkeypatch.setattr(multi_machine, "session_apart", apart)
     monkeypatch.setattr(multi_machine, "StopSignals", lambda: NoSignals())
     job = dataclasses.replace(job, directory=SimpleNamespace(most_power=1.0, edits=()))
-    options = CutOptions(send=SendOptions(at="front-left"))
-    share_sheets(job, ["A", "B"], None, options, pause=False, on_progress=lambda *a: None)
+    share_sheets(
+        job,
+        ["A", "B"],
+        None,
+        CutOptions(send=SendOptions(at="front-left")),
+        pause=False,
+        on_start=lambda port, finding: told.append((port, finding.code)),
+        on_progress=lambda *a: None,
+    )
     # The box begins at 3,4; the program ends at its origin.
     assert {places[0] for places in seen.values()} == {(3.0, 4.0)}
     assert {place for places in seen.values() for place in places[1:]} == {(0.0, 0.0)}
+    assert sorted(told) == [(port, "head") for port in sorted(seen)]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from sealing import seal
 
+import miurafab
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.posting import post
 from miurafab.profiles import OPERATIONS, load_machine, load_material
@@ -82,6 +83,21 @@ def write_folder(folder: Path, pattern=None, names=("sheet-01", "sheet-02")) -> 
             for name in names
         ],
     }
+    (folder / "layout.json").write_text(json.dumps(layout))
+    seal(folder)
+    return folder
+
+
+def write_job(folder: Path, count: int, pattern=None) -> Path:
+    """A job directory with ``count`` sheets, all alike, of ``pattern`` or of a small saddle."""
+    if pattern is None:
+        pattern = miurafab.fit("hypar", facets="4x4", size="60mm")
+    miurafab.sheets(pattern).write(folder)
+    layout = json.loads((folder / "layout.json").read_text())
+    (first,) = layout["sheets"]
+    for n in range(2, count + 1):
+        layout["sheets"].append({**first, "name": f"sheet-0{n}", "placements": []})
+        (folder / f"sheet-0{n}.nc").write_bytes((folder / "sheet-01.nc").read_bytes())
     (folder / "layout.json").write_text(json.dumps(layout))
     seal(folder)
     return folder
