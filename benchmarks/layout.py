@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 from travel_bound import only, path_bound
 
-from miurafab.fabrication import sheets
+from miurafab.fabrication import placing, plan, sheets
 from miurafab.fabrication.drawing.dxf import sheet_dxf
 from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
@@ -47,11 +47,12 @@ from miurafab.profiles.material import Perforation
 
 BED_MM, MARGIN_MM = (600.0, 400.0), 5.0
 STAGES = {
-    "frame_patches": "patches and tabs",
-    "nest": "nesting",
-    "place_texts": "lettering",
-    "sheet_strokes": "perforation",
-    "order_strokes": "ordering",
+    "split": (plan, "patches and tabs"),
+    "outline_split": (plan, "patches and tabs"),
+    "nest": (plan, "nesting"),
+    "place_texts": (placing, "lettering"),
+    "sheet_strokes": (sheets, "perforation"),
+    "order_strokes": (sheets, "ordering"),
 }
 LIMITS = {"patches and tabs": 20.0, "perforation": 5.0, "ordering": 5.0, "SVG": 10.0, "DXF": 10.0}
 
@@ -108,17 +109,17 @@ def measure(name: str, facets: int) -> tuple[dict[str, Any], tuple[Toolpath, ...
     pattern = PATTERNS[name](columns, round(facets / columns))
     machine = load_machine("fluidnc-laser-600")
     bed = replace(machine.bed, width_mm=BED_MM[0], height_mm=BED_MM[1], margin_mm=MARGIN_MM)
-    seconds = dict.fromkeys(STAGES.values(), 0.0)
-    kept = {stage: getattr(sheets, stage) for stage in STAGES}
-    for stage, title in STAGES.items():
-        setattr(sheets, stage, _timed(kept[stage], title, seconds))
+    seconds = {title: 0.0 for _, title in STAGES.values()}
+    kept = {stage: getattr(module, stage) for stage, (module, _) in STAGES.items()}
+    for stage, (module, title) in STAGES.items():
+        setattr(module, stage, _timed(kept[stage], title, seconds))
     try:
         started = time.process_time()
         layout = sheets.lay_out(pattern, replace(machine, bed=bed), load_material("card-250"))
         seconds["all of the layout"] = time.process_time() - started
     finally:
         for stage, function in kept.items():
-            setattr(sheets, stage, function)
+            setattr(STAGES[stage][0], stage, function)
     for title, draw in (("SVG", sheet_svg), ("DXF", sheet_dxf)):
         started = time.process_time()
         size = sum(len(draw(path)) for path in layout.toolpaths)

@@ -102,11 +102,13 @@ def _answer(job: JobDirectory, out: Path) -> dict[str, Any]:
             "tabs": totals.tabs,
             "border_tabs": totals.border_tabs,
             "density": totals.density,
+            "sheets_bound": totals.sheets_bound,
             "cut_mm": totals.cut_mm,
             "perforated_mm": totals.perforated_mm,
             "travel_mm": totals.travel_mm,
             "seconds": totals.seconds,
         },
+        "alternatives": [vars(each) for each in job.layout.alternatives],
         "borders": [
             {"number": each.number, "length_mm": each.length_mm, "across_mm": each.across_mm}
             for each in job.layout.borders
@@ -130,11 +132,30 @@ def _show(console: Console, answer: dict[str, Any], job: JobDirectory) -> None:
     if job.layout.borders:
         sizes = (f"{each.number}: {each.size}" for each in job.layout.borders)
         facts["open borders"] = "; ".join(sizes)
-    facts["sheets"] = f"{totals['sheets']:,}, {totals['density']:.0%} of their room used"
+    facts["sheets"] = f"{totals['sheets']:,}, {totals['density']:.0%} of their room used" + (
+        f"; at least {totals['sheets_bound']:,} for these patches"
+        if totals["sheets"] > totals["sheets_bound"]
+        else ""
+    )
     for key in ("cut", "perforated", "travel"):
         facts[key] = length_text(totals[f"{key}_mm"])
     facts["machine time"] = clock_text(totals["seconds"])
     console.facts(facts)
+    compared = answer["alternatives"]
+    if len(compared) > 1:
+        console.rows(
+            ("", "sheets", "patches", "seams", "smallest patch"),
+            [
+                (
+                    "chosen" if each["chosen"] else "compared",
+                    each["sheets"],
+                    each["patches"],
+                    length_text(each["seam_mm"]),
+                    f"{each['smallest']:.0%} of the mean",
+                )
+                for each in compared
+            ],
+        )
     rows = [(sheet["name"], sheet["patches"], clock_text(sheet["seconds"])) for sheet in sheets]
     if any(sheet["stock"] for sheet in sheets):
         cut_from = [(sheet["stock"] or "a whole sheet",) for sheet in sheets]

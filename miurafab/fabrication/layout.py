@@ -23,6 +23,7 @@ from miurafab.fabrication.borders import OpenBorder
 from miurafab.fabrication.kit.plan import kit_table, read_kit
 from miurafab.fabrication.labels import AbsentLabel
 from miurafab.fabrication.partition.patch_frame import Patch
+from miurafab.fabrication.plan import Alternative
 from miurafab.fabrication.sheets import Layout, Placement, Sheet, Totals
 from miurafab.fabrication.tabs import Tab
 from miurafab.files import Reading, file_name, parse_json
@@ -47,6 +48,7 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
         "absent_labels": [dataclasses.asdict(label) for label in layout.absent],
         **({} if layout.kit is None else {"kit": kit_table(layout.kit)}),
         "totals": dataclasses.asdict(layout.totals),
+        "alternatives": [dataclasses.asdict(each) for each in layout.alternatives],
         "findings": findings_json(layout.findings),
     }
     return json.dumps(document, separators=(",", ":")) + "\n"
@@ -92,6 +94,7 @@ def read_layout(text: str, where: object = "The layout") -> Layout:
             borders=tuple(map(_border, document.get("borders", ()))),
             absent=tuple(map(_absent, document.get("absent_labels", ()))),
             kit=read_kit(document["kit"]) if "kit" in document else None,
+            alternatives=tuple(map(_alternative, document.get("alternatives", ()))),
         )
 
 
@@ -207,6 +210,15 @@ def _border(table: dict[str, Any]) -> OpenBorder:
 def _absent(table: dict[str, Any]) -> AbsentLabel:
     numbers = (_number(table[key]) for key in ("x_mm", "y_mm", "rotation_deg", "height_mm"))
     return AbsentLabel(int(table["patch"]), _text(table["text"]), *numbers)
+
+
+def _alternative(table: dict[str, Any]) -> Alternative:
+    return Alternative(
+        **{
+            name: value if value in (True, False) else _number(value)
+            for name, value in table.items()
+        }
+    )
 
 
 def _text(value: object) -> str:

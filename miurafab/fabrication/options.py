@@ -136,6 +136,14 @@ class LayoutOptions(Shown):
     max_patch_mm: tuple[float, float] | None = option(
         SIDES, "The largest patch.", group="Patches", default_text="the bed", page="first"
     )
+    prefer: str | None = option(
+        Choice(("sheets", "glue")),
+        "What to save where one costs the other: sheets, or glue, which is the length of the "
+        "seams.",
+        group="Patches",
+        default_text="a sheet is worth 1.5 long sides of the bed in seams",
+        page="more",
+    )
     seam_rows: tuple[int, ...] = option(
         Several(LINES, distinct), "Force a seam after these rows of facets.", (), group="Patches"
     )

@@ -22,17 +22,13 @@ from miurafab.fabrication.caps import capped
 from miurafab.fabrication.kit.plan import FoldersKit, folders_kit
 from miurafab.fabrication.labels import AbsentLabel
 from miurafab.fabrication.layout_findings import layout_findings
-from miurafab.fabrication.nesting import Nesting, Problem, Ring, nest, turned
+from miurafab.fabrication.nesting import Nesting, Ring, turned
 from miurafab.fabrication.open_ring import opened
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.partition.patch_frame import (
-    DIGITS,
-    Patch,
-    copied,
-    frame_patches,
-)
+from miurafab.fabrication.partition.patch_frame import DIGITS, Patch
 from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.placing import absent_labels, motion_of, texts_of
+from miurafab.fabrication.plan import Alternative, plan_patches
 from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
 from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.stock import LaidStock, lay_stock
@@ -133,6 +129,9 @@ class Layout(Shown):
         The names and labels that are not engraved, for the guide.
     kit : FoldersKit or None
         The rows to fold and the gauge of their angles; None for a layout without a pattern.
+    alternatives : tuple of Alternative
+        The ways to divide the pattern that were compared: the chosen one, and those with the fewest
+        sheets and the least glue.
     """
 
     machine: str
@@ -144,6 +143,7 @@ class Layout(Shown):
     borders: tuple[OpenBorder, ...] = ()
     absent: tuple[AbsentLabel, ...] = ()
     kit: FoldersKit | None = None
+    alternatives: tuple[Alternative, ...] = ()
 
     def _summary(self) -> str:
         totals = self.totals
@@ -231,16 +231,9 @@ def lay_out(
     pattern = capped(opened(pattern, options), options)
     material = worked(material, machine, options)
     stock = lay_stock(options, machine.bed, material.grain)
-    framed = frame_patches(pattern, stock, material, options)
+    plan = plan_patches(pattern, stock, material, options)
+    framed, patches, nesting = plan.framed, plan.patches, plan.nesting
     outlined = framed.outlined
-    patches = copied(framed.patches, options.nesting.quantity)
-    nesting = nest(
-        Problem(
-            tuple(patch.outline_mm for patch in patches),
-            tuple(patch.label for patch in patches),
-            stock.kinds,
-        )
-    )
     sheets, placements = _sheets(nesting, patches, stock)
     motion = motion_of(patches, placements, np.array([slot.sheet for slot in nesting.slots]))
     lettering = texts_of(pattern, outlined, framed.labels, patches, motion, options)
@@ -274,6 +267,7 @@ def lay_out(
         borders=open_borders(pattern),
         absent=absent_labels(lettering, patches),
         kit=folders_kit(pattern),
+        alternatives=plan.alternatives,
         toolpaths=toolpaths,
         backs=behind,
         pattern=pattern,

@@ -8,9 +8,10 @@ from miurafab.fabrication.nesting.problem import (
     Stock,
     layout_faults,
     place,
+    price,
     turned,
 )
-from miurafab.fabrication.nesting.raster import Nesting, nest
+from miurafab.fabrication.nesting.raster import Nesting, first_nesting, nest, nest_within
 
 __all__ = [
     "Nesting",
@@ -19,8 +20,11 @@ __all__ = [
     "SheetKind",
     "Slot",
     "Stock",
+    "first_nesting",
     "layout_faults",
     "nest",
+    "nest_within",
     "place",
+    "price",
     "turned",
 ]

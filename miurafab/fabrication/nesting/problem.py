@@ -73,6 +73,31 @@ class Stock:
     kinds: tuple[SheetKind, ...]
     gap: float
 
+    @cached_property
+    def prices(self) -> tuple[float, ...]:
+        """What a sheet of each kind costs, in sheets of the largest kind: its share of that area.
+        Kinds of limited quantity are free where there are others, since they are to be used up.
+        """
+        endless = any(kind.quantity is None for kind in self.kinds)
+        largest = max(kind.area for kind in self.kinds)
+        return tuple(
+            0.0 if endless and kind.quantity is not None else kind.area / largest
+            for kind in self.kinds
+        )
+
+    def least_price(self, area: float) -> float:
+        """A lower bound of the price of sheets for outlines of ``area`` mm², grown by half the
+        gap.
+        """
+        room = [(kind.width + self.gap) * (kind.height + self.gap) for kind in self.kinds]
+        if len(room) == 1:
+            return float(math.ceil(area * (1 - 1e-9) / room[0]))
+        dear = [k for k, price in enumerate(self.prices) if price > 0]
+        free = sum(
+            room[k] * (kind.quantity or 0) for k, kind in enumerate(self.kinds) if k not in dear
+        )
+        return max(area - free, 0.0) * min(self.prices[k] / room[k] for k in dear)
+
     @property
     def in_turn(self) -> list[int]:
         """The indices of the kinds, kinds of limited quantity first."""
@@ -112,6 +137,12 @@ class Problem:
                 break
         return max(sheets, int((self.areas > max(room) / 2 * (1 + 1e-9)).sum()), 1)
 
+    @property
+    def least_price(self) -> float:
+        """A lower bound of the :func:`price` of a layout."""
+        least = self.stock.least_price(float(self.areas.sum()))
+        return max(least, float(self.bound)) if len(self.stock.kinds) == 1 else least
+
 
 @dataclass(frozen=True)
 class Slot:
@@ -149,6 +180,11 @@ def buffered(shape: BaseGeometry, distance: float) -> BaseGeometry:
     arcs and for the tolerance of GEOS, a hundredth of the distance.
     """
     return shapely.buffer(shape, distance * 1.015, quad_segs=16)
+
+
+def price(slots: Sequence[Slot], stock: Stock) -> float:
+    """The sum of the :attr:`Stock.prices` of the sheets of a layout."""
+    return sum(stock.prices[kind] for _, kind in {(slot.sheet, slot.kind) for slot in slots})
 
 
 def cost(slots: Sequence[Slot], stock: Stock) -> tuple[float, float]:

@@ -29,12 +29,11 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.nesting.cells import Part, Raster
-from miurafab.fabrication.nesting.problem import Problem, Slot, Stock, cost, layout_faults
-from miurafab.geometry.arrays import Bools, Ints
+from miurafab.fabrication.nesting.filling import FilledSheet, Rack, Rule
+from miurafab.fabrication.nesting.problem import Problem, Slot, cost, layout_faults, price
 
 WORK = 4_000_000_000
 """The limit of the search in cells transformed: about 40 s on one core of 2020 (measured:
@@ -47,18 +46,8 @@ take longer."""
 _FINE = 600
 """The same for the contact rule."""
 
-_FIRST = 64
-"""Positions that are tried at once, the best first."""
-
 _RIM = 12
 """The width of the rim around a part in cells (tried: 1 to 16)."""
-
-_LAST = 2
-"""The number of sheets that are searched for a part once the work limit is reached."""
-
-Rule = tuple[float, float] | None
-"""A corner rule: the weights of x and y of the far corner of a part, whose sum is minimised. None
-is the contact rule."""
 
 
 @dataclass(frozen=True)
@@ -77,14 +66,42 @@ class Nesting:
         return 1 + max(slot.sheet for slot in self.slots)
 
 
-def nest(problem: Problem, work: int = WORK) -> Nesting:
-    """A slot for each outline, proven by :func:`~miurafab.fabrication.nesting.layout_faults`.
+def nest(problem: Problem, work: int = WORK, *, known: Nesting | None = None) -> Nesting:
+    """A slot for each outline, proven by :func:`~miurafab.fabrication.nesting.layout_faults`; no
+    worse than the ``known`` nesting of :func:`first_nesting`.
 
     Raises :class:`~miurafab.errors.LayoutError` naming the outline if an outline fits no sheet at
     any rotation, or if the stock does not suffice.
     """
     _check_sizes(problem)
-    slots, finished = _Search(problem, work).run()
+    slots, finished = _Search(problem, work).run(() if known is None else known.slots)
+    return _proven(problem, slots, finished)
+
+
+def nest_within(problem: Problem, most: float, work: int = WORK) -> Nesting | None:
+    """What :func:`nest` finds if its price is at most ``most``, else None. An order is given up
+    at the first sheet too many.
+    """
+    _check_sizes(problem)
+    if problem.least_price > most:
+        return None
+    slots, finished = _Search(problem, work).run(most=most)
+    return _proven(problem, slots, finished) if slots else None
+
+
+def first_nesting(problem: Problem, most: float = math.inf) -> Nesting | None:
+    """The nesting of the first pass alone, not proven yet; None if its price is over ``most``.
+
+    Raises :class:`~miurafab.errors.LayoutError` as :func:`nest`.
+    """
+    _check_sizes(problem)
+    if problem.least_price > most:
+        return None
+    slots = _Search(problem, WORK).first_pass(most)
+    return None if slots is None else Nesting(tuple(slots), problem.bound, True)
+
+
+def _proven(problem: Problem, slots: Sequence[Slot], finished: bool) -> Nesting:
     faults = layout_faults(problem, slots)
     if faults:
         raise LayoutError(f"The nesting cannot be used: {faults[0]}.")
@@ -105,159 +122,6 @@ def _check_sizes(problem: Problem) -> None:
             )
 
 
-class _Sheet:
-    """The parts on one sheet. Cells are marked only when the sheet is first searched; until then
-    ``free``, an upper bound of the free area in mm², decides whether to search.
-    """
-
-    def __init__(self, kind: int, stock: Stock, raster: Raster) -> None:
-        self.kind, self.raster = kind, raster
-        self.allowed, gap = stock.kinds[kind], stock.gap
-        whole = (self.allowed.width + gap) * (self.allowed.height + gap)
-        self.free = whole - self.allowed.width * self.allowed.height + self.allowed.area
-        self.placed: list[tuple[int, Slot]] = []
-        self._refused: set[int] = set()
-        self._waiting: list[tuple[int, int, int, int]] = []
-        self._marked: Bools | None = None
-        self._room: NDArray[np.int16]
-        self._spectrum: NDArray[np.complex64] | None = None
-
-    def take(self, number: int, part: int, rule: Rule) -> bool:
-        """Place outline ``number``, of shape ``part``, at the free position that ``rule`` prefers;
-        False if no position is free.
-        """
-        shape = self.raster.parts[part]
-        if self.free < shape.area * (1 - 1e-6) or part in self._refused:
-            return False
-        rotations = [r for r in self.allowed.rotations if self.allowed.fits(shape.outline, r)]
-        if rule is None or self.placed or self.allowed.defects:
-            found = [self._best(part, rotation, rule) for rotation in rotations]
-        else:
-            found = [self._corner(part, rotation, rule) for rotation in rotations]
-        open_places = [(*at, r) for at, r in zip(found, rotations, strict=True) if at is not None]
-        if not open_places:
-            self._refused.add(part)
-            return False
-        _, i, j, rotation = min(open_places, key=lambda place: place[0])
-        self._waiting.append((part, rotation, i, j))
-        self.free -= shape.area
-        shift = np.array([i, j]) * self.raster.cell + shape.turned(rotation)[1]
-        slot = Slot(0, self.kind, float(shift[0]), float(shift[1]), rotation)
-        self.placed.append((number, slot))
-        return True
-
-    def _corner(
-        self, part: int, rotation: int, weights: tuple[float, float]
-    ) -> tuple[float, int, int] | None:
-        return float(self.raster.reach(part, rotation) * self.raster.cell @ weights), 0, 0
-
-    def _best(self, part: int, rotation: int, rule: Rule) -> tuple[float, int, int] | None:
-        raster = self.raster
-        raster.hold(part)
-        mask, room = raster.mask(part, rotation), self._free()
-        i, j = raster.open_positions(room, mask)
-        if not len(i):
-            return None
-        if rule is None:
-            touched = raster.correlated(self._transform(), raster.rim_of(part, rotation))
-            # Rounding keeps the noise of the transforms out of the decision.
-            order = -np.round(touched[i, j], 3)
-        else:
-            wide, high = mask.cells.shape
-            across, along = raster.cell * rule
-            order = (i + wide) * across + (j + high) * along
-        for at in _best_first(order):
-            clear = np.flatnonzero(raster.clear(room, mask, i[at], j[at]))
-            if len(clear):
-                best = at[clear[0]]
-                return float(order[best]), int(i[best]), int(j[best])
-        return None
-
-    def _free(self) -> NDArray[np.int16]:
-        """(columns, rows) the number of free cells from each cell upward."""
-        if self._marked is None:
-            self._marked = self.raster.blank(self.allowed)
-            self._room = _room(self._marked)
-        for part, rotation, i, j in self._waiting:
-            cells = self.raster.mask(part, rotation).cells
-            x, y = i + self.raster.rim, j + self.raster.rim
-            new = slice(x, x + cells.shape[0])
-            self._marked[new, y : y + cells.shape[1]] |= cells
-            self._room[new] = _room(self._marked[new])
-            self._spectrum = None
-        self._waiting.clear()
-        return self._room
-
-    def _transform(self) -> NDArray[np.complex64]:
-        """The transform of the marked cells."""
-        if self._spectrum is None:
-            assert self._marked is not None
-            self._spectrum = self.raster.transformed(self._marked.astype(np.float32))
-        return self._spectrum
-
-
-def _best_first(order: NDArray[np.floating]) -> Iterator[Ints]:
-    """The places of ``order`` from the least to the greatest, in parts; equals as they stand."""
-    done = 0
-    while done < len(order):
-        last = min(2 * done + _FIRST, len(order)) - 1
-        limit = np.partition(order, last)[last]
-        near = np.flatnonzero(order <= limit)
-        near = near[np.argsort(order[near], kind="stable")][done:]
-        yield near
-        done += len(near)
-
-
-def _room(marked: Bools) -> NDArray[np.int16]:
-    """The number of cells from each cell upward that are not ``marked``."""
-    rows = marked.shape[1]
-    row = np.arange(rows, dtype=np.int16)
-    above = np.where(marked, row, np.int16(rows))[:, ::-1]
-    return np.asarray(np.minimum.accumulate(above, axis=1)[:, ::-1] - row)
-
-
-class _Rack:
-    """Sheets of some kinds: the sheets ``begun``, the begun sheets that still have room, and one
-    blank sheet of each kind while the stock lasts.
-    """
-
-    def __init__(self, stock: Stock, rasters: list[Raster], kinds: list[int]) -> None:
-        self.stock, self.rasters, self.kinds = stock, rasters, kinds
-        self.begun: list[_Sheet] = []
-        self._open: list[_Sheet] = []
-        self._blank: dict[int, _Sheet] = {}
-        for kind in kinds:
-            self._supply(kind)
-
-    def take(self, number: int, part: int, rule: Rule, rest: float, late: bool) -> bool:
-        """Place outline ``number`` on the first sheet with room for it; False if there is none. No
-        later outline is smaller than ``rest`` mm². If ``late``, only the last sheets are tried.
-        """
-        near = self._open[-_LAST:] if late else self._open
-        blank = [self._blank[kind] for kind in self.kinds if kind in self._blank]
-        for sheet in (*near, *blank):
-            if sheet.take(number, part, rule):
-                break
-        else:
-            return False
-        if len(sheet.placed) == 1:
-            self._begin(sheet)
-        if sheet.free < rest * (1 - 1e-6):
-            self._open.remove(sheet)
-        return True
-
-    def _begin(self, sheet: _Sheet) -> None:
-        self.begun.append(sheet)
-        self._open.append(sheet)
-        del self._blank[sheet.kind]
-        self._supply(sheet.kind)
-
-    def _supply(self, kind: int) -> None:
-        most = self.stock.kinds[kind].quantity
-        if most is None or len(self.begun) < most:
-            self._blank[kind] = _Sheet(kind, self.stock, self.rasters[kind])
-
-
 class _Search:
     """The search for one problem, with the rasters that all passes share."""
 
@@ -274,26 +138,43 @@ class _Search:
         self.parts = list(parts.values())
         self._rasters: dict[bool, list[Raster]] = {}
 
-    def run(self) -> tuple[list[Slot], bool]:
-        """The best layout found, and whether the search ended within its work limit."""
-        best: list[Slot] = []
-        least = (math.inf, math.inf, math.inf)
-        for rule, order, endless in self.passes():
-            slots = self.first_fit(order, rule, endless, not best)
-            if slots is None:
-                return best, False
-            last = max(slot.sheet for slot in slots)
-            share = sum(
-                area for area, slot in zip(self.areas, slots, strict=True) if slot.sheet == last
-            )
-            taken = (*cost(slots, self.stock), float(share))
-            if taken < least:
-                best, least = slots, taken
-            if self.unbeatable(slots):
+    def run(
+        self, known: Sequence[Slot] = (), most: float = math.inf
+    ) -> tuple[Sequence[Slot], bool]:
+        """The best layout whose price is at most ``most``, empty if none is found, and whether the
+        search ended within its work limit. ``known`` is the layout of the first pass.
+        """
+        best = known
+        least = self.taken(known) if known else (math.inf, math.inf, math.inf)
+        for number, (rule, order, endless) in enumerate(self.passes()):
+            if number or not known:
+                must = not best and math.isinf(most)
+                slots = self.first_fit(order, rule, endless, must, most)
+                if slots is None:
+                    if self.late:
+                        return best, False
+                    continue
+                if self.taken(slots) < least:
+                    best, least = slots, self.taken(slots)
+            if self.unbeatable(best):
                 break
             if self.late:
                 return best, False
+            most = min(most, price(best, self.stock))
         return best, True
+
+    def first_pass(self, most: float) -> list[Slot] | None:
+        """The layout of the first pass; None if its price is over ``most``."""
+        rule, order, endless = next(self.passes())
+        return self.first_fit(order, rule, endless, True, most)
+
+    def taken(self, slots: Sequence[Slot]) -> tuple[float, float, float]:
+        """What a layout takes, compared in order: its cost, then the area on its last sheet."""
+        last = max(slot.sheet for slot in slots)
+        share = sum(
+            area for area, slot in zip(self.areas, slots, strict=True) if slot.sheet == last
+        )
+        return (*cost(slots, self.stock), float(share))
 
     @property
     def late(self) -> bool:
@@ -328,12 +209,19 @@ class _Search:
         return [given] if small_first == given else [given, small_first]
 
     def first_fit(
-        self, order: list[int], rule: Rule, endless: list[int], first: bool
+        self,
+        order: list[int],
+        rule: Rule,
+        endless: list[int],
+        first: bool,
+        most: float = math.inf,
     ) -> list[Slot] | None:
-        """The slots of one pass; None at the work limit, unless this is the ``first`` pass."""
+        """The slots of one pass; None at the work limit, unless this is the ``first`` pass, and
+        None as soon as the price is over ``most``.
+        """
         given = [k for k in self.stock.in_turn if self.stock.kinds[k].quantity is not None]
         racks = [
-            _Rack(self.stock, self.rasters(rule is None), kinds)
+            Rack(self.stock, self.rasters(rule is None), kinds)
             for kinds in (*([k] for k in given), endless)
         ]
         least = np.append(np.minimum.accumulate(self.areas[order][::-1])[::-1], np.inf)
@@ -344,6 +232,8 @@ class _Search:
             part, rest = self.alike[number], float(least[position + 1])
             if not any(rack.take(number, part, rule, rest, late) for rack in racks):
                 raise LayoutError(self._no_room(number))
+            if sum(rack.price for rack in racks) > most * (1 + 1e-9):
+                return None
         found = [Slot(0, 0, 0.0, 0.0, 0)] * len(order)
         for index, sheet in enumerate(sheet for rack in racks for sheet in rack.begun):
             for number, slot in sheet.placed:
@@ -355,7 +245,7 @@ class _Search:
         name = self.problem.names[number]
         kinds = self.stock.kinds
         if any(
-            _Sheet(k, self.stock, raster).take(number, self.alike[number], (1.0, 1.0))
+            FilledSheet(k, self.stock, raster).take(number, self.alike[number], (1.0, 1.0))
             for k, raster in enumerate(self.rasters(False))
         ):
             count = sum(kind.quantity or 0 for kind in kinds)

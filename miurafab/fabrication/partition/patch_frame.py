@@ -13,19 +13,16 @@ import numpy as np
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.nesting import turned
-from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.fit_box import Space
 from miurafab.fabrication.partition.patch_outline import (
     OutlinedPatch,
     OutlinedPatches,
-    outline_patches,
 )
 from miurafab.fabrication.seam_names import tab_labels
 from miurafab.fabrication.stock import LaidStock
 from miurafab.fabrication.tabs import FOLDS, Tab
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.profiles import Material
 
 DIGITS = 6
 """Decimals of mm in a layout, so that the written layout equals the computed layout."""
@@ -67,22 +64,21 @@ class FramedPatches:
     patches: tuple[Patch, ...]
 
 
-def frame_patches(
-    pattern: CreasePattern, stock: LaidStock, material: Material, options: LayoutOptions
-) -> FramedPatches:
-    """The patches of a pattern, each no larger than the main sheet of ``stock``.
-
-    Raises :class:`~miurafab.errors.LayoutError` as
-    :func:`~miurafab.fabrication.partition.patch_outline.outline_patches`.
-    """
+def sheet_space(stock: LaidStock) -> Space:
+    """The usable part of the main sheet of ``stock``."""
     kind = stock.kinds.kinds[stock.main]
     turns = tuple(sorted({turn // 90 % 2 for turn in kind.rotations})) if stock.upright else None
-    outlined = outline_patches(pattern, kind.width, kind.height, material, options, turns=turns)
+    return Space(kind.width, kind.height, turns)
+
+
+def framed_patches(
+    pattern: CreasePattern, outlined: OutlinedPatches, sheet: Space
+) -> FramedPatches:
+    """The patches in frames of their own, each no larger than ``sheet``."""
     labels = tab_labels(pattern, outlined.face_patch, outlined.tabs)
     numbers = _numbers(outlined)
-    space = Space(kind.width, kind.height, turns)
     patches = (
-        _patch(number, patch, outlined, numbers, labels, space)
+        _patch(number, patch, outlined, numbers, labels, sheet)
         for number, patch in enumerate(outlined.patches)
     )
     return FramedPatches(outlined, labels, tuple(patches))

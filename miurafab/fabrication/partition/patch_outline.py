@@ -56,6 +56,16 @@ class OutlinedPatches:
     untabbed: Ints
 
 
+def patch_space(sheet: Space, material: Material, options: LayoutOptions) -> Space:
+    """The room for the outline of a patch that is cut out of ``sheet``, the usable part of one."""
+    width, height = sheet.width, sheet.height
+    if options.max_patch_mm is not None:
+        long, short = options.max_patch_mm
+        along, across = (long, short) if width >= height else (short, long)
+        width, height = min(width, along), min(height, across)
+    return Space(width, height, sheet.turns).smaller(2 * allowance(material.kerf_mm))
+
+
 def outline_patches(
     pattern: CreasePattern,
     width: float,
@@ -72,12 +82,19 @@ def outline_patches(
     :func:`~miurafab.fabrication.partition.split.split`.
     """
     options = options or LayoutOptions()
-    if options.max_patch_mm is not None:
-        long, short = options.max_patch_mm
-        along, across = (long, short) if width >= height else (short, long)
-        width, height = min(width, along), min(height, across)
-    space = Space(width, height, turns).smaller(2 * allowance(material.kerf_mm))
+    space = patch_space(Space(width, height, turns), material, options)
     face_patch = split(pattern, space.width, space.height, material, options, turns=turns)
+    return outline_split(pattern, face_patch, space, material, options)
+
+
+def outline_split(
+    pattern: CreasePattern,
+    face_patch: Ints,
+    space: Space,
+    material: Material,
+    options: LayoutOptions,
+) -> OutlinedPatches:
+    """The patches of a split ``face_patch`` (F,) whose patches fit ``space`` with standard tabs."""
     around = boundaries(pattern, face_patch)
     tight = np.zeros(len(around), dtype=bool)
     while True:

@@ -52,11 +52,13 @@ def split(
     options: LayoutOptions | None = None,
     *,
     turns: tuple[int, ...] | None = None,
+    improve: bool = True,
 ) -> Ints:
     """(F,) the patch of each facet, from 0.
 
     Each patch with its tabs fits ``width`` x ``height`` mm, at any angle or by quarter ``turns``
-    only (:class:`~miurafab.fabrication.partition.fit_box.Space`).
+    only (:class:`~miurafab.fabrication.partition.fit_box.Space`). The first split is improved
+    unless ``improve`` is False.
     Tabs stand on the patch that ``options`` name, by default the patch with the lower number.
     Raises :class:`~miurafab.errors.LayoutError` naming the facet if a facet is not a simple polygon
     or does not fit alone, and if ``options`` ask for seams along grid lines that do not exist.
@@ -84,7 +86,8 @@ def split(
             found[piece.facets] = count
         else:
             tabs = border.of(piece.facets)
-            found[piece.facets] = count + _split(piece, parts, tabs, space, material, options)
+            own = _split(piece, parts, tabs, space, material, options, improve)
+            found[piece.facets] = count + own
         count = int(found[piece.facets].max()) + 1
     return found
 
@@ -96,6 +99,7 @@ def _split(
     space: Space,
     material: Material,
     options: LayoutOptions,
+    improve: bool,
 ) -> Ints:
     """(n,) the patch of each facet of a ``piece`` that is not whole, from 0.
 
@@ -151,7 +155,7 @@ def _split(
             for a0, a1, b0, b1 in split_grid(here, small):
                 found[block[a0:a1, b0:b1]] = count
                 count += 1
-    if space.turns is None:
+    if improve and space.turns is None:
         found = improved(
             pattern,
             found,

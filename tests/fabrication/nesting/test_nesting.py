@@ -18,6 +18,7 @@ from miurafab.fabrication.nesting import (
     Slot,
     Stock,
     cells,
+    filling,
     layout_faults,
     nest,
     place,
@@ -221,8 +222,8 @@ def test_patches_that_fill_a_sheet_each_are_placed_without_a_search(monkeypatch)
 
 def test_the_work_grows_with_the_outlines_and_not_with_their_pairs(monkeypatch):
     tried = []
-    take = raster._Sheet.take
-    monkeypatch.setattr(raster._Sheet, "take", lambda *a: tried.append(1) or take(*a))
+    take = filling.FilledSheet.take
+    monkeypatch.setattr(filling.FilledSheet, "take", lambda *a: tried.append(1) or take(*a))
     asked = problem([rectangle(90.0, 80.0)] * 2000, SheetKind(100.0, 90.0, ANY))
     found = nest(asked)
     assert (sheets_of(found.slots), found.bound) == (2000, 2000)
@@ -249,7 +250,7 @@ def test_free_positions_are_those_where_no_cell_is_marked(share):
     shape = np.array(mask.cells.shape)
     windows = np.lib.stride_tricks.sliding_window_view(marked[2:-2, 2:-2], tuple(shape))
     expected = ~(windows & mask.cells).any(axis=(2, 3))
-    room = raster._room(marked)
+    room = filling._room(marked)
     opened = grid.open_positions(room, mask)
     clear = grid.clear(room, mask, *opened)
     np.testing.assert_array_equal(np.argwhere(expected), np.column_stack(opened)[clear])
@@ -260,7 +261,7 @@ def test_free_positions_are_those_where_no_cell_is_marked(share):
 
 def test_positions_are_tried_from_the_best_on_and_equals_in_their_order():
     order = np.random.default_rng(2).integers(0, 40, 1000).astype(np.float32)
-    found = list(raster._best_first(order))
+    found = list(filling._best_first(order))
     np.testing.assert_array_equal(np.concatenate(found), np.argsort(order, kind="stable"))
     assert len(found[0]) < 150
 
