@@ -123,7 +123,7 @@ def _hpgl(made: Toolpath, machine: MachineProfile, material: Material) -> Job:
         speed = max(1, round(material.operations[name].feed_mm_min / 600.0))
         force = f"FS{depth(machine, name)};" if machine.tool.kind == "knife" else ""
         setup[name] = f"VS{speed};{force}"
-    return Job(made.sheet, sheet_hpgl(made, setup))
+    return Job(made.sheet, sheet_hpgl(made, setup=setup))
 
 
 def _wire_is_short(

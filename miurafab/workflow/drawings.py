@@ -41,13 +41,13 @@ def _tiled(page: str) -> Draw:
 
 
 _SHEETS: Mapping[str, tuple[str, Draw]] = {
-    "dxf": (".dxf", lambda path, letters, title: sheet_dxf(path).encode("ascii")),
+    "dxf": (".dxf", lambda path, letters, title: sheet_dxf(path, letters=letters).encode("ascii")),
     "dxf-r2010": (
         "-r2010.dxf",
-        lambda path, letters, title: sheet_dxf(path, "R2010").encode("utf-8"),
+        lambda path, letters, title: sheet_dxf(path, "R2010", letters).encode("utf-8"),
     ),
-    "pdf": (".pdf", lambda path, letters, title: sheets_pdf((path,), path.sheet)),
-    "hpgl": (".hpgl", lambda path, letters, title: sheet_hpgl(path).encode("ascii")),
+    "pdf": (".pdf", lambda path, letters, title: sheets_pdf((path,), path.sheet, letters)),
+    "hpgl": (".hpgl", lambda path, letters, title: sheet_hpgl(path, letters).encode("ascii")),
     **{f"tiled-{page}": (f"-{page}.pdf", _tiled(page)) for page in PAGES_MM},
 }
 FORMATS = (*_SHEETS, "picture")

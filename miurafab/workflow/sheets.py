@@ -12,6 +12,7 @@ from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError, ProfileError
 from miurafab.fabrication.drawing.assembly_guide import assembly_guide
 from miurafab.fabrication.drawing.svg import sheet_svg
+from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import DrawnLayout, lay_out
@@ -142,12 +143,13 @@ class SheetJob(Shown):
         wanted = read_formats((formats,) if isinstance(formats, str) else formats)
         tell = on_progress or (lambda fraction, note: None)
         layout, machine = self.layout, self.machine
+        letters = edge_letters(layout, self.pattern)
         with job_files(folder) as staging:
             keep_profiles(self.machine_file, self.material_file, folder, staging)
             for number, (toolpath, job) in enumerate(zip(layout.passes, self.jobs, strict=True)):
                 tell(0.7 * number / len(self.jobs), f"drawing {toolpath.sheet}")
                 write_draft(staging / f"{toolpath.sheet}{machine.job_suffix}", job.text)
-                write_draft(staging / f"{toolpath.sheet}.svg", sheet_svg(toolpath))
+                write_draft(staging / f"{toolpath.sheet}.svg", sheet_svg(toolpath, letters))
             for name, content in drawings(layout, self.pattern, wanted, self.name):
                 write_draft(staging / name, content)
             tell(0.7, "drawing the assembly guide")

@@ -13,7 +13,7 @@ import svgelements
 from scipy.spatial import cKDTree
 
 from miurafab.fabrication.drawing.hpgl import UNITS_PER_MM
-from miurafab.fabrication.drawing.svg import COLOURS
+from miurafab.fabrication.drawing.layers import LAYERS
 from miurafab.profiles import OPERATIONS
 
 POINT_MM = 25.4 / 72
@@ -50,7 +50,7 @@ def read_dxf(text):
     assert not document.audit().has_errors
     found = []
     for entity in document.modelspace():
-        operation = OPERATIONS.index(entity.dxf.layer)
+        operation = OPERATIONS.index(entity.dxf.layer.partition("-")[0])
         if entity.dxftype() == "LINE":
             start, end = entity.dxf.start, entity.dxf.end
             found.append((operation, start.x, start.y, end.x, end.y))
@@ -65,7 +65,7 @@ def read_svg(text, height):
     """By svgelements, which converts to pixels at 96 dpi: that it comes back to mm proves the real
     size.
     """
-    operation_of = {colour.lower(): OPERATIONS.index(name) for name, colour in COLOURS.items()}
+    operation_of = {each.colour.lower(): OPERATIONS.index(each.operation) for each in LAYERS}
     document = svgelements.SVG.parse(io.StringIO(text))
     found = []
     for path in document.elements(lambda e: isinstance(e, svgelements.Path)):
@@ -94,8 +94,8 @@ def read_pdf(content):
 
 def _pdf_segments(page, reader):
     by_colour = {
-        tuple(round(int(value[k : k + 2], 16) / 255, 3) for k in (1, 3, 5)): name
-        for name, value in COLOURS.items()
+        tuple(round(int(each.colour[k : k + 2], 16) / 255, 3) for k in (1, 3, 5)): each.operation
+        for each in LAYERS
     }
     content = pypdf.generic.ContentStream(page.get_contents(), reader)
     operation, pieces, start, at = None, [], None, None
@@ -118,9 +118,10 @@ def _pdf_segments(page, reader):
 
 
 def read_hpgl(text):
-    """By plain code: pens are operations, units 0.025 mm."""
+    """By plain code: pens are layers, units 0.025 mm."""
     assert text.startswith("IN;")
     assert text.rstrip().endswith("SP0;")
+    operation_of = {each.pen: OPERATIONS.index(each.operation) for each in LAYERS}
     found, pen, at = [], None, (0, 0)
     for word in re.findall(r"([A-Z]{2})([\d,]*);", text):
         numbers = [int(n) for n in word[1].split(",") if n]
@@ -129,7 +130,7 @@ def read_hpgl(text):
             pen = numbers[0]
         elif word[0] == "PD":
             for point in points:
-                found.append((pen - 1, *at, *point))
+                found.append((operation_of[pen], *at, *point))
                 at = point
         elif word[0] == "PU" and points:
             at = points[-1]

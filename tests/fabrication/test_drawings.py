@@ -30,10 +30,13 @@ from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out
 from miurafab.findings import Finding
-from miurafab.profiles import load_machine, load_material
+from miurafab.profiles import OPERATIONS, load_machine, load_material
 from miurafab.profiles.material import Crease
 
 MACHINE, MATERIAL = load_machine("grbl-laser-400"), load_material("card-250")
+
+
+LETTERS = regular(53, 37).edges_assignment
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +47,7 @@ def layout():
 @pytest.mark.parametrize("version", VERSIONS)
 def test_dxf(layout, version):
     for toolpath in layout.toolpaths:
-        text = sheet_dxf(toolpath, version)
+        text = sheet_dxf(toolpath, version, LETTERS)
         assert_same(read_dxf(text), toolpath, 1e-3)
         if version == "R2010":
             assert ezdxf.read(io.StringIO(text)).header["$INSUNITS"] == 4
@@ -52,11 +55,11 @@ def test_dxf(layout, version):
 
 def test_svg(layout):
     for toolpath in layout.toolpaths:
-        assert_same(read_svg(sheet_svg(toolpath), toolpath.height_mm), toolpath, 1e-3)
+        assert_same(read_svg(sheet_svg(toolpath, LETTERS), toolpath.height_mm), toolpath, 1e-3)
 
 
 def test_pdf(layout):
-    written = sheets_pdf(layout.toolpaths, "test")
+    written = sheets_pdf(layout.toolpaths, "test", LETTERS)
     assert b"ASCII85Decode" not in written, "text takes a quarter more room"
     sheets = read_pdf(written)
     assert len(sheets) == len(layout.toolpaths)
@@ -67,7 +70,7 @@ def test_pdf(layout):
 
 def test_hpgl(layout):
     for toolpath in layout.toolpaths:
-        text = sheet_hpgl(toolpath)
+        text = sheet_hpgl(toolpath, LETTERS)
         found = read_hpgl(text)
         assert_same(found, toolpath, 0.5 / UNITS_PER_MM + 1e-9)
         assert np.diff(toolpath.offsets).max() > POINTS_A_LINE + 1, "an outline longer than a line"
@@ -100,12 +103,31 @@ def test_tiles_joined_by_their_crosses_are_the_sheet(layout, page):
         else:
             raise AssertionError("a page shares no cross with the others")
     origin = next(move for words, move, _ in laid if re.search(r"^A1$", words, re.MULTILINE))
-    wanted = segments(toolpath)[:, 1:] - np.tile(toolpath.points.min(axis=0) - EDGE_MM, 2)
+    low = np.tile(toolpath.points.min(axis=0) - EDGE_MM, 2)
+    perforate = OPERATIONS.index("perforate")
+    pieces = segments(toolpath)
+    folds = whole_folds(toolpath, toolpath.operation == perforate)
+    solid = [ends for edge, ends in folds if letters[edge] == "M"]
+    wanted = np.concatenate([pieces[pieces[:, 0] != perforate][:, 1:], solid]) - low
     drawn = np.concatenate([p + np.tile(move - origin, 2) for _, move, p in laid])
     drawn -= np.tile(Tiling().margin_mm, 4)
     for ends in (wanted, wanted[:, [2, 3, 0, 1]]):
         gap, _ = cKDTree(np.concatenate([drawn, drawn[:, [2, 3, 0, 1]]])).query(ends, p=np.inf)
         assert gap.max() < 1e-3
+    # Of a dashed valley both ends are drawn.
+    tips = np.array([ends for edge, ends in folds if letters[edge] == "V"]) - low
+    gap, _ = cKDTree(drawn.reshape(-1, 2)).query(tips.reshape(-1, 2), p=np.inf)
+    assert gap.max() < 1e-3
+
+
+def whole_folds(toolpath, creases):
+    """The pattern edge of each crease among ``creases`` (S,), and both its ends as drawn."""
+    found = {}
+    for k in np.flatnonzero(creases).tolist():
+        key = int(toolpath.patch[k]), int(toolpath.edge[k])
+        first = found.get(key, toolpath.starts[k].tolist())[:2]
+        found[key] = [*first, *toolpath.ends[k].tolist()]
+    return [(edge, ends) for (_, edge), ends in found.items()]
 
 
 def read_tile(page, reader):

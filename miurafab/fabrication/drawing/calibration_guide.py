@@ -61,7 +61,7 @@ def calibration_guide(
     canvas.scale(scale, scale)
     canvas.setStrokeColor(RULE)
     canvas.rect(0, 0, sheet.width_mm * mm, sheet.height_mm * mm)
-    draw_strokes(canvas, sheet.toolpath, line_mm=0.15 / scale)
+    draw_strokes(canvas, sheet.toolpath, scale=scale)
     canvas.restoreState()
     drawn = f"{sheet.width_mm:.0f} x {sheet.height_mm:.0f} mm, drawn at 1:{1 / scale:.3g}"
     text(canvas, MARGIN, top - 4, drawn, 8, colour=QUIET)

@@ -17,7 +17,7 @@ from reportlab.pdfgen.canvas import Canvas
 from miurafab.fabrication.drawing.colours import patch_colour
 from miurafab.fabrication.drawing.svg_canvas import Pen
 from miurafab.fabrication.wording import runs
-from miurafab.geometry.arrays import Floats
+from miurafab.geometry.arrays import Floats, places_in_runs
 from miurafab.origami import picture
 
 rl_config.useA85 = 0  # pages as bytes take four fifths of the room that they take as text
@@ -38,6 +38,10 @@ PALE = HexColor("#eef1f4")
 MOUNTAIN, VALLEY = HexColor(picture.CREASES["M"]), HexColor(picture.CREASES["V"])
 OTHER = HexColor("#8a6d3b")
 CREASE_COLOURS = {"M": MOUNTAIN, "V": VALLEY, "U": OTHER}
+DASHES_MM = {"V": (2.4, 0.62), "U": (1.2, 0.3)}
+"""The period in mm and the drawn part of it of folds that are dashed for people; mountains are
+solid (as in the crease patterns of R. Lang). So a grey print tells them apart, too.
+"""
 
 
 def tint(number: int, strength: float = 1.0) -> Color:
@@ -138,14 +142,34 @@ def scale_bar(canvas: Pen, scale: float, x: float, y: float) -> None:
     text(canvas, x + length * scale + 2, y - 1, f"{length:g} mm", 8, colour=QUIET)
 
 
+def fold_lines(ends: Floats, letter: str, scale: float = 1.0) -> Floats:
+    """(M, 2, 2) the pieces of N folds ``ends`` (N, 2, 2), with the dashes of their ``letter`` on a
+    canvas that is scaled by ``scale``. A fold begins and ends with a dash and has two at least.
+    """
+    if letter not in DASHES_MM or not len(ends):
+        return ends
+    period, part = DASHES_MM[letter]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) * scale
+    count = np.maximum(np.rint(length / period + 1 - part), 2).astype(np.int64)
+    fold, place = np.repeat(np.arange(len(ends)), count), places_in_runs(count)
+    step = 1 / (count[fold] - 1 + part)
+    share = np.stack([place * step, (place + part) * step], axis=1)
+    along = ends[fold, 1] - ends[fold, 0]
+    return np.asarray(ends[fold, :1] + share[:, :, None] * along[:, None])
+
+
 def legend(canvas: Pen, entries: Sequence[tuple[str, Color, float]], x: float, y: float) -> None:
-    """Names, each behind a stroke of its colour and weight (mm), right-aligned at ``x``."""
+    """Names, each behind a stroke of its colour and weight (mm), right-aligned at ``x``. Those of
+    folds are dashed as in the drawing.
+    """
+    letters = {"mountain": "M", "valley": "V"}
     for name, colour, weight in reversed(entries):
         text(canvas, x, y - 1, name, 8, colour=QUIET, align="right")
         x -= stringWidth(name, "Helvetica", 8) / mm + 1.5
         canvas.setStrokeColor(colour)
         canvas.setLineWidth(weight * mm)
-        canvas.line((x - 7) * mm, y * mm, x * mm, y * mm)
+        line = np.array([[[x - 7, y], [x, y]]])
+        canvas.lines((fold_lines(line, letters.get(name, "")) * mm).reshape(-1, 4).tolist())
         x -= 12
 
 

@@ -1,21 +1,23 @@
 """Drawings as SVG: sheets for the machine, and a picture of a layout for people.
 
 A sheet is drawn true to scale: width, height and viewBox in mm, so that importers do not guess a
-resolution. The y axis of SVG points down and that of the sheet up, so y is mirrored. Each operation
-is a layer, in a colour that LightBurn maps to a layer (palette entries 00 to 03). Every dash is a
-segment: importers ignore a dashed line style and would cut through.
+resolution. The y axis of SVG points down and that of the sheet up, so y is mirrored. The layers are
+those of :mod:`~miurafab.fabrication.drawing.layers`, as far as there is anything on them.
 
 Only this module imports svgwrite. Its validation is off: it takes longer than the drawing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 import svgwrite
 
 from miurafab.fabrication.drawing.colours import hex_of, patch_colour
+from miurafab.fabrication.drawing.layers import LAYERS, NO_LETTERS, Letters, layers_of
 from miurafab.fabrication.seams import with_seams
 from miurafab.fabrication.sheets import Layout
 from miurafab.fabrication.toolpath import Toolpath
@@ -24,15 +26,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.seam_lines import SEAM_WORDS, SeamLine, seam_lines
 from miurafab.profiles import OPERATIONS
 
-COLOURS = {
-    "engrave": "#000000",
-    "score": "#00E000",
-    "perforate": "#0000FF",
-    "cut": "#FF0000",
-}
-
 _INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-_HAIRLINE = 0.1
 _PICTURE = 1200
 """The width of a picture in pixels."""
 
@@ -47,12 +41,15 @@ _CREASES = {
 }
 _WEIGHTS = {letter: 1.8 if letter in "BC" else 1.0 for letter in _CREASES}
 """The weights of lines over that of a crease."""
+_DASHES = {"V": (5.0, 3.0), "U": (1.5, 3.0)}
+"""Dashes and gaps of folds over the weight of their line: valleys are dashed, mountains solid."""
 
 
-def sheet_svg(toolpath: Toolpath) -> str:
-    """The strokes of one sheet in their order, true to scale, one layer per operation.
+def sheet_svg(toolpath: Toolpath, letters: Letters = NO_LETTERS) -> str:
+    """The strokes of one sheet in their order on each layer, true to scale.
 
-    The strokes of a crease are subpaths of one path, and so are the texts of a patch.
+    The strokes of a crease are subpaths of one path, and so are the texts of a patch. ``letters``
+    (E,) is the assignment of each pattern edge.
     """
     width, height = toolpath.width_mm, toolpath.height_mm
     drawing = _drawing(width, height, (f"{_short(width)}mm", f"{_short(height)}mm"))
@@ -62,11 +59,14 @@ def sheet_svg(toolpath: Toolpath) -> str:
     same = (np.diff(toolpath.edge) == 0) & (np.diff(toolpath.patch) == 0)
     same &= toolpath.operation[1:] != OPERATIONS.index("cut")
     together = np.concatenate([[0], np.cumsum(~same)])
-    for operation, name in enumerate(OPERATIONS):
-        layer = drawing.g(id=name, fill="none", stroke=COLOURS[name], stroke_width=_HAIRLINE)
+    layer_of = layers_of(toolpath, letters)
+    for number in np.unique(layer_of).tolist():
+        kind = LAYERS[number]
+        style = {"fill": "none", "stroke": kind.colour, "stroke_width": kind.line_mm}
+        layer = drawing.g(id=kind.name, **style)
         layer.attribs["inkscape:groupmode"] = "layer"
-        layer.attribs["inkscape:label"] = name
-        strokes = np.flatnonzero(toolpath.operation == operation)
+        layer.attribs["inkscape:label"] = kind.name
+        strokes = np.flatnonzero(layer_of == number)
         for run in np.split(strokes, np.flatnonzero(np.diff(together[strokes])) + 1):
             if len(run):
                 layer.add(drawing.path(d="".join(paths[s] for s in run.tolist())))
@@ -77,8 +77,8 @@ def sheet_svg(toolpath: Toolpath) -> str:
 def layout_svg(pattern: CreasePattern, layout: Layout) -> str:
     """A picture of the flat pattern with the patches of ``layout`` tinted and named.
 
-    Mountains are red, valleys blue, the border black. Each seam line has a colour and a number of
-    its own on both of its sides. A legend says so.
+    Mountains are red and solid, valleys blue and dashed, the border black. Each seam line has a
+    colour and a number of its own on both of its sides. A legend says so.
     """
     lines = seam_lines(with_seams(pattern))
     points = pattern.vertices_coords * np.array([1.0, -1.0])
@@ -98,7 +98,9 @@ def layout_svg(pattern: CreasePattern, layout: Layout) -> str:
         edges = np.flatnonzero(pattern.edges_assignment == letter)
         edges = np.setdiff1d(edges, [edge for seam in lines for edge in seam.edges.ravel()])
         if len(edges):
-            _add_lines(drawing, pattern, points, edges, name, colour, line * _WEIGHTS[letter])
+            weight = line * _WEIGHTS[letter]
+            style = _dashes(letter, weight)
+            _add_lines(drawing, pattern, points, edges, name, colour, weight, style)
     for seam in lines:
         name, weight = f"seam-{seam.number}", line * 3.0
         _add_lines(drawing, pattern, points, seam.edges.ravel(), name, seam.colour, weight)
@@ -106,10 +108,11 @@ def layout_svg(pattern: CreasePattern, layout: Layout) -> str:
     for seam in lines:
         for x, y in (seam.places * [1.0, -1.0] - low + margin).tolist():
             _add_number(drawing, seam, x, y, size)
-    for place, (words, colour) in enumerate(entries):
+    for place, (words, letter, colour) in enumerate(entries):
         y = height - 2 * size * (len(entries) - place)
         ends = (_short(margin), _short(y)), (_short(margin + 3 * size), _short(y))
-        drawing.add(drawing.line(*ends, stroke=colour, stroke_width=_short(3 * line)))
+        style = {"stroke": colour, "stroke_width": _short(3 * line), **_dashes(letter, 2 * line)}
+        drawing.add(drawing.line(*ends, **style))
         drawing.add(
             drawing.text(
                 words,
@@ -122,16 +125,28 @@ def layout_svg(pattern: CreasePattern, layout: Layout) -> str:
     return _text(drawing)
 
 
-def _legend_entries(pattern: CreasePattern, lines: tuple[SeamLine, ...]) -> list[tuple[str, str]]:
-    """The words and the colour of each kind of line that is drawn."""
+def _legend_entries(
+    pattern: CreasePattern, lines: tuple[SeamLine, ...]
+) -> list[tuple[str, str, str]]:
+    """The words, the letter and the colour of each kind of line that is drawn."""
     seams = {edge for seam in lines for edge in seam.edges.ravel().tolist()}
     letters = {
         letter for edge, letter in enumerate(pattern.edges_assignment.tolist()) if edge not in seams
     }
-    entries = [(name, colour) for letter, (name, colour) in _CREASES.items() if letter in letters]
+    entries = [
+        (name, letter, colour) for letter, (name, colour) in _CREASES.items() if letter in letters
+    ]
     if lines:
-        entries.append((SEAM_WORDS, lines[0].colour))
+        entries.append((SEAM_WORDS, "", lines[0].colour))
     return entries
+
+
+def _dashes(letter: str, weight: float) -> dict[str, str]:
+    """The style of the folds with a ``letter``."""
+    if letter not in _DASHES:
+        return {}
+    dashes = " ".join(_short(weight * part) for part in _DASHES[letter])
+    return {"stroke_linecap": "butt", "stroke_dasharray": dashes}
 
 
 def _add_lines(
@@ -142,13 +157,14 @@ def _add_lines(
     name: str,
     colour: str,
     weight: float,
+    style: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     """Some ``edges`` (n,) of the pattern as one path."""
     data = [
         f"M{_short(x0)} {_short(y0)}L{_short(x1)} {_short(y1)}"
         for (x0, y0), (x1, y1) in points[pattern.edges_vertices[edges]].tolist()
     ]
-    style = {"fill": "none", "stroke": colour, "stroke_linecap": "round"}
+    style = {"fill": "none", "stroke": colour, "stroke_linecap": "round", **style}
     drawing.add(drawing.path(d="".join(data), id=name, stroke_width=_short(weight), **style))
 
 

@@ -24,6 +24,7 @@ from miurafab.fabrication.drawing.page import (
     Box,
     disk,
     fitted,
+    fold_lines,
     polygon,
     text,
     tint,
@@ -221,17 +222,18 @@ class Views:
         for patch in self.patches:
             canvas.setFillColor(tint(patch.id, 0.75))
             self._filled(canvas, points, patch.id)
-        ends = (points[self.pattern.edges_vertices] * mm).reshape(-1, 4)
+        ends = points[self.pattern.edges_vertices] * mm
         canvas.setLineCap(1)
         for letter, colour in CREASE_COLOURS.items():
             canvas.setStrokeColor(colour)
             canvas.setLineWidth(0.12 * mm)
-            canvas.lines(ends[self.pattern.edges_assignment == letter].tolist())
+            folds = fold_lines(ends[self.pattern.edges_assignment == letter], letter, 1 / mm)
+            canvas.lines(folds.reshape(-1, 4).tolist())
         self._around(canvas, points, 0.3, INK)
         for line in self.seams:
             canvas.setStrokeColor(HexColor(line.colour))
             canvas.setLineWidth(0.6 * mm)
-            canvas.lines(ends[line.edges.ravel()].tolist())
+            canvas.lines(ends[line.edges.ravel()].reshape(-1, 4).tolist())
         size = _fitting(11.0, len(self.patches))
         for patch in self.patches:
             self._name(canvas, points, patch.id, size)
