@@ -25,7 +25,7 @@ from miurafab.workflow.job_files import LAYOUT, job_machine, job_material, settl
 from miurafab.workflow.manifest import edits
 from miurafab.workflow.picture import first_sheet
 
-GUIDE = "assembly.pdf"
+GUIDE, GUIDE_PAGE = "assembly.pdf", "assembly.html"
 
 
 @dataclass(frozen=True, repr=False)

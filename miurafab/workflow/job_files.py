@@ -21,7 +21,7 @@ from miurafab.workflow.manifest import MANIFEST
 from miurafab.workflow.whole_folder import put_in_place, settle, whole_folder
 
 LAYOUT = "layout.json"
-GUIDES = ("assembly.pdf", "calibration.pdf", "calibration.json")
+GUIDES = ("assembly.pdf", "assembly.html", "calibration.pdf", "calibration.json")
 """What explains a job; one made in the place of another leaves none of them."""
 _SHEET = re.compile(r"sheet-[0-9]{2,}(-back)?")
 """The names of programs, which begin those of all that is drawn."""

@@ -38,7 +38,7 @@ from miurafab.profiles.shipped import Kind
 from miurafab.workflow.design import read_layout_table
 from miurafab.workflow.drawings import drawings, read_formats
 from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run
-from miurafab.workflow.job_directory import GUIDE, JobDirectory
+from miurafab.workflow.job_directory import GUIDE, GUIDE_PAGE, JobDirectory
 from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
 from miurafab.workflow.manifest import sha256, write_manifest
 from miurafab.workflow.patterns import PatternLike, sound_pattern
@@ -154,7 +154,8 @@ class SheetJob(Shown):
                 write_draft(staging / name, content)
             tell(0.7, "drawing the assembly guide")
             guide = assembly_guide(layout, self.pattern, machine, self.material, self.name)
-            write_draft(staging / GUIDE, guide)
+            write_draft(staging / GUIDE, guide.pdf)
+            write_draft(staging / GUIDE_PAGE, guide.page)
             used = self._put_pattern(folder, staging)
             digest = sha256(used)
             write_draft(staging / LAYOUT, write_layout(layout, used.name, digest))

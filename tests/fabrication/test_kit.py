@@ -3,16 +3,34 @@
 from __future__ import annotations
 
 import dataclasses
+import html
+import io
 import math
+import re
+from collections.abc import Iterator
 
 import numpy as np
+import pypdf
 import pytest
 from problems import regular
 
+from miurafab.fabrication.drawing.assembly_guide import AssemblyGuide, assembly_guide
+from miurafab.fabrication.drawing.glue_sections import GlueSections
+from miurafab.fabrication.drawing.glue_view import GlueView
+from miurafab.fabrication.drawing.kit_sections import KitSections
+from miurafab.fabrication.drawing.sections import Figures, Numbered, Prose, Section
+from miurafab.fabrication.drawing.views import Views
 from miurafab.fabrication.kit.gauge import FLAT_DEG, MOST, STEP_DEG, wedges
 from miurafab.fabrication.kit.plan import folders_kit, kit_table, read_kit
+from miurafab.fabrication.kit.rim import rim_ends
 from miurafab.fabrication.kit.rows import Row, bend_of, crease_lines, named, numbered
+from miurafab.fabrication.kit.states import folded_states
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.sheets import lay_out
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import load_machine, load_material
+
+MACHINE, MATERIAL = load_machine("grbl-laser-400"), load_material("card-250")
 
 
 def trimmed(pattern: CreasePattern, keep: np.ndarray) -> CreasePattern:
@@ -124,3 +142,159 @@ def test_names_of_rows_are_drawn_together():
     assert numbered([1, 3, 5, 7], "R") == "R1, R3 ... R7"
     assert numbered([1, 2, 3, 4], "R") == "R1-R4"
     assert numbered([2, 5, 6], "C") == "C2, C5-C6"
+
+
+def guide_of(pattern: CreasePattern, options: LayoutOptions | None = None) -> AssemblyGuide:
+    layout = lay_out(pattern, MACHINE, MATERIAL, options=options)
+    return assembly_guide(layout, pattern, MACHINE, MATERIAL, "Kit")
+
+
+def words_of(page: str) -> str:
+    """The text of a page of HTML outside of its pictures, one space between words."""
+    page = re.sub(r"<style>.*?</style>|<svg.*?</svg>", " ", page, flags=re.DOTALL)
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
+
+
+def text_of(pdf: bytes) -> tuple[str, int]:
+    """The text of a PDF, one space between words, and its number of pages."""
+    pages = pypdf.PdfReader(io.BytesIO(pdf)).pages
+    return " ".join(" ".join(page.extract_text() for page in pages).split()), len(pages)
+
+
+@pytest.mark.parametrize("limit", [None, (120.0, 90.0)])
+def test_paper_and_tablet_say_the_same(limit):
+    pattern = regular(17, 13)
+    layout = lay_out(pattern, MACHINE, MATERIAL, options=LayoutOptions(max_patch_mm=limit))
+    views = Views(layout, pattern)
+    guide = assembly_guide(layout, pattern, MACHINE, MATERIAL, "Kit")
+    paper, tablet = text_of(guide.pdf)[0], words_of(guide.page)
+    sections = [*KitSections(views).sections(), *GlueSections(views).sections()]
+    titles = ["folding", "rows to crease first", "collapse", "gauge"]
+    assert [section.title for section in sections] == titles + ["glueing"] * (limit is not None)
+    said = [words for section in sections for words in spoken(section)]
+    assert len(said) > 20
+    for words in said:
+        assert words in paper
+        assert words in tablet
+    assert all(sheet.name[1:] in tablet for sheet in layout.sheets)
+    assert guide.page.count("<svg") == 2 + len(layout.sheets) + sum(
+        len(block.figures)
+        for section in sections
+        for block in section.blocks
+        if isinstance(block, Figures)
+    )
+
+
+def spoken(section: Section) -> Iterator[str]:
+    """All that a section says in words."""
+    yield section.subtitle
+    for block in section.blocks:
+        if isinstance(block, Prose):
+            yield block.words
+        elif isinstance(block, Numbered):
+            yield from block.lines
+        elif isinstance(block, Figures):
+            for figure in block.figures:
+                yield figure.title
+                yield from figure.lines
+
+
+def test_the_page_needs_no_network_and_fits_a_narrow_screen():
+    page = guide_of(regular(9, 7)).page
+    assert 'content="width=device-width, initial-scale=1"' in page
+    assert set(re.findall(r"""(?:src|href|url)\s*[=(]\s*["']?(.)""", page)) == {"#"}
+    assert "<script" not in page
+    assert set(re.findall(r"https?://[^\"' ]+", page)) == {"http://www.w3.org/2000/svg"}
+    ids = re.findall(r'id="(s\d+)"', page)
+    assert re.findall(r'href="#(s\d+)"', page) == ids
+
+
+def test_rows_end_on_the_rim_of_each_patch():
+    pattern = regular(17, 13)
+    layout = lay_out(pattern, MACHINE, MATERIAL, options=LayoutOptions(max_patch_mm=(120.0, 90.0)))
+    lines = crease_lines(pattern)
+    for patch in layout.patches:
+        inside = np.zeros(len(pattern.faces_vertices), dtype=bool)
+        inside[patch.faces] = True
+        beside = np.where(pattern.edges_faces >= 0, inside[pattern.edges_faces], False)
+        rim = np.unique(pattern.edges_vertices[beside.sum(axis=1) == 1])
+        ends = rim_ends(pattern, lines, inside)
+        crossing = [line for line in lines if beside[line.edges].all(axis=1).any()]
+        assert [end.name for end in ends] == [line.name for line in crossing for _ in range(2)]
+        for end in ends:
+            off = np.linalg.norm(pattern.vertices_coords[rim] - end.at, axis=1)
+            assert off.min() == 0
+            own = next(line for line in lines if line.name == end.name)
+            points = pattern.vertices_coords[pattern.edges_vertices[own.edges]]
+            inner = points[beside[own.edges].all(axis=1)].reshape(-1, 2)
+            assert ((inner - end.at) @ end.out).max() <= 1e-9
+
+
+def test_the_states_are_of_the_angles_that_they_are_called_after():
+    """A regular Miura-ori moves rigidly, so its median fold angle can be told in advance."""
+    pattern = regular(9, 7)
+    states = folded_states(pattern)
+    assert states.titles == ("One third", "Two thirds", "Done")
+    folded = np.flatnonzero(np.isin(pattern.edges_assignment, ("M", "V")))
+    median = np.median(np.abs(pattern.edges_fold_angle[folded]))
+    for part, shape in zip((1 / 3, 2 / 3, 1.0), states.shapes, strict=True):
+        angle = np.median([_opening(pattern, shape, edge) for edge in folded.tolist()])
+        assert math.pi - angle == pytest.approx(part * median, abs=1e-6)
+
+
+def _opening(pattern: CreasePattern, shape: np.ndarray, edge: int) -> float:
+    """The angle between the two facets at an edge, from coordinates alone."""
+    a, b = shape[pattern.edges_vertices[edge]]
+    way = (b - a) / np.linalg.norm(b - a)
+    sides = []
+    for face in pattern.edges_faces[edge].tolist():
+        to = shape[pattern.faces_vertices[face]].mean(axis=0) - a
+        to -= (to @ way) * way
+        sides.append(to / np.linalg.norm(to))
+    return math.acos(float(np.clip(sides[0] @ sides[1], -1, 1)))
+
+
+def test_a_sheet_that_cannot_be_moved_is_shown_done_with_a_sentence():
+    """Two facets that share no crease with the others: no motion, and no guess of one."""
+    pattern = regular(4, 3)
+    letters = pattern.edges_assignment.copy()
+    letters[(pattern.edges_faces >= 0).all(axis=1)] = "C"
+    loose = dataclasses.replace(
+        pattern, edges_assignment=letters, edges_fold_angle=np.zeros(len(letters))
+    )
+    states = folded_states(loose)
+    assert states.titles == ("Done",)
+    assert states.shapes[0] is pattern.folded_coords
+    assert "could not be computed" in states.how
+
+
+def test_a_tab_lies_in_the_plane_of_the_facet_over_it():
+    pattern = regular(17, 13)
+    layout = lay_out(pattern, MACHINE, MATERIAL, options=LayoutOptions(max_patch_mm=(120.0, 90.0)))
+    view = GlueView(Views(layout, pattern))
+    tabs = [(patch, tab) for patch in layout.patches for tab in patch.tabs]
+    assert tabs
+    for patch, tab in tabs:
+        face, outline = view.glued(patch, tab)
+        assert layout.patches[tab.mate_patch].faces.tolist().count(face) == 1
+        corners = pattern.folded_coords[pattern.faces_vertices[face]]
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        normal /= np.linalg.norm(normal)
+        assert np.abs((outline - corners[0]) @ normal).max() < 1e-6
+        for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            inward = np.cross(normal, b - a)
+            assert ((outline - a) @ inward).min() > -1e-3 * np.linalg.norm(inward)
+
+
+def test_a_sheet_of_3600_facets_has_the_sections_of_a_small_one():
+    """Bounds on pages and bytes: as many facets as a person folds in a week, and no flood."""
+    large = guide_of(regular(61, 61))
+    text, pages = text_of(large.pdf)
+    assert pages <= 16
+    assert len(large.pdf) < 2_000_000
+    assert len(large.page) < 8_000_000
+    small = words_of(guide_of(regular(9, 7)).page)
+    for title in ("Folding", "Rows to crease first", "Collapse", "Gauge"):
+        assert title in words_of(large.page)
+        assert title in small
+    assert "R1-R59 (" in text or "R1, R2" not in text

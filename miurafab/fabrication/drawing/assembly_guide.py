@@ -1,4 +1,4 @@
-"""``assembly.pdf``: the assembly guide, on A4.
+"""``assembly.pdf``, the assembly guide on A4, and ``assembly.html``, the same for a tablet.
 
 The first page shows the folded form and the flat pattern, with the patches in the same colours, and
 the settings. Then follow each sheet with its patches and their places, and the folding and gluing,
@@ -16,7 +16,9 @@ from reportlab.lib.colors import HexColor
 from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 
-from miurafab.fabrication.drawing.glue_pages import GluePages
+from miurafab.fabrication.drawing.flow import flow
+from miurafab.fabrication.drawing.glue_sections import GlueSections
+from miurafab.fabrication.drawing.kit_sections import KitSections
 from miurafab.fabrication.drawing.page import (
     BOTTOM,
     HEIGHT,
@@ -37,6 +39,7 @@ from miurafab.fabrication.drawing.page import (
     text,
 )
 from miurafab.fabrication.drawing.sheet_pages import SheetPages
+from miurafab.fabrication.drawing.tablet_page import tablet_page
 from miurafab.fabrication.drawing.views import Views
 from miurafab.fabrication.sheets import DrawnLayout
 from miurafab.fabrication.wording import count
@@ -46,23 +49,40 @@ from miurafab.origami.seam_lines import SEAM_WORDS
 from miurafab.profiles import MachineProfile, Material
 
 
+@dataclass(frozen=True)
+class AssemblyGuide:
+    """The guide as PDF, and as a page for a tablet."""
+
+    pdf: bytes
+    page: str
+
+
 def assembly_guide(
     layout: DrawnLayout,
     pattern: CreasePattern,
     machine: MachineProfile,
     material: Material,
     title: str,
-) -> bytes:
-    """The guide as PDF. ``layout`` must have its toolpaths."""
+) -> AssemblyGuide:
+    """Both forms of the guide. ``layout`` must have its toolpaths."""
+    views = Views(layout, pattern)
+    overview = _Overview(views, machine, material, title)
+    sections = [*KitSections(views).sections(), *GlueSections(views).sections()]
+    pages: list[Page] = [overview.page]
+    for sheet, toolpath in zip(layout.sheets, layout.toolpaths, strict=True):
+        pages += SheetPages(views, sheet, toolpath, title).pages()
+    pages += flow(sections, title)
+    return AssemblyGuide(
+        _pdf(pages, title),
+        tablet_page(views, title, overview.facts(), overview.subtitle(), sections),
+    )
+
+
+def _pdf(pages: list[Page], title: str) -> bytes:
     stream = io.BytesIO()
     canvas = Canvas(stream, invariant=1, pagesize=(WIDTH * mm, HEIGHT * mm))
     canvas.setTitle(f"{title}: assembly")
     canvas.setCreator("miurafab")
-    views = Views(layout, pattern)
-    pages: list[Page] = [_Overview(views, machine, material, title).page]
-    for sheet, toolpath in zip(layout.sheets, layout.toolpaths, strict=True):
-        pages += SheetPages(views, sheet, toolpath, title).pages()
-    pages += GluePages(views, title).pages()
     for number, page in enumerate(pages, start=1):
         page(canvas)
         foot(canvas, title, number, len(pages))
@@ -78,19 +98,22 @@ class _Overview:
     material: Material
     title: str
 
-    def page(self, canvas: Canvas) -> None:
+    def subtitle(self) -> str:
+        """How many facets, patches and sheets there are."""
         layout, pattern = self.views.layout, self.views.pattern
         facets = len(pattern.faces_vertices)
         several = pattern.pieces_count > 1
         pieces = f"{count(pattern.pieces_count, 'piece', 'pieces')}, " if several else ""
         copies = f", {layout.copies} copies," if layout.copies > 1 else ""
-        top = heading(
-            canvas,
-            self.title,
+        return (
             f"{count(facets, 'facet', 'facets')} in {pieces}"
             f"{count(len(self.views.patches), 'patch', 'patches')}{copies} on "
-            f"{count(len(layout.sheets), 'sheet', 'sheets')}",
+            f"{count(len(layout.sheets), 'sheet', 'sheets')}"
         )
+
+    def page(self, canvas: Canvas) -> None:
+        pattern = self.views.pattern
+        top = heading(canvas, self.title, self.subtitle())
         if pattern.folded_coords is not None:
             caption(canvas, "Folded", MARGIN, top)
             scale = self.views.folded_view(canvas, (MARGIN, top - 104, ROOM, 98))

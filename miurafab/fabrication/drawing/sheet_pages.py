@@ -93,8 +93,18 @@ class SheetPages:
     def label(self, patch: int) -> str:
         return self.layout.patches[patch].label
 
-    def pages(self) -> Iterator[Page]:
-        """Functions that draw one page each."""
+    @property
+    def scale(self) -> float:
+        """Millimetres on paper for one of the sheet."""
+        return min(ROOM / self.sheet.width_mm, 122.0 / self.sheet.height_mm)
+
+    @property
+    def tall(self) -> float:
+        """The height of :meth:`draw_sheet` in mm."""
+        return self.sheet.height_mm * self.scale + (16 if self.sheet.back is None else 26)
+
+    def subtitle(self) -> str:
+        """The patches of the sheet, its stock and its fibres."""
         sheet = self.sheet
         labels = [self.label(placed.patch) for placed in sheet.placements]
         subtitle = f"{'Patch' if len(labels) == 1 else 'Patches'} {', '.join(labels)}"
@@ -104,11 +114,13 @@ class SheetPages:
             subtitle += f" from '{sheet.stock}'"
         if sheet.grain != "none":
             subtitle += f", fibres along the bed's {sheet.grain}"
-        scale = min(ROOM / sheet.width_mm, 122.0 / sheet.height_mm)
+        return subtitle
+
+    def pages(self) -> Iterator[Page]:
+        """Functions that draw one page each."""
+        sheet, subtitle, scale = self.sheet, self.subtitle(), self.scale
         top = HEIGHT - MARGIN - 19
-        under = top - sheet.height_mm * scale - 16
-        if sheet.back is not None:
-            under -= 10
+        under = top - self.tall
         placed = [each.patch for each in sheet.placements]
         if len(placed) > _PICTURED:
             yield from self.listed(placed, subtitle, scale, under)

@@ -36,7 +36,7 @@ from miurafab.fabrication.seams import with_seams
 from miurafab.fabrication.sheets import DrawnLayout, Layout
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.picture import AZIMUTH, ELEVATION, View, project
+from miurafab.origami.picture import View, project
 from miurafab.origami.seam_lines import SeamLine, seam_lines
 
 _TALL = 1.25
@@ -61,12 +61,6 @@ def edge_letters(layout: Layout, pattern: CreasePattern) -> NDArray[np.str_]:
 
 _EVEN_ODD = 0
 """The fill of reportlab that leaves holes open."""
-
-_ASIDE, _ABOVE, _OVER = math.radians(25), math.radians(15), math.radians(40)
-"""A step of gluing is seen this far from the side and from above; a shell that is less than half as
-high as wide is seen at the last elevation."""
-_UPRIGHT = 0.05
-"""A direction with less extent, over the size of the shell, says nothing about the azimuth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +94,9 @@ class Views:
     @cached_property
     def flat(self) -> Floats:
         """(V, 2) the flat pattern, turned by a right angle if it is tall."""
-        return self._upright(self.pattern.vertices_coords)
+        return self.upright(self.pattern.vertices_coords)
 
-    def _upright(self, points: Floats) -> Floats:
+    def upright(self, points: Floats) -> Floats:
         """``points`` (n, 2) of the flat pattern in flat views."""
         width, height = np.ptp(self.pattern.vertices_coords, axis=0)
         return points[:, ::-1] * [-1.0, 1.0] if height > _TALL * width else points
@@ -150,57 +144,10 @@ class Views:
             tint(patch.id) if shown is None or patch.id in shown else PALE for patch in self.patches
         ]
         for face in view.order.tolist():
-            self._facet(canvas, seen, view, face, fills[self.face_patch[face]])
+            self.facet(canvas, seen, view, face, fills[self.face_patch[face]])
         return scale
 
-    def step(
-        self, canvas: Pen, box: Box, patch: int, done: Collection[int], edges: Collection[int]
-    ) -> None:
-        """``patch`` in colour and the patches ``done`` lighter, folded, seen from outside with the
-        pattern edges ``edges`` in front; these are heavy.
-        """
-        points = self.pattern.folded_coords
-        assert points is not None
-        faces = self.pattern.faces_vertices
-        view = project(points, faces, *self._towards(patch, edges))
-        seen, _ = fitted(view.places, box)
-        marked: dict[int, list[int]] = {}
-        for edge in edges:
-            for face in self.pattern.edges_faces[edge].tolist():
-                marked.setdefault(face, []).append(edge)
-        known = {patch, *done}
-        for face in view.order.tolist():
-            own = int(self.face_patch[face])
-            if own not in known:
-                continue
-            self._facet(canvas, seen, view, face, tint(own, 1.0 if own == patch else 0.45))
-            # Nearer facets hide the part of a seam that is not seen.
-            heavy = self.pattern.edges_vertices[marked.get(face, [])]
-            canvas.setStrokeColor(INK)
-            canvas.setLineWidth(0.7 * mm)
-            canvas.setLineCap(1)
-            canvas.lines((seen[heavy] * mm).reshape(-1, 4).tolist())
-        self._name(canvas, seen, patch, _fitting(8.0, len(self.patches)))
-
-    def _towards(self, patch: int, edges: Collection[int]) -> tuple[float, float]:
-        """The azimuth and elevation from which a patch and a seam are seen from outside."""
-        points = self.pattern.folded_coords
-        assert points is not None
-        middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        corners = self.pattern.faces_vertices[self.patches[patch].faces]
-        out = points[corners[corners >= 0]].mean(axis=0) - middle
-        if edges:
-            out += points[self.pattern.edges_vertices[list(edges)]].mean(axis=(0, 1)) - middle
-        across, size = math.hypot(out[0], out[1]), np.ptp(points, axis=0)
-        if across < _UPRIGHT * size.max():
-            return AZIMUTH, ELEVATION
-        azimuth = math.atan2(out[1], out[0]) + _ASIDE
-        if size[2] < size[:2].max() / 2:
-            return azimuth, _OVER  # an open shell
-        rise = math.atan2(out[2], across) + _ABOVE
-        return azimuth, min(max(rise, -math.pi / 6), math.pi / 3)
-
-    def _facet(self, canvas: Pen, seen: Floats, view: View, face: int, fill: Color) -> None:
+    def facet(self, canvas: Pen, seen: Floats, view: View, face: int, fill: Color) -> None:
         """One facet of a ``view``, at its places ``seen`` on the page."""
         level = min(float(view.shade[face]), 1.0)
         shaded = Color(fill.red * level, fill.green * level, fill.blue * level)
@@ -217,11 +164,10 @@ class Views:
         patches; returns its scale.
         """
         count = len(self.pattern.vertices_coords)
-        marks = (self._upright(line.places) for line in self.seams)
+        marks = (self.upright(line.places) for line in self.seams)
         points, scale = fitted(np.concatenate([self.flat, *marks]), box)
         for patch in self.patches:
-            canvas.setFillColor(tint(patch.id, 0.75))
-            self._filled(canvas, points, patch.id)
+            self.fill(canvas, points, patch.id, 0.75)
         ends = points[self.pattern.edges_vertices] * mm
         canvas.setLineCap(1)
         for letter, colour in CREASE_COLOURS.items():
@@ -250,6 +196,11 @@ class Views:
                 x, y = middle[int(np.argmin(far))].tolist()
                 disk(canvas, f"B{border.number}", x, y, INK)
         return scale
+
+    def fill(self, canvas: Pen, points: Floats, patch: int, strength: float) -> None:
+        """A patch in its colour, its vertices at ``points`` (V, 2) of the page."""
+        canvas.setFillColor(tint(patch, strength))
+        self._filled(canvas, points, patch)
 
     def _filled(self, canvas: Pen, points: Floats, patch: int) -> None:
         """A patch in the current colour; its holes stay open."""
