@@ -317,7 +317,14 @@ def test_every_drawing_is_reached_by_sheets_and_goes_with_its_job(run, tmp_path)
         ".nc", ".svg", ".dxf", "-r2010.dxf", ".pdf", ".hpgl",
         "-a4.pdf", "-a3.pdf", "-letter.pdf", "-legal.pdf",
     }  # fmt: skip
-    own = {"layout.json", "manifest.json", "assembly.pdf", "small.fold", "pattern.svg"}
+    own = {
+        "layout.json",
+        "manifest.json",
+        "assembly.pdf",
+        "assembly.html",
+        "small.fold",
+        "pattern.svg",
+    }
     assert {path.name for path in job.iterdir()} == own | {f"sheet-01{end}" for end in sheet}
     assert "$INSUNITS" in (job / "sheet-01-r2010.dxf").read_text()
     # A job made anew in the same place leaves nothing of this one behind.

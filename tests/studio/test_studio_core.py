@@ -179,7 +179,7 @@ def test_from_a_surface_to_sheets(done):
         "--machine grbl-laser-400 --material card-250 --gap 3mm"
     )
     archive = zipfile.ZipFile(io.BytesIO(done.get(job["files"]["zip"]).body.read_bytes()))
-    names = {"layout.json", "manifest.json", "assembly.pdf", "hypar.fold"}
+    names = {"layout.json", "manifest.json", "assembly.pdf", "assembly.html", "hypar.fold"}
     names |= {"sheet-01.nc", "sheet-01.svg"}
     assert set(archive.namelist()) == {f"hypar-job/{name}" for name in names}
     assert done.get(job["files"]["guide"]).body.read_bytes().startswith(b"%PDF")

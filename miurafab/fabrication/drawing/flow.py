@@ -53,7 +53,7 @@ _SMALL = 8.0
 
 
 @dataclass(frozen=True)
-class _Part:
+class _Stretch:
     """Something of a known ``height`` that is not broken; ``draw`` draws it from a height down."""
 
     height: float
@@ -62,7 +62,7 @@ class _Part:
 
 def flow(sections: Sequence[Section], title: str) -> list[Page]:
     """Functions that draw one page each of the guide with this ``title``."""
-    pages: list[list[tuple[float, _Part]]] = []
+    pages: list[list[tuple[float, _Stretch]]] = []
     y = BOTTOM
     for section in sections:
         parts = [part for block in section.blocks for part in _parts(block)]
@@ -80,7 +80,7 @@ def flow(sections: Sequence[Section], title: str) -> list[Page]:
             pages[-1].append((y, part))
             y -= part.height
 
-    def page(parts: list[tuple[float, _Part]]) -> Page:
+    def page(parts: list[tuple[float, _Stretch]]) -> Page:
         def draw(canvas: Pen) -> None:
             for top, part in parts:
                 part.draw(canvas, top)
@@ -90,20 +90,20 @@ def flow(sections: Sequence[Section], title: str) -> list[Page]:
     return [page(parts) for parts in pages]
 
 
-def _head(title: str, name: str, subtitle: str) -> _Part:
-    return _Part(0.0, lambda canvas, _: heading(canvas, f"{title}: {name}", subtitle))
+def _head(title: str, name: str, subtitle: str) -> _Stretch:
+    return _Stretch(0.0, lambda canvas, _: heading(canvas, f"{title}: {name}", subtitle))
 
 
-def _head_within(section: Section) -> _Part:
+def _head_within(section: Section) -> _Stretch:
     def draw(canvas: Pen, y: float) -> None:
         line_above(canvas, MARGIN, y, ROOM)
         text(canvas, MARGIN, y - 6, section.title[:1].upper() + section.title[1:], 13, bold=True)
         text(canvas, MARGIN, y - 10.2, section.subtitle, _SIZE, colour=QUIET)
 
-    return _Part(_HEAD, draw)
+    return _Stretch(_HEAD, draw)
 
 
-def _parts(block: Block) -> Iterator[_Part]:
+def _parts(block: Block) -> Iterator[_Stretch]:
     if isinstance(block, Numbered):
         for number, line in enumerate(block.lines, start=1):
             yield _step(number, line)
@@ -115,23 +115,23 @@ def _parts(block: Block) -> Iterator[_Part]:
         yield _said(block.words, bold=block.bold)
 
 
-def _said(words: str, *, bold: bool) -> _Part:
+def _said(words: str, *, bold: bool) -> _Stretch:
     height = len(wrapped(words, ROOM, _SIZE, bold=bold)) * _LINE + 2.0
-    return _Part(
+    return _Stretch(
         height,
         lambda canvas, y: paragraph(canvas, MARGIN, y - 3.2, words, ROOM, _SIZE, bold=bold),
     )
 
 
-def _step(number: int, words: str) -> _Part:
+def _step(number: int, words: str) -> _Stretch:
     def draw(canvas: Pen, y: float) -> None:
         text(canvas, MARGIN, y - 3.2, f"{number}", _SIZE, bold=True, colour=QUIET)
         paragraph(canvas, MARGIN + 6, y - 3.2, words, ROOM - 6, _SIZE)
 
-    return _Part(len(wrapped(words, ROOM - 6, _SIZE)) * _LINE + 1.6, draw)
+    return _Stretch(len(wrapped(words, ROOM - 6, _SIZE)) * _LINE + 1.6, draw)
 
 
-def _rows(block: Figures) -> Iterator[_Part]:
+def _rows(block: Figures) -> Iterator[_Stretch]:
     """The rows of figures, each as high as its highest figure."""
     columns = block.columns
     width = (ROOM - _GAP * (columns - 1)) / columns
@@ -139,7 +139,7 @@ def _rows(block: Figures) -> Iterator[_Part]:
         yield _row(block.figures[first : first + columns], width, block.tallest)
 
 
-def _row(figures: Sequence[Figure], width: float, tallest: float) -> _Part:
+def _row(figures: Sequence[Figure], width: float, tallest: float) -> _Stretch:
     said = [
         [part for line in each.lines for part in wrapped(line, width, _SMALL)] for each in figures
     ]
@@ -169,10 +169,10 @@ def _row(figures: Sequence[Figure], width: float, tallest: float) -> _Part:
                 at -= 3.7
             each.draw(canvas, (x, y - above - 1.0 - tall, width, tall))
 
-    return _Part(above + tall + 4.0, draw)
+    return _Stretch(above + tall + 4.0, draw)
 
 
-def _chunks(block: ShortRows) -> Iterator[_Part]:
+def _chunks(block: ShortRows) -> Iterator[_Stretch]:
     """The rows in columns, in parts of which two or three have room on a page."""
     a_part = _DEEP * block.columns
     width = (ROOM - _GAP * (block.columns - 1)) / block.columns
@@ -184,7 +184,7 @@ def _chunks(block: ShortRows) -> Iterator[_Part]:
 
 def _chunk(
     head: tuple[str, ...], rows: Sequence[tuple[str, ...]], deep: int, width: float
-) -> _Part:
+) -> _Stretch:
     taken = [
         max(stringWidth(row[k], "Helvetica-Bold", _SMALL) for row in (head, *rows)) / mm
         for k in range(len(head))
@@ -203,4 +203,4 @@ def _chunk(
                     at = y - 4.6 - _ROW * (place + 0.8)
                     text(canvas, x + shift, at, word, _SMALL, bold=number == 0)
 
-    return _Part(_ROW * deep + 8.0, draw)
+    return _Stretch(_ROW * deep + 8.0, draw)

@@ -17,6 +17,7 @@ from miurafab.fabrication.drawing.page import (
     VALLEY,
     Box,
     fitted,
+    fold_lines,
     polygon,
     text,
     tint,
@@ -24,7 +25,7 @@ from miurafab.fabrication.drawing.page import (
 from miurafab.fabrication.drawing.svg_canvas import Pen
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.picture import DASHES, fills, project
+from miurafab.origami.picture import fills, project
 
 _CROSSING_VIEW = math.radians(-65), math.radians(55)
 """The azimuth and elevation from which a crossing is seen, its middle normal upright."""
@@ -66,14 +67,11 @@ def _solid(points: Sequence[tuple[float, float, float]]) -> Floats:
 
 
 def _crease(canvas: Pen, ends: Floats, colour: Color, letter: str) -> None:
-    """A crease, drawn heavier than outlines, dash-dotted or dashed."""
+    """A crease, drawn heavier than outlines; a valley is dashed."""
     canvas.setStrokeColor(colour)
     canvas.setLineWidth(0.8 * mm)
     canvas.setLineCap(0)
-    canvas.setDash([2.2 * part for part in DASHES[letter]])
-    (x0, y0), (x1, y1) = (ends * mm).tolist()
-    canvas.line(x0, y0, x1, y1)
-    canvas.setDash([])
+    canvas.lines((fold_lines(ends[None], letter) * mm).reshape(-1, 4).tolist())
 
 
 def crossing_of(pattern: CreasePattern) -> int | None:

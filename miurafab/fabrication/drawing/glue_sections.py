@@ -67,12 +67,8 @@ class GlueSections:
         each = f", each of the {copies} copies" if copies > 1 else ""
         blocks: list[Block] = []
         if lines:
-            blocks += [
-                Figures(
-                    2, (Figure("Tab a7 goes under the facet a7", fold_figures.tab, 0.3),), 18.0
-                ),
-                Numbered(lines),
-            ]
+            tab = Figure("Where tab a7 goes: under the facet a7", fold_figures.tab, 0.3)
+            blocks += [Figures(2, (tab,), 18.0), Numbered(lines)]
         blocks += notes
         if self.in_space:
             says = (

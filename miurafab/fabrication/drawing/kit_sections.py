@@ -50,8 +50,8 @@ _FEW_LINES = 48
 _LISTED = 240
 """So many rows are listed one by one, which takes two pages; of more the wedges tell."""
 _HOLD = (
-    "Lay the sheet before you with its front up, the show side. All pictures show the front. A mountain (red, "
-    "dash-dot, M) rises towards you; a valley (blue, dashed, V) sinks away from you.",
+    "Lay the sheet before you with its front up, the show side, as in all pictures. A mountain "
+    "(red, solid, M) rises towards you; a valley (blue, dashed, V) sinks away from you.",
     "Hold it with both hands at the line: thumbs on top, first two fingers below. For a mountain "
     "push up with the fingers and press both sides down with the thumbs. For a valley press the "
     "line down with the thumbs and lift both sides.",
@@ -168,8 +168,8 @@ class KitSections:
             yield f"{names} ({looks}), one line after another. {ways} {how}"
         if any(patch.tabs for patch in self.views.patches):
             yield (
-                "Bend each tab along its own fold, mountain or valley by its letter, and let it stand. "
-                "So it does not catch in the rows when the sheet moves."
+                "Bend each tab along its own fold, mountain or valley by its letter, and let it "
+                "stand. So it does not catch in the rows when the sheet moves."
             )
         yield "Now the sheet is limp like cloth, and nothing in it is stiff. Only then go on."
 

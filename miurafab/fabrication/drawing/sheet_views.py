@@ -8,26 +8,26 @@ import numpy as np
 from reportlab.lib.colors import Color
 from reportlab.lib.units import mm
 
-from miurafab.fabrication.drawing.page import CREASE_COLOURS, INK, Box, fitted, polygon
+from miurafab.fabrication.drawing.page import CREASE_COLOURS, INK, Box, fitted, fold_lines, polygon
 from miurafab.fabrication.drawing.svg_canvas import Pen
 from miurafab.fabrication.drawing.views import OUTLINED, Views, named
 from miurafab.fabrication.kit.rim import RimEnd
 from miurafab.geometry.arrays import Bools, Floats
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.picture import DASHES, azimuth_of, fills, project
+from miurafab.origami.picture import azimuth_of, fills, project
 
 _LETTER = np.array([1.5, 2.5])
 """The room of a letter in mm on paper. Numbers that would overlap are thinned out."""
 _OFF = 3.2
 """The middle of a number is so far from the end of its row, in mm on paper."""
-_DASHED = 3.0
-"""Creases whose median length on paper is less, in mm, are drawn in full: dashes would vanish."""
+_WIDE = 3.0
+"""Creases whose median length on paper is less, in mm, are drawn thin."""
 
 
 def rim_view(
     canvas: Pen, box: Box, views: Views, ends: Sequence[RimEnd], inside: Bools | None = None
 ) -> None:
-    """The flat sheet, or the part of it ``inside`` (F,), with its creases, mountains dash-dotted
+    """The flat sheet, or the part of it ``inside`` (F,), with its creases, mountains solid
     and valleys dashed, and the numbers of its rows at their ``ends``.
     """
     pattern = views.pattern
@@ -46,24 +46,21 @@ def rim_view(
     for patch in views.patches:
         if kept[patch.faces].all():
             views.fill(canvas, points, patch.id, 0.35)
-    lines = (points[pattern.edges_vertices] * mm).reshape(-1, 4)
-    lengths = np.hypot(lines[:, 2] - lines[:, 0], lines[:, 3] - lines[:, 1]) / mm
+    lines = points[pattern.edges_vertices]
     both = by_side.all(axis=1)
-    median = float(np.median(lengths[both])) if both.any() else 0.0
-    unit = float(np.clip(median / 10, 0.5, 1.2))
+    lengths = np.linalg.norm(lines[both, 1] - lines[both, 0], axis=1)
+    wide = len(lengths) > 0 and float(np.median(lengths)) >= _WIDE
     canvas.setLineCap(0)
     for letter, colour in CREASE_COLOURS.items():
         canvas.setStrokeColor(colour)
-        canvas.setLineWidth(0.28 * mm if median >= _DASHED else 0.1 * mm)
-        dashes = [unit * part for part in DASHES[letter]] if median >= _DASHED else []
-        canvas.setDash(dashes)
-        canvas.lines(lines[both & (pattern.edges_assignment == letter)].tolist())
-    canvas.setDash([])
+        canvas.setLineWidth((0.28 if wide else 0.12) * mm)
+        folds = fold_lines(lines[both & (pattern.edges_assignment == letter)], letter)
+        canvas.lines((folds * mm).reshape(-1, 4).tolist())
     canvas.setStrokeColor(INK)
     canvas.setLineWidth(0.35 * mm)
     canvas.setLineCap(1)
     cut = (by_side.any(axis=1) & ~both) | (both & np.isin(pattern.edges_assignment, ("B", "C")))
-    canvas.lines(lines[cut].tolist())
+    canvas.lines((lines[cut] * mm).reshape(-1, 4).tolist())
     _numbers(canvas, views, ends, scale, shift)
 
 

@@ -45,9 +45,9 @@ class SvgPath:
         self.data.append("Z")
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class _Brush:
-    """The state of a canvas that is kept and restored."""
+    """The state of a canvas that is kept and restored; it changes as the canvas draws."""
 
     fill: str = "#000000"
     line: str = "#000000"
@@ -79,31 +79,31 @@ class SvgCanvas:
         )
 
     def setFillColor(self, colour: Color) -> None:
-        self._look = replace(self._look, fill=_hex(colour))
+        self._look.fill = _hex(colour)
 
     def setStrokeColor(self, colour: Color) -> None:
-        self._look = replace(self._look, line=_hex(colour))
+        self._look.line = _hex(colour)
 
     def setLineWidth(self, width: float) -> None:
-        self._look = replace(self._look, width=width)
+        self._look.width = width
 
     def setLineCap(self, mode: int) -> None:
-        self._look = replace(self._look, cap=mode)
+        self._look.cap = mode
 
     def setLineJoin(self, mode: int) -> None:
-        self._look = replace(self._look, join=mode)
+        self._look.join = mode
 
     def setDash(self, array: Sequence[float] = (), phase: float = 0) -> None:
         parts = " ".join(map(_n, array))
         dash = f' stroke-dasharray="{parts}" stroke-dashoffset="{_n(phase)}"' if parts else ""
-        self._look = replace(self._look, dash=dash)
+        self._look.dash = dash
 
     def setFont(self, name: str, size: float) -> None:
-        self._look = replace(self._look, font=name, size=size)
+        self._look.font, self._look.size = name, size
 
     def saveState(self) -> None:
         self._open.append(0)
-        self._kept.append(self._look)
+        self._kept.append(replace(self._look))
 
     def restoreState(self) -> None:
         self._parts.append("</g>" * self._open.pop())

@@ -22,15 +22,15 @@ _WIDE = 80.0
 """Pictures are drawn so wide, in mm, and scaled to the page by the browser: on 360 pixels the
 smallest type is 10 pixels high."""
 _STYLE = """
-:root{color-scheme:light;--ink:#1d2329;--quiet:#5c6670;--rule:#c3cad2}
+:root{color-scheme:light}
 *{box-sizing:border-box}
-body{margin:0 auto;padding:1rem;max-width:60rem;color:var(--ink);background:#fff;
+body{margin:0 auto;padding:1rem;max-width:60rem;color:#1d2329;background:#fff;
 font:1.0625rem/1.5 system-ui,"Segoe UI",Helvetica,Arial,sans-serif}
 h1{font-size:1.7rem;margin:.5rem 0}h2{font-size:1.35rem;margin:2.2rem 0 0;padding-top:1rem;
-border-top:1px solid var(--rule)}h3{font-size:1rem;margin:0}
-.sub,dt{color:var(--quiet)}.sub{margin:.1rem 0 1rem}
+border-top:1px solid #c3cad2}h3{font-size:1rem;margin:0}
+.sub,dt{color:#5c6670}.sub{margin:.1rem 0 1rem}
 nav ul{display:flex;flex-wrap:wrap;gap:.4rem;list-style:none;padding:0;margin:.5rem 0}
-nav a{display:block;padding:.6rem .8rem;border:1px solid var(--rule);border-radius:.5rem;
+nav a{display:block;padding:.6rem .8rem;border:1px solid #c3cad2;border-radius:.5rem;
 color:inherit;text-decoration:none}
 ol{padding-left:1.6rem}li{margin:.4rem 0}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.3rem 1rem}dd{margin:0}
@@ -39,11 +39,11 @@ dl{display:grid;grid-template-columns:max-content 1fr;gap:.3rem 1rem}dd{margin:0
 figure{margin:0;min-width:0}figcaption p{margin:.1rem 0 .4rem}
 figure svg{display:block;width:100%;height:auto;max-height:85vh}
 .step{display:inline-block;min-width:1.7em;margin-right:.5em;padding:0 .4em;border-radius:1em;
-background:var(--ink);color:#fff;text-align:center}
+background:#1d2329;color:#fff;text-align:center}
 .rows{columns:17rem;column-gap:1.5rem}
 table{border-collapse:collapse;width:100%;break-inside:avoid;font-variant-numeric:tabular-nums}
 th,td{padding:.15rem .5rem .15rem 0;text-align:left;border-bottom:1px solid #e4e8ec}
-th{color:var(--quiet);font-weight:400}td:first-child{font-weight:600}
+th{color:#5c6670;font-weight:400}td:first-child{font-weight:600}
 @media print{nav{display:none}section{break-before:page}}
 """
 _TOGETHER = 12
