@@ -1,6 +1,6 @@
 """A step of gluing in space: the patch, what it is glued to, and its tabs in place.
 
-A tab lies under the facet of its mate. It is drawn on that facet as if the paper over it were
+A tab lies under the facet of its mate. It is drawn in its place as if all paper over it were
 clear. Along its edge it has its length from the flat pattern, and across the edge its height, in
 the plane of the mate's facet.
 """
@@ -118,11 +118,12 @@ class GlueView:
             canvas.setLineWidth((0.6 if named_too else 0.35) * mm)
             canvas.setLineCap(1)
             canvas.lines((seen[heavy] * mm).reshape(-1, 4).tolist())
+        on_top = [each for face in ordered for each in outlines.get(face, ())]
+        for label, outline in on_top:
+            canvas.setFillColor(TAB)
+            canvas.setStrokeColor(INK)
             canvas.setLineWidth(0.2 * mm)
-            for _, outline in outlines.get(face, ()):
-                canvas.setFillColor(TAB)
-                polygon(canvas, outline, stroke=True)
-        for label, outline in (each for own in outlines.values() for each in own):
+            polygon(canvas, outline, stroke=True)
             _labelled(canvas, label, outline)
         if named_too:
             own_corners = faces[face_patch == step.patch]
@@ -198,7 +199,7 @@ class GlueView:
         faces = self.pattern.faces_vertices[list(over)]
         normal = facet_normals(self.points, faces).mean(axis=0)
         sizes = float(np.linalg.norm(normal) * np.linalg.norm(whole))
-        return normal if normal @ whole > sizes / 2 else whole
+        return normal if normal @ whole > sizes / 5 else whole
 
 
 def _angles(way: Floats) -> tuple[float, float]:
