@@ -28,7 +28,7 @@ from miurafab.errors import MiurafabError
 from miurafab.findings import refusals
 
 COUNT = 200
-KINDS = ("assignment", "angle", "facet", "coordinate", "grid", "scale")
+KINDS = ("assignment", "angle", "facet", "coordinate", "grid", "scale", "seam")
 Document = dict[str, Any]
 
 
@@ -95,6 +95,7 @@ def corrupted(
         "coordinate": _coordinate,
         "grid": _grid,
         "scale": _scale,
+        "seam": _seam,
     }[kind](file, random)
 
 
@@ -168,6 +169,13 @@ def _grid(file: Document, random: np.random.Generator) -> tuple[Document, str] |
     face, axis = int(random.integers(len(cells))), int(random.integers(2))
     cells[face][axis] += int(random.choice([-3, -2, 2, 3]))
     return file, f"cell of facet {face}"
+
+
+def _seam(file: Document, random: np.random.Generator) -> tuple[Document, str] | None:
+    if not file.get("miurafab:seams"):
+        return None
+    gone = file["miurafab:seams"].pop(int(random.integers(len(file["miurafab:seams"]))))
+    return file, f"seam {gone} left out"
 
 
 def _scale(file: Document, random: np.random.Generator) -> tuple[Document, str] | None:

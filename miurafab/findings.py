@@ -62,7 +62,10 @@ RULES = {
     "no-target": Rule("note", "distances left out, since the target is missing or has changed"),
     "degenerate-edge": Rule("refusal", "an edge too short to be creased or cut"),
     "overlap": Rule("refusal", "facets that overlap in the flat pattern"),
-    "seam": Rule("refusal", "a seam whose two edges differ in length or do not meet when folded"),
+    "seam": Rule(
+        "refusal",
+        "a seam whose two edges differ in length or do not meet when folded, or that is not named",
+    ),
     "planarity": Rule("refusal", "a facet that is not flat in the folded form"),
     "developability": Rule(
         "refusal", "an interior vertex whose angles do not add up to 360 degrees"
@@ -131,16 +134,13 @@ RULES = {
     "pauses": Rule("note", "a program that waits for a person (`M0`)"),
     "relative": Rule("note", "relative moves (`G91`)"),
     # A job directory, checked (miurafab.workflow.check_job)
-    "job-file": Rule(
-        "refusal", "a file of a job that is missing, has changed, or is unknown to it"
-    ),
     "job-version": Rule("note", "a job that another version of miurafab made"),
     "layout": Rule("refusal", "a layout whose patches or tabs are not those of the pattern"),
     "stroke": Rule("refusal", "a stroke that is not of the pattern, missing, or made too often"),
     "not-proven": Rule("note", "what `check` could not prove"),
     # A job that is previewed (miurafab.workflow.preview)
     "assumed-machine": Rule("note", "no machine is named, so a common machine is assumed"),
-    "edited": _check("a job whose files are not those that were made"),
+    "edited": _check("a file of a job that was removed, added, or changed since"),
     "pattern-changed": Rule("warning", "the pattern of the job has changed since"),
     "pattern-missing": Rule("note", "the pattern of the job is not there"),
     # The controller, before a line of the job is sent (miurafab.machine.preflight)

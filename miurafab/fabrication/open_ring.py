@@ -23,10 +23,11 @@ from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.seams import COINCIDENT, border_seams
+from miurafab.fabrication.seams import border_seams
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.meeting_borders import COINCIDENT
 from miurafab.origami.unfold import turned_upright, with_angles_of_the_folded_form
 
 _T = TypeVar("_T", np.float64, np.int64)

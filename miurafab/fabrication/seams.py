@@ -3,12 +3,8 @@
 Some seams lie within a piece of the pattern: an edge between two facets of different patches, one
 of which bears a tab. Others join two edges of the border: two pieces, or a folded form that closes
 upon itself (a ring, a tube). A pattern names these pairs (``CreasePattern.seams``). If it names
-none, as in the files of other programs, two border edges form a seam if, in the folded form,
-
-- their ends coincide, and the edges run in opposite directions as seen from their facets;
-- their lengths in the flat pattern are equal;
-- no third edge coincides with them, and their facets do not lie on each other, as in a sheet that
-  is folded flat without glue.
+none, as in the files of other programs, they are the borders that meet in the folded form
+(:mod:`~miurafab.origami.meeting_borders`).
 
 The crease of such a seam has the angle between its two facets. It is a valley if they close on the
 printed side, the side from which the flat pattern is seen.
@@ -16,26 +12,21 @@ printed side, the side from which the flat pattern is seen.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.spatial
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from miurafab.geometry.angles import fold_angles
 from miurafab.geometry.arrays import Bools, Ints
-from miurafab.geometry.polygons import edge_lengths, facet_normals
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.meeting_borders import (
+    border_angles,
+    meeting_borders,
+    with_facet_on_the_left,
+)
 from miurafab.origami.unfold import FLAT_ANGLE
-
-COINCIDENT = 1e-6
-"""The distance of coincident points, over the diagonal of the box of the folded form."""
-
-TOGETHER = math.radians(0.5)
-"""Facets at a smaller angle lie on each other and are not glued."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,18 +89,14 @@ def all_seams(pattern: CreasePattern, face_patch: Ints) -> Seams:
 
 def border_seams(pattern: CreasePattern) -> Seams:
     """The pairs of border edges that are glued, in the order of the lower edge."""
-    pairs = _coinciding(pattern) if pattern.seams is None else np.sort(pattern.seams, axis=1)
+    pairs = meeting_borders(pattern) if pattern.seams is None else np.sort(pattern.seams, axis=1)
     pairs = pairs[np.argsort(pairs[:, 0])]
     faces = pattern.edges_faces[pairs].max(axis=2)
     if pattern.folded_coords is None:
         return Seams(pairs, faces, np.full(len(pairs), "U"))
-    ends = _with_facet_on_the_left(pattern, pairs[:, 0])
-    normal = facet_normals(pattern.folded_coords, pattern.faces_vertices[faces.ravel()])
-    left, right = normal.reshape(-1, 2, 3).swapaxes(0, 1)
-    angle = fold_angles(pattern.folded_coords, ends, left, right)
+    angle = border_angles(pattern, pairs)
     fold = np.select([angle > FLAT_ANGLE, angle < -FLAT_ANGLE], ["V", "M"], "F")
-    seams = Seams(pairs, faces, fold)
-    return seams if pattern.seams is not None else seams.take(np.abs(angle) < math.pi - TOGETHER)
+    return Seams(pairs, faces, fold)
 
 
 def with_seams(pattern: CreasePattern) -> CreasePattern:
@@ -125,35 +112,7 @@ def shell_points(pattern: CreasePattern, seams: Seams) -> Ints:
     Facets run along their seam in opposite directions.
     """
     vertices = len(pattern.vertices_coords)
-    ends = [_with_facet_on_the_left(pattern, seams.edges[:, side]) for side in (0, 1)]
+    ends = [with_facet_on_the_left(pattern, seams.edges[:, side]) for side in (0, 1)]
     one, other = ends[0].ravel(), ends[1][:, ::-1].ravel()
     graph = coo_array((np.ones(len(one)), (one, other)), shape=(vertices, vertices))
     return connected_components(graph, directed=False)[1].astype(np.int64)
-
-
-def _coinciding(pattern: CreasePattern) -> Ints:
-    """(S, 2) the pairs of border edges of one length that coincide in the folded form; none if it
-    is unknown.
-    """
-    border = np.flatnonzero((pattern.edges_faces >= 0).sum(axis=1) == 1)
-    if pattern.folded_coords is None or len(border) < 2:
-        return np.empty((0, 2), dtype=np.int64)
-    ends = _with_facet_on_the_left(pattern, border)
-    folded = pattern.folded_coords[ends]
-    near = COINCIDENT * float(np.linalg.norm(np.ptp(pattern.folded_coords, axis=0)))
-    middles = scipy.spatial.KDTree(folded.mean(axis=1))
-    pairs = middles.query_pairs(near, output_type="ndarray").astype(np.int64).reshape(-1, 2)
-    pairs = np.sort(pairs, axis=1)
-    one, other = folded[pairs[:, 0]], folded[pairs[:, 1]][:, ::-1]
-    met = (np.linalg.norm(one - other, axis=2) <= near).all(axis=1)
-    length = edge_lengths(pattern.vertices_coords, ends)
-    met &= np.abs(length[pairs[:, 0]] - length[pairs[:, 1]]) <= near
-    alone = np.bincount(pairs.ravel(), minlength=len(border)) == 1
-    return np.asarray(border[pairs[met & alone[pairs].all(axis=1)]])
-
-
-def _with_facet_on_the_left(pattern: CreasePattern, border: Ints) -> Ints:
-    """(n, 2) the ends of the border edges ``border`` (n,), as their facet has them on its left."""
-    turned = pattern.edges_faces[border, 0] < 0
-    ends = pattern.edges_vertices[border]
-    return np.where(turned[:, None], ends[:, ::-1], ends)

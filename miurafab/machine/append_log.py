@@ -13,6 +13,7 @@ from collections import deque
 from pathlib import Path
 
 from miurafab.errors import InputError, MachineError
+from miurafab.files import write_bytes
 
 _PERIOD = 0.25  # s between two fsyncs
 
@@ -21,8 +22,8 @@ class DurableFile:
     """``path``, open for appending; ``noun`` is how messages call it ("journal").
 
     The opening writes ``header`` and waits until it is on the disk, so that a directory that
-    cannot be written and a disk that is full show before anything moves. Raises
-    :class:`~miurafab.errors.InputError` then.
+    cannot be written and a disk that is full show before anything moves. A new file comes into
+    being with its whole header. Raises :class:`~miurafab.errors.InputError`.
     """
 
     def __init__(self, path: Path, noun: str, header: bytes, *, append: bool) -> None:
@@ -34,12 +35,17 @@ class DurableFile:
         self._closing = False
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("ab" if append else "wb", buffering=0)
+            new = not append or not path.exists()
+            if new:
+                write_bytes(path, header)
+            self._file = path.open("ab", buffering=0)
             try:
-                self._put(header)
+                self._put(b"" if new else header)
             except OSError:
                 self._file.close()
                 raise
+        except InputError as fault:
+            raise InputError(f"The {noun} {fault.sentence}") from None
         except OSError as fault:
             raise InputError(f"The {noun} {path} cannot be written: {fault.strerror}.") from None
         self._thread = threading.Thread(target=self._work, name=f"miurafab {noun}", daemon=True)

@@ -26,6 +26,7 @@ from miurafab.origami.judge_creases import (
     measured_folds,
     unmeasured,
 )
+from miurafab.origami.meeting_borders import meeting_borders
 
 if TYPE_CHECKING:
     from miurafab.origami.verify import Measurements
@@ -143,6 +144,7 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
             f"{gaps[open_seams].max():.1e} mean edges in length or in place.",
             tuple(open_seams.tolist()),
         )
+    yield from _unlisted_seams(pattern)
     if found is not None:
         yield from _inexact(found)
     pairs = evidence.crossings
@@ -189,6 +191,23 @@ def proved(
     if pattern.seams is not None:
         claims.append(({"seam"}, f"The two edges of each of {len(pattern.seams)} seams fit."))
     return tuple(sentence for codes, sentence in claims if not codes & broken)
+
+
+def _unlisted_seams(pattern: CreasePattern) -> Iterator[Finding]:
+    """Borders that meet in the folded form and are in none of the seams that the pattern names."""
+    if pattern.seams is None:
+        return
+    pairs = meeting_borders(pattern)
+    pairs = pairs[~np.isin(pairs, pattern.seams).any(axis=1)]
+    if len(pairs):
+        one, other = pairs[0].tolist()
+        yield Finding(
+            "seam",
+            f"{len(pairs)} pairs of border edges meet in the folded form and are not among the "
+            f"{len(pattern.seams)} seams, the first being edges {one} and {other}; name them in "
+            "`miurafab:seams`, or leave that out, and all are found.",
+            tuple(np.unique(pairs).tolist()),
+        )
 
 
 def _shapes(pattern: CreasePattern) -> Iterator[Finding]:

@@ -45,7 +45,7 @@ def nearness(pattern: CreasePattern, surface: TargetSurface, tiles: Floats) -> N
     scale, folded = pattern.scale, pattern.folded_coords / pattern.scale
     triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
     sheet = folded[triangles]
-    means = facet_means(folded, pattern.faces_vertices[_uncut(pattern)])
+    means = facet_means(folded, pattern.faces_vertices[uncut(pattern)])
     off = np.linalg.norm(surface.nearest(means) - means, axis=1).max()
     diagonal = np.linalg.norm(np.ptp(pattern.folded_coords, axis=0))
     return Nearness(
@@ -56,7 +56,7 @@ def nearness(pattern: CreasePattern, surface: TargetSurface, tiles: Floats) -> N
     )
 
 
-def _uncut(pattern: CreasePattern) -> Bools:
+def uncut(pattern: CreasePattern) -> Bools:
     """(F,) the facets that no outline has cut, all facets where there are no others.
 
     The mean of half a facet lies above or below the middle of the sheet. Where a sheet was trimmed,

@@ -9,14 +9,16 @@ computer can reach it, too. Against them:
   browser gets it without a command line (:mod:`~miurafab.studio.door`);
 - a request that changes anything (POST) must have this page's ``Origin``, and repeat the key in a
   header, which neither a form nor another site can send;
-- a body must state its length, and the length has a limit.
+- a body must state its length, and the length has a limit, as has what is being sent at one time.
 """
 
 from __future__ import annotations
 
 import hmac
 import secrets
-from collections.abc import Mapping
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from miurafab.studio.messages import Response, refusal
@@ -32,6 +34,8 @@ ORDER_LIMIT = 2**16
 """The most bytes of any other body."""
 
 UPLOAD = "upload"
+BODIES, BODY_BYTES = 8, 2 * FILE_LIMIT
+"""The most bodies, and the most bytes of them, that are held in memory at one time."""
 
 
 def new_key() -> str:
@@ -87,6 +91,28 @@ class Guard:
         if len(length) > 18 or int(length) > limit:
             return refusal(413, f"The request is larger than the limit of {limit // 2**10:,} KiB.")
         return None
+
+
+class BodyRoom:
+    """The memory for the bodies of requests that are under way, of all threads; mutable."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._held: list[int] = []
+
+    @contextmanager
+    def kept(self, size: int) -> Iterator[bool]:
+        """Room for ``size`` bytes until the end of the block, or False where there is none now."""
+        with self._lock:
+            there = len(self._held) < BODIES and sum(self._held) + size <= BODY_BYTES
+            if there:
+                self._held.append(size)
+        try:
+            yield there
+        finally:
+            with self._lock:
+                if there:
+                    self._held.remove(size)
 
 
 def same_key(given: str, wanted: str) -> bool:

@@ -25,7 +25,7 @@ from miurafab.machine.signals import StopSignals
 from miurafab.profiles import find_file
 from miurafab.studio.core import Studio
 from miurafab.studio.door import Door
-from miurafab.studio.guard import ADDRESS, Guard, new_key
+from miurafab.studio.guard import ADDRESS, BodyRoom, Guard, new_key
 from miurafab.studio.messages import HttpRequest, Response, refusal
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.worker import Process
@@ -103,9 +103,11 @@ class _Server(ThreadingHTTPServer):
     allow_reuse_address = os.name == "posix"  # elsewhere other servers could share the port
     studio: Studio
     door: Door | None = None
+    room: BodyRoom
 
     def __init__(self, port: int, check: Callable[[], None]) -> None:
         self.lock = threading.Lock()
+        self.room = BodyRoom()
         self._check = check
         try:
             super().__init__((ADDRESS, port), _Handler)
@@ -151,7 +153,10 @@ class _Handler(BaseHTTPRequestHandler):
         """Log no request."""
 
     def _answer(self) -> None:
-        headers = {name.lower(): value for name, value in self.headers.items()}
+        headers: dict[str, str] = {}
+        for name, value in self.headers.items():  # one that comes twice is no name, key or length
+            key = name.lower()
+            headers[key] = f"{headers[key]}, {value}" if key in headers else value
         studio, door = self.server.studio, self.server.door
         opened = None if door is None else door.answer(self.command, self.path, headers)
         if opened is not None:
@@ -162,13 +167,21 @@ class _Handler(BaseHTTPRequestHandler):
             self.close_connection = True  # its body, if any, is not read
             self._send(refused)
             return
-        body = b""
         if self.command == "POST":
             wanted = int(headers["content-length"])
-            body = self.rfile.read(wanted)
-            if len(body) != wanted:
-                self.close_connection = True
-                return
+            with self.server.room.kept(wanted) as there:
+                body = self.rfile.read(wanted) if there else b""
+                if len(body) == wanted:
+                    self._handle(headers, body)
+                    return
+            self.close_connection = True
+            if not there:
+                self._send(refusal(503, "Too much is being sent at once; try again in a moment."))
+            return
+        self._handle(headers, b"")
+
+    def _handle(self, headers: dict[str, str], body: bytes) -> None:
+        studio = self.server.studio
         with self.server.lock:
             response = studio.handle(HttpRequest(self.command, self.path, headers, body))
         self._send(response)

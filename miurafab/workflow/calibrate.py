@@ -54,8 +54,8 @@ from miurafab.profiles.shipped import Kind
 from miurafab.profiles.table import toml_text
 from miurafab.workflow.dry_run import dry_run
 from miurafab.workflow.job_directory import JobDirectory
-from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles, settle_job
-from miurafab.workflow.manifest import write_manifest
+from miurafab.workflow.job_files import job_files, keep_profiles, settle_job
+from miurafab.workflow.manifest import LAYOUT, write_manifest
 
 CHOICES = "calibration.json"
 GUIDE = "calibration.pdf"

@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -31,10 +31,17 @@ from miurafab.machine.judge_job import judge_program
 from miurafab.options import read_options
 from miurafab.options.verbs import verb
 from miurafab.origami.formats.fold import read_fold
-from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.job_directory import WrittenJob, read_written
-from miurafab.workflow.job_files import LAYOUT, job_material, settle_job
-from miurafab.workflow.manifest import MANIFEST, TOOL, Manifest, pattern_name, read_manifest, sha256
+from miurafab.workflow.job_files import job_material, settle_job
+from miurafab.workflow.manifest import (
+    LAYOUT,
+    MANIFEST,
+    TOOL,
+    Manifest,
+    all_edits,
+    pattern_name,
+    read_manifest,
+)
 from miurafab.workflow.patterns import check
 from miurafab.workflow.trace import traced_strokes
 
@@ -130,33 +137,11 @@ def check_job(directory: AnyPath) -> JobCheck:
 
 def _sums(folder: Path, manifest: Manifest) -> Iterator[Finding]:
     """The files that are not those of the manifest."""
-    for name, digest in manifest.files.items():
-        file = folder / name
-        if not file.is_file():
-            yield Finding("job-file", f"{name} is missing.", name)
-        elif sha256(file) != digest:
-            yield Finding("job-file", f"{name} has changed since the job was made.", name)
-    programs = {path.name for path in folder.iterdir() if path.suffix.lower() in _PROGRAMS}
-    for name in sorted(programs - set(manifest.files)):
-        yield Finding("job-file", f"{name} is a program that the job does not know.", name)
-    for name, digest in manifest.profiles.items():
-        kind, _, file_name = name.partition("/")
-        own = folder / file_name
-        # A shipped profile stays in the package.
-        file = own if own.is_file() else shipped_directory(_kind(kind)) / file_name
-        if sha256(file) != digest:
-            yield Finding("job-file", f"{name} has changed since the job was made.", name)
+    programs = (path.name for path in folder.iterdir() if path.suffix.lower() in _PROGRAMS)
+    yield from all_edits(folder, manifest, programs)
     if manifest.tool != TOOL:
         sentence = f"The job was made by {manifest.tool} and is checked by {TOOL}."
         yield Finding("job-version", sentence, MANIFEST)
-
-
-def _kind(text: str) -> Kind:
-    kinds: tuple[Kind, ...] = get_args(Kind)
-    for kind in kinds:
-        if kind == text:
-            return kind
-    raise InputError(f"The manifest names profiles of the kind '{text}', which there is not.")
 
 
 def _traced(

@@ -220,8 +220,6 @@ def _from_pattern(
         on_progress=lambda fraction, note: tell(0.4 + 0.4 * fraction, note),
     )
     directory = job.write(out, on_progress=lambda part, note: tell(0.8 + 0.2 * part, note))
-    if job.opened and file is None:
-        pattern.save(directory.path / f"{name}.fold", title=name)
     return replace(_from_directory(directory, None), name=name, report=report)
 
 

@@ -21,8 +21,8 @@ from miurafab.findings import Finding
 from miurafab.gcode.job import Job
 from miurafab.profiles import MachineProfile
 from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run, read_gcode
-from miurafab.workflow.job_files import LAYOUT, job_machine, job_material, settle_job
-from miurafab.workflow.manifest import edits
+from miurafab.workflow.job_files import job_machine, job_material, settle_job
+from miurafab.workflow.manifest import LAYOUT, edits
 from miurafab.workflow.picture import first_sheet
 
 GUIDE, GUIDE_PAGE = "assembly.pdf", "assembly.html"

@@ -17,14 +17,16 @@ from miurafab.files import Reading, file_name, parse_json, read_bytes, read_text
 from miurafab.profiles import MachineProfile, Material, load_machine, load_material
 from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.workflow.drawings import ENDINGS, PICTURE
-from miurafab.workflow.manifest import MANIFEST
+from miurafab.workflow.manifest import LAYOUT, MANIFEST
 from miurafab.workflow.whole_folder import put_in_place, settle, whole_folder
 
-LAYOUT = "layout.json"
 GUIDES = ("assembly.pdf", "assembly.html", "calibration.pdf", "calibration.json")
 """What explains a job; one made in the place of another leaves none of them."""
 _SHEET = re.compile(r"sheet-[0-9]{2,}(-back)?")
 """The names of programs, which begin those of all that is drawn."""
+OPENED, CAPPED = "-opened", "-capped"
+"""What stands behind the name of a pattern that was opened, or capped, for its job."""
+_CHANGED = re.compile(rf"({OPENED}|{CAPPED})\.fold$")
 _ENDINGS = (".nc", ".plt", ".svg", *ENDINGS)
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
@@ -89,6 +91,7 @@ def _earlier(directory: Path) -> tuple[set[str], set[str]]:
         if not all(map(_SHEET.fullmatch, names)):
             raise ValueError("it names a sheet that no job has")
         copies = [made["pattern"]["file"], f"{made['machine']}.toml", f"{made['material']}.toml"]
+        copies.append(_CHANGED.sub(".fold", copies[0]))  # the pattern as it was fitted
         known = {file_name(name, str(layout)) for name in copies}
     drawn = {f"{name}{ending}" for name in names for ending in _ENDINGS}
     return drawn | {LAYOUT, MANIFEST, PICTURE, *GUIDES}, known

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from miurafab.errors import InputError
+from miurafab.fabrication.layout import read_head
 from miurafab.files import Reading, file_name, parse_json, read_bytes, read_text, write_draft
 from miurafab.findings import Finding
-from miurafab.profiles.shipped import Kind
+from miurafab.profiles.shipped import Kind, shipped_directory
 from miurafab.version import __version__
 
-MANIFEST = "manifest.json"
+LAYOUT, MANIFEST = "layout.json", "manifest.json"
 SCHEMA = "miurafab-job/1"
 TOOL = f"miurafab {__version__}"
 
@@ -76,27 +77,53 @@ def read_manifest(directory: Path) -> Manifest:
 
 
 def pattern_name(folder: Path, manifest: Manifest) -> str:
-    """The file name of the pattern of the job in ``folder``."""
-    patterns = [name for name in manifest.files if name.endswith(".fold")]
-    if len(patterns) != 1:
-        raise InputError(f"{folder / MANIFEST} names {len(patterns)} patterns; a job has one.")
-    return patterns[0]
+    """The file name of the pattern of the job in ``folder``: that which its layout is of."""
+    path = folder / LAYOUT
+    name = read_head(read_text(path, InputError, "a layout"), path).pattern_file
+    if name not in manifest.files:
+        raise InputError(f"{folder / MANIFEST} does not name {name}, the pattern of the layout.")
+    return name
 
 
 def edits(folder: Path, names: Iterable[str]) -> tuple[Finding, ...]:
-    """The findings ``edited``: which files of the job in ``folder``, of those ``names`` and of its
-    profiles, are not as the manifest says.
+    """The findings ``edited``: which files of the job in ``folder``, of those ``names`` and of the
+    profiles beside them, are not as the manifest says.
     """
     if not (folder / MANIFEST).is_file():
         says = f"{folder} holds no {MANIFEST}, so nothing tells whether its files are as made."
         return (Finding("edited", says, MANIFEST),)
     told = read_manifest(folder).files
     wanted = sorted({*names, *(name for name in told if name.endswith(".toml"))})
-    return tuple(
-        Finding("edited", f"{name} {how} since the job was made; make the job again.", name)
-        for name in wanted
-        if (how := _edit(folder / name, told.get(name)))
-    )
+    return tuple(_edited((name, folder / name, told.get(name)) for name in wanted))
+
+
+def all_edits(folder: Path, manifest: Manifest, programs: Iterable[str]) -> Iterator[Finding]:
+    """The findings ``edited`` of all files of the ``manifest``, of the ``programs`` that are in
+    ``folder``, and of the profiles, of which those that are shipped stay in the package.
+    """
+    names = [*manifest.files, *sorted(set(programs) - set(manifest.files))]
+    yield from _edited((name, folder / name, manifest.files.get(name)) for name in names)
+    for name, digest in manifest.profiles.items():
+        kind, _, file = name.partition("/")
+        own = folder / file
+        path = own if own.is_file() else shipped_directory(_kind(kind)) / file
+        yield from _edited([(name, path, digest)])
+
+
+def _kind(text: str) -> Kind:
+    kinds: tuple[Kind, ...] = get_args(Kind)
+    for kind in kinds:
+        if kind == text:
+            return kind
+    raise InputError(f"The manifest names profiles of the kind '{text}', which there is not.")
+
+
+def _edited(files: Iterable[tuple[str, Path, str | None]]) -> Iterator[Finding]:
+    for name, path, digest in files:
+        how = _edit(path, digest)
+        if how:
+            says = f"{name} {how} since the job was made; make the job again."
+            yield Finding("edited", says, name)
 
 
 def _edit(path: Path, digest: str | None) -> str:

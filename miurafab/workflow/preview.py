@@ -32,8 +32,8 @@ from miurafab.workflow.dry_run import (
     read_gcode,
     readiness,
 )
-from miurafab.workflow.job_files import LAYOUT, job_machine, job_material, settle_job
-from miurafab.workflow.manifest import edits, sha256
+from miurafab.workflow.job_files import job_machine, job_material, settle_job
+from miurafab.workflow.manifest import LAYOUT, edits, sha256
 
 if TYPE_CHECKING:
     from miurafab.workflow.job_directory import JobDirectory

@@ -35,6 +35,7 @@ from miurafab.options import read_options
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.fold import read_fold
+from miurafab.origami.nearness import uncut
 from miurafab.profiles import MachineProfile
 from miurafab.surfaces.description import described_surface
 from miurafab.workflow.job_directory import read_written
@@ -53,8 +54,8 @@ class Rebuilt(Shown):
     worst_mm : float
         The largest distance of a measured vertex from its place in the folded form.
     target_mm : float or None
-        The largest distance of the mean of a facet of the shell from the target; None without a
-        target.
+        The largest distance of the mean of a whole facet of the shell from the target; None
+        without a target.
     folded_target_mm : float or None
         The same for the folded form.
     seconds : float
@@ -143,11 +144,13 @@ def rebuild(directory: AnyPath) -> Rebuilt:
 
 
 def _off_target(points: Floats, pattern: CreasePattern) -> float | None:
-    """The largest distance of the mean of a facet at ``points`` (V, 3) from the target, mm."""
+    """The largest distance of the mean of a whole facet at ``points`` (V, 3) from the target, mm;
+    where the border has cut one, its mean says nothing.
+    """
     surface, _ = described_surface(pattern.target)
     if surface is None:
         return None
-    means = facet_means(points / pattern.scale, pattern.faces_vertices)
+    means = facet_means(points / pattern.scale, pattern.faces_vertices[uncut(pattern)])
     means = means[np.isfinite(means).all(axis=1)]
     off = np.linalg.norm(surface.nearest(means) - means, axis=1)
     return pattern.scale * float(off.max())

@@ -39,16 +39,14 @@ from miurafab.workflow.design import read_layout_table
 from miurafab.workflow.drawings import drawings, read_formats
 from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run
 from miurafab.workflow.job_directory import GUIDE, GUIDE_PAGE, JobDirectory
-from miurafab.workflow.job_files import LAYOUT, job_files, keep_profiles
-from miurafab.workflow.manifest import sha256, write_manifest
+from miurafab.workflow.job_files import CAPPED, OPENED, job_files, keep_profiles
+from miurafab.workflow.manifest import LAYOUT, sha256, write_manifest
 from miurafab.workflow.patterns import PatternLike, sound_pattern
 from miurafab.workflow.picture import first_sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-OPENED, CAPPED = "-opened", "-capped"
-"""What the name of a pattern that was opened for the job, or got caps, ends in."""
 Progress = Callable[[float, str], None]
 
 
@@ -78,6 +76,8 @@ class SheetJob(Shown):
         How the pattern was laid out.
     opened : bool
         Whether the pattern was opened or capped for the job.
+    fitted : CreasePattern, optional
+        The pattern as it was before that, where no file holds it.
     """
 
     name: str
@@ -91,6 +91,7 @@ class SheetJob(Shown):
     pattern_file: Path | None
     options: LayoutOptions
     opened: bool = False
+    fitted: CreasePattern | None = None
 
     @property
     def pattern(self) -> CreasePattern:
@@ -157,6 +158,9 @@ class SheetJob(Shown):
             write_draft(staging / GUIDE, guide.pdf)
             write_draft(staging / GUIDE_PAGE, guide.page)
             used = self._put_pattern(folder, staging)
+            if self.fitted is not None:
+                text = fold_text(seen_from(self.fitted, folder), self.name)
+                write_draft(staging / f"{self.name}.fold", text)
             digest = sha256(used)
             write_draft(staging / LAYOUT, write_layout(layout, used.name, digest))
             besides = [] if used.parent == staging else [used]
@@ -307,6 +311,7 @@ def make_job(
         kept,
         options or LayoutOptions(),
         opened,
+        pattern if opened and file is None else None,
     )
 
 

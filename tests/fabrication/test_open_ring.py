@@ -27,6 +27,7 @@ from miurafab.origami.unfold import unfold
 from miurafab.origami.verify import EXACT, audit
 from miurafab.workflow.cut import prepare
 from miurafab.workflow.job_directory import read_job
+from miurafab.workflow.manifest import read_manifest
 from miurafab.workflow.sheets import sheets
 
 
@@ -390,3 +391,9 @@ def test_a_design_says_where_its_ring_is_opened(tmp_path):
     laid_out = read_fold(tmp_path / "job" / "waist-opened.fold")
     assert_same_pattern(laid_out, open_ring(fitted, 0, 3))
     assert_tabs(laid_out, prepared.directory.layout)
+    # Both are files of the job, put in place with it; another job may take its place.
+    assert {"waist.fold", "waist-opened.fold"} <= set(read_manifest(tmp_path / "job").files)
+    assert miurafab.check_job(tmp_path / "job").valid
+    file.write_text(file.read_text().replace("140mm", "150mm"))
+    prepare(str(file), out=tmp_path / "job")
+    assert miurafab.check_job(tmp_path / "job").valid

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
+from disk import killed_at
 
 from miurafab.errors import InputError, MachineError
 from miurafab.gcode.job import Job
@@ -87,6 +89,24 @@ def test_a_torn_end_loses_only_itself(tmp_path: Path, cut: int) -> None:
     again.taken(2, 2, 0.0)
     again.close()
     assert [run.taken for run in read_journal(path)] == [1, 2]
+
+
+def test_a_new_file_comes_into_being_with_its_whole_first_line(tmp_path: Path) -> None:
+    """Killed at each call of its making, a journal or transcript is whole or not there."""
+    if not hasattr(os, "fork"):
+        pytest.skip("a process is killed here by its double")
+    makers = (
+        lambda path: DurableFile(path, "journal", b"\nhead of it\n", append=True),
+        lambda path: Transcript(path, "a job"),
+    )
+    for make, head in zip(makers, (b"\nhead of it\n", b"# a job\n"), strict=True):
+        for last in range(1, 40):
+            path = tmp_path / f"{head[:3]!r}-{last}"
+            if not killed_at(last, lambda make=make, path=path: make(path)):
+                break
+            assert not path.exists() or path.read_bytes() == head
+        assert last > 4
+        assert path.read_bytes() == head
 
 
 @pytest.mark.parametrize("text", ["", "hello\n", '{"taken": 3}\n', "[1]\n"])

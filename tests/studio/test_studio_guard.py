@@ -1,11 +1,13 @@
 """Who is let in: nobody from another site, without the key, or with a body without end."""
 
+import contextlib
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from studios import GUARD, KEY, ORIGIN, PORT, Asked, request, sentence
 
-from miurafab.studio.guard import FILE_LIMIT, ORDER_LIMIT
+from miurafab.studio.guard import BODIES, BODY_BYTES, FILE_LIMIT, ORDER_LIMIT, BodyRoom
 from miurafab.studio.names import safe_stem, suffix_of
 
 
@@ -83,6 +85,19 @@ def test_only_a_file_may_be_large():
         assert (found and found.status) == status
     large = request("POST", "upload", content_length=str(FILE_LIMIT + 1))
     assert GUARD.refuse("POST", large.path, large.headers).status == 413
+
+
+def test_what_is_being_sent_has_a_bound_in_number_and_bytes():
+    room = BodyRoom()
+    with contextlib.ExitStack() as under_way:
+        for _ in range(BODIES):
+            assert under_way.enter_context(room.kept(1))
+        with room.kept(1) as there:
+            assert not there
+    with room.kept(FILE_LIMIT) as one, room.kept(FILE_LIMIT) as two, room.kept(1) as three:
+        assert (one, two, three) == (True, True, False)
+    with room.kept(BODY_BYTES) as there:  # all is free again
+        assert there
 
 
 @given(st.text(), st.text(), st.dictionaries(st.sampled_from(["host", "origin"]), st.text()))

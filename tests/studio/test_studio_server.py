@@ -240,6 +240,8 @@ def test_only_this_computer_and_only_with_the_key(start):
     host = f"Host: 127.0.0.1:{port}"
     assert b" 404 " in raw(port, "GET / HTTP/1.1", host).splitlines()[0]
     assert b" 421 " in raw(port, f"GET /{key}/ HTTP/1.1", "Host: evil.example").splitlines()[0]
+    for twice in ((host, host), (host, "Host: evil.example"), ("Host:", host)):
+        assert b" 421 " in raw(port, f"GET /{key}/ HTTP/1.1", *twice).splitlines()[0]
     post = (f"POST /{key}/cancel HTTP/1.1", host, f"X-Studio-Key: {key}")
     assert b" 403 " in raw(port, *post, "Origin: http://evil.example", "Content-Length: 2")
     own = f"Origin: http://127.0.0.1:{port}"

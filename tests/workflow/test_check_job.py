@@ -100,11 +100,14 @@ def test_changed_missing_and_foreign_files_are_named(job):
     (job / "sheet-01.svg").unlink()
     (job / "other.nc").write_text("M2\n")
     (job / "sheet-01.journal").write_text("")
-    assert sentences(job, "job-file") == [
-        "sheet-01.nc has changed since the job was made.",
-        "sheet-01.svg is missing.",
-        "other.nc is a program that the job does not know.",
+    again = "since the job was made; make the job again."
+    assert sentences(job, "edited") == [
+        f"sheet-01.nc has changed {again}",
+        f"sheet-01.svg was removed {again}",
+        f"other.nc was added {again}",
     ]
+    # The quick part before a cut has the same words.
+    assert [found.sentence for found in mf.read_job(job).edits] == sentences(job, "edited")[:1]
 
 
 LINE = re.compile(r"G0 X(\S+) Y(\S+)\nG1 X(\S+) Y(\S+)( S\d+)?( F\d+)?\n")

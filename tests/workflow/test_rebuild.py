@@ -4,6 +4,7 @@ wrongly is not."""
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import miurafab as mf
 from miurafab.errors import InputError
 from miurafab.fabrication.glue import glued_shell, laid_on
 from miurafab.fabrication.recover import RecoveredCorners
+from miurafab.geometry.polygons import facet_means
 
 CASES = {
     "patches": (regular, {"max_patch": (60, 60)}),
@@ -45,6 +47,25 @@ def test_a_crease_burnt_beside_its_place_is_seen_in_the_shell(tmp_path):
     )
     file.write_text(file.read_text()[:start] + moved)
     assert mf.rebuild(tmp_path).worst_mm > 2 * whole > 0
+
+
+def test_facets_that_the_border_has_cut_are_left_out_as_in_check(tmp_path):
+    """The mean of half a facet of a fold lies off the middle of the sheet; in the plane of the
+    target the means of whole facets lie."""
+    cut = trimmed()
+    height = facet_means(cut.folded_coords, cut.faces_vertices[uncut_by_circle(cut)])[:, 2].mean()
+    lowered = cut.folded_coords - [0, 0, height]
+    target = {"surface": "plane", "parameters": {"width": 200.0, "depth": 200.0}, "edge": "trim"}
+    mf.sheets(replace(cut, folded_coords=lowered, target=target)).write(tmp_path)
+    found = mf.rebuild(tmp_path)
+    assert found.folded_target_mm < 1e-6
+    assert found.target_mm < 0.05
+
+
+def uncut_by_circle(pattern):
+    sides = pattern.faces_edges
+    border = pattern.edges_assignment == "B"
+    return ~((sides >= 0) & border[sides]).any(axis=1)
 
 
 def test_only_the_job_of_a_laser_is_rebuilt(tmp_path):
