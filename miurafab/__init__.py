@@ -63,7 +63,6 @@ if TYPE_CHECKING:
     from miurafab.profiles import load_machine as load_machine
     from miurafab.profiles import load_material as load_material
     from miurafab.workflow.calibrate import Calibration as Calibration
-    from miurafab.workflow.calibrate import add_material as add_material
     from miurafab.workflow.calibrate import calibrate as calibrate
     from miurafab.workflow.check_job import JobCheck as JobCheck
     from miurafab.workflow.check_job import check_job as check_job
@@ -88,6 +87,7 @@ if TYPE_CHECKING:
     from miurafab.workflow.listings import list_materials as list_materials
     from miurafab.workflow.listings import list_surfaces as list_surfaces
     from miurafab.workflow.own_machine import add_machine as add_machine
+    from miurafab.workflow.own_material import add_material as add_material
     from miurafab.workflow.patterns import check as check
     from miurafab.workflow.preview import Preview as Preview
     from miurafab.workflow.preview import preview as preview

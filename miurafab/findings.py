@@ -110,6 +110,8 @@ RULES = {
     "untabbed": Rule(
         "warning", "edges of seams, or of open borders with tabs, without room for one"
     ),
+    "scaled": Rule("warning", "settings of a material on a laser that they were not meant for"),
+    "other-forces": Rule("warning", "forces of a material that were found on another machine"),
     "unlettered": Rule("warning", "names and labels without room on the sheets"),
     # A job, judged without a machine (miurafab.machine.judge_job)
     "lines": Rule("refusal", "a line too long for the controller, or not printable ASCII"),
@@ -123,6 +125,7 @@ RULES = {
     "dwell": _check("a dwell (`G4`) with the beam on"),
     "power": _check("an S word above the machine's full power"),
     "material": _check("an S word above the `max_power` of the material"),
+    "other-beam": _check("a job made for another kind of beam, or for another full power"),
     "laser-mode": _check("laser mode (`$32`) that does not suit the tool"),
     "rate": Rule("warning", "a feed above the machine's largest rate"),
     "loose": Rule("warning", "a stroke inside a closed stroke that may have cut its piece loose"),

@@ -17,6 +17,7 @@ _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\
 _LENGTHS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, '"': 25.4}
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0}
 _FEEDS = {"mm/min": 1.0, "mm/s": 60.0, "m/min": 1000.0, "in/min": 25.4, "in/s": 1524.0}
+_POWERS = {"w": 1.0, "mw": 1e-3, "kw": 1e3}
 _PRESSURES = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "gpa": 1e9}
 
 
@@ -77,3 +78,8 @@ def parse_feed(text: str | float) -> float:
 def parse_pressure(text: str | float) -> float:
     """A modulus or pressure in pascal; a bare number is pascal. Raises ``UnitError``."""
     return _parse(text, _PRESSURES, "pa", "a modulus")
+
+
+def parse_power(text: str | float) -> float:
+    """A power in watts; a bare number is watts. Raises ``UnitError``."""
+    return _parse(text, _POWERS, "w", "a power")

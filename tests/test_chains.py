@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from test_posting import CARD, LASER, PERFORATE, joined, toolpath, toolpaths
+from worked import changed
 
 import miurafab.posting.make_job as posting
 from miurafab.fabrication.toolpath import Toolpath
@@ -55,13 +56,7 @@ def perforation(count: int, cut: float, gap: float) -> Toolpath:
 
 
 def perforated_at(feed: float) -> Material:
-    return replace(
-        CARD,
-        operations={
-            **CARD.operations,
-            "perforate": replace(CARD.operations["perforate"], feed_mm_min=feed),
-        },
-    )
+    return changed(CARD, perforate={"feed_mm_min": feed})
 
 
 def on_a_wire(machine: MachineProfile, baud: int) -> MachineProfile:
@@ -83,9 +78,9 @@ def test_read_back_it_is_the_same_strokes(path: Toolpath) -> None:
     assert np.array_equal(read.offsets, path.offsets)
     assert np.abs(read.points[:, :2] - path.points).max(initial=0.0) <= 1e-3
     for index in range(len(path)):
-        operation = CARD.operations[OPERATIONS[path.operation[index]]]
+        operation = CARD.on(LASER).operations[OPERATIONS[path.operation[index]]]
         moves = slice(read.first_move[index], read.last_move[index] + 1)
-        assert (program.power[moves] == round(1000 * operation.power)).all()
+        assert (program.power[moves] == round(100 * operation.power)).all()
         assert (program.feed_mm_min[moves] == operation.feed_mm_min).all()
         assert read.contexts[read.context[index]].operation == OPERATIONS[path.operation[index]]
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from test_posting import CARD, CUT, DASH, LASER, PERFORATE, SQUARE, toolpath, with_tool
+from worked import changed
 
 import miurafab as mf
 from miurafab.errors import InputError, ProfileError
@@ -44,8 +45,7 @@ MACHINES = {
 
 def deep(material: Material = CARD, **cut: object) -> Material:
     """``material`` whose cuts are made so."""
-    operations = material.operations
-    return replace(material, operations={**operations, "cut": replace(operations["cut"], **cut)})
+    return changed(material, cut=cut)
 
 
 def heights(machine: MachineProfile, job: Job) -> list[tuple[float, float]]:
@@ -127,7 +127,9 @@ def test_the_proof_of_a_job_includes_its_heights(tmp_path) -> None:
     machine.write_text(text + '[z]\ntravel = "30mm"\nmax_rate = "500mm/min"\nacceleration = 20\n')
     card = tmp_path / "card.toml"
     text = find_file("materials", "card-250").read_text()
-    card.write_text(text + 'passes = 2\nz_step = "0.2mm"\nfocus = "0.1mm"\n')
+    head, after = text.split("[beams.diode.operations.cut]\n")
+    own = 'passes = 2\nz_step = "0.2mm"\nfocus = "0.1mm"\n'
+    card.write_text(f"{head}[beams.diode.operations.cut]\n{own}{after}")
     sheet = mf.fit("plane", facets=(2, 2), size=40)
     mf.sheets(sheet, machine=machine, material=card).write(tmp_path / "job")
     found = mf.check_job(tmp_path / "job")

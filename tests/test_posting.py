@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from worked import changed
 
 from miurafab.errors import LayoutError, ProfileError
 from miurafab.fabrication.toolpath import Toolpath
@@ -49,11 +50,7 @@ def with_tool(machine: MachineProfile, **changes: object) -> MachineProfile:
 
 
 def with_passes(material: Material, **passes: int) -> Material:
-    operations = {
-        name: replace(operation, passes=passes.get(name, operation.passes))
-        for name, operation in material.operations.items()
-    }
-    return replace(material, operations=operations)
+    return changed(material, **{name: {"passes": count} for name, count in passes.items()})
 
 
 SQUARE = [(10.0, 10.0), (20.0, 10.0), (20.0, 20.5), (10.0, 10.0)]
@@ -169,9 +166,9 @@ def test_power_and_feed_are_those_of_the_operation(path: Toolpath) -> None:
     program = parse_program(post(path, LASER, CARD))
     read = strokes(program)
     for index in range(len(path)):
-        operation = CARD.operations[OPERATIONS[path.operation[index]]]
+        operation = CARD.on(LASER).operations[OPERATIONS[path.operation[index]]]
         moves = slice(read.first_move[index], read.last_move[index] + 1)
-        assert (program.power[moves] == round(1000 * operation.power)).all()
+        assert (program.power[moves] == round(100 * operation.power)).all()
         assert (program.feed_mm_min[moves] == operation.feed_mm_min).all()
 
 

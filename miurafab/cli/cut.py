@@ -260,7 +260,7 @@ def _report_dry_run(
     prepared, status, notes = rehearsed(prepared, sheet, options)
     page = draw(prepared)
     of_sheets = (finding for sheet in prepared.dry_runs for finding in sheet.findings)
-    findings = [*notes, *prepared.edits, *of_sheets]
+    findings = [*notes, *prepared.findings, *of_sheets]
     answer = {
         "status": status,
         "job": prepared.name,

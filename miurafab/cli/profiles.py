@@ -12,10 +12,12 @@ from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option
 from miurafab.errors import DONE
 from miurafab.options import File, Text, declared
+from miurafab.profiles.beam import Laser
 from miurafab.profiles.machine import Controller
 from miurafab.profiles.material import KERF
 
 _BAUD = declared(Controller)["baud"]
+_LASER = declared(Laser)
 NameArgument = Annotated[
     str | None, argument("NAME", "A shipped name or a TOML file; without it, all are listed.")
 ]
@@ -56,11 +58,27 @@ def add_machine(
             _BAUD.kind, "Speed of the port in baud.", default_text="as the profile like it says"
         ),
     ] = None,
+    beam: Annotated[str | None, option(_LASER["beam"].kind, "Kind of laser.")] = None,
+    power: Annotated[float | None, option(_LASER["power"].kind, _LASER["power"].help)] = None,
+    wavelength: Annotated[
+        float | None, option(_LASER["wavelength"].kind, _LASER["wavelength"].help)
+    ] = None,
     console: Console = Console(),
 ) -> int:
-    """Write a machine profile of your own from the settings of the board."""
+    """Write a machine profile of your own from the settings of the board.
+
+    A laser needs its beam and the power of its light, which no board tells.
+    """
     path, made = miurafab.add_machine(
-        name, port=port, settings=settings, like=like, title=title, baud=baud
+        name,
+        port=port,
+        settings=settings,
+        like=like,
+        title=title,
+        baud=baud,
+        beam=beam,
+        power=power,
+        wavelength=wavelength,
     )
     console.answer(
         {"file": str(path), "machine": asdict(made)},
@@ -80,12 +98,17 @@ def add_material(
     cut: Annotated[
         str | None, option(Text("LABEL"), "The first square that falls out, as X3.")
     ] = None,
-    kerf: Annotated[float | None, option(KERF, "What the kerf gauge reads.")] = None,
+    score: Annotated[
+        str | None, option(Text("LABEL"), "The scored flap that folds best, as S2.")
+    ] = None,
+    kerf: Annotated[float | None, option(KERF, "What the kerf gauges read.")] = None,
     title: Annotated[str | None, option(Text(), "The material's title in lists.")] = None,
     console: Console = Console(),
 ) -> int:
     """Write a material of your own from your choices on a calibration sheet."""
-    path, made = miurafab.add_material(name, source, cell=cell, cut=cut, kerf=kerf, title=title)
+    path, made = miurafab.add_material(
+        name, source, cell=cell, cut=cut, score=score, kerf=kerf, title=title
+    )
     answer = {"file": str(path), "material": asdict(made)}
 
     def show() -> None:
@@ -98,7 +121,13 @@ def add_material(
 PROFILES_HELP = "List the machine profiles, show and validate one, or add one from a board."
 PROFILES_ACTIONS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {
     "show": (profiles, ("miurafab profiles show grbl-laser-400",)),
-    "add": (add_machine, ("miurafab profiles add my-laser --port /dev/ttyUSB0",)),
+    "add": (
+        add_machine,
+        (
+            "miurafab profiles add my-k40 --port /dev/ttyUSB0 --like grbl-co2-k40 --beam co2 "
+            "--power 38W",
+        ),
+    ),
 }
 MATERIALS_HELP = "List the materials, show and validate one, or add one from a calibration."
 MATERIALS_EXAMPLES = ("miurafab materials", "miurafab materials card-250")

@@ -40,10 +40,10 @@ def use(
     if forget:
         write_defaults(OwnDefaults())
     elif machine is not None:
-        load_machine(machine)
+        profile = load_machine(machine)
         new = replace(own_defaults(), machine=_from_anywhere(machine))
         if material is not None:
-            load_material(material)
+            load_material(material).on(profile)
             new = OwnDefaults(new.machine, _from_anywhere(material), port)
         write_defaults(new)
     console.answer({**asdict(own_defaults()), "file": str(defaults_file())})

@@ -1,14 +1,16 @@
-"""The calibration sheet: finds the settings of a material on a laser from one small sheet.
+"""The calibration sheet: finds the settings of a material on a machine from one small sheet.
 
-It holds four tests, each with its settings engraved beside it:
+It holds these tests, each with its settings engraved beside it:
 
 * *Flaps*, cut on three sides and hinged on dashes: a row for each pair of dash and gap, a column
-  for each pair of power and feed. Fold them; the flap that folds best gives all four settings.
-* *Squares*, each cut with a power and a feed: use the settings of the first that falls out.
-* The *kerf gauge*, a window of width W cut into n strips. With a kerf k the window is W + k wide
-  and the strips W - n k together, so when they are pushed to the left the last one ends
-  (n + 1/2) k short of the drawn right end; a scale above the window is ruled by that formula, and
-  kerf is read off it.
+  for each setting of a laser, or force of a pen or knife. The last column has the settings of the
+  material and its hinges along Y, all others along X: they differ as the grain of the sheet does.
+* *Score flaps*, hinged on a score, a column for each setting, the last along Y.
+* *Squares*, each cut with a setting: use that of the first that falls out.
+* Two *kerf gauges* for a laser, a window of width W cut into n strips. With a kerf k the window is
+  W + k wide and the strips W - n k together, so when they are pushed to one end the last one ends
+  (n + 1/2) k short of the drawn other end; a scale beside the window is ruled by that formula. A
+  spot that is not round has one kerf along X and another along Y.
 * A *coupon*, a small Miura-ori made with the material as it is.
 
 The sheet is as small as possible, so that an off-cut is enough.
@@ -22,9 +24,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from miurafab.errors import LayoutError, ProfileError
+from miurafab.fabrication.blocks import Tree, arranged
+from miurafab.fabrication.calibration_ladder import columns, dashes, tried_on
 from miurafab.fabrication.lettering import text_strokes, text_width
-from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
+from miurafab.fabrication.perforation import perforate, unbroken
 from miurafab.fabrication.route.order import StrokeSet, order_strokes
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.geometry.arrays import Floats
@@ -32,36 +35,52 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.miura import MiuraCell, regular_miura
 from miurafab.origami.unfold import unfold
 from miurafab.profiles import OPERATIONS, MachineProfile, Material
-from miurafab.profiles.material import Operation, Perforation
+from miurafab.profiles.beam import Operation
+from miurafab.profiles.material import Perforation
 
 Points = Floats
 
 SHEET = "sheet-01"
-DASHES = ((0.7, 1.3), (1.0, 1.0), (1.4, 1.0), (1.8, 0.8))
-"""The rows: dash and gap over the material's, from stiff to soft."""
-POWERS = (0.7, 1.0, 1.3)
-FEEDS = (1.0, 1.6)
-"""The columns: power and feed over the material's, within the limits of both."""
 STRIPS = 20
 _PITCH = (16.0, 14.0)
 _FLAP = (11.0, 9.0)
 _SQUARE = 8.0
-_HEAD, _FOOT = 9.0, 20.0
+_HEAD, _SCORES, _FOOT = 9.0, 21.0, 20.0
 _RATIO = 2.4
 """The height of the text at the left of a row, in mm."""
 _WINDOW = (80.0, 14.0)
+_GAUGE = (_WINDOW[0] + 19.0, _WINDOW[1] + 8.0)
 _SPACE = 8.0
+_BESIDE: tuple[Tree, ...] = (("row", (0, 1)), ("column", (0, 1)))
+_BESIDE_GAUGES: tuple[Tree, ...] = (
+    ("row", (0, ("column", (2, ("row", (1, 3)))))),
+    ("column", (("row", (0, 3)), ("row", (2, 1)))),
+)
+"""How blocks may lie: in a row or a column, the first that has room is taken. The blocks are the
+flaps and squares, the coupon, and the two gauges."""
 _COUPON = MiuraCell(across=12.0, along=12.0, alpha=math.radians(68), theta=math.radians(40))
 _COUPON_GRID = (7, 5)
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One flap: its engraved ``label``, its dashes, and their operation."""
+    """One flap: its engraved ``label``, its dashes, their operation, and the axis ``along`` which
+    its hinge lies.
+    """
 
     label: str
     perforation: Perforation
     operation: Operation
+    along: str = "x"
+
+
+@dataclass(frozen=True)
+class ScoredFlap:
+    """One flap on a scored hinge: its engraved ``label``, operation and axis."""
+
+    label: str
+    operation: Operation
+    along: str = "x"
 
 
 @dataclass(frozen=True)
@@ -81,6 +100,7 @@ class CalibrationSheet:
     width_mm: float
     height_mm: float
     cells: tuple[Cell, ...]
+    scores: tuple[ScoredFlap, ...]
     squares: tuple[Square, ...]
     sections: tuple[tuple[Toolpath, Material], ...]
     labels: dict[int, str]
@@ -102,87 +122,142 @@ class CalibrationSheet:
 
 
 def calibration_sheet(machine: MachineProfile, material: Material) -> CalibrationSheet:
-    """The calibration sheet of ``material`` on ``machine``, a laser. Deterministic.
+    """The calibration sheet of ``material`` on ``machine``. Deterministic.
 
-    Raises :class:`~miurafab.errors.ProfileError` for a machine that is no laser, and
+    Raises :class:`~miurafab.errors.ProfileError` for a material without settings for the beam, and
     :class:`~miurafab.errors.LayoutError` for a bed that is too small.
     """
-    if machine.tool.kind != "laser":
-        raise ProfileError(
-            f"{machine.name}: a {machine.tool.kind} has no power to calibrate; choose a laser."
-        )
-    fastest = min(machine.motion.max_rate_mm_min)
-    rules = _dashes(material)
-    burns = _settings(material, "perforate", fastest)
-    cuts = _settings(material, "cut", fastest)
+    material = tried_on(material, machine)
+    trial = _Trial(machine, material)
     coupon = unfold(regular_miura(_COUPON, *_COUPON_GRID))
-    left = 5.0 + _RATIO * max(text_width(_ratio(rule)) for rule in rules)
-    trial = _trial_size(left, len(rules), max(len(burns), len(cuts)))
-    gauge = (_WINDOW[0] + 14.0, _WINDOW[1] + 8.0)
-    fold = (np.ptp(coupon.vertices_coords[:, 0]), np.ptp(coupon.vertices_coords[:, 1]))
-    corners, size = _arranged([trial, gauge, (float(fold[0]), float(fold[1]))], machine)
+    across, along = np.ptp(coupon.vertices_coords, axis=0).tolist()
+    lasing = machine.tool.laser is not None
+    blocks = [trial.size, (across, along), *([_GAUGE, _GAUGE[::-1]] if lasing else [])]
+    corners, size = arranged(blocks, _BESIDE_GAUGES if lasing else _BESIDE, machine)
+    trial.draw(corners[0])
+    plain, folds = _Pen(), _Pen()
+    if lasing:
+        _gauge(trial.engraved, plain, corners[2])
+        _gauge(trial.engraved, plain, corners[3], turned=True)
+    _coupon(folds, plain, coupon, corners[1], material)
 
     margin = machine.bed.margin_mm
     width, height = size[0] + 2 * margin, size[1] + 2 * margin
-    cells: list[Cell] = []
-    squares: list[Square] = []
-    engraved, flaps, plain = _Pen(), _Pen(), _Pen()
-    burnt = [_Pen() for _ in burns]
-    tried = [_Pen() for _ in cuts]
-    at = corners[0]
-    for column, operation in enumerate(burns):
-        x = at[0] + left + _PITCH[0] * column
-        top = at[1] + trial[1]
-        _write(engraved, _percent(operation), (x + _FLAP[0] / 2, top - 1.2), 2.2)
-        _write(engraved, _feed(operation), (x + _FLAP[0] / 2, top - 5.0), 2.2)
-        for row, rule in enumerate(rules):
-            corner = np.array([x, top - _HEAD - _PITCH[1] * row - _FLAP[1]])
-            cell = Cell(f"{chr(ord('A') + row)}{column + 1}", rule, operation)
-            patch = len(cells)
-            cells.append(cell)
-            hinge = corner + np.array([[0.0, 0.0], [_FLAP[0], 0.0]])
-            dashes = perforate(hinge[:1], hinge[1:], _with(material, rule))
-            burnt[column].add(np.stack([dashes.starts, dashes.ends], axis=1), "perforate", patch)
-            way = corner + np.array([(0.0, 0.0), (0.0, _FLAP[1]), _FLAP, (_FLAP[0], 0.0)])
-            flaps.add([way], "cut", patch)
-            _write(engraved, cell.label, corner + np.array(_FLAP) / 2, 3.0)
-    for row, rule in enumerate(rules):
-        y = at[1] + trial[1] - _HEAD - _PITCH[1] * row - _FLAP[1] / 2
-        text = _ratio(rule)
-        _write(engraved, text, (at[0] + 2.0 + _RATIO * text_width(text) / 2, y), _RATIO)
-    for column, operation in enumerate(cuts):
-        x = at[0] + left + _PITCH[0] * column + _FLAP[0] / 2
-        square = Square(f"X{column + 1}", operation)
-        patch = len(cells) + len(squares)
-        squares.append(square)
-        ring = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * _SQUARE / 2
-        tried[column].add([ring + np.array([x, at[1] + 12.0])], "cut", patch)
-        _write(engraved, square.label, (x, at[1] + 12.0), 3.0)
-        _write(engraved, _percent(operation), (x, at[1] + 5.2), 2.2)
-        _write(engraved, _feed(operation), (x, at[1] + 1.4), 2.2)
-    _gauge(engraved, plain, corners[1])
-    folds = _Pen()
-    _coupon(folds, plain, coupon, corners[2], material)
 
     def section(pen: _Pen, **operations: Operation) -> tuple[Toolpath, Material]:
-        own = replace(material, operations={**material.operations, **operations})
+        own = material.worked_with(machine, **operations)
         return pen.toolpath(width, height, margin), own
 
-    made = [section(engraved), (_routed(section(folds)[0], coupon), material)]
-    made += [section(pen, perforate=use) for pen, use in zip(burnt, burns, strict=True)]
-    made.append(section(flaps))
-    made += [section(pen, cut=use) for pen, use in zip(tried, cuts, strict=True)]
+    made = [section(trial.engraved), (_routed(section(folds)[0], coupon), material)]
+    made += [section(pen, perforate=use) for use, pen in trial.burnt]
+    made += [section(pen, score=use) for use, pen in trial.scored]
+    made.append(section(trial.flaps))
+    made += [section(pen, cut=use) for use, pen in trial.tried]
     made.append(section(plain))
-    labels = [*(cell.label for cell in cells), *(square.label for square in squares)]
     return CalibrationSheet(
         width_mm=width,
         height_mm=height,
-        cells=tuple(cells),
-        squares=tuple(squares),
+        cells=tuple(trial.cells),
+        scores=tuple(trial.scores),
+        squares=tuple(trial.squares),
         sections=tuple(entry for entry in made if len(entry[0])),
-        labels=dict(enumerate(labels)),
+        labels=dict(enumerate(trial.labels)),
         coupon=coupon,
     )
+
+
+class _Trial:
+    """The flaps and squares, drawn while they are numbered: ``labels`` by patch number, and the
+    strokes of each setting on a pen of its own.
+    """
+
+    def __init__(self, machine: MachineProfile, material: Material) -> None:
+        self._material = material
+        self._own = material.on(machine).operations
+        self._rules = dashes(material)
+        self._burns = columns(material, machine, "perforate")
+        self._cuts = columns(material, machine, "cut")
+        knife = machine.tool.knife
+        marks = knife is None or "score" not in knife.leave_out
+        self._marks = columns(material, machine, "score") if marks else []
+        self._left = 5.0 + _RATIO * max(text_width(_ratio(rule)) for rule in self._rules)
+        self._across = max(len(self._burns), len(self._cuts), len(self._marks))
+        self.size = (
+            self._left + _PITCH[0] * self._across + _FLAP[0],
+            _HEAD + _PITCH[1] * len(self._rules) + _SCORES + _FOOT,
+        )
+        self.labels: list[str] = []
+        self.cells: list[Cell] = []
+        self.scores: list[ScoredFlap] = []
+        self.squares: list[Square] = []
+        self.engraved, self.flaps = _Pen(), _Pen()
+        self.burnt: list[tuple[Operation, _Pen]] = []
+        self.scored: list[tuple[Operation, _Pen]] = []
+        self.tried: list[tuple[Operation, _Pen]] = []
+
+    def draw(self, at: Points) -> None:
+        top = at[1] + self.size[1]
+        for column, (operation, turned) in enumerate(self._columns(self._burns, "perforate")):
+            x, pen = self._x(at, column, turned), _Pen()
+            self._says(operation, (x + _FLAP[0] / 2, top - 5.0), 3.8)
+            for row, rule in enumerate(self._rules):
+                label = f"{chr(ord('A') + row)}{'Y' if turned else column + 1}"
+                self.cells.append(Cell(label, rule, operation, "y" if turned else "x"))
+                low = np.array([x, top - _HEAD - _PITCH[1] * row - _FLAP[1]])
+                hinge = self._flap(label, low, turned)
+                made = perforate(hinge[:1], hinge[1:], _with(self._material, rule))
+                strokes = np.stack([made.starts, made.ends], axis=1)
+                pen.add(strokes, "perforate", len(self.labels) - 1)
+            self.burnt.append((operation, pen))
+        for row, rule in enumerate(self._rules):
+            y = top - _HEAD - _PITCH[1] * row - _FLAP[1] / 2
+            text = _ratio(rule)
+            _write(self.engraved, text, (at[0] + 2.0 + _RATIO * text_width(text) / 2, y), _RATIO)
+        low_of_scores = at[1] + _FOOT + 9.5
+        for column, (operation, turned) in enumerate(self._columns(self._marks, "score")):
+            x, pen = self._x(at, column, turned), _Pen()
+            label = f"S{'Y' if turned else column + 1}"
+            self.scores.append(ScoredFlap(label, operation, "y" if turned else "x"))
+            self._says(operation, (x + _FLAP[0] / 2, low_of_scores - 7.5), 3.8)
+            hinge = self._flap(label, np.array([x, low_of_scores]), turned)
+            pen.add([hinge], "score", len(self.labels) - 1)
+            self.scored.append((operation, pen))
+        ring = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * _SQUARE / 2
+        for column, operation in enumerate(self._cuts):
+            x, pen = self._x(at, column, False) + _FLAP[0] / 2, _Pen()
+            label = f"X{column + 1}"
+            self.squares.append(Square(label, operation))
+            self.labels.append(label)
+            pen.add([ring + np.array([x, at[1] + 12.0])], "cut", len(self.labels) - 1)
+            _write(self.engraved, label, (x, at[1] + 12.0), 3.0)
+            self._says(operation, (x, at[1] + 1.4), 3.8)
+            self.tried.append((operation, pen))
+
+    def _columns(self, tried: Sequence[Operation], name: str) -> list[tuple[Operation, bool]]:
+        """The operations ``tried``, then the material's own for hinges that are turned."""
+        return [*((each, False) for each in tried), *([(self._own[name], True)] if tried else [])]
+
+    def _x(self, at: Points, column: int, turned: bool) -> float:
+        return float(at[0]) + self._left + _PITCH[0] * (self._across if turned else column)
+
+    def _says(self, operation: Operation, low: tuple[float, float], rise: float) -> None:
+        """What is tried, in two lines: the strength above the feed."""
+        strength = _strength(operation)
+        if strength:
+            _write(self.engraved, strength, (low[0], low[1] + rise), 2.2)
+        _write(self.engraved, f"F{operation.feed_mm_min:g}", low, 2.2)
+
+    def _flap(self, label: str, low: Points, turned: bool) -> Points:
+        """Draw a flap whose lower left corner is ``low``; returns the two ends of its hinge."""
+        self.labels.append(label)
+        wide, high = _FLAP
+        around = np.array([(0.0, 0.0), (0.0, high), (wide, high), (wide, 0.0)])
+        if turned:
+            around = np.roll(around[::-1], 1, axis=0)
+        way: Points = low + around
+        self.flaps.add([way], "cut", len(self.labels) - 1)
+        _write(self.engraved, label, low + np.array([wide, high]) / 2, 3.0)
+        return np.stack([way[0], way[-1]])
 
 
 @dataclass
@@ -220,82 +295,14 @@ def _with(material: Material, rule: Perforation) -> Material:
     return replace(material, perforation=rule, creases=creases)
 
 
-def _dashes(material: Material) -> list[Perforation]:
-    usual = material.perforation
-    least = material.kerf_mm + MIN_STROKE_MM
-    found: dict[tuple[float, float], Perforation] = {}
-    for dash, gap in DASHES:
-        cut = max(_scaled(usual.cut_mm, dash), math.ceil(least * 20 - 1e-9) / 20)
-        left = max(_scaled(usual.gap_mm, gap), 0.05)
-        rule = replace(usual, cut_mm=cut, gap_mm=left, min_end_mm=min(usual.min_end_mm, cut))
-        found.setdefault((cut, left), rule)
-    return list(found.values())
-
-
-def _scaled(length: float, factor: float) -> float:
-    """A length times ``factor``, rounded to 0.05 mm; unchanged if the factor is 1."""
-    return length if factor == 1.0 else round(round(length * factor * 20) / 20, 2)
-
-
-def _settings(material: Material, name: str, fastest: float) -> list[Operation]:
-    """The columns of one operation, by energy per mm, the least first."""
-    usual = material.operations[name]
-    powers = dict.fromkeys(
-        min(usual.power if factor == 1.0 else round(usual.power * factor, 2), material.max_power)
-        for factor in POWERS
-    )
-    feeds = dict.fromkeys(
-        min(
-            usual.feed_mm_min if factor == 1.0 else float(f"{usual.feed_mm_min * factor:.3g}"),
-            fastest,
-        )
-        for factor in FEEDS
-    )
-    found = [replace(usual, power=power, feed_mm_min=feed) for power in powers for feed in feeds]
-    return sorted(found, key=lambda each: (each.power / each.feed_mm_min, each.power))
-
-
-def _trial_size(left: float, rows: int, columns: int) -> tuple[float, float]:
-    wide = left + _PITCH[0] * (columns - 1) + _FLAP[0]
-    return wide, _HEAD + _PITCH[1] * rows + _FOOT
-
-
-def _arranged(
-    blocks: Sequence[tuple[float, float]], machine: MachineProfile
-) -> tuple[list[Points], tuple[float, float]]:
-    """The lower left corners of the blocks, and their total size: the first block on the left and
-    the others to its right if there is room, or all above each other.
-    """
-    (wide, high), (wide_1, high_1), (wide_2, high_2) = blocks
-    right = wide + _SPACE
-    beside = (right + max(wide_1, wide_2), max(high, high_1 + _SPACE + high_2))
-    above = (max(wide, wide_1, wide_2), high + high_1 + high_2 + 2 * _SPACE)
-    bed = machine.bed
-    room = (bed.width_mm - 2 * bed.margin_mm, bed.height_mm - 2 * bed.margin_mm)
-    if beside[0] <= room[0] and beside[1] <= room[1]:
-        low = beside[1] - high_1 - _SPACE - high_2
-        places = [(0.0, beside[1] - high), (right, beside[1] - high_1), (right, low)]
-        return [np.array(place) for place in places], beside
-    if above[0] <= room[0] and above[1] <= room[1]:
-        places = [(0.0, above[1] - high), (0.0, high_2 + _SPACE), (0.0, 0.0)]
-        return [np.array(place) for place in places], above
-    raise LayoutError(
-        f"The calibration sheet needs {beside[0]:.0f} mm x {beside[1]:.0f} mm or {above[0]:.0f} mm "
-        f"x {above[1]:.0f} mm, and the usable bed of {machine.name} is {room[0]:g} mm x "
-        f"{room[1]:g} mm; choose another machine, or a smaller margin in its profile."
-    )
-
-
 def _ratio(rule: Perforation) -> str:
     return f"{rule.cut_mm:g}/{rule.gap_mm:g}"
 
 
-def _percent(operation: Operation) -> str:
-    return f"{100 * operation.power:g}%"
-
-
-def _feed(operation: Operation) -> str:
-    return f"F{operation.feed_mm_min:g}"
+def _strength(operation: Operation) -> str:
+    if operation.power is not None:
+        return f"{operation.power:.3g}W"
+    return "" if operation.force is None else f"S{operation.force}"
 
 
 def _write(pen: _Pen, text: str, middle: Points | tuple[float, float], height: float) -> None:
@@ -307,9 +314,19 @@ def gauge_mark(kerf: float) -> float:
     return (STRIPS + 0.5) * kerf
 
 
-def _gauge(engraved: _Pen, cut: _Pen, corner: Points) -> None:
+def _gauge(engraved: _Pen, cut: _Pen, corner: Points, *, turned: bool = False) -> None:
+    """A gauge whose strips are side by side along X, or along Y if it is turned to the left."""
+    texts, strips = _Pen(), _Pen()
+    _drawn_gauge(texts, strips, "KERF-Y" if turned else "KERF-X")
+    for pen, drawn in ((engraved, texts), (cut, strips)):
+        for stroke, (operation, _, _) in zip(drawn.strokes, drawn.kinds, strict=True):
+            left = np.stack([_GAUGE[1] - stroke[:, 1], stroke[:, 0]], axis=1)
+            pen.add([corner + (left if turned else stroke)], OPERATIONS[operation])
+
+
+def _drawn_gauge(engraved: _Pen, cut: _Pen, name: str) -> None:
     wide, high = _WINDOW
-    low = corner + np.array([12.0, 0.0])
+    low = np.array([17.0, 0.0])
     for strip in range(1, STRIPS):
         x = low[0] + wide * strip / STRIPS
         ends = np.array([[x, low[1]], [x, low[1] + high]])
@@ -324,7 +341,7 @@ def _gauge(engraved: _Pen, cut: _Pen, corner: Points) -> None:
         engraved.add([np.array([[x, top], [x, top + tall]])], "engrave")
         if twentieth % 4 == 0:
             _write(engraved, f"{kerf:g}".removeprefix("0") or "0", (x, top + 4.4), 1.8)
-    _write(engraved, "KERF", (corner[0] + 5.0, low[1] + high / 2), 2.4)
+    _write(engraved, name, (1.1 * text_width(name), low[1] + high / 2), 2.2)
 
 
 def _routed(folds: Toolpath, coupon: CreasePattern) -> Toolpath:

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from miurafab.display import Shown
+from miurafab.fabrication.beam_findings import beam_findings
 from miurafab.fabrication.borders import OpenBorder, open_borders
 from miurafab.fabrication.caps import capped
 from miurafab.fabrication.kit.plan import FoldersKit, folders_kit
@@ -263,7 +264,10 @@ def lay_out(
         patches=patches,
         sheets=sheets,
         totals=_totals(pattern, outlined, patches, nesting, toolpaths + behind, usable),
-        findings=layout_findings(pattern, framed, nesting, lettering, drawn, material, options),
+        findings=(
+            *beam_findings(machine, material),
+            *layout_findings(pattern, framed, nesting, lettering, drawn, material, options),
+        ),
         borders=open_borders(pattern),
         absent=absent_labels(lettering, patches),
         kit=folders_kit(pattern),
@@ -284,7 +288,11 @@ def _with_passes(sheet: Sheet, front: Toolpath, back: Toolpath | None) -> Sheet:
 
 
 def worked(material: Material, machine: MachineProfile, options: LayoutOptions) -> Material:
-    """``material`` with the tabs of ``options``, and with a kerf only under a beam."""
+    """``material`` with the tabs of ``options``, and with a kerf only under a beam.
+
+    Raises :class:`~miurafab.errors.ProfileError` where it has no settings for the beam.
+    """
+    material.on(machine)
     rule = material.tabs
     if options.tab_height_mm is not None:
         rule = replace(rule, height_mm=options.tab_height_mm)

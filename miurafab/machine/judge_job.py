@@ -89,7 +89,8 @@ def judge_program(
         yield from _loose_parts(program)
         yield from _dwells(job, program, machine)
         if most_power < 1.0:
-            limit = most_power * full
+            least = machine.tool.s_min
+            limit = least + most_power * (full - least)
             words = f"S{limit:.0f} that the material takes (its max_power)"
             yield from _power("material", program, limit + _POWER_TOLERANCE, words)
     yield from _power("power", program, full, f"{full} that is full power on {machine.name}")

@@ -40,6 +40,7 @@ from miurafab.options.kinds import (
     modulus,
     number,
     percent,
+    watts,
 )
 
 __all__ = [
@@ -69,6 +70,7 @@ __all__ = [
     "percent",
     "read_options",
     "read_value",
+    "watts",
     "written_options",
 ]
 

@@ -14,7 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import UnitError
-from miurafab.units import as_float, parse_angle, parse_feed, parse_length, parse_pressure
+from miurafab.units import (
+    as_float,
+    parse_angle,
+    parse_feed,
+    parse_length,
+    parse_power,
+    parse_pressure,
+)
 
 
 class Kind:
@@ -113,6 +120,11 @@ def modulus(low: float = 0.0, high: float = math.inf) -> Quantity:
 def feed(low: float = 1.0, high: float = 1e6) -> Quantity:
     """A feed in mm/min."""
     return Quantity(parse_feed, "a feed", "FEED", " mm/min", low=low, high=high)
+
+
+def watts(low: float = 0.0, high: float = math.inf) -> Quantity:
+    """A power in watts, such as ``8W``."""
+    return Quantity(parse_power, "a power", "POWER", " W", low=low, high=high)
 
 
 def percent(low: float = 0.0, high: float = 100.0) -> Quantity:

@@ -7,7 +7,7 @@ A line is written only where something changes, so a job without heights has non
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from miurafab.posting.dialects import Words
 from miurafab.posting.strokes import Runs
 from miurafab.posting.text import trimmed
 from miurafab.profiles import OPERATIONS, MachineProfile, Material
+from miurafab.profiles.beam import Operation
 
 
 def heights_of(runs: Runs, machine: MachineProfile, material: Material) -> list[float]:
@@ -23,8 +24,9 @@ def heights_of(runs: Runs, machine: MachineProfile, material: Material) -> list[
 
     Raises :class:`~miurafab.errors.ProfileError` for heights that ``machine`` does not have.
     """
+    operations = material.on(machine).operations
     heights = [
-        material.operations[OPERATIONS[code]].heights_mm[number - 1]
+        operations[OPERATIONS[code]].heights_mm[number - 1]
         for code, number in zip(runs.operation.tolist(), runs.number.tolist(), strict=True)
     ]
     travel = float(np.ptp([0.0, *heights]))
@@ -45,10 +47,14 @@ class Between:
     """The lines between the ``runs`` of a sheet, which are made at ``heights``."""
 
     def __init__(
-        self, runs: Runs, heights: Sequence[float], material: Material, words: Words
+        self,
+        runs: Runs,
+        heights: Sequence[float],
+        operations: Mapping[str, Operation],
+        words: Words,
     ) -> None:
         self._heights = heights
-        self._air = [material.operations[OPERATIONS[code]].air for code in runs.operation.tolist()]
+        self._air = [operations[OPERATIONS[code]].air for code in runs.operation.tolist()]
         self._words = words
 
     @property

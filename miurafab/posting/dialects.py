@@ -19,17 +19,17 @@ gcode/control/M3-M5.cpp and gcode/gcode.cpp):
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from miurafab.errors import LayoutError, ProfileError
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.posting.text import trimmed
 from miurafab.profiles import OPERATIONS, Knife, MachineProfile, Material
+from miurafab.profiles.beam import SHALLOW, Operation
 
 _GRBL = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc")
 _LASER_MODE_IS_SETTING_32 = ("grbl-1.1", "grblhal")
-_SHALLOW = ("engrave", "score")
-"""The operations that mark the sheet and must not cut through it."""
 
 
 @dataclass(frozen=True)
@@ -67,16 +67,17 @@ def words_of(machine: MachineProfile, material: Material) -> Words:
             f"{machine.name}: G-code is written for {', '.join(_GRBL)} and marlin, not for the "
             f"dialect '{dialect}'; choose another machine."
         )
-    feed = tuple(trimmed(material.operations[name].feed_mm_min) for name in OPERATIONS)
+    operations = material.on(machine).operations
+    feed = tuple(trimmed(operations[name].feed_mm_min) for name in OPERATIONS)
     if kind == "laser":
-        s = tuple(machine.power_to_s(material.operations[name].power) for name in OPERATIONS)
+        s = tuple(machine.power_to_s(operations[name].power or 0.0) for name in OPERATIONS)
         return _marlin(machine, s, feed) if dialect == "marlin" else _laser(machine, s, feed)
     if dialect == "marlin":
         raise ProfileError(
             f"{machine.name}: for marlin, G-code is written for a laser, not for a {kind}; choose "
             "another machine."
         )
-    return _servo(machine, feed)
+    return _servo(machine, operations, feed)
 
 
 def _air(machine: MachineProfile) -> tuple[str, ...]:
@@ -116,7 +117,9 @@ def _marlin(machine: MachineProfile, s: tuple[int, ...], feed: tuple[str, ...]) 
     return Words(begin, end, ("",) * len(feed), "", s, feed, air, travel=travel, restated=True)
 
 
-def _servo(machine: MachineProfile, feed: tuple[str, ...]) -> Words:
+def _servo(
+    machine: MachineProfile, operations: Mapping[str, Operation], feed: tuple[str, ...]
+) -> Words:
     tool = machine.tool
     if machine.settings.get(32, 0) != 0:
         raise ProfileError(
@@ -126,16 +129,13 @@ def _servo(machine: MachineProfile, feed: tuple[str, ...]) -> Words:
     air = _air(machine)
     settle = f"\nG4 P{trimmed(tool.settle_s)}" if tool.settle_s > 0 else ""
     up = f"M3 S{tool.s_up}{settle}"
-    down = tuple(f"\nM3 S{depth(machine, name)}{settle}" for name in OPERATIONS)
+    down = tuple(f"\nM3 S{depth(machine, name, operations[name])}{settle}" for name in OPERATIONS)
     return Words((*_MODES, up), ("M5", *air[1:], *_HOME), down, "\n" + up, None, feed, air)
 
 
-def depth(machine: MachineProfile, operation: str) -> int:
-    """The S of a pen or knife that is down for ``operation``; shallow for operations that mark."""
-    knife = machine.tool.knife
-    if knife is not None and knife.s_shallow is not None and operation in _SHALLOW:
-        return knife.s_shallow
-    return machine.tool.s_down
+def depth(machine: MachineProfile, name: str, operation: Operation) -> int:
+    """The S of a pen or knife that is down for the ``operation`` of that ``name``."""
+    return machine.tool.depth(name) if operation.force is None else operation.force
 
 
 def made_by_knife(toolpath: Toolpath, knife: Knife, machine: MachineProfile) -> tuple[str, ...]:
@@ -145,7 +145,7 @@ def made_by_knife(toolpath: Toolpath, knife: Knife, machine: MachineProfile) -> 
     """
     present = [OPERATIONS[code] for code in sorted(set(toolpath.operation.tolist()))]
     for name in present:
-        if name in _SHALLOW and knife.s_shallow is None and name not in knife.leave_out:
+        if name in SHALLOW and knife.s_shallow is None and name not in knife.leave_out:
             raise LayoutError(
                 f"{toolpath.sheet} has strokes to {name}, which the knife of {machine.name} would "
                 f"cut right through; write s_shallow, a depth that only marks the sheet, or "

@@ -61,7 +61,8 @@ def post(
     if knife is not None:
         left_out = made_by_knife(toolpath, knife, machine)
         toolpath = tip_way(without_operations(toolpath, left_out), knife, machine.bed.margin_mm)
-    runs = runs_of(toolpath, [material.operations[name].passes for name in OPERATIONS])
+    operations = material.on(machine).operations
+    runs = runs_of(toolpath, [operations[name].passes for name in OPERATIONS])
     heights = heights_of(runs, machine, material)
     made = repeated(toolpath, runs)
     if knife is not None:
@@ -79,7 +80,7 @@ def post(
     ]
     labels = patch_labels or {}
 
-    between = Between(runs, heights, material, words)
+    between = Between(runs, heights, operations, words)
 
     def job(lines: tuple[ByteRows, Ints], *modes: str) -> Job:
         foot = [f"{word}\n" for word in (*modes, *between.back, *words.end)]
@@ -118,10 +119,11 @@ def _hpgl(made: Toolpath, machine: MachineProfile, material: Material) -> Job:
         )
     points_of(made, machine)
     setup = {}
-    for name in OPERATIONS:
+    for name, operation in material.on(machine).operations.items():
         # VS is in cm/s (HP-GL reference, "velocity select").
-        speed = max(1, round(material.operations[name].feed_mm_min / 600.0))
-        force = f"FS{depth(machine, name)};" if machine.tool.kind == "knife" else ""
+        speed = max(1, round(operation.feed_mm_min / 600.0))
+        pressed = machine.tool.kind == "knife" or operation.force is not None
+        force = f"FS{depth(machine, name, operation)};" if pressed else ""
         setup[name] = f"VS{speed};{force}"
     return Job(made.sheet, sheet_hpgl(made, setup=setup))
 
@@ -140,7 +142,8 @@ def _wire_is_short(
     sent = np.count_nonzero((rows != 0) & (rows != ord(" ")), axis=1)
     wire = sent * _BITS_A_BYTE / machine.controller.baud
     rapid = max(machine.motion.max_rate_mm_min)
-    feeds = np.array([material.operations[name].feed_mm_min for name in OPERATIONS])
+    operations = material.on(machine).operations
+    feeds = np.array([operations[name].feed_mm_min for name in OPERATIONS])
     feed = np.repeat(feeds[points.operation], np.diff(np.append(points.first, len(points.xy))))
     step = np.linalg.norm(np.diff(points.xy, axis=0, prepend=points.xy[:1]), axis=1) / 1000.0
     motion = step / np.where(points.starts, rapid, feed) * 60.0

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from miurafab.errors import ProfileError
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.job import Job
 from miurafab.posting.dialects import words_of
@@ -25,26 +24,27 @@ def post_sections(
     *,
     patch_labels: Mapping[int, str] | None = None,
 ) -> Job:
-    """One file for a laser that makes ``sections`` in turn, each with the powers, feeds and passes
-    of its own material. The job is called as the first of them.
+    """One file that makes ``sections`` in turn, each with the powers or forces, the feeds and the
+    passes of its own material. The job is called as the first of them. A knife is aligned before
+    each.
 
-    Raises what :func:`~miurafab.posting.make_job.post` raises, and
-    :class:`~miurafab.errors.ProfileError` for a machine that is no laser.
+    Raises what :func:`~miurafab.posting.make_job.post` raises.
     """
-    if machine.tool.kind != "laser":
-        raise ProfileError(
-            f"{machine.name}: a {machine.tool.kind} has no power to try; choose a laser."
-        )
     head: list[str] = []
     body: list[str] = []
     foot: list[str] = []
     for toolpath, material in sections:
-        words = words_of(machine, material)
         job = post(toolpath, machine, material, patch_labels=patch_labels)
         lines = job.text.splitlines(keepends=True)
-        first, last = _NAMES + len(words.begin), len(lines) - len(words.end)
+        first, last = 1, len(lines) - 1
+        air: tuple[str, ...] = ()
+        if machine.dialect != "hpgl":
+            words = words_of(machine, material)
+            left_out = sum(line.startswith("(left out ") for line in lines)
+            first, last = _NAMES + left_out + len(words.begin), len(lines) - len(words.end)
+            air = words.air
         head = head or lines[:first]
-        body += _with_air(body, lines[first:last], words.air)
+        body += _with_air(body, lines[first:last], air)
         foot = lines[last:]
     return Job(sections[0][0].sheet, "".join([*head, *body, *foot]))
 

@@ -1,7 +1,8 @@
 """Machines and materials, read strictly from TOML."""
 
+from miurafab.profiles.beam import OPERATIONS
 from miurafab.profiles.machine import Knife, MachineProfile, load_machine, read_machine
-from miurafab.profiles.material import GRAINS, OPERATIONS, Material, load_material
+from miurafab.profiles.material import GRAINS, Material, load_material
 from miurafab.profiles.shipped import (
     DEFAULT_MACHINE,
     DEFAULT_MATERIAL,

@@ -23,7 +23,7 @@ from miurafab.options import (
     number,
     option,
 )
-from miurafab.profiles.material import OPERATIONS
+from miurafab.profiles.beam import OPERATIONS, SHALLOW, Laser
 from miurafab.profiles.shipped import find_profile
 from miurafab.profiles.table import Table, read_toml
 from miurafab.units import as_float
@@ -122,7 +122,8 @@ class Tool:
     whenever motion stops; M3 keeps burning and must be allowed explicitly. ``air_word`` is the
     word that opens the valve of ``air_assist``.
     For a pen or knife ``s_down`` and ``s_up`` are the servo positions and ``settle_s`` the time
-    each takes; on an HPGL machine ``s_down`` is the force of its ``FS`` instruction.
+    each takes; on an HPGL machine ``s_down`` is the force of its ``FS`` instruction. ``laser`` is
+    the beam of a laser.
     """
 
     kind: str
@@ -135,6 +136,37 @@ class Tool:
     settle_s: float
     knife: Knife | None = None
     air_word: str = AIR_WORDS[0]
+    laser: Laser | None = None
+
+    @property
+    def beam(self) -> str:
+        """The kind of beam that settings of materials are for: a kind of laser, pen or knife."""
+        return self.kind if self.laser is None else self.laser.beam
+
+    @property
+    def beam_title(self) -> str:
+        """What messages call that kind of beam."""
+        return f"a {self.kind}" if self.laser is None else self.laser.title
+
+    def depth(self, operation: str) -> int:
+        """The S of a pen or knife that is down; shallow for operations that mark."""
+        knife = self.knife
+        if knife is not None and knife.s_shallow is not None and operation in SHALLOW:
+            return knife.s_shallow
+        return self.s_down
+
+    @property
+    def strength(self) -> str:
+        """What messages call the beam with its full power."""
+        return self.beam_title + ("" if self.laser is None else f", {self.laser.power:g} W")
+
+    def same_beam(self, other: Tool) -> bool:
+        """Whether a power or depth means the same on ``other``."""
+        if self.laser is None or other.laser is None:
+            return self.beam == other.beam
+        return self.laser.power == other.laser.power and self.laser.is_kind(
+            other.laser.beam, other.laser.wavelength
+        )
 
 
 @dataclass(frozen=True)
@@ -206,10 +238,17 @@ class MachineProfile(Shown):
         """How the name of a file for this machine ends."""
         return ".plt" if self.dialect == "hpgl" else ".nc"
 
-    def power_to_s(self, fraction: float) -> int:
-        """The S word for a power ``fraction`` (0 to 1) of the laser's full power."""
+    def share(self, power: float) -> float:
+        """A ``power`` in watts as a share of the laser's full power, 1 at most."""
+        laser = self.tool.laser
+        assert laser is not None
+        return min(1.0, power / laser.power)
+
+    def power_to_s(self, power: float) -> int:
+        """The S word for a ``power`` in watts of a laser."""
         tool = self.tool
-        return round(tool.s_min + fraction * (tool.s_max - tool.s_min)) if fraction > 0 else 0
+        least, most = tool.s_min, tool.s_max
+        return round(least + self.share(power) * (most - least)) if power > 0 else 0
 
 
 def read_machine(machine: MachineProfile | AnyPath | None) -> MachineProfile:
@@ -273,6 +312,8 @@ def _z_axis(table: Table) -> ZAxis:
 
 def _tool(table: Table) -> Tool:
     kind = table.value("kind", Choice(TOOLS))
+    if kind == "laser":
+        _states_its_beam(table)
     s_max = table.value("s_max", Whole(1, 100_000), 1000)
     own_s = Whole(0, s_max)
     tool = Tool(
@@ -285,12 +326,29 @@ def _tool(table: Table) -> Tool:
         s_down=table.value("s_down", own_s, s_max),
         s_up=table.value("s_up", own_s, 0),
         settle_s=table.value("settle", number(0, 10, unit=" s"), 0.0),
+        laser=table.options(Laser) if kind == "laser" else None,
         knife=table.options(Knife) if kind == "knife" else None,
     )
     table.finish()
+    if tool.beam == "diode" and not table.has("wavelength"):
+        raise table.fault(
+            "wavelength", "is missing: write that of the diode in nm, 450 for common blue ones"
+        )
     if tool.knife is not None and (tool.knife.s_shallow or 0) > s_max:
         raise table.fault("s_shallow", f"is {tool.knife.s_shallow}, which exceeds s_max ({s_max})")
     return tool
+
+
+def _states_its_beam(table: Table) -> None:
+    """Raise where a laser does not say what its S values mean in watts."""
+    for key in ("beam", "power"):
+        if not table.has(key):
+            raise table.fault(
+                key,
+                "is missing: settings of materials are for one kind of beam, in watts; write "
+                'beam = "diode" and wavelength = 450 (nm), or beam = "co2", and power = "10W", '
+                "which is what the laser's label says of its light",
+            )
 
 
 def _settings(table: Table) -> dict[int, float]:

@@ -1,35 +1,37 @@
 """A material in one strict TOML file: how to crease, cut and glue it.
 
-Powers are fractions of the laser's full power, so that one file serves machines with different S
-ranges; the machine profile turns them into S words.
+How it is worked stands once for each kind of beam (:mod:`miurafab.profiles.beam`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from miurafab.display import Shown
+from miurafab.errors import ProfileError
 from miurafab.files import AnyPath
 from miurafab.options import (
     REQUIRED,
     Choice,
-    Flag,
     Text,
-    Whole,
     angle,
-    feed,
     length,
     modulus,
     number,
     option,
 )
+from miurafab.profiles.beam import (
+    BEAMS,
+    LASERS,
+    OPERATIONS,
+    BeamSettings,
+    Meant,
+    Operation,
+)
+from miurafab.profiles.machine import MachineProfile
 from miurafab.profiles.shipped import find_profile
 from miurafab.profiles.table import Table, read_toml
-
-OPERATIONS = ("engrave", "score", "perforate", "cut")
-"""The operations in the order in which a sheet is made; cuts, which loosen it, come last."""
-
 
 CREASE_KINDS = ("mountain", "valley", "tab")
 """The kinds of crease, which may be made differently; ``tab`` is the fold of a tab."""
@@ -104,36 +106,9 @@ class TabRule:
     )
 
 
-@dataclass(frozen=True)
-class Operation:
-    """How one operation is made."""
-
-    power: float = option(number(0, 1), "Fraction of the laser's full power.", REQUIRED)
-    feed_mm_min: float = option(feed(), "Speed of the head.", REQUIRED)
-    passes: int = option(Whole(1, 50), "How often each stroke is made.", 1)
-    z_step_mm: float = option(
-        length(0, 20), "How much lower the head is in each further pass; needs a Z axis.", 0.0
-    )
-    focus_mm: float = option(
-        length(-50, 50),
-        "Z of the head in the first pass, 0 being the height to which you focused; needs a Z axis.",
-        0.0,
-    )
-    air: bool = option(
-        Flag(), "Whether air is blown, on a machine with air assist; false switches it off.", True
-    )
-
-    @property
-    def heights_mm(self) -> tuple[float, ...]:
-        """Z in each pass."""
-        return tuple(
-            round(self.focus_mm - number * self.z_step_mm, 3) for number in range(self.passes)
-        )
-
-
 @dataclass(frozen=True, repr=False)
 class Material(Shown):
-    """One material on one class of laser.
+    """One material.
 
     Attributes
     ----------
@@ -145,14 +120,12 @@ class Material(Shown):
         The thickness of the sheet.
     kerf_mm : float
         The width of the cut.
-    max_power : float
-        The most power that a job may use, as a fraction of full power.
     perforation : Perforation
         The dashes of creases that have none of their own, mm.
     tabs : TabRule
         The tabs that join patches, mm.
-    operations : dict of str to Operation
-        Power, feed, passes, heights and air of each operation.
+    beams : dict of str to BeamSettings
+        How it is worked, for each kind of beam that it has settings for.
     modulus_pa : float or None
         Young's modulus in bending, None where the file does not give it. Only energies in joules
         need it.
@@ -168,14 +141,45 @@ class Material(Shown):
     title: str
     thickness_mm: float
     kerf_mm: float
-    max_power: float
     perforation: Perforation
     tabs: TabRule
-    operations: dict[str, Operation]
+    beams: dict[str, BeamSettings]
     modulus_pa: float | None = None
     creases: dict[str, Crease] = field(default_factory=_all_perforated)
     relief_hole_mm: float = 0.0
     grain: str = "none"
+
+    def entry(self, machine: MachineProfile) -> BeamSettings | None:
+        """What the file says for the beam of ``machine``, None for nothing."""
+        found, laser = self.beams.get(machine.tool.beam), machine.tool.laser
+        if found is None or laser is None:
+            return found
+        return found if laser.is_kind(found.beam, found.meant.wavelength) else None
+
+    def on(self, machine: MachineProfile) -> BeamSettings:
+        """How it is worked on ``machine``. Raises ``ProfileError`` if that has another beam."""
+        found, tool = self.entry(machine), machine.tool
+        if found is None:
+            has = ", ".join(sorted(each.title for each in self.beams.values())) or "none"
+            raise ProfileError(
+                f"{self.name} has no settings for {tool.beam_title}, which {machine.name} is; it "
+                f"has some for: {has}. Take another machine or material, or find settings with "
+                "'miurafab calibrate' and a `power` and a `feed` to begin with."
+            )
+        if tool.laser is not None:
+            return found.on(tool.laser)
+        return found if found.meant.forces_of in (None, machine.name) else found.without_forces()
+
+    def most_power(self, machine: MachineProfile) -> float:
+        """The most power that a job may use, as a share of the full power of ``machine``."""
+        most = self.on(machine).most_watts
+        return 1.0 if most is None else machine.share(most)
+
+    def worked_with(self, machine: MachineProfile, **operations: Operation) -> Material:
+        """The same with other ``operations`` for the beam of ``machine``."""
+        used = self.on(machine)
+        made = replace(used, operations=used.operations | operations)
+        return replace(self, beams={**self.beams, used.beam: made})
 
     def perforation_of(self, kind: str) -> Perforation:
         """The dashes on creases of one kind."""
@@ -207,7 +211,13 @@ def load_material(name: AnyPath) -> Material:
     """
     path = find_profile("materials", name)
     table = Table(read_toml(path), path.name)
-    max_power = table.value("max_power", number(0.01, 1), 1.0)
+    if table.has("operations"):
+        raise table.fault(
+            "operations",
+            "has no beam: power belongs to one kind of beam; put these tables below [beams.diode] "
+            "(with lasers and wavelength), [beams.co2], [beams.knife] or [beams.pen], and write "
+            'each power in watts: 0.8 of a 10 W laser is "8W"',
+        )
     kerf = table.value("kerf", KERF)
     perforation = table.table("perforation").options(Perforation)
     creases, relief_hole = _creases(table.table("creases", {}), perforation, kerf)
@@ -216,10 +226,9 @@ def load_material(name: AnyPath) -> Material:
         title=table.value("title", Text()),
         thickness_mm=table.value("thickness", length(0.01, 20)),
         kerf_mm=kerf,
-        max_power=max_power,
         perforation=perforation,
         tabs=table.table("tabs").options(TabRule),
-        operations=_operations(table.table("operations"), max_power),
+        beams=_beams(table.table("beams")),
         modulus_pa=table.value("modulus", modulus(1e5, 1e12), None),
         creases=creases,
         relief_hole_mm=relief_hole,
@@ -256,12 +265,39 @@ def _creases(table: Table, usual: Perforation, kerf: float) -> tuple[dict[str, C
     return creases, hole
 
 
-def _operations(table: Table, max_power: float) -> dict[str, Operation]:
-    operations = {}
+def _beams(table: Table) -> dict[str, BeamSettings]:
+    beams = {}
+    for kind in BEAMS:
+        if table.has(kind):
+            beams[kind] = _settings(table.table(kind), kind)
+    table.finish(BEAMS)
+    return beams
+
+
+def _settings(table: Table, kind: str) -> BeamSettings:
+    operations: dict[str, Operation] = {}
+    entries = table.table("operations")
+    meant = table.options(Meant)
+    if kind in LASERS and meant.lasers is None:
+        raise table.fault("lasers", 'is missing: write the power of those meant, ["5W", "10W"]')
+    if kind == "diode" and meant.wavelength is None:
+        raise table.fault("wavelength", "is missing: write that of the diode in nm, as 450")
+    settings = BeamSettings(kind, meant, operations)
+    most = settings.most_watts
     for name in OPERATIONS:
-        entry = table.table(name)
+        entry = entries.table(name)
         operations[name] = made = entry.options(Operation)
-        if made.power > max_power:
-            raise entry.fault("power", f"is {made.power:g}; max_power allows {max_power:g} at most")
-    table.finish()
-    return operations
+        if (made.power is None) is (kind in LASERS):
+            complaint = (
+                "is missing" if made.power is None else f"is for a laser, not {settings.title}"
+            )
+            raise entry.fault("power", complaint)
+        if made.power is not None and most is not None and made.power > most:
+            raise entry.fault("power", f"is {made.power:g} W; max_power allows {most:g} W at most")
+        if made.force is not None and meant.forces_of is None:
+            raise entry.fault(
+                "force",
+                "is an S value of one machine; name that machine as forces_of above the operations",
+            )
+    entries.finish()
+    return settings

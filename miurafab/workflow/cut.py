@@ -18,7 +18,7 @@ from miurafab.findings import Finding, refusals
 from miurafab.gcode.job import Job
 from miurafab.profiles import MachineProfile, read_machine
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
-from miurafab.workflow.preview import assumed_machine, named_machine
+from miurafab.workflow.preview import another_beam, assumed_machine, maker_of, named_machine
 
 # What fits and lays out is imported where it is needed: loading it
 # takes longer than all that cuts.
@@ -41,7 +41,8 @@ class Prepared:
     ``folder`` is where the journals go. ``report`` is that of the fit or the check, None for what
     came as G-code or a job directory; ``refused`` are the findings of a fit that failed or a
     pattern that is not valid, for which nothing will be cut. ``aligned`` says which sheet was
-    turned and shifted to where it lies (:func:`~miurafab.workflow.alignment.align`).
+    turned and shifted to where it lies (:func:`~miurafab.workflow.alignment.align`); ``elsewhere``
+    that the job was made for another beam.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Prepared:
     report: dict[str, Any] | None = None
     refused: tuple[Finding, ...] = ()
     aligned: Aligned | None = None
+    elsewhere: tuple[Finding, ...] = ()
 
     @property
     def most_power(self) -> float:
@@ -60,9 +62,11 @@ class Prepared:
         return 1.0 if self.directory is None else self.directory.most_power
 
     @property
-    def edits(self) -> tuple[Finding, ...]:
-        """Which files of a job directory are not as they were made."""
-        return () if self.directory is None else self.directory.edits
+    def findings(self) -> tuple[Finding, ...]:
+        """Which files of a job directory are not as they were made, and whether it is for another
+        beam.
+        """
+        return (() if self.directory is None else self.directory.edits) + self.elsewhere
 
     def chosen(self, sheets: Sequence[int] | None) -> list[int]:
         """The numbers of the ``sheets`` (None: all); raises ``InputError`` for one that is
@@ -111,7 +115,8 @@ def prepare(
     named = named_machine(gcode, path.parent) if machine is None else read_machine(machine)
     profile = named or assumed_machine(path)
     sheet = _dry_run(gcode, profile, unread=unread)
-    return Prepared(path.name, profile, (gcode,), (sheet,), None, path.parent)
+    elsewhere = tuple(another_beam(maker_of(gcode, path.parent), profile, path.name))
+    return Prepared(path.name, profile, (gcode,), (sheet,), None, path.parent, elsewhere=elsewhere)
 
 
 def _fitted_already(options: Mapping[str, object], thing: object) -> None:
@@ -129,7 +134,9 @@ def _from_directory(
         dry_runs = tuple(
             _dry_run(each, profile, job.most_power, unread=unread) for each in job.jobs
         )
-    return Prepared(job.path.resolve().name, profile, job.jobs, dry_runs, job, job.path)
+    name = job.path.resolve().name
+    elsewhere = tuple(another_beam(job.machine, profile, name))
+    return Prepared(name, profile, job.jobs, dry_runs, job, job.path, elsewhere=elsewhere)
 
 
 def _from_value(

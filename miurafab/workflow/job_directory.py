@@ -150,7 +150,7 @@ def read_written(directory: Path) -> WrittenJob:
         )
     layout = read_layout(read_text(path, InputError, "a layout"), path)
     machine = job_machine(layout.machine, directory)
-    most_power = job_material(layout.material, directory).max_power
+    most_power = job_material(layout.material, directory).most_power(machine)
     passes = tuple((name, sheet) for sheet in layout.sheets for name in sheet.passes)
     jobs = []
     for name, _ in passes:

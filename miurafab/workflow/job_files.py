@@ -144,7 +144,7 @@ def _beside(name: str, folder: Path | None) -> str | Path:
 
 def keep_profiles(machine: Path, material: Path, directory: Path, staging: Path) -> None:
     """Copy the files of a machine and a material into a job meant for ``directory``, if they are
-    the user's own.
+    the user's own; one that was written into ``staging`` stays there.
 
     Raises :class:`~miurafab.errors.InputError` where two would have one name.
     """
@@ -157,9 +157,9 @@ def keep_profiles(machine: Path, material: Path, directory: Path, staging: Path)
                     f"{there} would stand in for the shipped {path.stem}; remove it, or give its "
                     "path to use it."
                 )
-        elif (staging / path.name).exists():
+        elif path != staging / path.name and (staging / path.name).exists():
             raise InputError(
                 f"The machine and the material are both called {path.stem}; rename one of them."
             )
-        else:
+        elif path.parent != staging:
             write_draft(staging / path.name, read_bytes(path, InputError))

@@ -10,11 +10,13 @@ import re
 from pathlib import Path
 from typing import Any
 
-from miurafab.errors import InputError, ProfileError
+from miurafab.errors import InputError, OptionError, ProfileError
 from miurafab.files import AnyPath, as_path, write_text
 from miurafab.grbl.settings import Settings
 from miurafab.machine.actions import read_dump, read_settings
+from miurafab.options import read_options
 from miurafab.profiles import MachineProfile, find_profile, load_machine, read_toml
+from miurafab.profiles.beam import Laser
 from miurafab.profiles.board import PLACES, told
 from miurafab.profiles.shipped import own_directory
 from miurafab.profiles.table import toml_text
@@ -34,6 +36,9 @@ def add_machine(
     like: AnyPath | None = None,
     title: str | None = None,
     baud: int | None = None,
+    beam: str | None = None,
+    power: float | str | None = None,
+    wavelength: float | str | None = None,
 ) -> tuple[Path, MachineProfile]:
     """Write a machine profile into the configuration folder, where it is known by its name.
 
@@ -51,6 +56,12 @@ def add_machine(
         What lists call the machine.
     baud : int, optional
         The speed of the port, as the profile ``like`` says without it.
+    beam : {"diode", "co2"}, optional
+        The kind of a laser, which no setting tells; a laser needs it.
+    power : float or str, optional
+        The power of a laser's light at full S in watts, as its label says; a laser needs it.
+    wavelength : float, optional
+        The wavelength of a diode's light in nm; a diode needs it.
 
     Returns
     -------
@@ -68,7 +79,8 @@ def add_machine(
     Examples
     --------
     >>> import miurafab as mf
-    >>> path, machine = mf.add_machine("my-laser", port="virtual", like="grbl-laser-400")
+    >>> own = {"beam": "diode", "power": "5W", "wavelength": 450}
+    >>> path, machine = mf.add_machine("my-laser", port="virtual", **own)
     >>> machine.tool.s_max
     1000
     """
@@ -81,6 +93,7 @@ def add_machine(
         raise InputError("Give the `port` of the board, or a file of its `settings`.")
     base = find_profile("firmware_profiles", like)
     values = read_toml(base)
+    _state_beam(values["tool"], {"beam": beam, "power": power, "wavelength": wavelength})
     if port is None:
         assert settings is not None
         file = as_path(settings, "The settings")
@@ -102,6 +115,29 @@ def add_machine(
     except ProfileError:
         path.unlink()
         raise
+
+
+def _state_beam(tool: dict[str, Any], given: dict[str, Any]) -> None:
+    """Put what is ``given`` of a laser's beam in place of that of another machine."""
+    given = {key: value for key, value in given.items() if value is not None}
+    if tool.get("kind") != "laser":
+        for key in given:
+            raise OptionError(key, f"is for a laser, and this machine has a {tool.get('kind')}")
+        return
+    if "beam" not in given or "power" not in given:
+        raise InputError(
+            "Give the `beam` of the laser, diode or co2, and the `power` of its light, as its "
+            "label says: no setting tells them, and materials have settings for one kind of "
+            "beam, in watts."
+        )
+    if given["beam"] == "diode" and "wavelength" not in given:
+        raise InputError("Give the `wavelength` of the diode in nm; common blue ones have 450.")
+    made = read_options(Laser, given)
+    for key in ("beam", "power", "wavelength"):
+        tool.pop(key, None)
+    tool |= {"beam": made.beam, "power": f"{made.power:g}W"}
+    if made.wavelength is not None:
+        tool["wavelength"] = made.wavelength
 
 
 def _take(values: dict[str, Any], found: Settings) -> None:

@@ -20,7 +20,7 @@ from miurafab.grbl.settings import parse_dump
 from miurafab.options import Whole, declared, read_value
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.profiles import MachineProfile, read_machine
+from miurafab.profiles import MachineProfile, known_names, read_machine
 from miurafab.profiles.board import with_settings
 from miurafab.workflow.alignment import Mark, lay, the_one
 from miurafab.workflow.cut_options import CutOptions
@@ -202,7 +202,12 @@ def preview(
         profile = _as_dumped(profile, as_path(settings, "The settings"))
     bed = (profile.bed.width_mm, profile.bed.height_mm)
     papers = {} if layout is None else _papers(layout)
-    most_power = 1.0 if layout is None else job_material(layout.material, path).max_power
+    most_power = 1.0
+    made_for = maker_of(jobs[0], path.parent) if layout is None else None
+    if layout is not None:
+        made_for = job_machine(layout.machine, path)
+        most_power = job_material(layout.material, path).most_power(made_for)
+    findings += another_beam(made_for, profile, path.name)
     sheets = []
     for number, (file, gcode) in enumerate(zip(files, jobs, strict=True)):
         if on_progress is not None:
@@ -253,8 +258,10 @@ def _of_value(
     pattern = job.pattern if isinstance(job, SheetJob) else None
     edited = job.edits if isinstance(job, JobDirectory) else ()
     dry_runs = job.dry_runs
+    elsewhere: list[Finding] = []
     if machine is not None or settings is not None:
         profile = machine or job.machine
+        elsewhere = another_beam(job.machine, profile, name)
         if settings is not None:
             profile = _as_dumped(profile, as_path(settings, "The settings"))
         dry_runs = tuple(
@@ -263,7 +270,8 @@ def _of_value(
         )
     else:
         profile = job.machine
-    return Preview(name, profile, dry_runs, pattern, edited), job.jobs, job.most_power
+    made = Preview(name, profile, dry_runs, pattern, (*edited, *elsewhere))
+    return made, job.jobs, job.most_power
 
 
 def _as_dumped(machine: MachineProfile, dump: Path) -> MachineProfile:
@@ -308,6 +316,27 @@ def named_machine(job: Job, folder: Path | None = None) -> MachineProfile | None
     """
     comment = _MACHINE.search(job.text)
     return None if comment is None else job_machine(comment[1], folder)
+
+
+def maker_of(job: Job, folder: Path) -> MachineProfile | None:
+    """As :func:`named_machine`, and None where the machine is not known here."""
+    comment = _MACHINE.search(job.text)
+    known = {*known_names("firmware_profiles"), *(file.stem for file in folder.glob("*.toml"))}
+    return named_machine(job, folder) if comment and comment[1] in known else None
+
+
+def another_beam(
+    made_for: MachineProfile | None, machine: MachineProfile, job: str
+) -> list[Finding]:
+    """The finding that a ``job`` was made for a machine whose beam is not that of ``machine``."""
+    if made_for is None or made_for.tool.same_beam(machine.tool):
+        return []
+    says = (
+        f"{job} was made for {made_for.tool.strength} ({made_for.name}), and {machine.name} is "
+        f"{machine.tool.strength}, where its S values mean another power: make it anew for that "
+        "machine with 'miurafab sheets'."
+    )
+    return [Finding("other-beam", says, job)]
 
 
 def _made_for(

@@ -42,7 +42,7 @@ def plan_sheets(
         )
     chosen = prepared.chosen(sheets)
     require_known(options.send.force)
-    edits = raise_findings(prepared.edits, options.send.force, GcodeError)
+    edits = raise_findings(prepared.findings, options.send.force, GcodeError)
     plans: list[tuple[int, JobPlan]] = []
     begun = False
     for number in chosen:
@@ -136,7 +136,7 @@ def rehearsed(
     dry_runs[first - 1] = what_is_sent(prepared, first, resumption)
     prepared = replace(prepared, dry_runs=tuple(dry_runs))
     send, machine = options.send, prepared.machine
-    ready = readiness(prepared.edits, send.force) == "ready" and all(
+    ready = readiness(prepared.findings, send.force) == "ready" and all(
         readiness(each.findings, send.force | passed_checks(send, machine, each.program)) == "ready"
         for each in prepared.dry_runs
     )

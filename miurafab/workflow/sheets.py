@@ -100,8 +100,8 @@ class SheetJob(Shown):
 
     @property
     def most_power(self) -> float:
-        """The largest power of the material, as a fraction of full power."""
-        return self.material.max_power
+        """The most power that the material allows, as a share of full power."""
+        return self.material.most_power(self.machine)
 
     @property
     def seconds(self) -> float:
@@ -294,7 +294,7 @@ def make_job(
         job = post(toolpath, profile, stock, patch_labels=labels)
         jobs.append(job)
         size = (toolpath.width_mm, toolpath.height_mm)
-        dry_runs.append(dry_run(toolpath.sheet, job, profile, size, stock.max_power))
+        dry_runs.append(dry_run(toolpath.sheet, job, profile, size, stock.most_power(profile)))
     tell(1.0, "done")
     seconds = round(float(sum(sheet.seconds for sheet in dry_runs)), 1)
     opened = layout.pattern is not pattern

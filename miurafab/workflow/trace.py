@@ -9,7 +9,7 @@ each pass, at the height of that pass. A drag knife's segments are those of its 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.posting.dialects import made_by_knife
 from miurafab.posting.make_job import without_operations
 from miurafab.profiles import OPERATIONS, Knife, MachineProfile, Material
+from miurafab.profiles.beam import Operation
 
 NEAR_MM = 0.002
 """G-code is rounded to 0.001 mm, and relative moves add up to as much again."""
@@ -81,7 +82,8 @@ def traced_strokes(
         path, kinds = _made_by_knife(path, kinds, knife, machine)
         burnt, faults = _of_tip(burnt, program, knife, 2 * near, path.sheet)
         yield from faults
-    yield from _compared(path, kinds, burnt, program, near, material, traced)
+    operations = material.on(machine).operations
+    yield from _compared(path, kinds, burnt, program, near, operations, traced)
 
 
 def _made_by_knife(
@@ -121,7 +123,7 @@ def _compared(
     burnt: _Segments,
     program: Program,
     near: float,
-    material: Material,
+    operations: Mapping[str, Operation],
     traced: Counter[str],
 ) -> Iterator[Finding]:
     wanted = _wanted(path, burnt.shortest)
@@ -133,7 +135,7 @@ def _compared(
     told = np.flatnonzero(away <= near * 2)
     as_told = burnt.operation[told]
     right = np.zeros(len(burnt.ends), dtype=bool)
-    heights, passes = _heights(material)
+    heights, passes = _heights(operations)
     off = np.abs(heights[wanted.operation[found[told]]] - program.end[burnt.stroke[told], 2:])
     right[told] = (as_told < 0) | (as_told == wanted.operation[found[told]])
     right[told] &= off.min(axis=1) <= near
@@ -172,13 +174,11 @@ def _compared(
     traced.update(KINDS[kind] for kind in kinds[good].tolist())
 
 
-def _heights(material: Material) -> tuple[Floats, Ints]:
+def _heights(operations: Mapping[str, Operation]) -> tuple[Floats, Ints]:
     """(operations, h) the heights of the head in each operation, filled up with infinity, and how
     often each stroke is due at each.
     """
-    found = [
-        np.unique(material.operations[name].heights_mm, return_counts=True) for name in OPERATIONS
-    ]
+    found = [np.unique(operations[name].heights_mm, return_counts=True) for name in OPERATIONS]
     most = max(len(levels) for levels, _ in found)
     heights, due = np.full((len(found), most), np.inf), np.zeros((len(found), most), np.int64)
     for row, (levels, counts) in enumerate(found):

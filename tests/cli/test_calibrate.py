@@ -1,11 +1,13 @@
 """``miurafab calibrate`` and ``miurafab materials add``: from a sheet to a material."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from command_line import sentence
 
-from miurafab.profiles import load_material
+from miurafab.fabrication.beam_findings import beam_findings
+from miurafab.profiles import load_machine, load_material
 
 
 @pytest.fixture
@@ -32,17 +34,22 @@ def test_the_sheet_is_a_job_that_can_be_previewed_and_cut(run, sheet, tmp_path):
 def test_what_was_chosen_becomes_a_material(run, sheet, tmp_path):
     cell = next(entry for entry in sheet["cells"] if entry["label"] == "C4")
     square = next(entry for entry in sheet["squares"] if entry["label"] == "X3")
-    chosen = ("--cell", "c4", "--cut", "X3", "--kerf", "0.2mm")
+    score = next(entry for entry in sheet["scores"] if entry["label"] == "S4")
+    chosen = ("--cell", "c4", "--cut", "X3", "--score", "s4", "--kerf", "0.2mm")
     done = run("materials", "add", "mine", "--from", "trial", *chosen, "--json")
     assert done.returncode == 0, done.stderr
     mine, base = load_material(tmp_path / "mine.toml"), load_material("card-250")
     assert mine.kerf_mm == 0.2
     assert (mine.perforation.cut_mm, mine.perforation.gap_mm) == (cell["cut_mm"], cell["gap_mm"])
-    assert mine.operations["perforate"].power == cell["power"]
-    assert mine.operations["perforate"].feed_mm_min == cell["feed_mm_min"]
-    assert mine.operations["cut"].power == square["power"]
-    assert mine.operations["cut"].feed_mm_min == square["feed_mm_min"]
-    assert mine.operations["score"] == base.operations["score"]
+    assert list(mine.beams) == ["diode"]
+    made, before = mine.beams["diode"].operations, base.beams["diode"].operations
+    assert made["perforate"].power == cell["power"]
+    assert made["perforate"].feed_mm_min == cell["feed_mm_min"]
+    assert made["cut"].power == square["power"]
+    assert made["cut"].feed_mm_min == square["feed_mm_min"]
+    assert made["score"].power == score["power"] != before["score"].power
+    assert made["engrave"] == before["engrave"]
+    assert mine.beams["diode"].meant.lasers == (10.0, 10.0)
     assert mine.tabs == base.tabs
     again = run("calibrate", "--material", "mine.toml", "-o", "second")
     assert again.returncode == 0, again.stderr
@@ -88,5 +95,35 @@ def test_materials_still_lists_and_shows(run):
     assert "not a known material" in sentence(run("materials", "card-25"), 2)
 
 
-def test_a_machine_without_a_laser_is_refused(run):
-    assert "laser" in sentence(run("calibrate", "--machine", "hpgl-cutter-a3", "-o", "x"), 2)
+@pytest.mark.parametrize("machine", ["grbl-knife-a3", "grbl-pen-a4", "hpgl-cutter-a3"])
+def test_forces_are_tried_chosen_and_kept_for_that_machine_alone(run, tmp_path, machine):
+    made = json.loads(run("calibrate", "--machine", machine, "-o", "trial", "--json").stdout)
+    forces = {entry["force"] for entry in made["cells"]}
+    assert len(forces) == 5
+    chosen = ("--cell", "B1", "--cut", "X2", "--score", "S1", "--quiet")
+    done = run("materials", "add", "mine", "--from", "trial", *chosen)
+    assert done.returncode == 0, done.stderr
+    mine, used = load_material(tmp_path / "mine.toml"), load_machine(machine)
+    assert list(mine.beams) == [used.tool.beam]
+    weakest = min(entry["force"] for entry in made["cells"])
+    assert mine.on(used).operations["perforate"].force == weakest < used.tool.s_down
+    other = replace(used, name="another")
+    assert mine.on(other).operations["perforate"].force is None
+    assert [each.code for each in beam_findings(other, mine)] == ["other-forces"]
+    assert beam_findings(used, mine) == []
+
+
+def test_a_beam_without_settings_begins_with_a_power_and_a_feed_of_ones_own(run, tmp_path):
+    k40 = ("--machine", "grbl-co2-k40", "--material", "card-250", "-o", "trial")
+    assert "no settings for a CO2 laser" in sentence(run("calibrate", *k40), 2)
+    assert "--feed is missing" in sentence(run("calibrate", *k40, "--power", "4W"), 2)
+    assert "--power is missing" in sentence(run("calibrate", *k40, "--feed", "900"), 2)
+    begin = ("--power", "4W", "--feed", "1800mm/min")
+    made = json.loads(run("calibrate", *k40, *begin, "--json").stdout)
+    assert max(entry["power"] for entry in made["squares"]) == pytest.approx(5.2)
+    assert run("preview", "trial").returncode == 0
+    run("materials", "add", "mine", "--from", "trial", "--cut", "X1", "--cell", "A1", "--quiet")
+    mine = load_material(tmp_path / "mine.toml")
+    assert list(mine.beams) == ["co2"]
+    assert mine.on(load_machine("grbl-co2-k40")).most_watts == pytest.approx(5.2)
+    assert "has some: leave it out" in sentence(run("calibrate", "-o", "x", *begin), 2)

@@ -11,8 +11,11 @@ from command_line import sentence
 
 import miurafab
 from miurafab.profiles import shipped_directory
+from miurafab.profiles.beam import Laser
 from miurafab.profiles.own import OwnDefaults, configuration_folder, own_defaults
 from miurafab.simulate.grbl.controller import virtual_settings
+
+BEAM = ("--beam", "diode", "--power", "10W", "--wavelength", "450")
 
 
 @pytest.fixture(autouse=True)
@@ -45,6 +48,12 @@ def test_a_machine_alone_leaves_the_rest(run):
     assert own_defaults() == OwnDefaults("grbl-laser-400", "paper-100", "virtual")
 
 
+def test_a_pair_without_settings_is_not_taken(run):
+    says = sentence(run("use", "grbl-co2-k40", "card-250"), 2)
+    assert "card-250 has no settings for a CO2 laser, which grbl-co2-k40 is" in says
+    assert own_defaults() == OwnDefaults()
+
+
 def test_what_is_not_known_is_not_taken(run):
     assert "did you mean 'grbl-laser-400'" in sentence(run("use", "grbl-laser-40"), 2)
     assert "is not a known material" in sentence(run("use", "grbl-laser-400", "cheese"), 2)
@@ -56,8 +65,8 @@ def test_own_profiles_are_known_by_their_names_and_travel_with_the_job(
 ):
     (configuration / "machines").mkdir(parents=True)
     own = configuration / "machines" / "my-laser.toml"
-    shutil.copy(shipped_directory("firmware_profiles") / "grbl-co2-k40.toml", own)
-    assert miurafab.load_machine("my-laser").bed.width_mm == 300
+    shutil.copy(shipped_directory("firmware_profiles") / "marlin-laser-220.toml", own)
+    assert miurafab.load_machine("my-laser").bed.width_mm == 220
     assert "my-laser" in miurafab.list_machines()
     assert "my-laser" in run("profiles").stdout
     run("use", "my-laser")
@@ -82,13 +91,14 @@ def test_a_file_is_found_from_any_folder(run, tmp_path):
 
 def test_a_machine_of_ones_own_is_made_from_its_board(run, tmp_path, configuration):
     """The virtual board is set up as the profile says that it is made like."""
-    done = run("profiles", "add", "mine", "--port", "virtual", "--json")
+    done = run("profiles", "add", "mine", "--port", "virtual", *BEAM, "--json")
     made = json.loads(done.stdout)
     assert made["file"] == str(configuration / "machines" / "mine.toml")
     own = miurafab.load_machine("mine")
     like = miurafab.load_machine("grbl-laser-400")
     assert (own.bed, own.motion) == (like.bed, like.motion)
     assert own.settings[32] == 1
+    assert own.tool.laser == Laser("diode", 10.0, 450.0)
     assert "exists already" in sentence(run("profiles", "add", "mine", "--port", "virtual"), 2)
     assert run("use", "mine").returncode == 0
     assert miurafab.profiles.read_machine(None) == own
@@ -98,8 +108,9 @@ def test_a_dump_makes_the_same_machine(run, tmp_path):
     values = virtual_settings(miurafab.load_machine("grbl-laser-400"))
     text = "".join(f"${number}={value:.3f}\n" for number, value in values.items())
     (tmp_path / "saved.txt").write_text(text)
-    run("profiles", "add", "one", "--port", "virtual")
-    run("profiles", "add", "two", "--settings", "saved.txt", "--title", "one, like grbl-laser-400")
+    run("profiles", "add", "one", "--port", "virtual", *BEAM)
+    titled = ("--title", "one, like grbl-laser-400")
+    run("profiles", "add", "two", "--settings", "saved.txt", *titled, *BEAM)
     one, two = (miurafab.load_machine(name) for name in ("one", "two"))
     assert dataclasses.replace(two, name="one") == one
 
@@ -109,7 +120,14 @@ def test_a_dump_makes_the_same_machine(run, tmp_path):
     [
         (("my laser", "--port", "virtual"), "'my laser' cannot name a machine"),
         (("mine",), "Give the --port of the board, or a file of its --settings"),
-        (("mine", "--settings", "gone.txt"), "gone.txt"),
+        (("mine", "--settings", "gone.txt", *BEAM), "gone.txt"),
+        (
+            ("mine", "--port", "virtual"),
+            "Give the --beam of the laser, diode or co2, and the --power",
+        ),
+        (("mine", "--port", "virtual", *BEAM[:4]), "Give the --wavelength of the diode"),
+        (("mine", "--port", "virtual", *BEAM[:2], "--power", "4kW"), "--power is 4000 W"),
+        (("mine", "--port", "virtual", "--like", "grbl-pen-a4", *BEAM), "--beam is for a laser"),
     ],
 )
 def test_what_makes_no_machine_is_told(run, configuration, arguments, complaint):

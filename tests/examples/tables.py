@@ -14,8 +14,9 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.findings import RULES
 from miurafab.options import declared
 from miurafab.origami.fitting.request import FitOptions
+from miurafab.profiles.beam import Laser, Meant, Operation
 from miurafab.profiles.machine import Bed, Controller, Knife, MotionLimits, ZAxis
-from miurafab.profiles.material import Operation, Perforation, TabRule
+from miurafab.profiles.material import Perforation, TabRule
 from miurafab.workflow.cut_options import CutOptions
 
 _PLACE = re.compile(r"(<!-- table: (\w+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
@@ -42,10 +43,10 @@ def _options(cls):
 
 
 def _keys(**tables):
-    """The keys of the TOML ``tables``, each declared by a class."""
+    """The keys of the TOML ``tables``, each declared by classes."""
     rows = []
-    for table, cls in tables.items():
-        for key in declared(cls).values():
+    for table, classes in tables.items():
+        for key in (key for cls in classes for key in declared(cls).values()):
             rows.append((table, f"`{key.name}`", key.help, key.kind.accepts, key.default_text))
     shown = [
         (f"`[{row[0]}]`" if at == 0 or rows[at - 1][0] != row[0] else "", *row[1:])
@@ -76,9 +77,11 @@ TABLES = {
     "LayoutOptions": lambda: _options(LayoutOptions),
     "CutOptions": lambda: _options(CutOptions),
     "machine": lambda: _keys(
-        bed=Bed, motion=MotionLimits, z=ZAxis, controller=Controller, tool=Knife
+        bed=[Bed], motion=[MotionLimits], z=[ZAxis], controller=[Controller], tool=[Laser, Knife]
     ),
-    "material": lambda: _keys(perforation=Perforation, tabs=TabRule, operations=Operation),
+    "material": lambda: _keys(
+        perforation=[Perforation], tabs=[TabRule], **{"beams.BEAM": [Meant]}, operations=[Operation]
+    ),
     "checks": _checks,
     "findings": _findings,
     "exits": _exits,

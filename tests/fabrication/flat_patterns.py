@@ -7,8 +7,9 @@ import shapely
 from numpy.typing import NDArray
 
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles.beam import OPERATIONS, BeamSettings, Laser, Meant, Operation
 from miurafab.profiles.machine import Bed, Controller, MachineProfile, MotionLimits, Tool
-from miurafab.profiles.material import Material, Operation, Perforation, TabRule
+from miurafab.profiles.material import Material, Perforation, TabRule
 
 
 def bed(width: float, height: float, margin: float = 5.0) -> MachineProfile:
@@ -19,7 +20,7 @@ def bed(width: float, height: float, margin: float = 5.0) -> MachineProfile:
         dialect="grbl-1.1",
         bed=Bed(width, height, margin),
         motion=MotionLimits(6000.0, 6000.0, 500.0, 500.0, 0.01),
-        tool=Tool("laser", 0, 1000, "M4", False, 1000, 0, 0.0),
+        tool=Tool("laser", 0, 1000, "M4", False, 1000, 0, 0.0, laser=Laser("diode", 10.0, 450.0)),
         controller=Controller(115_200, "character-counting", 128, 79, 15),
         settings={},
     )
@@ -40,11 +41,14 @@ def card(
         title="Test card",
         thickness_mm=0.3,
         kerf_mm=kerf,
-        max_power=1.0,
         perforation=Perforation(cut, gap, end_bridge, min_end),
         tabs=TabRule(tab, inset),
-        operations={
-            name: Operation(0.5, 1000.0, 1) for name in ("engrave", "score", "perforate", "cut")
+        beams={
+            "diode": BeamSettings(
+                "diode",
+                Meant((10.0, 10.0), 10.0, 450.0),
+                {name: Operation(1000.0, 5.0) for name in OPERATIONS},
+            )
         },
     )
 

@@ -37,7 +37,6 @@ from miurafab.profiles.material import (
     START_ENDS,
     Crease,
     Material,
-    Operation,
     Perforation,
     TabRule,
 )
@@ -98,10 +97,9 @@ def materials(draw):
         title="Any",
         thickness_mm=0.3,
         kerf_mm=kerf,
-        max_power=1.0,
         perforation=dashes(),
         tabs=TabRule(draw(sizes(0.5, 30.0)), draw(sizes(0.0, 2.0))),
-        operations={name: Operation(0.5, 1000.0, 1) for name in OPERATIONS},
+        beams=flat_patterns.card().beams,
         creases={kind: crease() for kind in CREASE_KINDS},
         relief_hole_mm=draw(st.just(0.0) | sizes(kerf + 0.11, 2.0)),
     )

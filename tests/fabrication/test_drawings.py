@@ -287,8 +287,8 @@ def test_power_is_told_for_lasers_alone():
     for machine, powered in ((MACHINE, True), (pen, False)):
         layout = lay_out(pattern, machine, MATERIAL)
         text = pages_of(assembly_guide(layout, pattern, machine, MATERIAL, "One").pdf)[0]
-        feed = f"{MATERIAL.operations['cut'].feed_mm_min:g} mm/min"
-        assert (f"%, {feed}" in text) == powered
+        feed = f"{MATERIAL.on(machine).operations['cut'].feed_mm_min:g} mm/min"
+        assert (f"8 W (80%), {feed}" in text) == powered
         assert feed in text
 
 

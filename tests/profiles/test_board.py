@@ -8,11 +8,13 @@ import pytest
 
 import miurafab as mf
 from miurafab.profiles import load_machine
+from miurafab.profiles.beam import Laser
 from miurafab.profiles.board import PLACES, with_settings
 from miurafab.profiles.machine import ZAxis
 
 LASER = load_machine("grbl-laser-400")
 TALL = replace(LASER, z=ZAxis(10.0, 500.0, 20.0))
+BEAM = {"beam": "diode", "power": 5, "wavelength": 455}
 TOLD = {number: 100.0 + number for number in PLACES} | {11: 0.02, 31: 2.0, 32: 1.0}
 
 
@@ -33,15 +35,16 @@ def test_a_file_of_ones_own_says_the_same(tmp_path, monkeypatch, tall):
     like.write_text(text + z * tall)
     dump = tmp_path / "board.txt"
     dump.write_text("".join(f"${number}={value:g}\n" for number, value in TOLD.items()))
-    _, made = mf.add_machine("mine", settings=dump, like=like)
+    _, made = mf.add_machine("mine", settings=dump, like=like, **BEAM)
     wanted = with_settings(TALL if tall else LASER, TOLD)
     for part in ("bed", "motion", "z"):
         assert getattr(made, part) == getattr(wanted, part)
+    assert made.tool.laser == Laser("diode", 5.0, 455.0)
     assert (made.tool.s_max, made.tool.s_min) == (wanted.tool.s_max, wanted.tool.s_min) == (130, 2)
 
 
 def test_the_practice_machine_of_a_profile_tells_what_the_profile_says(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    _, made = mf.add_machine("practice", port="virtual", like="grblhal-laser-600")
+    _, made = mf.add_machine("practice", port="virtual", like="grblhal-laser-600", **BEAM)
     like = load_machine("grblhal-laser-600")
     assert (made.bed.width_mm, made.motion) == (like.bed.width_mm, like.motion)

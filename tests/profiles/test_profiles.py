@@ -12,14 +12,21 @@ from miurafab.profiles import load_machine, load_material, shipped_directory, sh
 def test_shipped_machines_load(name):
     machine = load_machine(name)
     assert machine.name == name
-    assert machine.power_to_s(1.0) == machine.tool.s_max
-    assert machine.power_to_s(0.0) == 0
+    if machine.tool.laser is not None:
+        full = machine.tool.laser.power
+        assert machine.power_to_s(full) == machine.power_to_s(2 * full) == machine.tool.s_max
+        assert machine.power_to_s(0.0) == 0
 
 
 @pytest.mark.parametrize("name", shipped_names("materials"))
 def test_shipped_materials_load(name):
     material = load_material(name)
-    assert all(op.power <= material.max_power for op in material.operations.values())
+    for entry in material.beams.values():
+        strengths = [each.power for each in entry.operations.values()]
+        if entry.most_watts is None:
+            assert strengths == [None] * 4
+        else:
+            assert max(strengths) <= entry.most_watts <= entry.meant.lasers[1]
 
 
 MACHINE = (shipped_directory("firmware_profiles") / "grbl-laser-400.toml").read_text()
@@ -48,6 +55,10 @@ MATERIAL = (shipped_directory("materials") / "card-250.toml").read_text()
             'margin = "300mm"',
             r"'bed' has a margin that leaves nothing",
         ),
+        ('beam = "diode"', "", r"\[tool\]: 'beam' is missing: .*one kind of beam, in watts"),
+        ('power = "10W"', "", r"\[tool\]: 'power' is missing: .*label"),
+        ("wavelength = 450", "", r"\[tool\]: 'wavelength' is missing"),
+        ('beam = "diode"', 'beam = "CO2"', r"\[tool\]: 'beam' is 'CO2'"),
         ("s_max = 1000", "s_max = 1000.5", r"'s_max' is 1000.5, not a whole number"),
         ('"$30" = 1000', '"30" = 1000', r"'30' is not a setting"),
         ('"$30" = 1000', '"$30" = "full"', r"'\$30' is 'full', not a number"),
@@ -67,8 +78,23 @@ def test_a_fault_in_a_machine_is_named(tmp_path, old, new, named):
 @pytest.mark.parametrize(
     ("old", "new", "named"),
     [
-        ("power = 0.8", "power = 0.95", r"\[cut\]: 'power' is 0.95; max_power allows 0.9 at most"),
-        ("[operations.score]", "[operations.scoer]", r"'score' is missing.*'scoer'"),
+        ('"8W"', '"9.5W"', r"\[cut\]: 'power' is 9.5 W; max_power allows 9 W at most"),
+        ('power = "8W"', "", r"\[cut\]: 'power' is missing"),
+        ("wavelength = 450 # nm", "", r"\[diode\]: 'wavelength' is missing"),
+        ('lasers = ["5W", "10W"]', "", r"\[diode\]: 'lasers' is missing"),
+        ("[beams.pen.", "[beams.penn.", r"\[beams\]: 'penn' is not a known key"),
+        (
+            "[beams.pen.operations.cut]",
+            '[beams.pen.operations.cut]\npower = "1W"',
+            "is for a laser",
+        ),
+        ("[beams.pen.operations.cut]", "[beams.pen.operations.cut]\nforce = 9", "forces_of"),
+        (
+            "[beams.diode.operations.score]",
+            "[beams.diode.operations.scoer]",
+            r"'score' is missing.*'scoer'",
+        ),
+        ("[beams.diode.operations.cut]", "[operations.cut]", "'operations' has no beam.*watts"),
         ('gap = "0.8mm"', 'gap = "0mm"', r"'gap' is 0 mm"),
     ],
 )

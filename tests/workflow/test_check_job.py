@@ -71,15 +71,16 @@ def test_each_stroke_of_a_job_is_traced_to_the_pattern(name, tmp_path):
 
 def test_strokes_of_two_sides_and_several_passes_are_traced(tmp_path):
     shipped = load_material("card-250")
-    assert shipped.operations["cut"].passes == 1
-    text = 'title = "Scored"\nthickness = "0.3mm"\nkerf = "0.15mm"\nmax_power = 0.9\n' + (
+    assert shipped.beams["diode"].operations["cut"].passes == 1
+    text = 'title = "Scored"\nthickness = "0.3mm"\nkerf = "0.15mm"\n' + (
         '[perforation]\ncut = "1.2mm"\ngap = "0.8mm"\nend_bridge = "0.6mm"\nmin_end = "0.5mm"\n'
         '[creases]\nrelief_hole = "0.5mm"\n[creases.valley]\nmode = "score"\n'
         '[tabs]\nheight = "7mm"\n'
-        '[operations.score]\npower = 0.25\nfeed = "2400mm/min"\n'
-        '[operations.perforate]\npower = 0.7\nfeed = "1500mm/min"\n'
-        '[operations.cut]\npower = 0.8\nfeed = "900mm/min"\npasses = 2\n'
-        '[operations.engrave]\npower = 0.15\nfeed = "3000mm/min"\n'
+        '[beams.diode]\nwavelength = 450\nlasers = ["5W", "10W"]\n'
+        '[beams.diode.operations.score]\npower = "2.5W"\nfeed = "2400mm/min"\n'
+        '[beams.diode.operations.perforate]\npower = "7W"\nfeed = "1500mm/min"\n'
+        '[beams.diode.operations.cut]\npower = "8W"\nfeed = "900mm/min"\npasses = 2\n'
+        '[beams.diode.operations.engrave]\npower = "1.5W"\nfeed = "3000mm/min"\n'
     )
     (tmp_path / "scored.toml").write_text(text)
     job = mf.sheets(gores(), material=tmp_path / "scored.toml", two_sided=True)

@@ -155,7 +155,7 @@ class _Overview:
                 [f"{material.title} ({material.name}), {material.thickness_mm:g} mm thick"],
             ),
             ("Creases", [*_ways(material), f"kerf {material.kerf_mm:g} mm"]),
-            ("Settings", [_setting(self.machine, material, name) for name in material.operations]),
+            ("Settings", _settings(self.machine, material)),
         ]
         on_borders = totals.border_tabs
         on_seams = count(totals.tabs - on_borders, "tab", "tabs")
@@ -197,9 +197,13 @@ def _ways(material: Material) -> list[str]:
     return found
 
 
-def _setting(machine: MachineProfile, material: Material, name: str) -> str:
-    """The power, if the tool is a laser, and the feed of one operation."""
-    operation = material.operations[name]
-    power = f"{operation.power:.0%}, " if machine.tool.kind == "laser" else ""
-    passes = f", {operation.passes} passes" if operation.passes > 1 else ""
-    return f"{name}: {power}{operation.feed_mm_min:g} mm/min{passes}"
+def _settings(machine: MachineProfile, material: Material) -> list[str]:
+    """The power or force, the feed and the passes of each operation."""
+    found = []
+    for name, each in material.on(machine).operations.items():
+        strength = "" if each.force is None else f"S{each.force}, "
+        if each.power is not None:
+            strength = f"{each.power:.3g} W ({machine.share(each.power):.0%}), "
+        passes = f", {each.passes} passes" if each.passes > 1 else ""
+        found.append(f"{name}: {strength}{each.feed_mm_min:.4g} mm/min{passes}")
+    return found

@@ -53,7 +53,7 @@ def corner_of(machine: MachineProfile, material: Material) -> float:
 
     It slows down into the leg between them and out of it, each time by up to v / a of lost time.
     """
-    feed = material.operations["perforate"].feed_mm_min
+    feed = material.on(machine).operations["perforate"].feed_mm_min
     speed = min(feed, *machine.motion.max_rate_mm_min) / 60
     return 2 * speed**2 / min(machine.motion.acceleration_mm_s2)
 
