@@ -113,6 +113,7 @@ RULES = {
     "scaled": Rule("warning", "settings of a material on a laser that they were not meant for"),
     "other-forces": Rule("warning", "forces of a material that were found on another machine"),
     "unlettered": Rule("warning", "names and labels without room on the sheets"),
+    "rim-numbers": Rule("note", "numbers of rows without room on the waste"),
     # A job, judged without a machine (miurafab.machine.judge_job)
     "lines": Rule("refusal", "a line too long for the controller, or not printable ASCII"),
     "program": _check(

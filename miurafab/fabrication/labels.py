@@ -69,7 +69,8 @@ def sides_of(options: LayoutOptions) -> Sides:
 class PlacedText:
     """A ``text`` on a patch, in mm in the pattern's plane: centred on ``centre`` (2,), written
     along the unit vector ``along`` (2,), its capitals ``height`` mm high, 0 where it has no room.
-    ``side`` is ``front`` or ``back``, or None if it is not engraved.
+    ``side`` is ``front`` or ``back``, or None if it is not engraved. A rim number stands ``beside``
+    its patch, on the waste.
     """
 
     patch: int
@@ -78,6 +79,7 @@ class PlacedText:
     along: Floats
     height: float
     side: str | None
+    beside: bool = False
 
     @cached_property
     def strokes(self) -> tuple[Floats, ...]:

@@ -7,6 +7,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from miurafab.fabrication.borders import chosen_edges
+from miurafab.fabrication.kit.rim_texts import RimTexts
 from miurafab.fabrication.labels import Lettering
 from miurafab.fabrication.nesting import Nesting
 from miurafab.fabrication.options import LayoutOptions
@@ -29,6 +30,7 @@ def layout_findings(
     framed: FramedPatches,
     nesting: Nesting,
     lettering: Lettering,
+    rim: RimTexts,
     drawn: Drawn,
     material: Material,
     options: LayoutOptions,
@@ -76,6 +78,10 @@ def layout_findings(
         names = count(lettering.left_out, "name or label", "names and labels")
         sentence = f"{names} found no room on the sheets: the guide shows them at the sheets."
         findings.append(Finding("unlettered", sentence))
+    if rim.left_out:
+        names = count(rim.left_out, "rim number", "rim numbers")
+        sentence = f"{names} found no room on the waste: the guide shows them."
+        findings.append(Finding("rim-numbers", sentence))
     return tuple(findings)
 
 

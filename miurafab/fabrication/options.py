@@ -220,6 +220,13 @@ class LayoutOptions(Shown):
         group="Cutting",
         page="more",
     )
+    rim_numbers: bool = option(
+        Flag(),
+        "Engrave the number of each row on the waste beside its ends, where there is room.",
+        False,
+        group="Cutting",
+        page="more",
+    )
     two_sided: bool = option(
         Flag(), "Score the valleys from the back of the sheet.", False, group="Cutting", page="more"
     )

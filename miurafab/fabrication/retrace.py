@@ -19,6 +19,7 @@ import shapely
 from miurafab.errors import LayoutError
 from miurafab.fabrication.kerf import cut_lines
 from miurafab.fabrication.kit.plan import folders_kit
+from miurafab.fabrication.kit.rim_texts import rim_texts
 from miurafab.fabrication.labels import AbsentLabel
 from miurafab.fabrication.nesting import turned
 from miurafab.fabrication.options import LayoutOptions
@@ -62,15 +63,11 @@ def retraced(
     margin = options.nesting.margin_mm
     margin = machine.bed.margin_mm if margin is None else margin
     lettering = texts_of(pattern, outlined, labels, layout.patches, motion, options)
-    drawn = sheet_strokes(
-        pattern,
-        outlined,
-        lettering.texts,
-        motion,
-        material,
-        [Blank(each.name, each.width_mm, each.height_mm, margin) for each in layout.sheets],
-        options,
-    )
+    blanks = [Blank(each.name, each.width_mm, each.height_mm, margin) for each in layout.sheets]
+    defects = [sheet.defects_mm for sheet in layout.sheets]
+    rim = rim_texts(pattern, outlined.face_patch, layout.patches, motion, blanks, defects, options)
+    texts = (*lettering.texts, *rim.texts)
+    drawn = sheet_strokes(pattern, outlined, texts, motion, material, blanks, options)
     passes = [
         each
         for back, front in zip(drawn.backs, drawn.fronts, strict=True)

@@ -21,6 +21,7 @@ from miurafab.fabrication.beam_findings import beam_findings
 from miurafab.fabrication.borders import OpenBorder, open_borders
 from miurafab.fabrication.caps import capped
 from miurafab.fabrication.kit.plan import FoldersKit, folders_kit
+from miurafab.fabrication.kit.rim_texts import rim_texts
 from miurafab.fabrication.labels import AbsentLabel
 from miurafab.fabrication.layout_findings import layout_findings
 from miurafab.fabrication.nesting import Nesting, Ring, turned
@@ -238,15 +239,11 @@ def lay_out(
     sheets, placements = _sheets(nesting, patches, stock)
     motion = motion_of(patches, placements, np.array([slot.sheet for slot in nesting.slots]))
     lettering = texts_of(pattern, outlined, framed.labels, patches, motion, options)
-    drawn = sheet_strokes(
-        pattern,
-        outlined,
-        lettering.texts,
-        motion,
-        material,
-        [Blank(each.name, each.width_mm, each.height_mm, stock.margin_mm) for each in sheets],
-        options,
-    )
+    blanks = [Blank(each.name, each.width_mm, each.height_mm, stock.margin_mm) for each in sheets]
+    defects = [sheet.defects_mm for sheet in sheets]
+    rim = rim_texts(pattern, outlined.face_patch, patches, motion, blanks, defects, options)
+    texts = (*lettering.texts, *rim.texts)
+    drawn = sheet_strokes(pattern, outlined, texts, motion, material, blanks, options)
     ways, corner = pattern.edges_vertices, corner_of(machine, material)
     spread = options.spread_heat
 
@@ -266,7 +263,7 @@ def lay_out(
         totals=_totals(pattern, outlined, patches, nesting, toolpaths + behind, usable),
         findings=(
             *beam_findings(machine, material),
-            *layout_findings(pattern, framed, nesting, lettering, drawn, material, options),
+            *layout_findings(pattern, framed, nesting, lettering, rim, drawn, material, options),
         ),
         borders=open_borders(pattern),
         absent=absent_labels(lettering, patches),

@@ -42,6 +42,9 @@ SLIT = ("B", "C")
 _INNER, _WASTE = 1, 2
 """Ranks among cuts between :data:`HOLE` and :data:`OUTLINE`: slits in a patch, rings of waste."""
 
+RIM = 1
+"""The rank of rim numbers among what is engraved: after the labels."""
+
 PIN_MM = 2.0
 """The diameter of a registration hole; it lies in the middle of the margin."""
 
@@ -228,6 +231,7 @@ class _Part:
 def _engraved(texts: Sequence[PlacedText]) -> _Part:
     strokes = [stroke for text in texts for stroke in text.strokes]
     each = np.array([len(text.strokes) for text in texts], dtype=np.int64)
+    beside = np.array([text.beside for text in texts], dtype=bool)
     patch = np.repeat(np.array([text.patch for text in texts], dtype=np.int64), each)
     return _Part(
         operation=OPERATIONS.index("engrave"),
@@ -236,7 +240,7 @@ def _engraved(texts: Sequence[PlacedText]) -> _Part:
         patch=patch,
         edge=np.full(len(strokes), -1),
         group=np.repeat(np.arange(len(texts)), each),
-        rank=np.zeros(len(strokes), dtype=np.int64),
+        rank=np.repeat(np.where(beside, RIM, 0), each),
     )
 
 

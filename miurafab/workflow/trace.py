@@ -18,7 +18,7 @@ from scipy.spatial import KDTree
 from miurafab.fabrication.knife import with_aligning_cut
 from miurafab.fabrication.knife_tip import overcuts, tip_moves
 from miurafab.fabrication.route.order import HOLE, StrokeSet
-from miurafab.fabrication.strokes import SLIT
+from miurafab.fabrication.strokes import RIM, SLIT
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.findings import Finding
 from miurafab.gcode.program import Program
@@ -38,7 +38,7 @@ HPGL_MM = 0.03
 SHORTEST_MM = 0.002
 """A shorter segment may vanish in the rounding of a program."""
 
-KINDS = ("crease", "tab fold", "outline", "hole", "slit", "label", "aligning cut")
+KINDS = ("crease", "tab fold", "outline", "hole", "slit", "label", "rim number", "aligning cut")
 _NAMED = 5
 """So many faults of one kind are named on a sheet; the others are counted."""
 
@@ -210,15 +210,17 @@ def _kinds(strokes: StrokeSet, pattern: CreasePattern, tab_edges: Ints) -> Ints:
     """(S,) the kind of each stroke, an index of :data:`KINDS`."""
     path = strokes.toolpath
     cut = path.operation == OPERATIONS.index("cut")
-    crease, tab_fold, outline, hole, slit, label = range(6)
+    engraved = path.operation == OPERATIONS.index("engrave")
+    crease, tab_fold, outline, hole, slit, label, rim = range(7)
     return np.select(
         [
-            path.operation == OPERATIONS.index("engrave"),
+            engraved & (strokes.rank == RIM),
+            engraved,
             cut & (strokes.rank == HOLE),
             path.edge < 0,
             np.isin(path.edge, tab_edges),
             np.isin(pattern.edges_assignment[path.edge], SLIT),
         ],
-        [label, hole, outline, tab_fold, slit],
+        [rim, label, hole, outline, tab_fold, slit],
         crease,
     )

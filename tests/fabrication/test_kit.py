@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import html
 import io
+import json
 import math
 import re
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 import pypdf
 import pytest
+import shapely
 from problems import regular
 
 from miurafab.fabrication.drawing.assembly_guide import AssemblyGuide, assembly_guide
@@ -25,10 +27,14 @@ from miurafab.fabrication.kit.plan import folders_kit, kit_table, read_kit
 from miurafab.fabrication.kit.rim import rim_ends
 from miurafab.fabrication.kit.rows import Row, bend_of, crease_lines, named, numbered
 from miurafab.fabrication.kit.states import folded_states
-from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.labels import CLEARANCE_MM
+from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out
+from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import load_machine, load_material
+from miurafab.workflow.check_job import check_job
+from miurafab.workflow.sheets import sheets
 
 MACHINE, MATERIAL = load_machine("grbl-laser-400"), load_material("card-250")
 
@@ -298,3 +304,51 @@ def test_a_sheet_of_3600_facets_has_the_sections_of_a_small_one():
         assert title in words_of(large.page)
         assert title in words_of(small.page)
     assert "Mountains: R1, R3 ... R59. Valleys: R2, R4 ... R58." in text
+
+
+def test_rim_numbers_stand_on_the_waste_beside_their_rows():
+    pattern = regular(9, 7)
+    options = LayoutOptions(
+        rim_numbers=True, max_patch_mm=(60.0, 60.0), nesting=NestingOptions(quantity=2)
+    )
+    without = dataclasses.replace(options, rim_numbers=False)
+    bare = lay_out(pattern, MACHINE, MATERIAL, options=without)
+    layout = lay_out(pattern, MACHINE, MATERIAL, options=options)
+    count = 0
+    for sheet, path, before in zip(layout.sheets, layout.toolpaths, bare.toolpaths, strict=True):
+        solid = shapely.union_all(
+            [
+                shapely.Polygon(placed.from_patch(layout.patches[placed.patch].outline_mm))
+                for placed in sheet.placements
+            ]
+        )
+        known = {points_of(before, k) for k in range(len(before))}
+        added = [path.stroke(k) for k in range(len(path)) if points_of(path, k) not in known]
+        assert len(path) - len(added) == len(before)
+        assert min(shapely.LineString(a).distance(solid) for a in added) >= CLEARANCE_MM
+        places = np.concatenate(added)
+        margin = MACHINE.bed.margin_mm
+        assert places.min() >= margin
+        assert (places.max(axis=0) <= [sheet.width_mm - margin, sheet.height_mm - margin]).all()
+        count += len(added)
+    assert count > 40
+
+
+def points_of(path: Toolpath, stroke: int) -> frozenset[tuple[float, float]]:
+    """The points of a stroke, whichever way it is made."""
+    return frozenset(map(tuple, path.stroke(stroke).round(6).tolist()))
+
+
+def test_a_check_of_a_job_knows_rim_numbers_and_the_rows(tmp_path):
+    pattern = regular(9, 7)
+    sheets(pattern, rim_numbers=True).write(tmp_path / "job")
+    proof = check_job(tmp_path / "job")
+    assert proof.valid
+    assert proof.traced["rim number"] > 20
+    layout = tmp_path / "job" / "layout.json"
+    document = json.loads(layout.read_text())
+    assert document["kit"]["rows"][0]["name"] == "C1"
+    document["kit"]["rows"][0]["median_deg"] += 1.0
+    layout.write_text(json.dumps(document))
+    said = [finding.sentence for finding in check_job(tmp_path / "job").findings]
+    assert "The rows and angles of the folder's kit are not those of the pattern." in said
