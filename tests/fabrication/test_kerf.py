@@ -11,7 +11,7 @@ from flat_patterns import bed, card, zigzag
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miurafab.fabrication.kerf import allowance, cut_lines
+from miurafab.fabrication.kerf import SHORTEST_MM, allowance, cut_lines
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.sheets import lay_out
 
@@ -42,7 +42,24 @@ def test_the_beam_burns_up_to_the_piece_and_never_into_it(sector, kerf):
         straight = shapely.distance(sides, nominal) <= kerf / 2 + 1e-9
         assert shapely.length(sides[straight]).sum() >= 0.95 * path.length
         assert shapely.distance(shapely.points(outer), nominal).max() <= allowance(kerf) + 1e-9
+        assert shapely.length(sides).min() >= SHORTEST_MM - 1e-9
         assert not waste
+
+
+@pytest.mark.parametrize("kerf", [0.03, 0.15, 0.3])
+@pytest.mark.parametrize("apex", [59.9, 58.0, 55.0])
+def test_a_mitre_that_is_cut_off_ends_in_no_speck(kerf, apex):
+    half = np.radians(apex / 2)
+    corner = np.array([[0.0, 0.0], [30 * np.sin(half), 30 * np.cos(half)]])
+    outline = np.array([corner[1] * [-1, 1], corner[0], corner[1]])
+    (line,) = cut_lines([[outline]], kerf)[0]
+    low = line[line[:, 1] < 0]
+    tip = -kerf / 2 / np.sin(half)
+    wide = np.ptp(low[:, 0])
+    assert wide == pytest.approx(0) or wide >= SHORTEST_MM - 1e-9
+    # Its ends lie on the sides that are kerf / 2 away, up to their meeting point.
+    assert np.abs(low[:, 0]) == pytest.approx((low[:, 1] - tip) * np.tan(half))
+    assert low[:, 1].max() <= -kerf / 2
 
 
 def test_waste_enclosed_by_a_narrow_mouth_is_cut_out_too():
