@@ -35,6 +35,7 @@ from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
 from miurafab.fabrication.seams import all_seams
 from miurafab.fabrication.stock import LaidStock, lay_stock
 from miurafab.fabrication.strokes import Blank, sheet_strokes
+from miurafab.fabrication.tooling import made_by
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats
@@ -285,7 +286,7 @@ def _with_passes(sheet: Sheet, front: Toolpath, back: Toolpath | None) -> Sheet:
 
 
 def worked(material: Material, machine: MachineProfile, options: LayoutOptions) -> Material:
-    """``material`` with the tabs of ``options``, and with a kerf only under a beam.
+    """``material`` with the tabs of ``options``, as the tool of ``machine`` makes it.
 
     Raises :class:`~miurafab.errors.ProfileError` where it has no settings for the beam.
     """
@@ -297,8 +298,7 @@ def worked(material: Material, machine: MachineProfile, options: LayoutOptions) 
         rule = replace(rule, inset_mm=options.tab_inset_mm)
     if options.tab_angle is not None:
         rule = replace(rule, max_angle=options.tab_angle)
-    kerf = material.kerf_mm if machine.tool.kind == "laser" else 0.0
-    return replace(material, tabs=rule, kerf_mm=kerf)
+    return made_by(replace(material, tabs=rule), machine)
 
 
 def _kinds(nesting: Nesting) -> list[int]:

@@ -34,7 +34,6 @@ from miurafab.fabrication.toolpath import Toolpath
 from miurafab.geometry.arrays import Floats, Ints, run_starts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import OPERATIONS, Material
-from miurafab.profiles.material import CREASE_KINDS
 
 FOLDED = ("M", "V", "U")
 SLIT = ("B", "C")
@@ -106,7 +105,7 @@ def sheet_strokes(
     creases, holes = _creases(pattern, outlined, material)
     outlines, unbridged = _outlines(outlined, options, material.kerf_mm)
     drawn_once = [
-        *(_made(creases[kind], kind, material) for kind in CREASE_KINDS),
+        *(_made(own, kind, material) for kind, own in creases.items()),
         _relief(pattern, holes, material),
         _slits(pattern, outlined),
         outlines,
@@ -258,7 +257,9 @@ class _Creases:
 def _creases(
     pattern: CreasePattern, outlined: OutlinedPatches, material: Material
 ) -> tuple[dict[str, _Creases], Holes]:
-    """The creases of each kind, shortened where they meet in a relief hole, and the holes."""
+    """The creases of each kind, shortened where they meet in a relief hole, and the holes. A
+    material without a rule for the folds of tabs makes them like other folds.
+    """
     edges, patch = _inner_edges(pattern, outlined, FOLDED)
     valley = pattern.edges_assignment[edges] == "V"
     kind = np.where(valley, "valley", "mountain")
@@ -268,7 +269,7 @@ def _creases(
 
     least = {
         name: 2 * material.perforation_of(name).bridge_mm + material.kerf_mm + MIN_STROKE_MM
-        for name in CREASE_KINDS
+        for name in material.creases
     }
     room = np.where(kind == "valley", least["valley"], least["mountain"])
     diameter = material.relief_hole_mm
@@ -286,11 +287,17 @@ def _creases(
     backwards = np.einsum("ni,ni->n", base[:, 1] - base[:, 0], along) < 0
     base = np.where(backwards[:, None, None], base[:, ::-1], base)
     owner = outlined.face_patch[tabs.own_face]
+    of_tab = np.full(len(tabs), "tab", dtype="U8")
+    if "tab" not in material.creases:
+        of_tab = np.where(tabs.seams.fold == "V", "valley", "mountain")
+    kind = np.concatenate([kind, of_tab])
+    ends, edges = np.concatenate([ends, base]), np.concatenate([edges, tabs.edge])
+    patch = np.concatenate([patch, owner])
     found = {
         name: _Creases(ends[kind == name], edges[kind == name], patch[kind == name])
-        for name in ("mountain", "valley")
+        for name in material.creases
     }
-    return found | {"tab": _Creases(base, tabs.edge, owner)}, holes
+    return found, holes
 
 
 def _made(creases: _Creases, kind: str, material: Material) -> _Part:

@@ -11,9 +11,12 @@ from flat_patterns import bed, card, zigzag
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.kerf import SHORTEST_MM, allowance, cut_lines
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.sheets import lay_out
+from miurafab.profiles import OPERATIONS
+from miurafab.profiles.material import Crease
 
 
 def test_a_rectangle_grows_by_half_a_kerf_on_each_side():
@@ -73,14 +76,38 @@ def test_waste_enclosed_by_a_narrow_mouth_is_cut_out_too():
     assert shapely.Polygon(waste).area == pytest.approx(9.6 * 9.6)
 
 
-@pytest.mark.parametrize("kind", ["pen", "knife"])
-def test_pens_and_knives_take_nothing_away(kind):
+def test_pens_and_knives_take_nothing_away():
     laser = bed(300.0, 300.0)
-    other = replace(laser, tool=replace(laser.tool, kind=kind))
     pattern = zigzag(4, 4)
-    made, plain, burnt = (
+    knife, pen = (replace(laser, tool=replace(laser.tool, kind=kind)) for kind in ("knife", "pen"))
+    made, drawn, plain, burnt = (
         lay_out(pattern, machine, card(kerf=kerf)).toolpaths[0]
-        for machine, kerf in ((other, 0.3), (laser, 0.0), (laser, 0.3))
+        for machine, kerf in ((knife, 0.3), (pen, 0.3), (laser, 0.0), (laser, 0.3))
     )
     np.testing.assert_array_equal(made.points, plain.points)
     assert not np.array_equal(made.points, burnt.points)
+    assert drawn.length_of("cut") == pytest.approx(plain.length_of("cut"))
+
+
+def test_a_pen_draws_mountains_as_lines_and_valleys_dashed():
+    laser = bed(120.0, 90.0)
+    pen = replace(laser, tool=replace(laser.tool, kind="pen"))
+    pattern = zigzag(12, 8, a=14.0)  # too large for the bed
+    layout = lay_out(pattern, pen, card())
+    letters = edge_letters(layout, pattern)
+    assert layout.totals.tabs > 0
+    strokes = {}
+    for path in layout.toolpaths:
+        for k in np.flatnonzero(path.edge >= 0).tolist():
+            strokes.setdefault(int(path.edge[k]), []).append(OPERATIONS[path.operation[k]])
+    for edge, made in strokes.items():
+        if letters[edge] == "V":
+            assert set(made) == {"perforate"}
+            assert len(made) >= 2
+        else:
+            assert made == ["score"]
+    assert {str(letters[edge]) for edge in strokes} == {"M", "V"}
+    # What the material says is drawn as it says.
+    own = {"mountain": Crease(), "valley": Crease("score"), "tab": Crease("none")}
+    (path,) = lay_out(zigzag(4, 4), pen, replace(card(), creases=own)).toolpaths
+    assert path.length_of("perforate") == 0 < path.length_of("score")

@@ -42,6 +42,7 @@ from miurafab.fabrication.drawing.sheet_pages import SheetPages
 from miurafab.fabrication.drawing.tablet_page import tablet_page
 from miurafab.fabrication.drawing.views import Views
 from miurafab.fabrication.sheets import DrawnLayout
+from miurafab.fabrication.tooling import made_by
 from miurafab.fabrication.wording import count
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
@@ -154,7 +155,7 @@ class _Overview:
                 "Material",
                 [f"{material.title} ({material.name}), {material.thickness_mm:g} mm thick"],
             ),
-            ("Creases", [*_ways(material), f"kerf {material.kerf_mm:g} mm"]),
+            ("Creases", [*_ways(material, self.machine), f"kerf {material.kerf_mm:g} mm"]),
             ("Settings", _settings(self.machine, material)),
         ]
         on_borders = totals.border_tabs
@@ -179,14 +180,15 @@ class _Overview:
         return found
 
 
-def _ways(material: Material) -> list[str]:
+def _ways(material: Material, machine: MachineProfile) -> list[str]:
     """How the creases are made; kinds made alike share a line."""
     kinds: dict[str, list[str]] = {}
+    material, pen = made_by(material, machine), machine.tool.kind == "pen"
     for kind, crease in material.creases.items():
         rule = material.perforation_of(kind)
         way = {
-            "perforate": f"{rule.cut_mm:g} mm cut, {rule.gap_mm:g} mm left",
-            "score": "scored",
+            "perforate": f"{rule.cut_mm:g} mm {'drawn' if pen else 'cut'}, {rule.gap_mm:g} mm left",
+            "score": "drawn as lines" if pen else "scored",
             "cut": f"cut but for {rule.bridge_mm:g} mm at both ends",
             "none": "not made",
         }[crease.mode]
