@@ -51,7 +51,7 @@ def line(name: str, **options: object) -> str:
     return (
         f"| {name} | {m.facets} | {pieces} | {100 * m.hausdorff_midsurface_mm / diagonal:.2f} "
         f"| {sectors.min():.0f}-{sectors.max():.0f} | {bad:.0f} "
-        f"| {folds.min():.0f}-{folds.max():.0f} | {sheet.score.rim:.2f} "
+        f"| {folds.min():.0f}-{folds.max():.0f} | {sheet.score.rim:.2f} | {m.area_ratio:.1f} "
         f"| {m.self_intersections} | {sheet.score.bow_ties} | {worst:.0e} | {seconds:.1f} |"
     )
 
@@ -64,9 +64,9 @@ def main() -> None:
     asked = parser.parse_args()
     print(
         "| surface | facets | pieces | middle % | sectors | outside 45-135 % | folds | rim % "
-        "| crossings | bow-ties | residual | CPU s |"
+        "| paper | crossings | bow-ties | residual | CPU s |"
     )
-    print("|" + "---|" * 12)
+    print("|" + "---|" * 13)
     if asked.round:
         for name, parameters, facets, pieces in ROUND:
             if asked.names and name not in asked.names:

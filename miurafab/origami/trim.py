@@ -35,9 +35,13 @@ Polygon = tuple[list[int], list[int]]
 """The corners of a facet, and the edge of the whole sheet of the side after each corner, or -1."""
 
 
-def trimmed(pattern: CreasePattern, target: WholeMesh) -> CreasePattern:
-    """``pattern``, a whole sheet with its folded form, cut along the outline of ``target``."""
-    cutter = _Cutter(pattern, target, edge_cuts(pattern, target))
+def trimmed(pattern: CreasePattern, target: WholeMesh, near: Floats) -> CreasePattern:
+    """``pattern``, a whole sheet with its folded form, cut along the outline of ``target``.
+
+    ``near`` (V, 2) are parameters near the place of each vertex: where two parts of a target lie
+    side by side, the nearest point alone does not tell to which one a vertex belongs.
+    """
+    cutter = _Cutter(pattern, target, edge_cuts(pattern, target, near))
     polygons: list[Polygon] = []
     owner: list[int] = []
     for facet in range(len(pattern.faces_vertices)):
@@ -48,11 +52,14 @@ def trimmed(pattern: CreasePattern, target: WholeMesh) -> CreasePattern:
     return _assembled(pattern, cutter.tables(), faces, parents, np.array(owner, dtype=np.int64))
 
 
-def inner_facets(pattern: CreasePattern, target: WholeMesh) -> CreasePattern:
-    """The whole facets of ``pattern`` whose means are inside the outline of ``target``."""
+def inner_facets(pattern: CreasePattern, target: WholeMesh, near: Floats) -> CreasePattern:
+    """The whole facets of ``pattern`` whose means are inside the outline of ``target``; ``near`` is
+    that of :func:`trimmed`.
+    """
     assert pattern.folded_coords is not None
     means = facet_means(pattern.folded_coords, pattern.faces_vertices) / pattern.scale
-    owners = np.flatnonzero(target.outline.signed_distance(target.feet(means)) > 0)
+    feet = target.feet(means, near[pattern.faces_vertices].mean(axis=1))
+    owners = np.flatnonzero(target.outline.signed_distance(feet) > 0)
     tables = pattern.vertices_coords, pattern.folded_coords, meeting_vertices(pattern)
     faces, parents = pattern.faces_vertices[owners], pattern.faces_edges[owners]
     return _assembled(pattern, tables, faces, parents, owners)
@@ -131,7 +138,12 @@ class _Cutter:
 
     def _middle_inside(self, corners: list[int]) -> bool:
         middle = self._points(corners).mean(axis=0, keepdims=True)
-        return bool(self.target.outline.signed_distance(self.target.feet(middle))[0] > 0)
+        foot = self.target.feet(middle, self._near(corners)[None])
+        return bool(self.target.outline.signed_distance(foot)[0] > 0)
+
+    def _near(self, corners: list[int]) -> Floats:
+        """(2,) the parameters in the middle of a facet."""
+        return np.asarray(self.cuts.feet[corners].mean(axis=0))
 
     def _polygon(
         self, corners: list[int], nodes: list[int], parents: list[int], arcs: list[list[int]]
@@ -153,7 +165,7 @@ class _Cutter:
         points = self._points(corners)
         length = float(np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1).mean())
         start, end = self._folded(leaves), self._folded(enters)
-        found = bend(points, start, end, length, self.target)
+        found = bend(points, start, end, length, self.target, self._near(corners))
         return [self._in_facet(corners[:3], points[:3], point) for point in found]
 
     def _points(self, corners: list[int]) -> Floats:

@@ -39,13 +39,15 @@ class EdgeCuts:
     Both edges of a seam have one line, which runs from the vertex of lower number ``meeting`` (V,)
     to the other: vertices that meet at seams have equal numbers. ``line`` (E,) is the line of each
     edge, ``breaks`` of a line the places between 0 and 1 where it is cut, ``starts_inside``
-    (lines,) whether its first interval is inside.
+    (lines,) whether its first interval is inside. ``feet`` (V, 2) are the parameters of the points
+    of the target nearest to the vertices.
     """
 
     meeting: Ints
     line: Ints
     breaks: tuple[tuple[float, ...], ...]
     starts_inside: Bools
+    feet: Floats
 
     def walk(self, edge: int, tail: int, head: int) -> tuple[list[float], list[bool]]:
         """The cuts of ``edge`` from the vertex ``tail`` to ``head`` as places on its line, and
@@ -72,28 +74,27 @@ def meeting_vertices(pattern: CreasePattern) -> Ints:
         least = lower
 
 
-def edge_cuts(pattern: CreasePattern, target: WholeMesh) -> EdgeCuts:
-    """The cuts of the edges of ``pattern`` by the outline of ``target``."""
+def edge_cuts(pattern: CreasePattern, target: WholeMesh, near: Floats) -> EdgeCuts:
+    """The cuts of the edges of ``pattern`` by the outline of ``target``; ``near`` (V, 2) are
+    parameters near the place of each vertex.
+    """
     assert pattern.folded_coords is not None
     points = pattern.folded_coords / pattern.scale
     meeting = meeting_vertices(pattern)
     lines, line = np.unique(
         np.sort(meeting[pattern.edges_vertices], axis=1), axis=0, return_inverse=True
     )
-    used = np.unique(lines)
-    feet = np.zeros((len(points), 2))
-    feet[used] = target.feet(points[used])
-    phi = np.zeros(len(points))
-    phi[used] = target.outline.signed_distance(feet[used])
+    feet = target.feet(points, near)
+    phi = target.outline.signed_distance(feet)
     ends = phi[lines]
-    near = np.flatnonzero(np.abs(ends).min(axis=1) < 1.5 * edge_lengths(points, lines))
+    close = np.flatnonzero(np.abs(ends).min(axis=1) < 1.5 * edge_lengths(points, lines))
     at = np.linspace(0.0, 1.0, BETWEEN + 2)
     values = np.repeat(ends[:, :1], BETWEEN + 2, axis=1)
     values[:, -1] = ends[:, 1]
-    where = np.broadcast_to(at[1:-1], (len(near), BETWEEN)).reshape(-1)
-    values[near, 1:-1] = _phi(points, feet, lines[np.repeat(near, BETWEEN)], where, target).reshape(
-        -1, BETWEEN
-    )
+    where = np.broadcast_to(at[1:-1], (len(close), BETWEEN)).reshape(-1)
+    values[close, 1:-1] = _phi(
+        points, feet, lines[np.repeat(close, BETWEEN)], where, target
+    ).reshape(-1, BETWEEN)
     row, change = np.nonzero((values[:, 1:] > 0) != (values[:, :-1] > 0))
     low, high = at[change], at[change + 1]
     rising = values[row, change] <= 0
@@ -110,6 +111,7 @@ def edge_cuts(pattern: CreasePattern, target: WholeMesh) -> EdgeCuts:
         line.reshape(-1),
         tuple(breaks for breaks, _ in parted),
         np.array([inside for _, inside in parted], dtype=bool),
+        feet,
     )
 
 
@@ -140,14 +142,15 @@ def _snapped(breaks: list[float], starts_inside: bool) -> tuple[tuple[float, ...
 
 
 def bend(
-    corners: Floats, start: Floats, end: Floats, length: float, target: WholeMesh
+    corners: Floats, start: Floats, end: Floats, length: float, target: WholeMesh, near: Floats
 ) -> list[Floats]:
     """The points (3,) in the plane of a facet at which its cut from ``start`` to ``end`` bends.
 
     ``corners`` (k, 3) are those of the facet, ``length`` is the mean edge, and the facet lies left
-    of the cut. There is none where the outline within the facet is as good as straight.
+    of the cut. ``near`` (2,) are parameters near it. There is none where the outline within the
+    facet is as good as straight.
     """
-    uv = target.feet(np.stack([start, end]))
+    uv = target.feet(np.stack([start, end]), np.stack([near, near]))
     sides = target.outline.nearest(uv)[2].tolist()
     normal = vector_product(corners[2] - corners[0], corners[-1] - corners[1])
     normal /= np.linalg.norm(normal)

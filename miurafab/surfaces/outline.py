@@ -103,15 +103,16 @@ class WholeMesh:
         return turned(uv, -self.angle)
 
     def closest_point(self, points: Floats) -> Floats:
-        """(n, 3) the points of the mesh and what fills its holes nearest to ``points`` (n, 3), and
-        beyond the outline those of the spline.
+        """(n, 3) the points nearest to ``points`` (n, 3) of the mesh and what fills its holes, and
+        of the spline beyond the outline.
         """
         feet = self.feet(points)
         filled = np.concatenate([self.triangles, self.layout.filling])
         closest = closest_on_mesh(points, filled)
         beyond = self.outline.signed_distance(feet) < 0
-        closest[beyond] = self.point(feet[beyond])
-        return closest
+        on_spline = self.point(feet)
+        beyond &= _apart(points, on_spline) < _apart(points, closest)
+        return np.where(beyond[:, None], on_spline, closest)
 
     def nearest(self, points: Floats) -> Floats:
         return closest_on_mesh(points, self.triangles)
@@ -182,6 +183,10 @@ class WholeMesh:
             if not len(active):
                 break
         return uv
+
+
+def _apart(points: Floats, others: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(points - others, axis=1))
 
 
 def whole_mesh(layout: MeshChart, stiffness: float = 0.0) -> WholeMesh:

@@ -45,13 +45,18 @@ def bowl() -> tuple[CreasePattern, WholeMesh]:
     return pattern, whole_mesh(surface.layout).laid(surface.placement.angle)
 
 
+def near(pattern: CreasePattern, target: WholeMesh) -> np.ndarray:
+    assert pattern.folded_coords is not None
+    return target.feet(pattern.folded_coords)
+
+
 def cut(bowl: tuple[CreasePattern, WholeMesh], shape: str) -> tuple[CreasePattern, WholeMesh]:
     pattern, whole = bowl
     d = whole.domain
     centre = np.array([(d.u0 + d.u1) / 2, (d.v0 + d.v1) / 2])
     outline = Outline.of_loops([loop + centre for loop in SHAPES[shape]])
     target = replace(whole, outline=outline)
-    return trimmed(pattern, target), target
+    return trimmed(pattern, target, near(pattern, target)), target
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -116,7 +121,8 @@ def test_a_corner_of_the_outline_inside_a_facet_stays(
     if reflex:
         far = corner + np.array([[0, -65], [70, -65], [70, 60], [-60, 60], [-60, 5.0]])
         loop = np.concatenate([[corner], far])
-    pattern = trimmed(whole, replace(target, outline=Outline.of_loops([loop])))
+    cornered = replace(target, outline=Outline.of_loops([loop]))
+    pattern = trimmed(whole, cornered, near(whole, target))
     assert pattern.folded_coords is not None
     feet = target.feet(pattern.folded_coords)
     nearest = int(np.linalg.norm(feet - corner, axis=1).argmin())
@@ -148,7 +154,7 @@ def test_whole_facets_are_those_with_their_means_inside(
     d = target.domain
     outline = Outline.of_loops([72 * CIRCLE + np.array([(d.u0 + d.u1) / 2, (d.v0 + d.v1) / 2])])
     target = replace(target, outline=outline)
-    pattern = inner_facets(whole, target)
+    pattern = inner_facets(whole, target, near(whole, target))
     assert whole.folded_coords is not None
     assert pattern.folded_coords is not None
     assert pattern.faces_vertices.shape[1] == 4

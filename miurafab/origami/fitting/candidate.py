@@ -16,7 +16,7 @@ from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.inequalities import limits
-from miurafab.origami.fitting.nominal import Follow
+from miurafab.origami.fitting.nominal import Follow, Nominal
 from miurafab.origami.fitting.outlined import with_border
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.result import Attempt
@@ -82,7 +82,7 @@ def candidate(
     charts, points = start.unknowns.whole(x)
     pattern = unfold_charts(charts, points, target=request.target | start.layout)
     if isinstance(start.surface, WholeMesh):
-        pattern = with_border(pattern, start.surface, request)
+        pattern = with_border(pattern, start.surface, charts, request)
     assert pattern.folded_coords is not None
     extent = float(np.ptp(pattern.folded_coords, axis=0).max())
     scale = 1.0 if request.size_mm is None else request.size_mm / extent
@@ -94,7 +94,10 @@ def candidate(
         measured = with_nearness(measured, pattern, unturned(start.surface))
     deviation = deviation_of(start, request.follow, charts, points)
     points_of_rim = start.unknowns.vertices(x)
-    marks = score(start.unknowns.charts, points_of_rim, start.rim, deviation)
+    solved = start.unknowns.charts
+    cells = Nominal.of(start.surface, solved, *start.cells).corners
+    crowds = start.pieces > 1 or start.all_round
+    marks = score(solved, points_of_rim, cells, start.rim, deviation, crowds)
     closeness = Closeness.of(request, measured, deviation * scale)
     faults = tuple(_faults(request, start, pattern, measured, closeness, scale, x, marks))
     residual = max(measured.max_planarity or 0.0, measured.max_developability or 0.0)

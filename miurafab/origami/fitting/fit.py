@@ -29,7 +29,9 @@ from miurafab.surfaces.tube import TubeSurface
 
 TRIED = 3
 """The starts that are brought to fair sheets, for each number of pieces. Where the number of pieces
-is asked for, more are tried until one will do: the globe in two pieces needs its fourth."""
+is asked for, more are tried until one will do: the globe in two pieces needs its fourth. Where the
+best sheet only takes much paper, more are tried too: the candlestick takes 4.2 times its area with
+three, and 3.6 times with five."""
 LARGE = 900
 """A sheet of more facets is brought to the end from the likeliest start alone, if that one will
 do."""
@@ -194,13 +196,19 @@ class _FitSearch:
         # of pieces whose number is asked for there are no more to try
         last = len(pieces) == 1 and pieces[0] > 1
         for number, start in enumerate(starts):
-            if number >= TRIED and not (last and not self._one_will_do()):
+            more = self._much_paper() or (last and not self._one_will_do())
+            if number >= TRIED and not more:
                 return
             self._tell(start)
             shaken = start.shaken(request.seed) if request.seed else start
             yield from polished(request, shaken, self._check_time)
             if self._settled() or (large and self._one_will_do()) or self._too_far():
                 return
+
+    def _much_paper(self) -> bool:
+        """Whether the best sheet has no fault but that it takes much paper."""
+        best = self.best
+        return best is not None and not best.faults and best.score.total == best.score.paper
 
     def _too_far(self) -> bool:
         """Whether a search of sizes is to go on to the next, since no start will mend this one."""

@@ -78,19 +78,24 @@ def angles_of(rotate: float | None) -> tuple[float, ...]:
     return ANGLES if rotate is None else (rotate, rotate + math.pi / 2)
 
 
-def with_border(pattern: CreasePattern, target: WholeMesh, asked: FitOptions) -> CreasePattern:
-    """``pattern`` cut along the outline of ``target``, or its whole facets inside where `edge` asks
-    for them, and where the cut leaves an edge under `min_edge`.
+def with_border(
+    pattern: CreasePattern, target: WholeMesh, charts: QuadCharts, asked: FitOptions
+) -> CreasePattern:
+    """``pattern``, the sheet of ``charts``, cut along the outline of ``target``, or its whole
+    facets inside where `edge` asks for them, and where the cut leaves an edge under `min_edge`.
     """
+    corner = charts.cells[:, None, :] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    near = np.zeros((len(pattern.vertices_coords), 2))
+    near[pattern.faces_vertices] = target.domain.at(corner, (asked.columns, asked.rows))
     if asked.edge == "trim":
-        cut = trimmed(pattern, target)
+        cut = trimmed(pattern, target, near)
         assert cut.folded_coords is not None
         size = float(np.ptp(cut.folded_coords, axis=0).max())
         scale = 1.0 if asked.size_mm is None else asked.size_mm / size
         shortest = float(edge_lengths(cut.vertices_coords, cut.edges_vertices).min())
         if asked.min_edge_mm is None or scale * shortest >= asked.min_edge_mm:
             return cut
-    whole = inner_facets(pattern, target)
+    whole = inner_facets(pattern, target, near)
     return replace(whole, target=whole.target | {"edge": "whole"})
 
 

@@ -147,7 +147,7 @@ def _objective(
     request: FitRequest, start: Start, x: Floats, bounds: Bounds, reach: float
 ) -> FairObjective:
     """The fair objective with the limits ``bounds`` as hinges, and ``reach`` on the distance."""
-    weights = Weights.of(start.pieces)
+    weights = Weights.of(start.pieces, start.all_round)
     if bounds.min_edge is not None:
         shortest = max(weights.shortest_edge, bounds.min_edge / start.unknowns.length)
         weights = replace(weights, shortest_edge=shortest)

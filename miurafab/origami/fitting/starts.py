@@ -95,6 +95,12 @@ class Start:
         return replace(self, x=self.x + moves)
 
     @property
+    def all_round(self) -> bool:
+        """Whether the sheet goes all round an axis."""
+        surface = self.surface
+        return isinstance(surface, Revolution) and surface.closed
+
+    @property
     def order(self) -> tuple[int, bool]:
         """How steep the slide is, in three classes, and whether it is a part of the target."""
         steep = 0 if self.steepest < GENTLE else 1 if self.steepest < STEEP else 2
