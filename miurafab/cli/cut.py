@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from miurafab.cli.console import Console
 from miurafab.cli.declared import MachineOption, MaterialOption, argument, option, split, takes
-from miurafab.cli.fit import RigidOption, fit_options
+from miurafab.cli.fit import RigidOption, bed_options, fit_options
 from miurafab.cli.machine import PORT
 from miurafab.errors import (
     DONE,
@@ -66,7 +66,7 @@ def cut_options() -> type[CutOptions]:
     return CutOptions
 
 
-@takes(cut_options, fit_options)
+@takes(cut_options, fit_options, bed_options)
 def cut(
     thing: Annotated[
         str,

@@ -7,7 +7,14 @@ from typing import Annotated
 
 import miurafab
 from miurafab.cli.console import Console
-from miurafab.cli.declared import TargetArgument, option, takes
+from miurafab.cli.declared import (
+    MachineOption,
+    MaterialOption,
+    TargetArgument,
+    option,
+    split,
+    takes,
+)
 from miurafab.cli.ending import spelled
 from miurafab.errors import DONE, INTERRUPTED, NO, OptionError
 from miurafab.files import new_file, write_text
@@ -17,6 +24,7 @@ from miurafab.workflow.json_text import json_text
 EXAMPLES = (
     "miurafab fit hypar:height=0.5 -o hypar.fold",
     "miurafab fit sphere --facets 12x12 --size 150mm -o sphere.fold",
+    "miurafab fit hypar --facets 8x8 --size bed --machine grbl-laser-400 -o largest.fold",
     "miurafab fit hypar --min-edge 4mm --max-deviation 2mm -o coarsest.fold",
 )
 
@@ -30,7 +38,14 @@ def fit_options() -> type:
     return FitOptions
 
 
-@takes(fit_options)
+def bed_options() -> type:
+    """The class that declares what a size by the bed depends on."""
+    from miurafab.workflow.bed_size import BedOptions
+
+    return BedOptions
+
+
+@takes(fit_options, bed_options)
 def fit(
     target: TargetArgument,
     /,
@@ -40,6 +55,8 @@ def fit(
         Path | None, option(File(), "Also write the report to this JSON file.")
     ] = None,
     rigid: RigidOption = False,
+    machine: MachineOption = None,
+    material: MaterialOption = None,
     console: Console = Console(),
     **given: str,
 ) -> int:
@@ -47,18 +64,21 @@ def fit(
 
     Exits with 1 if no sheet meets what you ask for; the answer then says what to change, and the
     nearest sheet is written to NAME.rejected.fold. Ctrl-C ends the search: the best sheet up to
-    then is written.
+    then is written. With --size bed the shell is as large as the sheets of the machine allow.
     """
     if out.suffix.lower() != ".fold":
         raise OptionError("out", f"is {out}; a fit writes a FOLD file, whose name ends in .fold")
     new_file(out, "The pattern file", (".fold",))
     if rigid:
         given["flat_foldable"] = "exact"
+    of_bed, given = split(given, bed_options())
     asked = miurafab.design(target, **given)
     for finding in asked.findings:
         console.note(finding.sentence)
     with console.progress("fitting") as progress:
-        result = miurafab.fit(asked, on_progress=progress)
+        result = miurafab.fit(
+            asked, machine=machine, material=material, on_progress=progress, **of_bed
+        )
     answer = spelled(result.report())
     if result.pattern is not None:
         file = out if result.is_valid else out.with_suffix(".rejected.fold")

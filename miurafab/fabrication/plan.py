@@ -118,7 +118,10 @@ class _Trial:
 
 
 def plan_patches(
-    pattern: CreasePattern, stock: LaidStock, material: Material, options: LayoutOptions
+    pattern: CreasePattern,
+    stock: LaidStock,
+    material: Material,
+    options: LayoutOptions,
 ) -> Plan:
     """The pattern divided and nested with the least J that was found.
 
@@ -127,6 +130,21 @@ def plan_patches(
     :func:`~miurafab.fabrication.nesting.nest`.
     """
     return _Planner(pattern, stock, material, options).plan()
+
+
+def fits_on(
+    pattern: CreasePattern,
+    stock: LaidStock,
+    material: Material,
+    options: LayoutOptions,
+    sheets: int,
+) -> bool:
+    """Whether a split of ``pattern`` takes at most so many ``sheets`` in the first pass of the
+    nester, whatever its glue.
+
+    Raises :class:`~miurafab.errors.LayoutError` as :func:`plan_patches`.
+    """
+    return _Planner(pattern, stock, material, options).fits_on(sheets)
 
 
 class _Planner:
@@ -151,6 +169,21 @@ class _Planner:
         self.piece = components(pattern)
         self.lengths = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
         self.joins = float(self.lengths[border_seams(pattern).edges[:, 0]].sum())
+
+    def fits_on(self, sheets: int) -> bool:
+        usual = self.split(self.room, self.options)
+        few = usual.max() < _MANY
+        others = self.candidates(usual, True) if few else []
+        return any(self.takes(each, sheets) for each in (usual, *(each for each, _ in others)))
+
+    def takes(self, face_patch: Ints, sheets: int) -> bool:
+        """Whether the first pass puts the patches of a split on so many sheets."""
+        problem = self.framed(face_patch)[2]
+        if problem.bound > sheets:
+            return False
+        most = float(sheets) if len(self.stock.kinds.kinds) == 1 else math.inf
+        nesting = first_nesting(problem, most)
+        return nesting is not None and nesting.sheets <= sheets
 
     def plan(self) -> Plan:
         usual = self.split(self.room, self.options, improve=True)
@@ -178,7 +211,7 @@ class _Planner:
         trials = [today]
         rooms: dict[int, Space] = {}
         for face_patch, room in sorted(
-            self.candidates(today, wasteful), key=lambda each: self.rest_mm(each[0])
+            self.candidates(today.face_patch, wasteful), key=lambda each: self.rest_mm(each[0])
         ):
             trial = self.promising(face_patch, min(map(self.worse, trials)))
             if trial is not None:
@@ -193,12 +226,12 @@ class _Planner:
             trials += self.dissolve(trial)
         return trials[1:]
 
-    def candidates(self, today: _Trial, wasteful: bool) -> Iterator[tuple[Ints, Space]]:
+    def candidates(self, usual: Ints, wasteful: bool) -> Iterator[tuple[Ints, Space]]:
         """Splits that differ, each with the room of its patches. Where no sheet is wasted, these
         are only splits into more equal patches.
         """
-        seen = {self.key(today.face_patch)}
-        count = int(today.face_patch.max()) + 1
+        seen = {self.key(usual)}
+        count = int(usual.max()) + 1
         few = math.ceil(self.fill / self.copies)
         most = 2 * count if wasteful else count
         height = self.material.tabs.height_mm
@@ -209,7 +242,7 @@ class _Planner:
         if wasteful:
             rooms = smaller_rooms(self.room, self.options.gap_mm)
             ways += [(room, self.options) for room in rooms]
-        if self.slivers_mm(today.face_patch) > 0 and len(self.areas) <= _LARGE:
+        if self.slivers_mm(usual) > 0 and len(self.areas) <= _LARGE:
             ways += [(room, self.options) for room in tighter_rooms(self.room)]
         for room, options in ways:
             try:

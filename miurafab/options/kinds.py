@@ -213,7 +213,8 @@ class Either(Kind):
 
     @property
     def metavar(self) -> str:
-        return f"{self.kind.metavar}|PLACE"
+        names = self.choice.names
+        return f"{self.kind.metavar}|{names[0] if len(names) == 1 else 'PLACE'}"
 
     def read(self, value: object) -> Any:
         named = isinstance(value, str) and value[:1].isalpha()

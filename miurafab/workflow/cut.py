@@ -16,6 +16,7 @@ from miurafab.errors import InputError, OptionError
 from miurafab.files import AnyPath, as_path
 from miurafab.findings import Finding, refusals
 from miurafab.gcode.job import Job
+from miurafab.options import declared, read_options
 from miurafab.profiles import MachineProfile, read_machine
 from miurafab.workflow.dry_run import SheetPreview, dry_run, read_gcode
 from miurafab.workflow.preview import another_beam, assumed_machine, maker_of, named_machine
@@ -149,7 +150,9 @@ def _from_value(
 ) -> Prepared:
     """A job in memory, a pattern, or a target: what is missing is made and written."""
     from miurafab.origami.crease_pattern import CreasePattern
+    from miurafab.origami.fitting.request import BED
     from miurafab.origami.fitting.result import FitResult
+    from miurafab.workflow.bed_size import BedOptions, with_stock
     from miurafab.workflow.design import Design, design
     from miurafab.workflow.fit import fit
     from miurafab.workflow.job_directory import JobDirectory
@@ -174,9 +177,21 @@ def _from_value(
         return _from_pattern(
             pattern, path, name, report, faults, machine, material, out or JOBS / name, tell
         )
+    of_bed: dict[str, Any] = {
+        name: value for name, value in options.items() if name in declared(BedOptions)
+    }
+    options = {name: value for name, value in options.items() if name not in of_bed}
     wanted = thing if isinstance(thing, Design) and not options else design(thing, **options)
+    by_bed: dict[str, Any] = {}
+    if wanted.request.size_mm == BED:
+        by_bed = {"machine": machine, "material": material}
     tell(0.0, "fitting")
-    result = fit(wanted, on_progress=lambda fraction, note: tell(0.4 * fraction, note))
+    result = fit(
+        wanted,
+        on_progress=lambda fraction, note: tell(0.4 * fraction, note),
+        **by_bed,
+        **of_bed,
+    )
     if result.status == "interrupted":
         raise KeyboardInterrupt  # the person wants no job now
     named = path is not None and path.suffix.lower() == ".toml"
@@ -196,7 +211,7 @@ def _from_value(
         wanted.material if material is None else material,
         directory,
         tell,
-        wanted.layout,
+        with_stock(wanted.layout, read_options(BedOptions, of_bed)),
     )
 
 

@@ -6,18 +6,29 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from miurafab.errors import OptionError
+from miurafab.files import AnyPath
+from miurafab.options import declared, read_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.fitting.fit import fit as fit_request
-from miurafab.origami.fitting.request import FitOptions
+from miurafab.origami.fitting.request import BED, FitOptions
 from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.judge_pattern import judge_quality
+from miurafab.profiles import MachineProfile, Material
+from miurafab.workflow.bed_size import BedOptions, fit_to_bed
 from miurafab.workflow.design import design
 
 
 @verb
 def fit(
-    target: object, /, *, on_progress: Callable[[float, str], None] | None = None, **options: Any
+    target: object,
+    /,
+    *,
+    machine: MachineProfile | AnyPath | None = None,
+    material: Material | AnyPath | None = None,
+    on_progress: Callable[[float, str], None] | None = None,
+    **options: Any,
 ) -> FitResult:
     """Fit a generalized Miura-ori to a target surface.
 
@@ -39,6 +50,11 @@ def fit(
         - heights, an array (rows, columns), with ``spacing`` (1 mm by default); or an image, whose
           grey values are heights, with ``height`` (white above black) and ``spacing``;
         - a grid of points, an array (rows, columns, 3).
+    machine : MachineProfile, str or os.PathLike, optional
+        With ``size="bed"``: the machine for which the sheet is made. The default is that of a
+        design, then grbl-laser-400.
+    material : Material, str or os.PathLike, optional
+        With ``size="bed"``: the material. The default is that of a design, then card-250.
     on_progress : callable, optional
         Called with a fraction in 0..1 and a short text.
     {options}
@@ -69,10 +85,26 @@ def fit(
     L. H. Dudte, E. Vouga, T. Tachi and L. Mahadevan, "Programming curvature using origami
     tessellations", Nature Materials 15 (2016).
     """
+    of_bed = {name: options.pop(name, None) for name in declared(BedOptions)}
     asked = design(target, **options)
-    result = fit_request(asked.request, on_progress)
+    if asked.request.size_mm == BED:
+        result = fit_to_bed(
+            asked.request,
+            asked.machine if machine is None else machine,
+            asked.material if material is None else material,
+            read_options(BedOptions, of_bed),
+            asked.layout,
+            on_progress,
+        )
+    else:
+        for name, value in {"machine": machine, "material": material, **of_bed}.items():
+            if value is not None:
+                raise OptionError(
+                    name, "is for a `size` that the bed decides; ask for the `size` bed"
+                )
+        result = fit_request(asked.request, on_progress)
     shape = () if result.measurements is None else judge_quality(result.measurements)
     return replace(result, findings=(*asked.findings, *result.findings, *shape))
 
 
-described(fit, FitOptions)
+described(fit, FitOptions, BedOptions)

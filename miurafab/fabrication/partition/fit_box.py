@@ -135,22 +135,56 @@ def best_turn(points: Floats, width: float, height: float) -> float | None:
     return float(angles[np.lexsort((angles, np.round(np.abs(angles), 9)))[0]])
 
 
+def scale_to_fit(points: Floats, space: Space) -> float:
+    """The largest s for which ``points`` (n, 2), s times as large, fit ``space``. Exact:
+
+        s = max over θ of min(W / w(θ), H / h(θ)).
+
+    Between two angles of :func:`_intervals` the extents w and h are concave, so the best θ is an
+    end of such an interval, or the angle at which w / W = h / H:
+    (d_x H - g_y W) cos θ + (d_y H + g_x W) sin θ = 0.
+    """
+    width, height = space.width, space.height
+    if space.turns is None:
+        hull, ends, d, g = _intervals(points)
+        a, b = d[:, 0] * height - g[:, 1] * width, d[:, 1] * height + g[:, 0] * width
+        sizes = _extents(hull, np.concatenate([ends, _solved(a, b, 0.0)]))
+    else:
+        upright = np.ptp(points, axis=0)
+        sizes = np.array([upright if turn == 0 else upright[::-1] for turn in space.turns])
+    return float((np.array([width, height]) / np.maximum(sizes, 1e-12)).min(axis=1).max())
+
+
 def boxes_at(
     points: NDArray[Any], width: float, height: float
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Candidate angles (A,) in [0, π) and the extents (A, 2) along u and v at each."""
+    hull, ends, d, g = _intervals(points)
+    equal = _solved(d[:, 0] - g[:, 1], d[:, 1] + g[:, 0], width - height)
+    full = [_solved(d[:, 0], d[:, 1], width), _solved(g[:, 1], -g[:, 0], height)]
+    angles = np.unique(np.concatenate([ends, equal, *full]))
+    return angles, _extents(hull, angles)
+
+
+def _intervals(
+    points: NDArray[Any],
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """The convex hull of ``points``; the angles (A,) in [0, π) at which a side of it is parallel to
+    the box; and between each and the next the spans d and g (A, 2) that do not change there.
+    """
     hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(points)))
     sides = np.diff(hull, axis=0) if len(hull) > 1 else np.array([[1.0, 0.0]])
     flush = np.arctan2(sides[:, 1], sides[:, 0])
     ends = np.unique(np.concatenate([flush, flush + np.pi / 2, [0.0]]) % np.pi)
     middle = (ends + np.append(ends[1:], np.pi)) / 2
-    d, g = _spans(hull, middle), _spans(hull, middle + np.pi / 2)
-    equal = _solved(d[:, 0] - g[:, 1], d[:, 1] + g[:, 0], width - height)
-    full = [_solved(d[:, 0], d[:, 1], width), _solved(g[:, 1], -g[:, 0], height)]
-    angles = np.unique(np.concatenate([ends, equal, *full]))
+    return hull, ends, _spans(hull, middle), _spans(hull, middle + np.pi / 2)
+
+
+def _extents(hull: NDArray[Any], angles: NDArray[Any]) -> NDArray[Any]:
+    """(A, 2) the extents of ``hull`` along u and v at each of ``angles``."""
     u = np.column_stack([np.cos(angles), np.sin(angles)])
     v = np.column_stack([-u[:, 1], u[:, 0]])
-    return angles, np.column_stack([np.ptp(hull @ u.T, axis=0), np.ptp(hull @ v.T, axis=0)])
+    return np.column_stack([np.ptp(hull @ u.T, axis=0), np.ptp(hull @ v.T, axis=0)])
 
 
 def _solved(a: NDArray[Any], b: NDArray[Any], level: float) -> NDArray[Any]:

@@ -85,7 +85,7 @@ def candidate(
         pattern = with_border(pattern, start.surface, charts, request)
     assert pattern.folded_coords is not None
     extent = float(np.ptp(pattern.folded_coords, axis=0).max())
-    scale = 1.0 if request.size_mm is None else request.size_mm / extent
+    scale = 1.0 if request.side_mm is None else request.side_mm / extent
     pattern = pattern.scaled(scale)
     # the distances take long; while the search goes on only a limit on them needs them
     limited = request.max_distance_mm is not None

@@ -16,10 +16,11 @@ import math
 import time
 from collections.abc import Callable, Iterator
 
+from miurafab.errors import OptionError
 from miurafab.findings import Finding
 from miurafab.origami.fitting.candidate import Candidate
 from miurafab.origami.fitting.polish import plain, polished
-from miurafab.origami.fitting.request import FitRequest
+from miurafab.origami.fitting.request import BED, FitRequest
 from miurafab.origami.fitting.result import INTERRUPTED, TIME_RAN_OUT, Attempt, FitResult
 from miurafab.origami.fitting.score import ENOUGH, GOOD
 from miurafab.origami.fitting.search import coarsest
@@ -64,6 +65,10 @@ def fit(
     a result with advice. Ctrl-C ends the search: the result is then the best exact sheet so far,
     with status ``interrupted``; ``KeyboardInterrupt`` is raised only if there is none.
     """
+    if request.size_mm == BED:
+        raise OptionError(
+            "size", "is bed, which only `fit` and `cut` know, with a machine; give mm"
+        )
     if request.search:
 
         def at(size: FitRequest) -> FitResult:

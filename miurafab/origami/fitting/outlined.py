@@ -91,7 +91,7 @@ def with_border(
         cut = trimmed(pattern, target, near)
         assert cut.folded_coords is not None
         size = float(np.ptp(cut.folded_coords, axis=0).max())
-        scale = 1.0 if asked.size_mm is None else asked.size_mm / size
+        scale = 1.0 if asked.side_mm is None else asked.side_mm / size
         shortest = float(edge_lengths(cut.vertices_coords, cut.edges_vertices).min())
         if asked.min_edge_mm is None or scale * shortest >= asked.min_edge_mm:
             return cut

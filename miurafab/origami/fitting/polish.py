@@ -140,7 +140,7 @@ def _ticking(on_step: Callable[[], None] | None) -> Callable[[int, float], None]
 def _scale_of(request: FitRequest, start: Start) -> float:
     """The scale that brings the seed to the size asked for."""
     size = float(np.ptp(start.unknowns.whole(start.x)[1], axis=0).max())
-    return 1.0 if request.size_mm is None else request.size_mm / size
+    return 1.0 if request.side_mm is None else request.side_mm / size
 
 
 def _objective(

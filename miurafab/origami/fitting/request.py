@@ -10,6 +10,7 @@ from miurafab.display import Shown
 from miurafab.errors import OptionError
 from miurafab.options import (
     Choice,
+    Either,
     Pair,
     Whole,
     Written,
@@ -37,6 +38,8 @@ MOST_FACETS = 2_000
 MOST_IN_ALL = 400_000
 """The largest measured fit has 100,000 facets."""
 LARGEST_MM = 1e6
+BED = "bed"
+"""The size of a sheet that is as large as a bed allows (miurafab.workflow.bed_size)."""
 FACETS = Pair(Whole(2, MOST_FACETS), "COLSxROWS", "20x20", "x")
 
 
@@ -52,9 +55,9 @@ class FitOptions(Shown):
         default_text=FACETS.show(DEFAULT_FACETS),
         page="first",
     )
-    size_mm: float | None = option(
-        length(0, LARGEST_MM, above=True),
-        "Longest side of the folded bounding box.",
+    size_mm: float | str | None = option(
+        Either(Choice((BED,)), length(0, LARGEST_MM, above=True)),
+        "Longest side of the folded bounding box; bed: as large as the machine's bed allows.",
         group="Sheet",
         default_text=f"{DEFAULT_SIZE_MM:g} mm; a mesh keeps its file's size",
         page="first",
@@ -244,6 +247,11 @@ class FitOptions(Shown):
     def rows(self) -> int:
         """Rows of facets; only the proportion to the columns counts in a search."""
         return (self.facets or DEFAULT_FACETS)[1]
+
+    @property
+    def side_mm(self) -> float | None:
+        """The longest side of the folded form, mm; None for that of the target itself."""
+        return None if isinstance(self.size_mm, str) else self.size_mm
 
     @property
     def search(self) -> bool:

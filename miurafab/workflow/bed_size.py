@@ -1,0 +1,101 @@
+"""A fit as large as the bed allows: size and bed know each other.
+
+The target is fitted at some size, the flat pattern is measured against the sheets, and the target
+is fitted again at the size found. A sheet is linear in its size unless a limit in millimetres is
+active, such as the shortest edge, so the second fit is the last one nearly always.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from miurafab.display import Shown
+from miurafab.errors import LayoutError
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.plan_size import Sizing
+from miurafab.files import AnyPath
+from miurafab.options import File, Whole, check_options, option
+from miurafab.origami.fitting.fit import fit as fit_request
+from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitRequest
+from miurafab.origami.fitting.result import FitResult
+from miurafab.profiles import (
+    MachineProfile,
+    Material,
+    find_profile,
+    load_material,
+    read_machine,
+)
+
+_FITS = 4
+"""So many fits are made at most."""
+
+_DIGITS = 2
+"""Sizes are rounded down to so many decimals of mm."""
+
+
+@dataclass(frozen=True, repr=False)
+class BedOptions(Shown):
+    """What a size by the bed depends on, besides the machine and the material."""
+
+    sheets: int | None = option(
+        Whole(1, 1000),
+        "With `size` bed: as large as so many sheets allow; on one sheet nothing is cut apart.",
+        group="Bed",
+        default_text="1",
+    )
+    stock: Path | None = option(
+        File(),
+        "With `size` bed: a TOML file with the sheets to use.",
+        group="Bed",
+        default_text="sheets of the bed's size",
+    )
+
+    def __post_init__(self) -> None:
+        check_options(self)
+
+
+def with_stock(layout: LayoutOptions | None, wanted: BedOptions) -> LayoutOptions:
+    """``layout`` with the stock that is ``wanted``."""
+    options = layout or LayoutOptions()
+    if wanted.stock is None:
+        return options
+    return replace(options, nesting=replace(options.nesting, stock=wanted.stock))
+
+
+def fit_to_bed(
+    request: FitRequest,
+    machine: MachineProfile | AnyPath | None,
+    material: Material | AnyPath | None,
+    wanted: BedOptions,
+    layout: LayoutOptions | None,
+    on_progress: Callable[[float, str], None] | None,
+) -> FitResult:
+    """The fit of ``request`` at the largest size that the sheets allow; ``layout`` is what is asked
+    of them. The result may be a fit that found no sheet.
+
+    Raises :class:`~miurafab.errors.LayoutError` if no size can be found.
+    """
+    profile, card = read_machine(machine), _material(material)
+    options = with_stock(layout, wanted)
+    size = DEFAULT_SIZE_MM
+    for number in range(_FITS):
+        result = fit_request(replace(request, size_mm=size), on_progress)
+        if result.pattern is None or result.status == "interrupted":
+            return result
+        sizing = Sizing(result.pattern, profile, card, options, wanted.sheets or 1)
+        if number and sizing.holds():
+            return result
+        found = size * sizing.largest_scale()
+        size = math.floor(found * 10**_DIGITS) / 10**_DIGITS
+    raise LayoutError(
+        f"No `size` was found at which the sheet that is fitted then fits; about {size:g} mm fit."
+    )
+
+
+def _material(given: Material | AnyPath | None) -> Material:
+    if isinstance(given, Material):
+        return given
+    return load_material(find_profile("materials", given))
