@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Iterator
 
+import kit_pictures
 import numpy as np
 import pypdf
 import pytest
@@ -352,3 +353,15 @@ def test_a_check_of_a_job_knows_rim_numbers_and_the_rows(tmp_path):
     layout.write_text(json.dumps(document))
     said = [finding.sentence for finding in check_job(tmp_path / "job").findings]
     assert "The rows and angles of the folder's kit are not those of the pattern." in said
+
+
+def test_the_pictures_in_print_are_made_by_the_command_and_small():
+    """The command draws any pattern; those on the page are all that are there."""
+    made = dict(kit_pictures.pictures("hypar", regular(9, 7)))
+    assert set(made) == {f"hypar-{name}.png" for name in ("folding", "rows", "collapse", "gauge")}
+    assert all(content.startswith(b"\x89PNG") for content in made.values())
+    page = (kit_pictures.FOLDER.parent / "folding-kit.md").read_text()
+    shown = re.findall(r"\(folding-kit/([a-z-]+\.png)\)", page)
+    there = {path.name: path.stat().st_size for path in kit_pictures.FOLDER.iterdir()}
+    assert set(shown) == set(there)
+    assert max(there.values()) <= 150_000

@@ -213,19 +213,24 @@ class KitSections:
         pattern, blocks = self.views.pattern, []
         if states.shapes:
             azimuth = camera(pattern, states.shapes[-1])
-            figures = tuple(
-                Figure(
-                    title,
-                    partial(shape_view, pattern=pattern, shape=shape, azimuth=azimuth),
-                    0.85,
+            figures = []
+            for title, shape in zip(states.titles, states.shapes, strict=True):
+                inside = np.ones(len(pattern.faces_vertices), dtype=bool)
+                if pattern.pieces is not None and shape is not states.shapes[-1]:
+                    inside = pattern.pieces == pattern.pieces[self.views.patches[0].faces[0]]
+                draw = partial(
+                    shape_view, pattern=pattern, shape=shape, azimuth=azimuth, inside=inside
                 )
-                for title, shape in zip(states.titles, states.shapes, strict=True)
-            )
-            blocks.append(Figures(max(len(figures), 2), figures, 70.0))
-        several = len(self.views.patches) > 1
-        whole = "The pictures show the whole shell; fold each patch as its part of it. " * several
+                figures.append(Figure(title, draw, 0.85))
+            blocks.append(Figures(max(len(figures), 2), tuple(figures), 70.0))
+        shows = ""
+        if pattern.pieces_count > 1 and len(states.shapes) > 1:
+            name = self.views.name(self.views.patches[0].id)
+            shows = f"On the way the piece of {name} is drawn; the others move like it. "
+        elif len(self.views.patches) > 1:
+            shows = "The pictures show the whole shell; fold each patch as its part of it. "
         said: list[Block] = [
-            Prose(f"{whole}{states.how}"),
+            Prose(f"{shows}{states.how}"),
             Numbered(tuple(self._steps_of_collapse())),
             Prose("If it goes wrong", bold=True),
             Numbered(_WRONG),

@@ -105,19 +105,23 @@ def camera(pattern: CreasePattern, shape: Floats) -> float:
 
 
 def shape_view(
-    canvas: Pen, box: Box, pattern: CreasePattern, shape: Floats, azimuth: float
-) -> float:
-    """The sheet in one state, the two sides of the paper in two colours; returns its scale."""
+    canvas: Pen, box: Box, pattern: CreasePattern, shape: Floats, azimuth: float, inside: Bools
+) -> None:
+    """The facets ``inside`` (F,) of a sheet in one state, the two sides of the paper in two
+    colours.
+    """
     faces = pattern.faces_vertices
     view = project(shape, faces, azimuth)
-    seen, scale = fitted(view.places, box)
+    corners = faces[inside]
+    used = np.unique(corners[corners >= 0])
+    seen = np.zeros_like(view.places)
+    seen[used], _ = fitted(view.places[used], box)
     colours = fills(view) / 255
     outlined = len(faces) <= OUTLINED
     canvas.setLineWidth(0.08 * mm)
     canvas.setLineJoin(1)
-    for face in view.order.tolist():
+    for face in view.order[inside[view.order]].tolist():
         red, green, blue = colours[face].tolist()
         canvas.setFillColor(Color(red, green, blue))
         canvas.setStrokeColor(Color(0.72 * red, 0.72 * green, 0.72 * blue))
         polygon(canvas, seen[faces[face][faces[face] >= 0]], stroke=outlined)
-    return scale

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from miurafab.errors import InputError, PatternError
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
@@ -69,8 +67,3 @@ def _motion(pattern: CreasePattern) -> tuple[FoldingMotion | None, str]:
     if len(motion.frames) <= _PARTS:
         return motion, f"{bends} Its way could not be followed to the end: see the finished form."
     return motion, bends
-
-
-def spread(states: FoldedStates) -> float:
-    """The largest extent of any state in mm, so that all pictures can have one scale."""
-    return max(float(np.ptp(shape, axis=0).max()) for shape in states.shapes)
