@@ -15,7 +15,7 @@ CASES = {
     "miura": miura(24, 20),
     "fan": flat_patterns.fan(24, 20, radius=150.0),
     "fan without grid": without_grid(flat_patterns.fan(24, 20, radius=150.0)),
-    "triangles": triangles(3, 20, 700.0),
+    "triangles": triangles(3, 14, 450.0),
 }
 
 
