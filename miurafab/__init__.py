@@ -91,6 +91,7 @@ if TYPE_CHECKING:
     from miurafab.workflow.patterns import check as check
     from miurafab.workflow.preview import Preview as Preview
     from miurafab.workflow.preview import preview as preview
+    from miurafab.workflow.quicker import QuickerWay as QuickerWay
     from miurafab.workflow.rebuild import Rebuilt as Rebuilt
     from miurafab.workflow.rebuild import rebuild as rebuild
     from miurafab.workflow.sheets import SheetJob as SheetJob

@@ -70,8 +70,10 @@ def preview(
     answer: dict[str, Any] = {**seen.as_dict(), "files": [str(file) for file in files]}
 
     def show() -> None:
+        from miurafab.workflow.dry_run import at_work
+
         console.rows(
-            ("sheet", "lines", "time", "beam on", "drawn", "travel", "bounds mm"),
+            ("sheet", "lines", "time", at_work(seen.machine), "drawn", "travel", "bounds mm"),
             [_row(sheet) for sheet in seen.sheets],
             title=f"{seen.name} on {seen.machine.title}",
         )

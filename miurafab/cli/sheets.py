@@ -14,6 +14,7 @@ from miurafab.options import File, Text
 
 if TYPE_CHECKING:
     from miurafab.workflow.job_directory import JobDirectory
+    from miurafab.workflow.sheets import SheetJob
 
 EXAMPLES = (
     "miurafab sheets hypar.fold -o jobs/hypar",
@@ -74,7 +75,7 @@ def sheets(
             formats=formats or (),
             on_progress=lambda fraction, note: progress(0.7 + 0.3 * fraction, note),
         )
-    answer = _answer(job, out)
+    answer = {**_answer(job, out), **_times(made)}
     console.answer(answer, lambda: _show(console, answer, job))
     return DONE
 
@@ -117,6 +118,16 @@ def _answer(job: JobDirectory, out: Path) -> dict[str, Any]:
     }
 
 
+def _times(made: SheetJob) -> dict[str, Any]:
+    """The time of each operation, and what would be quicker."""
+    return {
+        "operation_seconds": {
+            name or "other": round(seconds, 1) for name, seconds in made.operation_seconds.items()
+        },
+        "quicker": [{"change": way.change, "seconds": way.seconds} for way in made.quicker()],
+    }
+
+
 def _show(console: Console, answer: dict[str, Any], job: JobDirectory) -> None:
     from miurafab.workflow.dry_run import clock_text, length_text
 
@@ -140,6 +151,12 @@ def _show(console: Console, answer: dict[str, Any], job: JobDirectory) -> None:
     for key in ("cut", "perforated", "travel"):
         facts[key] = length_text(totals[f"{key}_mm"])
     facts["machine time"] = clock_text(totals["seconds"])
+    parts = {name: each for name, each in answer["operation_seconds"].items() if each >= 1}
+    if len(parts) > 1:
+        facts["of it"] = ", ".join(f"{name} {clock_text(each)}" for name, each in parts.items())
+    ways = (f"{way['change']}: {clock_text(way['seconds'])}" for way in answer["quicker"])
+    if answer["quicker"]:
+        facts["quicker"] = "; ".join(ways)
     console.facts(facts)
     compared = answer["alternatives"]
     if len(compared) > 1:

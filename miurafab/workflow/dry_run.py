@@ -75,6 +75,9 @@ class SheetPreview(Shown):
         When each move ends.
     layer_mm, layer_strokes : tuple
         The length and the number of the strokes of each layer.
+    operation_seconds : mapping of str to float
+        The time of each operation with the moves between its strokes, in the order of the file;
+        ``""`` for what the comments of the file give to none.
     paper_mm : (float, float)
         Width and height of the sheet, or of the bed where no sheet is known.
     view_mm : (x0, y0, x1, y1)
@@ -94,6 +97,7 @@ class SheetPreview(Shown):
     end_seconds: Floats
     layer_mm: tuple[float, ...]
     layer_strokes: tuple[int, ...]
+    operation_seconds: Mapping[str, float]
     paper_mm: tuple[float, float]
     view_mm: tuple[float, float, float, float]
 
@@ -126,6 +130,9 @@ class SheetPreview(Shown):
             "lines": self.lines,
             "seconds": round(self.seconds, 3),
             "beam_on_seconds": round(self.beam_on_seconds, 3),
+            "operation_seconds": {
+                name or "other": round(each, 3) for name, each in self.operation_seconds.items()
+            },
             "cut_mm": round(self.cut_mm, 3),
             "travel_mm": round(self.travel_mm, 3),
             "bounds_mm": None if self.bounds_mm is None else list(self.bounds_mm),
@@ -185,6 +192,7 @@ def dry_run(
         end_seconds=times.end,
         layer_mm=tuple(np.bincount(layer, lengths, len(LAYERS)).tolist()),
         layer_strokes=tuple(np.bincount(stroke_layer, minlength=len(LAYERS)).tolist()),
+        operation_seconds=_by_operation(program, times.end),
         paper_mm=paper_mm,
         view_mm=_box(np.vstack([program.start[:1, :2], program.end[:, :2], (0, 0), bed, paper_mm])),
     )
@@ -215,6 +223,22 @@ def _layers(program: Program) -> NDArray[np.int8]:
     place = {layer.name: at for at, layer in enumerate(LAYERS) if layer.name in OPERATIONS}
     of_context = [place.get(context.operation, _OTHER) for context in program.contexts]
     return np.array(of_context, dtype=np.int8)[program.context]
+
+
+def _by_operation(program: Program, end: Floats) -> dict[str, float]:
+    """The time of each operation that the comments name."""
+    took = np.bincount(program.context, np.diff(end, prepend=0.0), len(program.contexts))
+    found: dict[str, float] = {}
+    for context, seconds in zip(program.contexts, took.tolist(), strict=True):
+        name = context.operation if context.operation in OPERATIONS else ""
+        found[name] = found.get(name, 0.0) + seconds
+    return {name: seconds for name, seconds in found.items() if seconds > 0}
+
+
+def at_work(machine: MachineProfile) -> str:
+    """What the tool is while it makes a stroke: ``beam on``, ``pen down``, ``knife down``."""
+    kind = machine.tool.kind
+    return "beam on" if kind == "laser" else f"{kind} down"
 
 
 def _box(points: Floats) -> tuple[float, float, float, float]:

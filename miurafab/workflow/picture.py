@@ -22,7 +22,7 @@ from miurafab.files import write_bytes, write_text
 from miurafab.geometry.arrays import Bools, Ints
 from miurafab.origami.picture import INK
 from miurafab.profiles import MachineProfile
-from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_text
+from miurafab.workflow.dry_run import LAYERS, SheetPreview, at_work, clock_text, length_text
 from miurafab.workflow.preview import Preview
 
 LEFT, TOP, RIGHT, BOTTOM, AIR = 7.0, 10.0, 32.0, 8.0, 1.2
@@ -79,7 +79,7 @@ def svg_text(sheet: SheetPreview, machine: MachineProfile) -> str:
     view = (x0 - air, y0 - air, x1 - x0 + 2 * air, y1 - y0 + 2 * air)
     left, top = -LEFT * unit, -TOP * unit
     subtitle = (
-        f"{machine.title}, {clock_text(sheet.seconds)} estimated, beam on "
+        f"{machine.title}, {clock_text(sheet.seconds)} estimated, {at_work(machine)} "
         f"{clock_text(sheet.beam_on_seconds)}, {length_text(sheet.cut_mm)} drawn, "
         f"{length_text(sheet.travel_mm)} travel"
     )

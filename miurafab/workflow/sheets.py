@@ -25,6 +25,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.fold import fold_text, seen_from
 from miurafab.posting import post
 from miurafab.profiles import (
+    OPERATIONS,
     MachineProfile,
     Material,
     Table,
@@ -43,6 +44,7 @@ from miurafab.workflow.job_files import CAPPED, OPENED, job_files, keep_profiles
 from miurafab.workflow.manifest import LAYOUT, sha256, write_manifest
 from miurafab.workflow.patterns import PatternLike, sound_pattern
 from miurafab.workflow.picture import first_sheet
+from miurafab.workflow.quicker import QuickerWay, quicker_ways
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -184,6 +186,25 @@ class SheetJob(Shown):
             return self.pattern_file
         write_draft(file, read_bytes(self.pattern_file, PatternError))
         return file
+
+    @property
+    def operation_seconds(self) -> dict[str, float]:
+        """The estimated time of each operation on all sheets; ``""`` for the rest."""
+        found: dict[str, float] = {}
+        for sheet in self.dry_runs:
+            for name, seconds in sheet.operation_seconds.items():
+                found[name] = found.get(name, 0.0) + seconds
+        return {name: found[name] for name in (*OPERATIONS, "") if name in found}
+
+    def quicker(self) -> tuple[QuickerWay, ...]:
+        """What would make the job quicker, measured (:mod:`miurafab.workflow.quicker`).
+
+        Returns
+        -------
+        tuple of QuickerWay
+            Each a ``change`` in words, and the ``seconds`` that the job would take.
+        """
+        return quicker_ways(self)
 
     def plot(self) -> list[Axes]:
         """Draw what is made of each sheet (:meth:`DrawnLayout.plot`)."""

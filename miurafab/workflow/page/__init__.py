@@ -27,7 +27,7 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.contact import triangulate
 from miurafab.version import __version__
-from miurafab.workflow.dry_run import LAYERS, SheetPreview, clock_text, length_text
+from miurafab.workflow.dry_run import LAYERS, SheetPreview, at_work, clock_text, length_text
 from miurafab.workflow.preview import Preview
 
 _SCRIPTS = ("viewer.js", "sheets.js", "fold.js", "page.js")
@@ -115,7 +115,8 @@ def _data(
     if preview is not None:
         facts["Sheets"] = f"{len(preview.sheets)}"
         facts["Machine time"] = clock_text(preview.seconds)
-        facts["Beam on"] = clock_text(sum(sheet.beam_on_seconds for sheet in preview.sheets))
+        working = sum(sheet.beam_on_seconds for sheet in preview.sheets)
+        facts[at_work(preview.machine).capitalize()] = clock_text(working)
         facts["Drawn"] = length_text(sum(sheet.cut_mm for sheet in preview.sheets))
         facts["Travel"] = length_text(sum(sheet.travel_mm for sheet in preview.sheets))
     if pattern is not None:

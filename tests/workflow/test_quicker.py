@@ -1,0 +1,46 @@
+"""What a job takes by operation, and what would make it quicker, against the jobs made so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from problems import regular
+
+import miurafab as mf
+from miurafab.profiles.shipped import shipped_directory
+from miurafab.workflow.dry_run import at_work
+
+CARD = (shipped_directory("materials") / "card-250.toml").read_text()
+SCORED = "".join(f'[creases.{kind}]\nmode = "score"\n' for kind in ("mountain", "valley", "tab"))
+CHANGES = {
+    "all creases scored (mode = 'score')": lambda text: f"{text}\n{SCORED}",
+    "valleys scored (mode = 'score')": lambda text: f'{text}\n[creases.valley]\nmode = "score"\n',
+    "dashes of 2.4 mm (cut)": lambda text: text.replace('cut = "1.2mm"', 'cut = "2.4mm"'),
+}
+
+
+def test_the_ways_that_are_told_are_as_quick_as_told(tmp_path):
+    knife = mf.load_machine("grbl-knife-a3")
+    pattern = regular(9, 7)
+    job = mf.sheets(pattern, machine=knife)
+    told = job.quicker()
+    assert {way.change for way in told} == set(CHANGES)
+    assert [way.seconds for way in told] == sorted(way.seconds for way in told)
+    for way in told:
+        file = Path(tmp_path, "other.toml")
+        file.write_text(CHANGES[way.change](CARD))
+        made = mf.sheets(pattern, machine=knife, material=file)
+        assert way.seconds == pytest.approx(made.seconds, rel=0.05)
+        assert made.seconds < 0.95 * job.seconds
+
+
+@pytest.mark.parametrize(
+    ("machine", "word"),
+    [("grbl-laser-400", "beam on"), ("grbl-pen-a4", "pen down"), ("grbl-knife-a3", "knife down")],
+)
+def test_the_operations_take_the_time_of_the_job(machine, word):
+    job = mf.sheets(regular(5, 5), machine=machine)
+    assert sum(job.operation_seconds.values()) == pytest.approx(job.seconds, abs=0.1)
+    assert {"engrave", "cut"} <= set(job.operation_seconds)
+    assert at_work(job.machine) == word
