@@ -110,6 +110,11 @@ RULES = {
     "untabbed": Rule(
         "warning", "edges of seams, or of open borders with tabs, without room for one"
     ),
+    "small-facets": Rule("warning", "facets too narrow for the thickness of the sheet, or to hold"),
+    "sharp-corners": Rule("warning", "corners whose two rows of dashes run into each other"),
+    "single-dash": Rule("warning", "creases of one dash alone, beside which they may fold"),
+    "stiff-creases": Rule("warning", "creases of which less is burnt than half the usual share"),
+    "thin-bridges": Rule("warning", "bridges narrower than the kerf or the thickness"),
     "scaled": Rule("warning", "settings of a material on a laser that they were not meant for"),
     "other-forces": Rule("warning", "forces of a material that were found on another machine"),
     "unlettered": Rule("warning", "names and labels without room on the sheets"),

@@ -20,6 +20,7 @@ from miurafab.display import Shown
 from miurafab.fabrication.beam_findings import beam_findings
 from miurafab.fabrication.borders import OpenBorder, open_borders
 from miurafab.fabrication.caps import capped
+from miurafab.fabrication.feasibility import require_foldable, strength_findings
 from miurafab.fabrication.kit.plan import FoldersKit, folders_kit
 from miurafab.fabrication.kit.rim_texts import rim_texts
 from miurafab.fabrication.labels import AbsentLabel
@@ -226,15 +227,16 @@ def lay_out(
 ) -> DrawnLayout:
     """The pattern laid out on sheets of the machine's bed, as ``options`` say; deterministic.
 
-    Raises :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed or is not a simple
-    polygon, if the dashes of the material cannot be drawn, if the stock does not suffice, or if the
-    pattern or the material lacks what an option asks for.
+    Raises :class:`~miurafab.errors.LayoutError` if a facet does not fit the bed, is not a simple
+    polygon or is narrower than the sheet is thick, if the dashes of the material cannot be drawn,
+    if the stock does not suffice, or if the pattern or the material lacks what an option asks for.
     """
     options = options or LayoutOptions()
     pattern = capped(opened(pattern, options), options)
     material = worked(material, machine, options)
     stock = lay_stock(options, machine.bed, material.grain)
     plan = plan_patches(pattern, stock, material, options)
+    require_foldable(pattern, material)
     framed, patches, nesting = plan.framed, plan.patches, plan.nesting
     outlined = framed.outlined
     sheets, placements = _sheets(nesting, patches, stock)
@@ -264,6 +266,7 @@ def lay_out(
         totals=_totals(pattern, outlined, patches, nesting, toolpaths + behind, usable),
         findings=(
             *beam_findings(machine, material),
+            *strength_findings(pattern, material, options),
             *layout_findings(pattern, framed, nesting, lettering, rim, drawn, material, options),
         ),
         borders=open_borders(pattern),
