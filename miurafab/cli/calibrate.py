@@ -36,7 +36,7 @@ def calibrate(
     feed: Annotated[float | None, option(_OPERATION["feed"].kind, "Feed of that cut.")] = None,
     console: Console = Console(),
 ) -> int:
-    """Make a test sheet: dashes against power and feed, or against force, scores, kerf, a coupon.
+    """Make a test sheet: dashes against power or force, scores, kerf, a coupon.
 
     Preview and cut it like any job, then keep the best settings with 'miurafab materials add'.
     """

@@ -128,7 +128,7 @@ def calibration_sheet(machine: MachineProfile, material: Material) -> Calibratio
     :class:`~miurafab.errors.LayoutError` for a bed that is too small.
     """
     material = tried_on(material, machine)
-    trial = _Trial(machine, material)
+    trial = _TrialBlock(machine, material)
     coupon = unfold(regular_miura(_COUPON, *_COUPON_GRID))
     across, along = np.ptp(coupon.vertices_coords, axis=0).tolist()
     lasing = machine.tool.laser is not None
@@ -166,7 +166,7 @@ def calibration_sheet(machine: MachineProfile, material: Material) -> Calibratio
     )
 
 
-class _Trial:
+class _TrialBlock:
     """The flaps and squares, drawn while they are numbered: ``labels`` by patch number, and the
     strokes of each setting on a pen of its own.
     """
