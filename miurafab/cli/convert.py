@@ -7,16 +7,19 @@ from typing import Annotated
 
 import miurafab
 from miurafab.cli.console import Console
-from miurafab.cli.declared import argument, option
+from miurafab.cli.declared import argument, option, takes
+from miurafab.cli.sheets import scale_options
 from miurafab.errors import DONE
 from miurafab.options import Choice, File, length
 
 EXAMPLES = (
     "miurafab convert hypar.fold hypar.svg",
+    "miurafab convert hypar.fold small.fold --scale 0.5",
     "miurafab convert flat.obj sheet.fold --folded folded.obj",
 )
 
 
+@takes(scale_options)
 def convert(
     source: Annotated[Path, argument("IN", "A .fold, .svg, .dxf, .cp, .opx or flat .obj file.")],
     target: Annotated[
@@ -45,12 +48,13 @@ def convert(
         ),
     ] = None,
     console: Console = Console(),
+    **given: str,
 ) -> int:
     """Convert a pattern from one format to another.
 
     The endings of the files name the formats: FOLD, SVG, DXF, CP, OPX, OBJ, STL and GLB.
     """
-    done = miurafab.convert(source, target, folded=folded, form=form, tolerance=tolerance)
+    done = miurafab.convert(source, target, folded=folded, form=form, tolerance=tolerance, **given)
     for finding in done.findings:
         console.note(finding.sentence)
     report = done.report()

@@ -28,7 +28,14 @@ def _layout_options() -> type:
     return LayoutOptions
 
 
-@takes(_layout_options)
+def scale_options() -> type:
+    """The class that declares the size of a pattern."""
+    from miurafab.workflow.scaling import ScaleOptions
+
+    return ScaleOptions
+
+
+@takes(_layout_options, scale_options)
 def sheets(
     file: Annotated[Path, argument("FILE", "The pattern, a FOLD file.")],
     /,
@@ -91,6 +98,7 @@ def _answer(job: JobDirectory, out: Path) -> dict[str, Any]:
             {
                 "name": sheet.name,
                 "stock": sheet.stock,
+                "card_mm": sheet.card_mm,
                 "patches": len(sheet.placements),
                 "seconds": round(sum(seconds[name] for name in sheet.passes), 1),
             }
@@ -148,6 +156,8 @@ def _show(console: Console, answer: dict[str, Any], job: JobDirectory) -> None:
         if totals["sheets"] > totals["sheets_bound"]
         else ""
     )
+    if len(sheets) == 1:
+        facts["needs card of"] = _card(sheets[0])
     for key in ("cut", "perforated", "travel"):
         facts[key] = length_text(totals[f"{key}_mm"])
     facts["machine time"] = clock_text(totals["seconds"])
@@ -173,14 +183,22 @@ def _show(console: Console, answer: dict[str, Any], job: JobDirectory) -> None:
                 for each in compared
             ],
         )
-    rows = [(sheet["name"], sheet["patches"], clock_text(sheet["seconds"])) for sheet in sheets]
+    rows = [
+        (sheet["name"], sheet["patches"], _card(sheet), clock_text(sheet["seconds"]))
+        for sheet in sheets
+    ]
     if any(sheet["stock"] for sheet in sheets):
         cut_from = [(sheet["stock"] or "a whole sheet",) for sheet in sheets]
         console.rows(
-            ("sheet", "patches", "machine time", "cut from"),
+            ("sheet", "patches", "needs card of", "machine time", "cut from"),
             [row + end for row, end in zip(rows, cut_from, strict=True)],
         )
     elif len(sheets) > 1:
-        console.rows(("sheet", "patches", "machine time"), rows)
+        console.rows(("sheet", "patches", "needs card of", "machine time"), rows)
     console.findings(job.findings)
     console.line(f"Look at it first: miurafab preview {answer['job']}")
+
+
+def _card(sheet: dict[str, Any]) -> str:
+    width, height = sheet["card_mm"]
+    return f"{width:g} x {height:g} mm"

@@ -190,6 +190,7 @@ def _sheet(table: dict[str, Any], where: str) -> Sheet:
         stock=_text(table.get("stock", "")),
         grain=_text(table.get("grain", "none")),
         defects_mm=tuple(tuple(map(_pair, ring)) for ring in table.get("defects_mm", ())),
+        card_mm=_pair(card) if (card := table.get("card_mm")) is not None else None,
     )
 
 

@@ -102,7 +102,7 @@ class Plan:
 
 
 @dataclass(frozen=True, eq=False)
-class _Trial:
+class _NestedSplit:
     """A split, nested: ``rest_mm`` is J without its sheets."""
 
     face_patch: Ints
@@ -189,7 +189,9 @@ class _Planner:
         usual = self.split(self.room, self.options, improve=True)
         if usual.max() >= _MANY:
             framed, patches, problem = self.framed(usual)
-            trial = _Trial(usual, framed, patches, problem, nest(problem), self.rest_mm(usual))
+            trial = _NestedSplit(
+                usual, framed, patches, problem, nest(problem), self.rest_mm(usual)
+            )
             return self.made(trial, [trial])
         today = self.trial(usual)
         trials = [today, *self.search(today)]
@@ -203,7 +205,7 @@ class _Planner:
                 trials[0] = final
         return self.made(final, [final if trial is best else trial for trial in trials])
 
-    def search(self, today: _Trial) -> list[_Trial]:
+    def search(self, today: _NestedSplit) -> list[_NestedSplit]:
         """Other splits, nested by the first pass, that may be better than ``today``."""
         wasteful = today.price > self.goal + 1e-9
         if not wasteful and self.slivers_mm(today.face_patch) == 0:
@@ -253,9 +255,9 @@ class _Planner:
                 seen.add(self.key(found))
                 yield found, room
 
-    def dissolve(self, trial: _Trial) -> list[_Trial]:
+    def dissolve(self, trial: _NestedSplit) -> list[_NestedSplit]:
         """``trial`` with small patches cut up, one after the other, as long as J falls."""
-        found: list[_Trial] = []
+        found: list[_NestedSplit] = []
         tries = 0
         while trial.price > self.goal + 1e-9:
             areas = patch_areas(self.areas, trial.face_patch)
@@ -277,7 +279,9 @@ class _Planner:
                 return found
         return found
 
-    def promising(self, face_patch: Ints, least: float, *, within: bool = False) -> _Trial | None:
+    def promising(
+        self, face_patch: Ints, least: float, *, within: bool = False
+    ) -> _NestedSplit | None:
         """The split nested by the first pass; None if J cannot be below ``least``, or, with
         ``within``, is not.
         """
@@ -294,13 +298,13 @@ class _Planner:
             return None  # The stock does not suffice, or a tab on another side is too wide for it.
         if nesting is None:
             return None
-        return _Trial(face_patch, framed, patches, problem, nesting, rest)
+        return _NestedSplit(face_patch, framed, patches, problem, nesting, rest)
 
-    def trial(self, face_patch: Ints) -> _Trial:
+    def trial(self, face_patch: Ints) -> _NestedSplit:
         framed, patches, problem = self.framed(face_patch)
         nesting = first_nesting(problem)
         assert nesting is not None
-        return _Trial(face_patch, framed, patches, problem, nesting, self.rest_mm(face_patch))
+        return _NestedSplit(face_patch, framed, patches, problem, nesting, self.rest_mm(face_patch))
 
     def split(self, room: Space, options: LayoutOptions, *, improve: bool = False) -> Ints:
         return split(
@@ -322,7 +326,7 @@ class _Planner:
         labels = tuple(patch.label for patch in patches)
         return framed, patches, Problem(outlines, labels, self.stock.kinds)
 
-    def worse(self, trial: _Trial) -> float:
+    def worse(self, trial: _NestedSplit) -> float:
         """J of a split."""
         return self.worth * trial.price + trial.rest_mm
 
@@ -354,7 +358,7 @@ class _Planner:
         smallest = float(self.shares(face_patch).min())
         return int(face_patch.max()), round(self.seam_mm(face_patch), 3), round(smallest, 6)
 
-    def made(self, final: _Trial, trials: list[_Trial]) -> Plan:
+    def made(self, final: _NestedSplit, trials: list[_NestedSplit]) -> Plan:
         """The plan, with the alternatives that have fewer sheets or less glue."""
         rows = {
             each.nesting.sheets: each

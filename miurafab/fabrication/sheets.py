@@ -69,7 +69,8 @@ class Sheet:
     ``defects_mm`` are closed curves on which nothing lies.
 
     ``back`` is the name of the program for its back, which is made before the front, or None.
-    ``travel_mm`` is the length travelled with the beam off.
+    ``travel_mm`` is the length travelled with the beam off. ``card_mm`` are width and height of the
+    smallest card with its corner at the bed's, whole mm, from which the patches can be cut.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Sheet:
     stock: str = ""
     grain: str = "none"
     defects_mm: tuple[Ring, ...] = ()
+    card_mm: tuple[float, float] | None = None
 
     @property
     def passes(self) -> tuple[str, ...]:
@@ -239,7 +241,8 @@ def lay_out(
     require_foldable(pattern, material)
     framed, patches, nesting = plan.framed, plan.patches, plan.nesting
     outlined = framed.outlined
-    sheets, placements = _sheets(nesting, patches, stock)
+    both_sides = options.two_sided or options.marks == "back"
+    sheets, placements = _sheets(nesting, patches, stock, both_sides)
     motion = motion_of(patches, placements, np.array([slot.sheet for slot in nesting.slots]))
     lettering = texts_of(pattern, outlined, framed.labels, patches, motion, options)
     blanks = [Blank(each.name, each.width_mm, each.height_mm, stock.margin_mm) for each in sheets]
@@ -311,9 +314,11 @@ def _kinds(nesting: Nesting) -> list[int]:
 
 
 def _sheets(
-    nesting: Nesting, patches: tuple[Patch, ...], stock: LaidStock
+    nesting: Nesting, patches: tuple[Patch, ...], stock: LaidStock, both_sides: bool
 ) -> tuple[tuple[Sheet, ...], list[Placement]]:
-    """The sheets with their patches, and the placement of each patch."""
+    """The sheets with their patches, and the placement of each patch. A sheet that is turned over
+    is as large as the card, if it may be of any size: its registration holes lie on the card.
+    """
     placements = [
         Placement(
             patch=patch.id,
@@ -325,21 +330,30 @@ def _sheets(
     ]
     kinds = _kinds(nesting)
     on_sheet: list[list[Placement]] = [[] for _ in kinds]
-    for placement, slot in zip(placements, nesting.slots, strict=True):
+    far = np.zeros((len(kinds), 2))
+    for patch, placement, slot in zip(patches, placements, nesting.slots, strict=True):
         on_sheet[slot.sheet].append(placement)
-    sheets = tuple(
-        Sheet(
-            f"sheet-{number:02d}",
-            stock.sheets[kind].width_mm,
-            stock.sheets[kind].height_mm,
-            tuple(placed),
-            stock=stock.sheets[kind].name,
-            grain=stock.fibres[kind],
-            defects_mm=stock.sheets[kind].defects_mm,
+        outline = placement.from_patch(patch.outline_mm)
+        far[slot.sheet] = np.maximum(far[slot.sheet], outline.max(axis=0))
+    sheets = []
+    for number, (kind, placed) in enumerate(zip(kinds, on_sheet, strict=True)):
+        cut_from = stock.sheets[kind]
+        whole = (cut_from.width_mm, cut_from.height_mm)
+        card = np.minimum(np.ceil(far[number] + stock.margin_mm - 1e-6), whole).tolist()
+        width, height = card if both_sides and not cut_from.name else whole
+        sheets.append(
+            Sheet(
+                f"sheet-{number + 1:02d}",
+                width,
+                height,
+                tuple(placed),
+                stock=cut_from.name,
+                grain=stock.fibres[kind],
+                defects_mm=cut_from.defects_mm,
+                card_mm=(card[0], card[1]),
+            )
         )
-        for number, (kind, placed) in enumerate(zip(kinds, on_sheet, strict=True), start=1)
-    )
-    return sheets, placements
+    return tuple(sheets), placements
 
 
 def _totals(

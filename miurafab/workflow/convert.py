@@ -14,10 +14,13 @@ import numpy as np
 from miurafab.display import Shown
 from miurafab.files import AnyPath, as_path, new_file
 from miurafab.findings import Finding, findings_json
+from miurafab.options import read_options
+from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.formats.files import SOLIDS, WITHOUT_ANGLES, WRITTEN, load, write_pattern
 from miurafab.workflow.patterns import require_consistent
+from miurafab.workflow.scaling import ScaleOptions, scaled
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,6 +71,7 @@ def convert(
     folded: AnyPath | None = None,
     form: str | None = None,
     tolerance: float | None = None,
+    **options: Any,
 ) -> Conversion:
     """Read the pattern in ``source`` and write it to ``target``, in the formats of their endings.
 
@@ -84,6 +88,7 @@ def convert(
         pattern has a folded form.
     tolerance : float, optional
         How near the ends of lines in a drawing count as met, mm.
+    {options}
 
     Returns
     -------
@@ -108,6 +113,7 @@ def convert(
     target = new_file(target, "The file to write", WRITTEN)
     pattern = load(source, folded=folded, tolerance=tolerance)
     require_consistent(pattern, str(source))
+    pattern = scaled(pattern, read_options(ScaleOptions, options))
     findings = [] if source.suffix.lower() == ".fold" else _assumed(source, pattern)
     write_pattern(pattern, target, title=source.stem, form=form)
     ending = target.suffix.lower()
@@ -123,6 +129,9 @@ def convert(
             says = "tells mountains from valleys and no fold angles"
             findings.append(_loss("no-fold-angles", target, says))
     return Conversion(source, target, pattern, tuple(findings))
+
+
+described(convert, ScaleOptions)
 
 
 def _loss(code: str, target: Path, says: str) -> Finding:

@@ -18,7 +18,7 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import DrawnLayout, lay_out
 from miurafab.files import AnyPath, as_path, read_bytes, write_draft
 from miurafab.gcode.job import Job
-from miurafab.options import read_options, written_options
+from miurafab.options import declared, read_options, written_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
@@ -45,6 +45,7 @@ from miurafab.workflow.manifest import LAYOUT, sha256, write_manifest
 from miurafab.workflow.patterns import PatternLike, sound_pattern
 from miurafab.workflow.picture import first_sheet
 from miurafab.workflow.quicker import QuickerWay, quicker_ways
+from miurafab.workflow.scaling import ScaleOptions, scaled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -280,16 +281,19 @@ def sheets(
     >>> job.layout.totals.sheets
     1
     """
+    of_size = {name: options.pop(name, None) for name in declared(ScaleOptions)}
     wanted, usual_machine, usual_material = layout_options(options, design)
     machine = machine if machine is not None else usual_machine
     material = material if material is not None else usual_material
-    given = sound_pattern(pattern)
+    read = sound_pattern(pattern)
+    given = scaled(read, read_options(ScaleOptions, of_size))
     file = None if isinstance(pattern, CreasePattern | Shown) else as_path(pattern, "The pattern")
     name = file.stem if file is not None else given.name or "sheet"
+    file = file if given is read else None
     return make_job(given, name, machine, material, wanted, file=file, on_progress=on_progress)
 
 
-described(sheets, LayoutOptions)
+described(sheets, LayoutOptions, ScaleOptions)
 
 
 def make_job(
