@@ -47,8 +47,9 @@ def sheets(
         list[str] | None,
         option(
             Text("FORMAT,..."),
-            "Draw more than SVG: dxf, dxf-r2010, pdf, hpgl, tiled-a4, tiled-a3, tiled-letter, "
-            "tiled-legal (pages to join), picture (of the pattern); comma-separated.",
+            "Draw more than SVG: dxf, dxf-r2010, pdf, hpgl, picture (of the pattern), and tiled- "
+            "with a page (to join): a0 to a6, letter, legal, tabloid or a measure such as "
+            "200x300mm; comma-separated.",
             "--format",
             "--formats",
         ),

@@ -7,8 +7,9 @@ dxf          sheet-01.dxf                 cutters and CAD: R12, which every prog
 dxf-r2010    sheet-01-r2010.dxf           the same in R2010, with its unit (mm), outlines whole
 pdf          sheet-01.pdf                 large printers and cutters: the page is the sheet
 hpgl         sheet-01.hpgl                cutting plotters
-tiled-a4     sheet-01-a4.pdf              ordinary printers, likewise -a3, -letter, -legal: pages
-                                          to be joined, mountains and valleys in their colours
+tiled-a4     sheet-01-a4.pdf              ordinary printers, likewise -a0 to -a6, -letter, -legal,
+                                          -tabloid and -200x300mm: pages to be joined,
+                                          mountains and valleys in their colours
 picture      pattern.svg                  people: the flat pattern with its patches
 ============ ============================ ======================================================
 """
@@ -16,6 +17,7 @@ picture      pattern.svg                  people: the flat pattern with its patc
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
@@ -26,7 +28,7 @@ from miurafab.fabrication.drawing.dxf import sheet_dxf
 from miurafab.fabrication.drawing.hpgl import sheet_hpgl
 from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.svg import layout_svg
-from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, tiled_pdf
+from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, page_size, tiled_pdf
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.sheets import DrawnLayout
 from miurafab.fabrication.toolpath import Toolpath
@@ -48,11 +50,18 @@ _SHEETS: Mapping[str, tuple[str, Draw]] = {
     ),
     "pdf": (".pdf", lambda path, letters, title: sheets_pdf((path,), path.sheet, letters)),
     "hpgl": (".hpgl", lambda path, letters, title: sheet_hpgl(path, letters).encode("ascii")),
-    **{f"tiled-{page}": (f"-{page}.pdf", _tiled(page)) for page in PAGES_MM},
 }
-FORMATS = (*_SHEETS, "picture")
-ENDINGS = tuple(ending for ending, _ in _SHEETS.values())
-"""The endings of the names of drawings, after the name of their sheet."""
+_TILED = "tiled-"
+FORMATS = (*_SHEETS, *(f"{_TILED}{page}" for page in PAGES_MM), "picture")
+_ENDING = re.compile(
+    "|".join(re.escape(ending) for ending, _ in _SHEETS.values())
+    + rf"|-({'|'.join(PAGES_MM)}|[0-9a-z.]+x[0-9a-z.]+)\.pdf"
+)
+
+
+def is_ending(text: str) -> bool:
+    """Whether the names of drawings may have ``text`` behind the name of their sheet."""
+    return _ENDING.fullmatch(text) is not None
 
 
 def read_formats(given: Iterable[str]) -> tuple[str, ...]:
@@ -64,7 +73,9 @@ def read_formats(given: Iterable[str]) -> tuple[str, ...]:
     # Every sheet is always drawn as SVG.
     names = list(dict.fromkeys(name for name in names if name != "svg"))
     for name in names:
-        if name not in FORMATS:
+        if name.startswith(_TILED) and name[len(_TILED) :][:1].isdigit():
+            page_size(name.removeprefix(_TILED))
+        elif name not in FORMATS:
             near = difflib.get_close_matches(name, FORMATS, 1)
             hint = f"; did you mean '{near[0]}'?" if near else f": there are {', '.join(FORMATS)}."
             raise InputError(f"'{name}' is not a drawing format{hint}")
@@ -82,6 +93,7 @@ def drawings(
         if name == "picture":
             yield PICTURE, layout_svg(pattern, layout).encode("utf-8")
             continue
-        ending, draw = _SHEETS[name]
+        page = name.removeprefix(_TILED)
+        ending, draw = _SHEETS.get(name) or (f"-{page}.pdf", _tiled(page))
         for toolpath in layout.passes:
             yield f"{toolpath.sheet}{ending}", draw(toolpath, letters, title)

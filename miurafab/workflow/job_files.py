@@ -16,7 +16,7 @@ from miurafab.errors import InputError
 from miurafab.files import Reading, file_name, parse_json, read_bytes, read_text, write_draft
 from miurafab.profiles import MachineProfile, Material, load_machine, load_material
 from miurafab.profiles.shipped import Kind, shipped_directory
-from miurafab.workflow.drawings import ENDINGS, PICTURE
+from miurafab.workflow.drawings import PICTURE, is_ending
 from miurafab.workflow.manifest import LAYOUT, MANIFEST
 from miurafab.workflow.whole_folder import put_in_place, settle, whole_folder
 
@@ -27,7 +27,7 @@ _SHEET = re.compile(r"sheet-[0-9]{2,}(-back)?")
 OPENED, CAPPED = "-opened", "-capped"
 """What stands behind the name of a pattern that was opened, or capped, for its job."""
 _CHANGED = re.compile(rf"({OPENED}|{CAPPED})\.fold$")
-_ENDINGS = (".nc", ".plt", ".svg", *ENDINGS)
+_ENDINGS = (".nc", ".plt", ".svg")
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
@@ -93,15 +93,24 @@ def _earlier(directory: Path) -> tuple[set[str], set[str]]:
         copies = [made["pattern"]["file"], f"{made['machine']}.toml", f"{made['material']}.toml"]
         copies.append(_CHANGED.sub(".fold", copies[0]))  # the pattern as it was fitted
         known = {file_name(name, str(layout)) for name in copies}
-    drawn = {f"{name}{ending}" for name in names for ending in _ENDINGS}
+    drawn = {
+        path.name
+        for path in directory.iterdir()
+        for name in names
+        if path.name.startswith(name) and _is_drawn(path.name[len(name) :])
+    }
     return drawn | {LAYOUT, MANIFEST, PICTURE, *GUIDES}, known
 
 
 def _is_of_job(name: str) -> bool:
     """Whether ``name`` is that of a file that every job may have, and that another removes."""
     sheet = _SHEET.match(name)
-    drawn = sheet is not None and name[sheet.end() :] in _ENDINGS
+    drawn = sheet is not None and _is_drawn(name[sheet.end() :])
     return drawn or name in (LAYOUT, MANIFEST, PICTURE, *GUIDES)
+
+
+def _is_drawn(ending: str) -> bool:
+    return ending in _ENDINGS or is_ending(ending)
 
 
 def settle_job(directory: Path) -> None:

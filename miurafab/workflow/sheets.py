@@ -128,8 +128,8 @@ class SheetJob(Shown):
         directory : str or os.PathLike
             The job directory. It is made if need be.
         formats : str or collection of str
-            Drawings besides SVG: dxf, dxf-r2010, pdf, hpgl, tiled-a4, tiled-a3, tiled-letter,
-            tiled-legal, picture.
+            Drawings besides SVG: dxf, dxf-r2010, pdf, hpgl, picture, and tiled-
+            with a page: a0 to a6, letter, legal, tabloid, or a measure (tiled-200x300mm).
         on_progress : callable, optional
             Called with a fraction in 0..1 and a short text.
 
@@ -145,6 +145,8 @@ class SheetJob(Shown):
         """
         folder = as_path(directory, "The job directory")
         wanted = read_formats((formats,) if isinstance(formats, str) else formats)
+        if self.machine.dialect == "hpgl":  # whose programs are HPGL
+            wanted = tuple(name for name in wanted if name != "hpgl")
         tell = on_progress or (lambda fraction, note: None)
         layout, machine = self.layout, self.machine
         letters = edge_letters(layout, self.pattern)

@@ -29,6 +29,7 @@ from miurafab.fabrication.drawing.tiles import EDGE_MM, PAGES_MM, Tiling, tiled_
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out
+from miurafab.fabrication.toolpath import Toolpath
 from miurafab.findings import Finding
 from miurafab.profiles import OPERATIONS, load_machine, load_material
 from miurafab.profiles.material import Crease
@@ -184,10 +185,46 @@ def test_blank_tiles_are_not_printed():
     assert len(pages) == 2
 
 
+def test_no_page_is_a_sliver_and_none_repeats_its_neighbours():
+    """A drawing just larger than a page is on two halves; a stroke in a strip alone asks for no
+    page of its own."""
+    letters = np.array(["B"])
+    across = np.array([[0.0, 0.0], [200.0, 0.0], [0.0, 30.0], [200.0, 30.0]])
+    path = Toolpath("one", 400.0, 400.0, across, np.array([0, 2, 4]), *np.zeros((3, 2), int))
+    guide = pypdf.PdfReader(io.BytesIO(tiled_pdf((path,), letters, "t", Tiling("150x60mm"))))
+    frames = [frame_of(page, guide) for page in guide.pages[1:]]
+    # 200 mm and 2 mm at each end, on two pages with a strip of 10 mm in common.
+    assert frames == [pytest.approx((107.0, 34.0), abs=1e-3)] * 2
+    # Three strokes, one of which lies in the middle strip: its half belongs to a page already.
+    ends = np.array([[0, 0], [30, 0], [0, 200], [1, 200], [105, 0], [106, 0]], dtype=float)
+    offsets = np.array([0, 2, 4, 6])
+    path = Toolpath("one", 400.0, 400.0, ends, offsets, *np.zeros((3, 3), int))
+    tiles = tiled_pdf((path,), letters, "t", Tiling("150x150mm"))
+    assert len(pages_of(tiles)) - 1 == 2
+
+
+def frame_of(page, reader):
+    """Width and height of the frame around a tile, mm: the last rectangle of its page."""
+    content = pypdf.generic.ContentStream(page.get_contents(), reader)
+    *_, last = (operands for operands, operator in content.operations if operator == b"re")
+    return tuple(float(side) * POINT_MM for side in last[2:])
+
+
+@pytest.mark.parametrize("name", ["dxf", "dxf-r2010"])
+def test_drawings_say_that_they_are_in_mm(layout, name):
+    version = {"dxf": "R12", "dxf-r2010": "R2010"}[name]
+    text = sheet_dxf(layout.toolpaths[0], version)
+    assert ezdxf.read(io.StringIO(text)).header["$INSUNITS"] == 4
+    assert re.search(r"\$INSUNITS\n *70\n *4\n", text)
+
+
 def test_a_page_that_cannot_be_is_refused(layout):
     letters = edge_letters(layout, regular(53, 37))
     with pytest.raises(InputError, match="'a9'"):
         tiled_pdf(layout.toolpaths, letters, "test", Tiling(page="a9"))
+    for measure in ("20x300mm", "200x", "200x300x400"):
+        with pytest.raises(InputError, match=r"nor a measure .* such as 200x300mm"):
+            tiled_pdf(layout.toolpaths, letters, "test", Tiling(page=measure))
     with pytest.raises(InputError, match="no room"):
         tiled_pdf(layout.toolpaths, letters, "test", Tiling(margin_mm=120))
 

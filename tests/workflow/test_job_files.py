@@ -5,7 +5,9 @@ import json
 import os
 
 import pytest
+from problems import regular
 
+import miurafab as mf
 from miurafab.errors import InputError
 from miurafab.origami.formats.fold import fold_text
 from miurafab.origami.miura import MiuraCell, regular_miura
@@ -109,3 +111,14 @@ def test_profiles_of_one_name_are_told_apart(tmp_path):
     assert (staging / "grbl-laser-400.toml").read_text() == "own"
     with pytest.raises(InputError, match="both called grbl-laser-400"):
         keep_profiles(FLUIDNC, job / "grbl-laser-400.toml", job, staging)
+
+
+def test_a_sheet_in_hpgl_is_one_file_and_a_page_of_any_size_is_of_the_job(tmp_path):
+    made = mf.sheets(regular(), machine="hpgl-cutter-a3", material="paper-100")
+    made.write(tmp_path, formats="hpgl,tiled-200x300mm,tiled-tabloid")
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"sheet-01.plt", "sheet-01-200x300mm.pdf", "sheet-01-tabloid.pdf"} <= names
+    assert "sheet-01.hpgl" not in names
+    made.write(tmp_path)
+    left = {path.name for path in tmp_path.iterdir()}
+    assert names - left == {"sheet-01-200x300mm.pdf", "sheet-01-tabloid.pdf"}

@@ -1,8 +1,10 @@
 """Sheets as DXF, for cutters and CAD programs: real segments, on the layers of drawings, in mm.
 
 Every program reads R12. It is written line by line, so a hundred thousand dashes need no memory.
-R2010 also states its unit, mm (``$INSUNITS`` = 4), and keeps outlines whole as light-weight
-polylines. The y axis points up, as on the sheet. Only this module imports ezdxf.
+R2010 keeps outlines whole as light-weight polylines. Both state their unit, mm (``$INSUNITS`` = 4,
+``$MEASUREMENT`` = 1): those words came after R12, whose readers skip words that they do not know
+(AutoCAD DXF reference, "HEADER section"), and most programs look for them in any file. The y axis
+points up, as on the sheet. Only this module imports ezdxf.
 """
 
 from __future__ import annotations
@@ -18,6 +20,14 @@ from miurafab.geometry.arrays import Ints
 VERSIONS = ("R12", "R2010")
 
 _DECIMALS = 4
+_R12_HEADER = "".join(
+    f"{line}\n"
+    for line in (
+        *("0", "SECTION", "2", "HEADER", "9", "$ACADVER", "1", "AC1009"),
+        *("9", "$INSUNITS", "70", "4", "9", "$MEASUREMENT", "70", "1", "0", "ENDSEC"),
+    )
+)
+"""Version and unit."""
 
 
 def sheet_dxf(toolpath: Toolpath, version: str = "R12", letters: Letters = NO_LETTERS) -> str:
@@ -43,6 +53,7 @@ def _r12(toolpath: Toolpath, layer: Ints) -> str:
     from ezdxf.addons.r12writer import r12writer
 
     stream = io.StringIO()
+    stream.write(_R12_HEADER)
     with r12writer(stream):
         # The writer's add_line takes three times as long.
         stream.writelines(

@@ -27,9 +27,6 @@ from miurafab.origami.seam_lines import SEAM_WORDS, SeamLine, seam_lines
 from miurafab.profiles import OPERATIONS
 
 _INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
-_PICTURE = 1200
-"""The width of a picture in pixels."""
-
 _CREASES = {
     "M": ("mountain", "#c8372d"),
     "V": ("valley", "#2a5fb0"),
@@ -91,7 +88,7 @@ def layout_svg(pattern: CreasePattern, layout: Layout) -> str:
     size = span / 45
     entries = _legend_entries(pattern, lines)
     height += 2 * size * len(entries) + size
-    drawing = _drawing(width, height, (_PICTURE, _short(_PICTURE * height / width)))
+    drawing = _drawing(width, height, (f"{_short(width)}mm", f"{_short(height)}mm"))
     drawing.add(drawing.rect((0, 0), (_short(width), _short(height)), fill="#ffffff"))
     _add_facets(drawing, pattern, points, layout)
     for letter, (name, colour) in _CREASES.items():
@@ -226,7 +223,7 @@ def _add_names(
     drawing.add(group)
 
 
-def _drawing(width: float, height: float, size: tuple[str | int, str | int]) -> svgwrite.Drawing:
+def _drawing(width: float, height: float, size: tuple[str, str]) -> svgwrite.Drawing:
     return svgwrite.Drawing(
         size=size, viewBox=f"0 0 {_short(width)} {_short(height)}", debug=False, profile="full"
     )

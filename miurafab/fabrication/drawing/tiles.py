@@ -4,7 +4,9 @@ The first page shows the sheet and its tiles. Then follows one page for each til
 named like a square of a chess board: A1 is at the lower left. The tiles start at the drawing, not
 at the sheet, because each page costs an edge to glue. Neighbouring pages overlap by a strip with
 numbered crosses; each cross is on both pages at the same place of the sheet, so pages match cross
-on cross. Mountains, valleys and cuts have different colours.
+on cross. The tiles of a sheet are of one size, so no page shows a mere sliver, and a page that
+would show nothing but strips of its neighbours is left out. Mountains,
+valleys and cuts have different colours.
 """
 
 from __future__ import annotations
@@ -37,14 +39,23 @@ from miurafab.fabrication.drawing.pdf import draw_for_people, new_canvas
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.fabrication.wording import count
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.options import Pair, length
 
 PAGES_MM = {
-    "a4": (210.0, 297.0),
+    "a0": (841.0, 1189.0),
+    "a1": (594.0, 841.0),
+    "a2": (420.0, 594.0),
     "a3": (297.0, 420.0),
+    "a4": (210.0, 297.0),
+    "a5": (148.0, 210.0),
+    "a6": (105.0, 148.0),
     "letter": (215.9, 279.4),
     "legal": (215.9, 355.6),
+    "tabloid": (279.4, 431.8),
 }
 """Page sizes by name: width and height in mm (ISO 216; ANSI/ASME Y14.1, US legal)."""
+
+_MEASURE = Pair(length(50, 5000), "WIDTHxHEIGHT", "200x300mm", "x")
 
 CHECK_MM = 50.0
 """The length of the bar for checking the scale of a print."""
@@ -61,7 +72,7 @@ _HOW = (
 
 @dataclass(frozen=True)
 class Tiling:
-    """The tiling of a sheet: a page size of :data:`PAGES_MM`, portrait or landscape, whichever
+    """The tiling of a sheet: a page size of :func:`page_size`, portrait or landscape, whichever
     needs fewer pages, the blank ``margin_mm`` of printers, and the ``overlap_mm`` of neighbouring
     pages.
     """
@@ -71,6 +82,24 @@ class Tiling:
     overlap_mm: float = 10.0
 
 
+def page_size(page: str) -> tuple[float, float]:
+    """Width and height in mm of the ``page``: a name of :data:`PAGES_MM`, or ``200x300mm``.
+
+    Raises :class:`~miurafab.errors.InputError` for a page that is neither.
+    """
+    name = page.lower()
+    if name in PAGES_MM:
+        return PAGES_MM[name]
+    try:
+        width, height = _MEASURE.read(name)
+    except ValueError:
+        raise InputError(
+            f"The page '{page}' is not one of {', '.join(PAGES_MM)}, nor a measure of 50 mm to 5 m "
+            "a side such as 200x300mm."
+        ) from None
+    return float(width), float(height)
+
+
 def tiled_pdf(
     toolpaths: tuple[Toolpath, ...], letters: NDArray[np.str_], title: str, tiling: Tiling
 ) -> bytes:
@@ -78,16 +107,14 @@ def tiled_pdf(
 
     Raises :class:`~miurafab.errors.InputError` for an unknown page or one without room.
     """
-    size = PAGES_MM.get(tiling.page.lower())
-    if size is None:
-        raise InputError(f"The page '{tiling.page}' is not one of {', '.join(PAGES_MM)}.")
+    size = page_size(tiling.page)
     if min(size) <= 2 * tiling.margin_mm + tiling.overlap_mm:
         raise InputError("The page has no room left within its margins and overlap.")
     stream = io.BytesIO()
     canvas = new_canvas(stream, title)
     for toolpath in toolpaths:
         both = [_Tiles(toolpath, letters, each, tiling) for each in (size, size[::-1])]
-        tiles = min(both, key=lambda each: each.columns * each.rows)
+        tiles = min(both, key=lambda each: (len(each.printed), each.columns * each.rows))
         canvas.setPageSize((tiles.page[0] * mm, tiles.page[1] * mm))
         tiles.overview(canvas, title)
         for row, column in tiles.printed:
@@ -108,14 +135,18 @@ class _Tiles:
     ) -> None:
         self.toolpath, self.letters, self.page = toolpath, letters, page
         self.margin, self.overlap = tiling.margin_mm, tiling.overlap_mm
-        self.shown = tuple(side - 2 * self.margin for side in page)
-        self.step = tuple(side - self.overlap for side in self.shown)
         self.origin = toolpath.points.min(axis=0) - EDGE_MM
         self.size = np.ptp(toolpath.points, axis=0) + 2 * EDGE_MM
-        self.columns, self.rows = (
-            max(1, math.ceil((length - self.overlap) / step))
-            for length, step in zip(self.size.tolist(), self.step, strict=True)
+        most = [side - 2 * self.margin for side in page]
+        self.columns, self.rows = counts = [
+            max(1, math.ceil((extent - self.overlap) / (side - self.overlap)))
+            for extent, side in zip(self.size.tolist(), most, strict=True)
+        ]
+        self.step = tuple(
+            (extent - self.overlap) / tiles
+            for extent, tiles in zip(self.size.tolist(), counts, strict=True)
         )
+        self.shown = tuple(step + self.overlap for step in self.step)
 
     @property
     def grid(self) -> str:
@@ -128,10 +159,15 @@ class _Tiles:
         x, y = self.origin.tolist()
         return x + column * self.step[0], y + row * self.step[1]
 
-    def strokes_in(self, row: int, column: int) -> Ints:
-        """The strokes that touch a tile."""
+    def strokes_in(self, row: int, column: int, inset: float = 0.0) -> Ints:
+        """The strokes that touch a tile, without ``inset`` mm on its sides with neighbours."""
         x, y = self.corner(row, column)
-        window = shapely.box(x, y, x + self.shown[0], y + self.shown[1])
+        window = shapely.box(
+            x + inset * (column > 0),
+            y + inset * (row > 0),
+            x + self.shown[0] - inset * (column < self.columns - 1),
+            y + self.shown[1] - inset * (row < self.rows - 1),
+        )
         return np.sort(self._tree.query(window, predicate="intersects"))
 
     @cached_property
@@ -142,9 +178,12 @@ class _Tiles:
 
     @cached_property
     def printed(self) -> list[tuple[int, int]]:
-        """The tiles that are not blank, row by row."""
+        """The tiles that show what no neighbour does, row by row: up to the middle of the strips
+        the tiles share the sheet among themselves.
+        """
         places = [(row, column) for row in range(self.rows) for column in range(self.columns)]
-        return [place for place in places if len(self.strokes_in(*place))]
+        half = self.overlap / 2
+        return [place for place in places if len(self.strokes_in(*place, half))]
 
     def crosses(self) -> Iterator[tuple[int, float, float]]:
         """The number and place on the sheet of each cross: two on each side of a tile that has a
