@@ -227,6 +227,13 @@ class LayoutOptions(Shown):
         group="Cutting",
         page="more",
     )
+    jig_mm: float | None = option(
+        length(0.1, 30),
+        "Also draw the ribs of a jig that carries the folded shell, from board of this thickness.",
+        group="Tabs",
+        default_text="no jig",
+        page="more",
+    )
     two_sided: bool = option(
         Flag(), "Score the valleys from the back of the sheet.", False, group="Cutting", page="more"
     )

@@ -21,6 +21,7 @@ from miurafab.fabrication.beam_findings import beam_findings
 from miurafab.fabrication.borders import OpenBorder, open_borders
 from miurafab.fabrication.caps import capped
 from miurafab.fabrication.feasibility import require_foldable, strength_findings
+from miurafab.fabrication.kit.jig import Jig, jig_of
 from miurafab.fabrication.kit.plan import FoldersKit, folders_kit
 from miurafab.fabrication.kit.rim_texts import rim_texts
 from miurafab.fabrication.labels import AbsentLabel
@@ -187,11 +188,14 @@ class DrawnLayout(Layout):
         The strokes of each sheet, in the order of ``sheets``.
     backs : tuple of Toolpath
         The strokes of each back that is worked on.
+    jig : Jig or None
+        The ribs that carry the folded shell, if they were asked for.
     """
 
     pattern: CreasePattern = field(kw_only=True)
     toolpaths: tuple[Toolpath, ...] = field(kw_only=True)
     backs: tuple[Toolpath, ...] = ()
+    jig: Jig | None = None
 
     def plot(self) -> list[Axes]:
         """Draw what is made of each sheet with matplotlib: cuts, creases and scores in mm.
@@ -235,6 +239,7 @@ def lay_out(
     """
     options = options or LayoutOptions()
     pattern = capped(opened(pattern, options), options)
+    jig = jig_of(pattern, options.jig_mm)
     material = worked(material, machine, options)
     stock = lay_stock(options, machine.bed, material.grain)
     plan = plan_patches(pattern, stock, material, options)
@@ -278,6 +283,7 @@ def lay_out(
         alternatives=plan.alternatives,
         toolpaths=toolpaths,
         backs=behind,
+        jig=jig,
         pattern=pattern,
     )
 

@@ -20,7 +20,7 @@ from miurafab.workflow.drawings import PICTURE, is_ending
 from miurafab.workflow.manifest import LAYOUT, MANIFEST
 from miurafab.workflow.whole_folder import put_in_place, settle, whole_folder
 
-GUIDES = ("assembly.pdf", "assembly.html", "calibration.pdf", "calibration.json")
+GUIDES = ("assembly.pdf", "assembly.html", "jig.svg", "calibration.pdf", "calibration.json")
 """What explains a job; one made in the place of another leaves none of them."""
 _SHEET = re.compile(r"sheet-[0-9]{2,}(-back)?")
 """The names of programs, which begin those of all that is drawn."""

@@ -15,8 +15,9 @@ import numpy as np
 import pypdf
 import pytest
 import shapely
-from problems import regular
+from problems import fitted, regular
 
+from miurafab.errors import OptionError
 from miurafab.fabrication.drawing.assembly_guide import AssemblyGuide, assembly_guide
 from miurafab.fabrication.drawing.glue_sections import GlueSections
 from miurafab.fabrication.drawing.glue_view import GlueView
@@ -24,6 +25,7 @@ from miurafab.fabrication.drawing.kit_sections import KitSections
 from miurafab.fabrication.drawing.sections import Figures, Numbered, Prose, Section
 from miurafab.fabrication.drawing.views import Views
 from miurafab.fabrication.kit.gauge import FLAT_DEG, MOST, STEP_DEG, wedges
+from miurafab.fabrication.kit.jig import jig_of, lower_side
 from miurafab.fabrication.kit.plan import folders_kit, kit_table, read_kit
 from miurafab.fabrication.kit.rim import rim_ends
 from miurafab.fabrication.kit.rows import Row, bend_of, crease_lines, named, numbered
@@ -33,6 +35,7 @@ from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.contact import triangulate
 from miurafab.profiles import load_machine, load_material
 from miurafab.workflow.check_job import check_job
 from miurafab.workflow.sheets import sheets
@@ -365,3 +368,71 @@ def test_the_pictures_in_print_are_made_by_the_command_and_small():
     there = {path.name: path.stat().st_size for path in kit_pictures.FOLDER.iterdir()}
     assert set(shown) == set(there)
     assert max(there.values()) <= 150_000
+
+
+@pytest.mark.parametrize("name", ["hypar", "sphere"])
+def test_the_ribs_of_a_jig_touch_the_shell_and_reach_nowhere_into_it(name):
+    """Against points of the folded form itself, sampled at random over its facets."""
+    pattern = fitted(name, 6, 6).pattern
+    jig = jig_of(pattern, 3.0)
+    rng = np.random.default_rng(15)
+    triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
+    for rib in jig.ribs:
+        axis = "UV".index(rib.name[0])
+        at, lowest = lower_side(jig.shell[triangles], axis, rib.place_mm)
+        body = shapely.Polygon(rib.outline)
+        assert body.is_valid
+        assert body.bounds[1] == 0
+        above = np.flatnonzero(rib.outline[:, 1] > 0)
+        heights = np.interp(rib.outline[above, 0], at, lowest) - rib.outline[above, 1]
+        assert heights.min() > -0.05
+        assert heights.min() < 1.0
+        weights = rng.dirichlet([1, 1, 1], len(triangles))
+        points = np.einsum("tk,tkd->td", weights, jig.shell[triangles])
+        near = points[np.abs(points[:, 1 - axis] - rib.place_mm) < 0.05]
+        assert not any(body.buffer(-0.3).contains(shapely.Point(p[axis], p[2])) for p in near)
+    slots = [np.ptp(rib.outline[:, 1]) for rib in jig.ribs]
+    assert min(slots) >= 20.0
+
+
+def test_the_ribs_of_a_jig_go_into_each_other():
+    """A slot in each of two ribs that cross, and together they are as high as both are there."""
+    jig = jig_of(fitted("hypar", 6, 6).pattern, 3.0)
+    bodies = {rib.name: (rib, shapely.Polygon(rib.outline)) for rib in jig.ribs}
+    for u in "123":
+        for v in "123":
+            (along, one), (across, other) = bodies[f"U{u}"], bodies[f"V{v}"]
+            here, there = (
+                body.intersection(shapely.LineString([(place, -1), (place, 500)])).bounds
+                for body, place in ((one, across.place_mm), (other, along.place_mm))
+            )
+            assert here[1] == 0
+            assert there[1] == pytest.approx(here[3])
+
+
+def test_a_shell_that_closes_round_has_no_jig():
+    pattern = dataclasses.replace(regular(9, 7), folded_coords=None)
+    with pytest.raises(OptionError, match="needs a folded form"):
+        jig_of(pattern, 3.0)
+    assert jig_of(pattern, None) is None
+    turn = np.linspace(0, 2 * np.pi, 9, endpoint=False)
+    angle = np.tile(turn, 7)
+    round_ = np.stack(
+        [50 * np.cos(angle), 50 * np.sin(angle), np.repeat(np.arange(7.0) * 10, 9)], axis=1
+    )
+    with pytest.raises(OptionError, match="closes round"):
+        jig_of(dataclasses.replace(pattern, folded_coords=round_), 3.0)
+
+
+def test_a_jig_is_a_file_of_the_job_and_goes_with_it(tmp_path):
+    pattern = regular(9, 7)
+    job = tmp_path / "job"
+    sheets(pattern, jig="3mm").write(job)
+    drawing = (job / "jig.svg").read_text()
+    assert re.findall(r'width="([\d.]+)mm"', drawing)
+    assert drawing.count("Z") == 6
+    assert "jig.svg" in json.loads((job / "manifest.json").read_text())["files"]
+    assert "Ribs of 3 mm board" in text_of((job / "assembly.pdf").read_bytes())[0]
+    assert check_job(job).valid
+    sheets(pattern).write(job)
+    assert not (job / "jig.svg").exists()

@@ -18,6 +18,7 @@ from reportlab.pdfgen.canvas import Canvas
 
 from miurafab.fabrication.drawing.flow import flow
 from miurafab.fabrication.drawing.glue_sections import GlueSections
+from miurafab.fabrication.drawing.jig_section import jig_section
 from miurafab.fabrication.drawing.kit_sections import KitSections
 from miurafab.fabrication.drawing.page import (
     BOTTOM,
@@ -69,6 +70,8 @@ def assembly_guide(
     views = Views(layout, pattern)
     overview = _Overview(views, machine, material, title)
     sections = [*KitSections(views).sections(), *GlueSections(views).sections()]
+    if layout.jig is not None:
+        sections.append(jig_section(layout.jig, pattern))
     pages: list[Page] = [overview.page]
     for sheet, toolpath in zip(layout.sheets, layout.toolpaths, strict=True):
         pages += SheetPages(views, sheet, toolpath, title).pages()
