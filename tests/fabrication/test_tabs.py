@@ -6,6 +6,7 @@ import dataclasses
 import math
 
 import flat_patterns
+import needles
 import numpy as np
 import pytest
 import shapely
@@ -263,6 +264,15 @@ def test_no_tab_is_a_needle(seed, short, long, shake):
         if unusual[k]:
             assert x.min() >= -1e-6
             assert x.max() <= base + 1e-6
+
+
+def test_random_designs_have_no_needles_and_keep_their_glue():
+    """A sample of ``benchmarks/needles.py``; the second has facets so small that needles were."""
+    for each in needles.sample(20, 1):
+        assert each.needles == 0
+        assert each.kept >= needles.LEAST_KEPT
+    small = needles.sample(20, 1, (4.0, 16.0))
+    assert sum(each.needles for each in small) == 0 < sum(each.needles_before for each in small)
 
 
 def test_the_longest_bare_run_is_told():
