@@ -74,9 +74,9 @@ ANSWERS = {
         "takes pattern and steps without a name, and the rest by name: too many",
     ),
     "33 half a pair": (lambda: mf.fit("hypar", facets="8x"), "is '8x'; write COLSxROWS such as"),
-    "34 a tolerance for a pattern": (
-        lambda: mf.convert("hypar.fold", "b.svg", tolerance=1),
-        "'tolerance' goes with a drawing of lines",
+    "34 a tolerance of nothing": (
+        lambda: mf.convert("hypar.fold", "b.svg", tolerance=0),
+        "'tolerance' is 0",
     ),
 }
 

@@ -43,8 +43,9 @@ def convert(
         float | None,
         option(
             length(above=True),
-            "The largest gap between ends of lines in a drawing that count as one point.",
-            default_text="1/10000 of the median line",
+            "The largest gap between ends of lines in a drawing that count as one point; in a FOLD "
+            "or OBJ file shorter edges vanish, and their ends are one.",
+            default_text="1/10000 of the median line of a drawing",
         ),
     ] = None,
     console: Console = Console(),

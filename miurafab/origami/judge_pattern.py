@@ -116,7 +116,8 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
             "degenerate-edge",
             f"{_these(short, 'edge')} shorter than a millionth of the mean edge (down to "
             f"{edges[short].min():.1e} mm): they cannot be creased or cut, so the sheet cannot "
-            "be made. Fit again with `min_edge`.",
+            "be made. Fit again with `min_edge`, or convert a file of another program with a "
+            "`tolerance` above that.",
             tuple(short.tolist()),
         )
     yield from _shapes(pattern)

@@ -87,7 +87,8 @@ def convert(
         The form to write to an ``.obj``, ``.stl`` or ``.glb``. The default is folded where the
         pattern has a folded form.
     tolerance : float, optional
-        How near the ends of lines in a drawing count as met, mm.
+        How near the ends of lines in a drawing count as met, mm. In a FOLD or OBJ file shorter
+        edges vanish.
     {options}
 
     Returns

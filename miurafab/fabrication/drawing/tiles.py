@@ -60,6 +60,8 @@ _MEASURE = Pair(length(50, 5000), "WIDTHxHEIGHT", "200x300mm", "x")
 CHECK_MM = 50.0
 """The length of the bar for checking the scale of a print."""
 
+_NARROW_MM = 190.0  # a narrower page has room for its field and the bar alone
+
 EDGE_MM = 2.0
 """The distance between the drawing and the edge of the outermost pages."""
 
@@ -273,7 +275,8 @@ class _Tiles:
         foot = margin - 5.5
         text(canvas, margin, foot, _field(row, column), 11, bold=True)
         words = f"{title}, {self.toolpath.sheet}; {self.grid}"
-        text(canvas, margin + 10, foot, words, 7.5, colour=QUIET)
+        if self.page[0] >= _NARROW_MM:
+            text(canvas, margin + 10, foot, words, 7.5, colour=QUIET)
         _check_bar(canvas, self.page[0] - margin, foot)
         canvas.showPage()
 

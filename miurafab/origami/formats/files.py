@@ -23,6 +23,7 @@ import numpy as np
 
 from miurafab.errors import InputError, OptionError, PatternError
 from miurafab.files import AnyPath, Reading, as_path, new_file, read_bytes, write_bytes, write_text
+from miurafab.options import length, read_value
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
@@ -39,6 +40,7 @@ from miurafab.origami.formats.mesh import glb_bytes, obj_text, stl_bytes
 from miurafab.origami.formats.obj import pattern_from_obj_pair
 from miurafab.origami.formats.planar_graph import CreaseLines, lines_of, pattern_from_lines
 from miurafab.origami.formats.svg import parse_svg, svg_text
+from miurafab.origami.weld import welded
 
 DRAWINGS: dict[str, Callable[[str], CreaseLines]] = {
     ".svg": parse_svg,
@@ -65,8 +67,9 @@ def load(
     folded : str or os.PathLike, optional
         The OBJ file with the folded form of an OBJ ``path``.
     tolerance : float, optional
-        How near the ends of lines in a drawing count as met, mm. The default is a ten-thousandth
-        of the median line.
+        How near the ends of lines in a drawing count as met, mm; the default is a ten-thousandth
+        of the median line. In a FOLD or OBJ file shorter edges vanish, and their ends are one; the
+        default keeps all.
 
     Returns
     -------
@@ -90,17 +93,18 @@ def load(
     ending = path.suffix.lower()
     if folded is not None and ending != ".obj":
         raise OptionError("folded", f"goes with a flat .obj file, and {path} is none")
-    if tolerance is not None and ending not in DRAWINGS:
-        raise OptionError("tolerance", f"goes with a drawing of lines, and {path} is none")
+    if tolerance is not None:
+        tolerance = read_value("tolerance", length(above=True), tolerance)
     if ending == ".fold":
-        return read_fold(path)
+        found = read_fold(path)
+        return found if tolerance is None else welded(found, tolerance)
     if ending == ".obj":
         if folded is None:
             raise InputError(
                 f"{path} is one shape; give its folded form (.obj) as `folded` to make a pattern "
                 "of the two, or fit it as a surface with 'miurafab fit'."
             )
-        return pattern_from_obj_pair(path, as_path(folded, "The folded form"))
+        return pattern_from_obj_pair(path, as_path(folded, "The folded form"), tolerance)
     if ending in (".stl", ".glb"):
         raise InputError(
             f"{path} holds triangles and no crease pattern; fit it as a surface with "

@@ -19,18 +19,22 @@ from miurafab.geometry.polygons import connected_parts, next_corners, reversed_f
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.unfold import with_angles_of_the_folded_form
+from miurafab.origami.weld import welded
 
 
-def pattern_from_obj_pair(flat: Path, folded: Path) -> CreasePattern:
-    """The pattern whose flat form is in ``flat`` and whose folded form is in ``folded``.
+def pattern_from_obj_pair(
+    flat: Path, folded: Path, tolerance: float | None = None
+) -> CreasePattern:
+    """The pattern whose flat form is in ``flat`` and whose folded form is in ``folded``, without
+    edges shorter than ``tolerance`` (mm; None: with all).
 
     Raises :class:`~miurafab.errors.PatternError` naming the file and what is wrong with it.
     """
     with Reading(flat, "an OBJ file of a flat form", PatternError):
-        return _pattern(flat, folded)
+        return _pattern(flat, folded, tolerance)
 
 
-def _pattern(flat: Path, folded: Path) -> CreasePattern:
+def _pattern(flat: Path, folded: Path, tolerance: float | None) -> CreasePattern:
     points, faces = _read_obj(flat)
     shape, same = _read_obj(folded)
     if len(points) != len(shape):
@@ -60,6 +64,8 @@ def _pattern(flat: Path, folded: Path) -> CreasePattern:
         folded_coords=shape,
         pieces=piece if pieces > 1 else None,
     )
+    if tolerance is not None:
+        pattern = welded(pattern, tolerance)
     return with_angles_of_the_folded_form(pattern)
 
 
