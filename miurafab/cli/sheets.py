@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -83,7 +84,7 @@ def sheets(
             formats=formats or (),
             on_progress=lambda fraction, note: progress(0.7 + 0.3 * fraction, note),
         )
-    answer = {**_answer(job, out), **_times(made)}
+    answer = {**_answer(job, out), **_times(made), "advice": _advice(made)}
     console.answer(answer, lambda: _show(console, answer, job))
     return DONE
 
@@ -157,6 +158,19 @@ def _show(console: Console, answer: dict[str, Any], job: JobDirectory) -> None:
         if totals["sheets"] > totals["sheets_bound"]
         else ""
     )
+    if advice := answer["advice"]:
+        size = f"{advice['size_mm']:.4g} mm ({advice['scale'] - 1:+.1%})"
+        takes = (
+            "nothing to glue"
+            if not advice["seam_mm"]
+            else (f"{length_text(advice['seam_mm'])} of seams")
+        )
+        number = "one sheet" if advice["sheets"] == 1 else f"{advice['sheets']} sheets"
+        facts["other size"] = (
+            f"up to {size} on the same sheet"
+            if advice["scale"] > 1
+            else (f"{size} takes {number}, {takes}")
+        )
     if len(sheets) == 1:
         facts["needs card of"] = _card(sheets[0])
     for key in ("cut", "perforated", "travel"):
@@ -203,3 +217,14 @@ def _show(console: Console, answer: dict[str, Any], job: JobDirectory) -> None:
 def _card(sheet: dict[str, Any]) -> str:
     width, height = sheet["card_mm"]
     return f"{width:g} x {height:g} mm"
+
+
+def _advice(made: SheetJob) -> dict[str, Any] | None:
+    """The size that pays."""
+    from miurafab.workflow.scaling import size_of
+
+    found = made.advised_size()
+    if found is None:
+        return None
+    size = math.floor(10 * found.scale * size_of(made.pattern)) / 10
+    return {"size_mm": size, **vars(found)}

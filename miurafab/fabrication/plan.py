@@ -67,11 +67,11 @@ _FULL, _ONE = 0.85, 0.95
 """Sheets are rarely filled more than this, and one sheet not more (measured on ten jobs: where a
 split needs no more sheets than this lets expect, no search found fewer)."""
 
-_MANY = 20
+MANY = 20
 """Of more patches no other splits are compared: they fill their sheets well, and each split of a
 pattern so large takes long."""
 
-_LARGE = 5_000
+LARGE = 5_000
 """Tighter rooms are tried for patterns of at most so many facets, which are split in 0.5 s."""
 
 _TRIES = 36
@@ -117,6 +117,12 @@ class _NestedSplit:
         return price(self.nesting.slots, self.problem.stock)
 
 
+def worth_of_sheet(stock: LaidStock, options: LayoutOptions) -> float:
+    """λ, the length of seams in mm that a sheet is worth."""
+    sheet = sheet_space(stock)
+    return _SHEET * max(sheet.width, sheet.height) * _PREFERENCE[options.prefer]
+
+
 def plan_patches(
     pattern: CreasePattern,
     stock: LaidStock,
@@ -156,8 +162,7 @@ class _Planner:
         self.pattern, self.stock, self.material, self.options = pattern, stock, material, options
         self.sheet = sheet_space(stock)
         self.room = patch_space(self.sheet, material, options)
-        long = max(self.sheet.width, self.sheet.height)
-        self.worth = _SHEET * long * _PREFERENCE[options.prefer]
+        self.worth = worth_of_sheet(stock, options)
         self.copies = options.nesting.quantity
         corners = pattern.vertices_coords[filled(pattern.faces_vertices)]
         self.areas = np.abs(signed_areas(corners))
@@ -172,7 +177,7 @@ class _Planner:
 
     def fits_on(self, sheets: int) -> bool:
         usual = self.split(self.room, self.options)
-        few = usual.max() < _MANY
+        few = usual.max() < MANY
         others = self.candidates(usual, True) if few else []
         return any(self.takes(each, sheets) for each in (usual, *(each for each, _ in others)))
 
@@ -187,7 +192,7 @@ class _Planner:
 
     def plan(self) -> Plan:
         usual = self.split(self.room, self.options, improve=True)
-        if usual.max() >= _MANY:
+        if usual.max() >= MANY:
             framed, patches, problem = self.framed(usual)
             trial = _NestedSplit(
                 usual, framed, patches, problem, nest(problem), self.rest_mm(usual)
@@ -244,7 +249,7 @@ class _Planner:
         if wasteful:
             rooms = smaller_rooms(self.room, self.options.gap_mm)
             ways += [(room, self.options) for room in rooms]
-        if self.slivers_mm(usual) > 0 and len(self.areas) <= _LARGE:
+        if self.slivers_mm(usual) > 0 and len(self.areas) <= LARGE:
             ways += [(room, self.options) for room in tighter_rooms(self.room)]
         for room, options in ways:
             try:

@@ -77,8 +77,12 @@ class Sizing:
             area = float(np.abs(signed_areas(corners)).sum()) * self.options.nesting.quantity
             largest = max(kind.area for kind in self.stock.kinds.kinds)
             return self.bisected(math.sqrt(self.sheets * largest / area), _ROUGH)
+        return self.bisected(self.bound(), _FINE)
+
+    def bound(self) -> float:
+        """The largest scale at which each piece fits whole without the tabs on its border."""
         coords = (piece.pattern.vertices_coords for piece in self.pieces)
-        return self.bisected(_SAFE * min(scale_to_fit(each, self.room) for each in coords), _FINE)
+        return _SAFE * min(scale_to_fit(each, self.room) for each in coords)
 
     def holds(self, scale: float = 1.0, *, planned: bool = True) -> bool:
         """Whether the pattern, ``scale`` times as large, can be cut from the sheets; as it is

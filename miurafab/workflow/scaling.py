@@ -47,9 +47,14 @@ def scaled(pattern: CreasePattern, wanted: ScaleOptions) -> CreasePattern:
         return pattern.scaled(wanted.scale)
     if wanted.size_mm is None:
         return pattern
-    known = pattern.folded_coords
-    points = pattern.vertices_coords if known is None else known
-    longest = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
+    longest = size_of(pattern)
     if longest <= 0:
         raise PatternError("The pattern has no extent, so it can have no `size`.")
     return pattern.scaled(wanted.size_mm / longest)
+
+
+def size_of(pattern: CreasePattern) -> float:
+    """How large a pattern is, mm."""
+    known = pattern.folded_coords
+    points = pattern.vertices_coords if known is None else known
+    return float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0

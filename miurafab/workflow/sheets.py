@@ -16,6 +16,7 @@ from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.plan_advice import SizeAdvice, advised_size
 from miurafab.fabrication.sheets import DrawnLayout, lay_out
 from miurafab.files import AnyPath, as_path, read_bytes, write_draft
 from miurafab.gcode.job import Job
@@ -201,6 +202,19 @@ class SheetJob(Shown):
             for name, seconds in sheet.operation_seconds.items():
                 found[name] = found.get(name, 0.0) + seconds
         return {name: found[name] for name in (*OPERATIONS, "") if name in found}
+
+    def advised_size(self) -> SizeAdvice | None:
+        """The size that pays, found by plans (:mod:`miurafab.fabrication.plan_advice`).
+
+        Returns
+        -------
+        SizeAdvice or None
+            None where no size pays.
+        """
+        options = self.options
+        if self.opened:  # the pattern is opened and capped already
+            options = replace(options, open_row=None, open_column=None, caps=())
+        return advised_size(self.pattern, self.layout, self.machine, self.material, options)
 
     def quicker(self) -> tuple[QuickerWay, ...]:
         """What would make the job quicker, measured (:mod:`miurafab.workflow.quicker`).

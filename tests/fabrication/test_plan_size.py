@@ -11,6 +11,7 @@ import miurafab as mf
 from miurafab.errors import LayoutError, OptionError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.fit_box import Space, best_turn, scale_to_fit
+from miurafab.fabrication.plan_advice import advised_size
 from miurafab.fabrication.plan_size import Sizing
 from miurafab.fabrication.sheets import lay_out
 
@@ -85,3 +86,19 @@ def test_what_a_size_in_mm_has_no_use_for_is_refused():
         mf.fit("hypar", facets=(4, 4), sheets=2)
     with pytest.raises(OptionError, match="'machine' is for a 'size'"):
         mf.fit("hypar", facets=(4, 4), size=200, machine="grbl-laser-400")
+
+
+def test_a_size_that_pays_is_told():
+    pattern, machine, options = miura(9, 7), bed(310.0, 210.0), LayoutOptions()
+    scale = Sizing(pattern, machine, card(), options).largest_scale()
+
+    def told(size):
+        scaled = pattern.scaled(size)
+        layout = lay_out(scaled, machine, card())
+        return advised_size(scaled, layout, machine, card(), options)
+
+    whole = told(1.03 * scale)
+    assert (whole.sheets, whole.seam_mm) == (1, 0.0)
+    assert whole.scale == pytest.approx(1 / 1.03)
+    assert told(0.8 * scale).scale == pytest.approx(1 / 0.8)
+    assert told(0.999 * scale) is None
