@@ -104,6 +104,7 @@ RULES = {
     "weak-tabs": Rule("warning", "tabs with less glue than the material's `min_area`"),
     "fold-letters": Rule("note", "tabs without room for the letter of their fold"),
     "relief-holes": Rule("warning", "vertices whose creases are too short for a relief hole"),
+    "ticks": Rule("note", "ends of folds without room for their ticks"),
     "bridges": Rule("warning", "outlines without room for all holding bridges"),
     "nesting-limit": Rule("note", "a nesting that ended before every order was tried"),
     "unassigned-creases": Rule("warning", "creases that are neither mountain nor valley"),

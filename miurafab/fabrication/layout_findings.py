@@ -62,6 +62,9 @@ def layout_findings(
             "must be over three times as long."
         )
         findings.append(Finding("bridges", sentence))
+    if drawn.unticked:
+        ends = count(drawn.unticked, "end of a fold has", "ends of folds have")
+        findings.append(Finding("ticks", f"{ends} no room for a tick."))
     if not nesting.finished:
         sentence = (
             "The nesting reached its limit of work before it had tried every order of the patches; "

@@ -234,6 +234,14 @@ class LayoutOptions(Shown):
         default_text="no jig",
         page="more",
     )
+    ticks_mm: float | None = option(
+        length(0.4, 3),
+        "Length of ticks at the ends of folds on the outline: one across a mountain, two across a "
+        "valley.",
+        group="Cutting",
+        default_text="none",
+        page="more",
+    )
     two_sided: bool = option(
         Flag(), "Score the valleys from the back of the sheet.", False, group="Cutting", page="more"
     )
@@ -254,6 +262,12 @@ class LayoutOptions(Shown):
 
     def __post_init__(self) -> None:
         check_options(self)
+        if self.ticks_mm is not None and self.marks in ("tabs", "none"):
+            raise OptionError(
+                "ticks",
+                f"is {self.ticks_mm:g} mm, but `marks` is {self.marks}, which keeps the facets "
+                "clean; take `marks` front or back",
+            )
         if self.bridges == 1:
             raise OptionError("bridges", "is 1, on which a piece would swing; use 0, or 2 and more")
         if self.bridge_mm != BRIDGE_MM and not self.bridges:

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from miurafab.errors import LayoutError
+from miurafab.fabrication.backs import check_two_sided, turned_over, with_pins
 from miurafab.fabrication.kerf import bridged
 from miurafab.fabrication.labels import PlacedText
 from miurafab.fabrication.options import LayoutOptions
@@ -30,6 +30,7 @@ from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
 from miurafab.fabrication.relief import Holes, circles, relief_holes
 from miurafab.fabrication.route.order import HOLE, OUTLINE, StrokeSet
+from miurafab.fabrication.ticks import Ticks, fold_ticks
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.geometry.arrays import Floats, Ints, run_starts
 from miurafab.origami.crease_pattern import CreasePattern
@@ -43,9 +44,6 @@ _INNER, _WASTE = 1, 2
 
 RIM = 1
 """The rank of rim numbers among what is engraved: after the labels."""
-
-PIN_MM = 2.0
-"""The diameter of a registration hole; it lies in the middle of the margin."""
 
 
 @dataclass(frozen=True)
@@ -63,13 +61,15 @@ class Drawn:
     """The unordered strokes of each sheet and of each back (None: nothing on it).
 
     ``unrelieved`` is the number of vertices without room for their relief hole, ``unbridged`` the
-    number of outlines without room for all their bridges.
+    number of outlines without room for all their bridges, ``unticked`` of ends of folds without
+    room for their ticks.
     """
 
     fronts: list[StrokeSet]
     backs: list[StrokeSet | None]
     unrelieved: int
     unbridged: int
+    unticked: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +101,12 @@ def sheet_strokes(
     """
     options = options or LayoutOptions()
     if options.two_sided or options.marks == "back":
-        _check_two_sided(material, sheets, options)
+        check_two_sided(material, sheets, options)
     creases, holes = _creases(pattern, outlined, material)
     outlines, unbridged = _outlines(outlined, options, material.kerf_mm)
+    ticks = _ticks(pattern, outlined, options)
     drawn_once = [
+        *([] if ticks is None else [_bars(ticks)]),
         *(_made(own, kind, material) for kind, own in creases.items()),
         _relief(pattern, holes, material),
         _slits(pattern, outlined),
@@ -127,6 +129,8 @@ def sheet_strokes(
     group = np.concatenate([part.group + step for part, step in zip(parts, steps, strict=False)])
     behind = np.zeros(len(patch), dtype=bool)
     behind[: len(parts[0].count)] = [t.side == "back" for t in texts for _ in t.strokes]
+    if options.marks == "back":
+        behind |= (operation == OPERATIONS.index("engrave")) & (edge >= 0)  # ticks
     if options.two_sided:
         scored = operation == OPERATIONS.index("score")
         folds = pattern.edges_assignment.copy()
@@ -159,59 +163,9 @@ def sheet_strokes(
     backs: list[StrokeSet | None] = []
     for number, blank in enumerate(sheets):
         fronts.append(taken(2 * number, blank, blank.name))
-        drawn = _turned_over(taken(2 * number + 1, blank, f"{blank.name}-back"))
-        backs.append(_with_pins(drawn, blank, material) if len(drawn.toolpath) else None)
-    return Drawn(fronts, backs, holes.left_out, unbridged)
-
-
-def _check_two_sided(material: Material, sheets: Sequence[Blank], options: LayoutOptions) -> None:
-    if options.two_sided and material.creases["valley"].mode != "score":
-        raise LayoutError(
-            "Two-sided working scores the valleys from the back, but the material "
-            f"'{material.name}' does not score them; write mode = 'score' under [creases.valley]."
-        )
-    if any(blank.margin < PIN_MM + 1.0 for blank in sheets):
-        raise LayoutError(
-            f"Two-sided working needs a margin of {PIN_MM + 1.0:g} mm for its registration holes, "
-            f"and the machine's is {sheets[0].margin:g} mm; make it wider in the machine's file."
-        )
-
-
-def _turned_over(strokes: StrokeSet) -> StrokeSet:
-    """The strokes seen from the back of the sheet, turned over about its vertical axis."""
-    front = strokes.toolpath
-    points = front.points * np.array([-1.0, 1.0]) + np.array([front.width_mm, 0.0])
-    return replace(strokes, toolpath=replace(front, points=points))
-
-
-def pin_centres(width: float, height: float, margin: float) -> Floats:
-    """(3, 2) the centres of the registration holes on the front of a sheet, in mm. Their distances
-    from the corners differ, so a sheet that is turned the wrong way does not match.
-    """
-    near = margin / 2
-    return np.array([[near, near], [width - near, near], [near, height * 0.7]])
-
-
-def _with_pins(back: StrokeSet, blank: Blank, material: Material) -> StrokeSet:
-    """The strokes of a back, with its registration holes."""
-    centres = pin_centres(blank.width, blank.height, blank.margin) * [-1.0, 1.0]
-    moved = centres + np.array([blank.width, 0.0])
-    points, count = circles(moved, PIN_MM - material.kerf_mm)
-    path, pins = back.toolpath, len(centres)
-    return StrokeSet(
-        replace(
-            path,
-            points=np.concatenate([path.points, points]),
-            offsets=np.concatenate(
-                [path.offsets, path.offsets[-1] + count * np.arange(1, 1 + pins)]
-            ),
-            operation=np.append(path.operation, np.full(pins, OPERATIONS.index("cut"))),
-            patch=np.append(path.patch, np.full(pins, -1)),
-            edge=np.append(path.edge, np.full(pins, -1)),
-        ),
-        np.append(back.group, back.group.max(initial=-1) + 1 + np.arange(pins)),
-        np.append(back.rank, np.full(pins, HOLE)),
-    )
+        drawn = turned_over(taken(2 * number + 1, blank, f"{blank.name}-back"))
+        backs.append(with_pins(drawn, blank, material) if len(drawn.toolpath) else None)
+    return Drawn(fronts, backs, holes.left_out, unbridged, 0 if ticks is None else ticks.left_out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,6 +194,27 @@ def _engraved(texts: Sequence[PlacedText]) -> _Part:
         edge=np.full(len(strokes), -1),
         group=np.repeat(np.arange(len(texts)), each),
         rank=np.repeat(np.where(beside, RIM, 0), each),
+    )
+
+
+def _ticks(
+    pattern: CreasePattern, outlined: OutlinedPatches, options: LayoutOptions
+) -> Ticks | None:
+    if options.ticks_mm is None:
+        return None
+    edges, patch = _inner_edges(pattern, outlined, FOLDED)
+    return fold_ticks(pattern, outlined.face_patch, edges, patch, options.ticks_mm)
+
+
+def _bars(ticks: Ticks) -> _Part:
+    return _Part(
+        operation=OPERATIONS.index("engrave"),
+        points=ticks.ends.reshape(-1, 2),
+        count=np.full(len(ticks.ends), 2),
+        patch=ticks.patch,
+        edge=ticks.edge,
+        group=ticks.group,
+        rank=np.zeros(len(ticks.ends), dtype=np.int64),
     )
 
 

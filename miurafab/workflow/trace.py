@@ -38,7 +38,17 @@ HPGL_MM = 0.03
 SHORTEST_MM = 0.002
 """A shorter segment may vanish in the rounding of a program."""
 
-KINDS = ("crease", "tab fold", "outline", "hole", "slit", "label", "rim number", "aligning cut")
+KINDS = (
+    "crease",
+    "tab fold",
+    "outline",
+    "hole",
+    "slit",
+    "label",
+    "rim number",
+    "tick",
+    "aligning cut",
+)
 _NAMED = 5
 """So many faults of one kind are named on a sheet; the others are counted."""
 
@@ -211,16 +221,17 @@ def _kinds(strokes: StrokeSet, pattern: CreasePattern, tab_edges: Ints) -> Ints:
     path = strokes.toolpath
     cut = path.operation == OPERATIONS.index("cut")
     engraved = path.operation == OPERATIONS.index("engrave")
-    crease, tab_fold, outline, hole, slit, label, rim = range(7)
+    crease, tab_fold, outline, hole, slit, label, rim, tick = range(8)
     return np.select(
         [
             engraved & (strokes.rank == RIM),
+            engraved & (path.edge >= 0),
             engraved,
             cut & (strokes.rank == HOLE),
             path.edge < 0,
             np.isin(path.edge, tab_edges),
             np.isin(pattern.edges_assignment[path.edge], SLIT),
         ],
-        [rim, label, hole, outline, tab_fold, slit],
+        [rim, tick, label, hole, outline, tab_fold, slit],
         crease,
     )

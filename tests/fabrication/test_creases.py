@@ -14,10 +14,10 @@ from flat_patterns import bed, card, fits_turned, miura, zigzag
 from rings import revolved, tube
 
 from miurafab.errors import LayoutError
+from miurafab.fabrication.backs import PIN_MM, pin_centres
 from miurafab.fabrication.kerf import bridged
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import lay_out
-from miurafab.fabrication.strokes import PIN_MM, pin_centres
 from miurafab.profiles import OPERATIONS
 from miurafab.profiles.material import CREASE_KINDS, MODES, Crease
 

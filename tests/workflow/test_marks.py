@@ -20,27 +20,14 @@ from problems import regular
 import miurafab as mf
 from miurafab.errors import LayoutError
 from miurafab.fabrication.lettering import text_strokes
+from miurafab.profiles.shipped import shipped_directory
 
-SCORED = """
-title = "Scored"
-thickness = "0.3mm"
-kerf = "0.15mm"
-[perforation]
-cut = "1.2mm"
-gap = "0.8mm"
-end_bridge = "0.6mm"
-min_end = "0.5mm"
-[creases.valley]
-mode = "score"
-[tabs]
-height = "7mm"
-""" + "".join(
-    f'[operations.{name}]\npower = 0.5\nfeed = "1500mm/min"\n'
-    for name in ("engrave", "score", "perforate", "cut")
+SCORED = (shipped_directory("materials") / "card-250.toml").read_text() + (
+    '\n[creases.valley]\nmode = "score"\n'
 )
 JOBS = {
     "front": {},
-    "back": {},
+    "back": {"ticks": 1},
     "tabs": {},
     "tabs of two sides": {"marks": "tabs", "two_sided": True},
     "none": {},
@@ -125,7 +112,9 @@ def test_every_stroke_is_traced_and_the_show_side_is_clean(made, name):
     behind = [line for sheet, drawn in lines.items() if sheet.endswith("-back") for line in drawn]
     assert bool(shown) == (name == "front")
     assert bool(behind) == (name in ("back", "tabs of two sides"))
-    assert found.traced["label"] == sum(map(len, lines.values()))
+    engraving = found.traced["label"] + found.traced["tick"]
+    assert engraving == sum(map(len, lines.values()))
+    assert bool(found.traced["tick"]) == ("ticks" in JOBS[name])
     if name == "tabs of two sides":
         for sheet, drawn in lines.items():
             if sheet.endswith("-back"):
@@ -188,7 +177,7 @@ def test_a_layout_that_lists_other_labels_is_named(made, tmp_path):
 
 
 def test_marks_on_the_back_leave_the_shell_as_it_was(made):
-    found = mf.rebuild(made / "tabs of two sides")
+    found = mf.rebuild(made / "back")
     assert found.measured == found.corners
     assert found.worst_mm < 0.05
 
