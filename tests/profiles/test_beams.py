@@ -112,3 +112,8 @@ def test_a_job_is_for_the_beam_that_it_was_made_for(tmp_path, machine, refused):
         assert "was made for a diode laser of 450 nm, 10 W (grbl-laser-400)" in found[0].sentence
         with pytest.raises(mf.errors.MiurafabError, match="S values mean another power"):
             mf.cut(job.path, port="virtual", machine=machine)
+    if machine == "grbl-co2-k40":
+        with pytest.raises(mf.errors.MiurafabError, match="'force' other-beam overrides this"):
+            mf.cut(job.path, port="virtual", machine=machine, force=("power", "material"))
+        (done,) = mf.cut(job.path, port="virtual", machine=machine, force="other-beam")
+        assert done.name == "sheet-01"
