@@ -362,9 +362,7 @@ def make_job(
 def layout_options(
     given: Mapping[str, Any], design: AnyPath | None = None
 ) -> tuple[LayoutOptions, str | None, str | None]:
-    """The options ``given``, and for the rest those of the design file, with its machine and its
-    material. Raises :class:`~miurafab.errors.InputError` naming the key.
-    """
+    """The options ``given``, else those of the design file, with its machine and material."""
     if design is None:
         return read_options(LayoutOptions, given), None, None
     file = as_path(design, "The design file")
