@@ -1,9 +1,9 @@
 """The pictures of docs/folding-kit.md, and how large the guide is.
 
     python benchmarks/kit_pictures.py            # writes docs/folding-kit/*.png
-    python benchmarks/kit_pictures.py --sizes    # prints pages, bytes and processor time
+    python benchmarks/kit_pictures.py sizes      # prints pages, bytes and processor time
 
-The pictures are figures of the guide, as it draws them. ``--sizes`` fits hypars of growing numbers
+The pictures are figures of the guide, as it draws them. ``sizes`` fits hypars of growing numbers
 of facets.
 """
 
@@ -123,8 +123,8 @@ def sizes() -> Iterator[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sizes", action="store_true")
-    if parser.parse_args().sizes:
+    parser.add_argument("what", nargs="?", choices=("pictures", "sizes"), default="pictures")
+    if parser.parse_args().what == "sizes":
         for line in sizes():
             print(line, flush=True)
         return

@@ -16,8 +16,10 @@ import pypdf
 import pytest
 import shapely
 from problems import fitted, regular
+from rings import revolved
 
 from miurafab.errors import OptionError
+from miurafab.fabrication.caps import capped
 from miurafab.fabrication.drawing.assembly_guide import AssemblyGuide, assembly_guide
 from miurafab.fabrication.drawing.glue_sections import GlueSections
 from miurafab.fabrication.drawing.glue_view import GlueView
@@ -36,6 +38,7 @@ from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.unfold import with_angles_of_the_folded_form
 from miurafab.profiles import load_machine, load_material
 from miurafab.workflow.check_job import check_job
 from miurafab.workflow.sheets import sheets
@@ -436,3 +439,37 @@ def test_a_jig_is_a_file_of_the_job_and_goes_with_it(tmp_path):
     assert check_job(job).valid
     sheets(pattern).write(job)
     assert not (job / "jig.svg").exists()
+
+
+def test_creases_of_caps_are_in_no_row_and_the_guide_is_made():
+    """A cap is a fan of triangles, which cannot bend: its way is found by its creases alone."""
+    ring = revolved("12x4", "120mm")
+    pattern = capped(ring, LayoutOptions(caps="all"))
+    kit = folders_kit(pattern)
+    assert kit.rows == folders_kit(ring).rows
+    folded = [int(np.isin(each.edges_assignment, ("M", "V")).sum()) for each in (ring, pattern)]
+    of_caps = folded[1] - folded[0]
+    assert kit.unnumbered == of_caps
+    assert of_caps >= 4
+    layout = lay_out(pattern, MACHINE, MATERIAL)
+    text, _ = text_of(assembly_guide(layout, pattern, MACHINE, MATERIAL, "Kit").pdf)
+    assert f"{of_caps} creases are in no row" in text
+
+
+def test_a_fan_of_triangles_which_has_no_diagonal_to_bend_has_states():
+    turn = np.arange(6) * np.pi / 3
+    rim = np.stack([np.cos(turn), np.sin(turn)], axis=1) * 50.0
+    around = np.stack([np.arange(1, 7), np.roll(np.arange(1, 7), -1)], axis=1)
+    spokes = np.stack([np.zeros(6, dtype=int), np.arange(1, 7)], axis=1)
+    height = np.array([0.0, 12.0, -9.0, 14.0, -12.0, 9.0, -14.0])
+    fan = CreasePattern(
+        np.concatenate([[[0.0, 0.0]], rim]),
+        np.concatenate([spokes, around]),
+        np.array(["M"] * 6 + ["B"] * 6),
+        np.array([-1.0] * 6 + [0.0] * 6),
+        np.column_stack([np.zeros(6, dtype=int), around]),
+        folded_coords=np.column_stack([np.concatenate([[[0.0, 0.0]], rim]), height]),
+    )
+    states = folded_states(with_angles_of_the_folded_form(fan))
+    assert states.titles[-1] == "Done"
+    assert np.abs(states.shapes[-1] - fan.folded_coords).max() < 1e-9

@@ -7,7 +7,8 @@ each crossing. The other family zigzags, and each of its lines is of one kind fr
 
 The straighter family is creased first: its lines can be folded over in one go. Within a family the
 lines go from rim to rim. So the order is that of :func:`crease_lines`, and each line stands in it
-once. Creases of a pattern without a lattice are of no line.
+once. Creases of a cap, and of a
+pattern without a lattice, are of no line.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from miurafab.fabrication.partition.pieces import lattice_cells
 from miurafab.fabrication.wording import runs
 from miurafab.geometry.arrays import Bools, Floats, Ints, run_starts
 from miurafab.origami.crease_pattern import CreasePattern
@@ -79,27 +81,15 @@ def read_row(table: dict[str, Any]) -> Row:
     return Row(str(table["name"]), str(table["fold"]), *angles)
 
 
-def lattice_of(pattern: CreasePattern) -> Ints | None:
-    """(F, 2) the column and row of each facet, None for a pattern without a lattice."""
-    if pattern.cells is not None:
-        return pattern.cells
-    if pattern.grid is None:
-        return None
-    corners = pattern.faces_vertices
-    first = np.where(corners >= 0, corners, corners.max()).min(axis=1)
-    row, column = np.divmod(first, pattern.grid[0])
-    return np.stack([column, row], axis=1)
-
-
 def crease_lines(pattern: CreasePattern) -> tuple[CreaseLine, ...]:
     """All lines of ``pattern`` in the order in which they are creased."""
-    cells = lattice_of(pattern)
+    cells = lattice_cells(pattern)
     if cells is None:
         return ()
-    edges = np.flatnonzero(_folded(pattern))
+    pieces = np.zeros(len(cells), np.int64) if pattern.pieces is None else pattern.pieces
+    edges = np.flatnonzero(_folded(pattern) & ~_of_caps(pattern, pieces))
     pair = cells[pattern.edges_faces[edges]]
     step = np.abs(pair[:, 1] - pair[:, 0])
-    pieces = np.zeros(len(cells), np.int64) if pattern.pieces is None else pattern.pieces
     piece = pieces[pattern.edges_faces[edges, 0]]
     families = []
     for axis, family in enumerate(FAMILIES):
@@ -119,6 +109,15 @@ def _folded(pattern: CreasePattern) -> Bools:
     """(E,) whether an edge is a crease between two facets."""
     inner = (pattern.edges_faces >= 0).all(axis=1)
     return np.asarray(inner & np.isin(pattern.edges_assignment, FOLDED))
+
+
+def _of_caps(pattern: CreasePattern, pieces: Ints) -> Bools:
+    """(E,) whether an edge is of a cap: a piece of triangles alone, beside pieces of others."""
+    corners = (pattern.faces_vertices >= 0).sum(axis=1)
+    round_ = np.bincount(pieces[corners > 3], minlength=int(pieces.max()) + 1) == 0
+    if round_.all():
+        return np.zeros(len(pattern.edges_vertices), dtype=bool)
+    return np.asarray(round_[pieces[pattern.edges_faces.max(axis=1)]])
 
 
 def _line(pattern: CreasePattern, family: str, number: int, edges: Ints) -> CreaseLine:

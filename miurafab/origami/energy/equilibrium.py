@@ -264,9 +264,11 @@ class Driven:
     def _held(self) -> Ints:
         """The corners (3,) of the held triangle, which is nearest to the middle."""
         model = self.model
-        centres = model.points[model.hinges[:, :3]].mean(axis=1)
+        # Triangles do not bend; then creases have the corners.
+        corners = (model.hinges if len(model.hinges) else model.creases)[:, :3]
+        centres = model.points[corners].mean(axis=1)
         away = np.linalg.norm(centres - model.points.mean(axis=0), axis=1)
-        return model.hinges[np.argmin(away), :3]
+        return np.asarray(corners[np.argmin(away)])
 
     @cached_property
     def _free(self) -> Ints:
