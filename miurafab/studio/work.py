@@ -24,7 +24,7 @@ from miurafab.origami.picture import flat_svg
 from miurafab.origami.verify import Audit
 from miurafab.studio.recipe import job_name
 from miurafab.surfaces.description import no_target
-from miurafab.workflow.job_directory import GUIDE
+from miurafab.workflow.drawings import GUIDE
 from miurafab.workflow.page import write_page
 from miurafab.workflow.picture import svg_text
 from miurafab.workflow.preview import Preview

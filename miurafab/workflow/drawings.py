@@ -18,14 +18,16 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
+from miurafab.fabrication.drawing.assembly_guide import assembly_guide
 from miurafab.fabrication.drawing.dxf import sheet_dxf
 from miurafab.fabrication.drawing.hpgl import sheet_hpgl
+from miurafab.fabrication.drawing.jig_svg import jig_svg
 from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.svg import layout_svg
 from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, page_size, tiled_pdf
@@ -33,8 +35,10 @@ from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.sheets import DrawnLayout
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.profiles import MachineProfile, Material
 
 PICTURE = "pattern.svg"
+GUIDE, GUIDE_PAGE, JIG = "assembly.pdf", "assembly.html", "jig.svg"
 Draw = Callable[[Toolpath, NDArray[np.str_], str], bytes]
 
 
@@ -97,3 +101,16 @@ def drawings(
         ending, draw = _SHEETS.get(name) or (f"-{page}.pdf", _tiled(page))
         for toolpath in layout.passes:
             yield f"{toolpath.sheet}{ending}", draw(toolpath, letters, title)
+
+
+def guides(
+    layout: DrawnLayout, machine: MachineProfile, material: Material, title: str
+) -> Iterator[tuple[str, str | bytes]]:
+    """The file names and contents of what explains the job with this ``title``: the guide in both
+    forms, and the jig if there is one.
+    """
+    guide = assembly_guide(layout, layout.pattern, machine, material, title)
+    yield GUIDE, guide.pdf
+    yield GUIDE_PAGE, guide.page
+    if layout.jig is not None:
+        yield JIG, jig_svg(layout.jig, title)

@@ -25,8 +25,6 @@ from miurafab.workflow.job_files import job_machine, job_material, settle_job
 from miurafab.workflow.manifest import LAYOUT, edits
 from miurafab.workflow.picture import first_sheet
 
-GUIDE, GUIDE_PAGE, JIG = "assembly.pdf", "assembly.html", "jig.svg"
-
 
 @dataclass(frozen=True, repr=False)
 class JobDirectory(Shown):

@@ -16,11 +16,11 @@ from miurafab.errors import InputError
 from miurafab.files import Reading, file_name, parse_json, read_bytes, read_text, write_draft
 from miurafab.profiles import MachineProfile, Material, load_machine, load_material
 from miurafab.profiles.shipped import Kind, shipped_directory
-from miurafab.workflow.drawings import PICTURE, is_ending
+from miurafab.workflow.drawings import GUIDE, GUIDE_PAGE, JIG, PICTURE, is_ending
 from miurafab.workflow.manifest import LAYOUT, MANIFEST
 from miurafab.workflow.whole_folder import put_in_place, settle, whole_folder
 
-GUIDES = ("assembly.pdf", "assembly.html", "jig.svg", "calibration.pdf", "calibration.json")
+GUIDES = (GUIDE, GUIDE_PAGE, JIG, "calibration.pdf", "calibration.json")
 """What explains a job; one made in the place of another leaves none of them."""
 _SHEET = re.compile(r"sheet-[0-9]{2,}(-back)?")
 """The names of programs, which begin those of all that is drawn."""

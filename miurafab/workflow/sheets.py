@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError, ProfileError
-from miurafab.fabrication.drawing.assembly_guide import assembly_guide
-from miurafab.fabrication.drawing.jig_svg import jig_svg
 from miurafab.fabrication.drawing.svg import sheet_svg
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.layout import write_layout
@@ -39,9 +37,9 @@ from miurafab.profiles import (
 )
 from miurafab.profiles.shipped import Kind
 from miurafab.workflow.design import read_layout_table
-from miurafab.workflow.drawings import drawings, read_formats
+from miurafab.workflow.drawings import drawings, guides, read_formats
 from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run
-from miurafab.workflow.job_directory import GUIDE, GUIDE_PAGE, JIG, JobDirectory
+from miurafab.workflow.job_directory import JobDirectory
 from miurafab.workflow.job_files import CAPPED, OPENED, job_files, keep_profiles
 from miurafab.workflow.manifest import LAYOUT, sha256, write_manifest
 from miurafab.workflow.patterns import PatternLike, sound_pattern
@@ -161,11 +159,8 @@ class SheetJob(Shown):
             for name, content in drawings(layout, self.pattern, wanted, self.name):
                 write_draft(staging / name, content)
             tell(0.7, "drawing the assembly guide")
-            guide = assembly_guide(layout, self.pattern, machine, self.material, self.name)
-            write_draft(staging / GUIDE, guide.pdf)
-            write_draft(staging / GUIDE_PAGE, guide.page)
-            if layout.jig is not None:
-                write_draft(staging / JIG, jig_svg(layout.jig, self.name))
+            for name, explains in guides(layout, machine, self.material, self.name):
+                write_draft(staging / name, explains)
             used = self._put_pattern(folder, staging)
             if self.fitted is not None:
                 text = fold_text(seen_from(self.fitted, folder), self.name)
