@@ -39,7 +39,15 @@ _PERFORATE, _SCORE = OPERATIONS.index("perforate"), OPERATIONS.index("score")
 
 @dataclass(frozen=True)
 class QuickerWay:
-    """``change``, in words, would bring the job to ``seconds``."""
+    """A change that would make a job quicker.
+
+    Attributes
+    ----------
+    change : str
+        What to change, in words.
+    seconds : float
+        The time that the job would then take.
+    """
 
     change: str
     seconds: float
