@@ -309,7 +309,7 @@ def test_the_guide_tells_how_both_sides_are_made():
     layout = lay_out(pattern, MACHINE, material, options=LayoutOptions(two_sided=True))
     pages = pages_of(assembly_guide(layout, pattern, MACHINE, material, "Both").pdf)
     assert "valley: scored" in pages[0]
-    near, far = MACHINE.bed.margin_mm / 2, MACHINE.bed.width_mm - MACHINE.bed.margin_mm / 2
+    near, far = MACHINE.bed.margin_mm / 2, layout.sheets[0].width_mm - MACHINE.bed.margin_mm / 2
     words = pages[1].replace("\n", " ")
     assert f"holes lie at X{near:.1f} Y{near:.1f}, X{near:.1f} Y" in words
     assert f"and X{far:.1f} Y{near:.1f}; then run sheet-01." in words
