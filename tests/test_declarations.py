@@ -117,7 +117,9 @@ def test_a_design_file_takes_every_option_of_a_fit_and_of_a_layout(tmp_path) -> 
             if name not in ("region", "rotate", "close", *MESH_ONLY)}  # fmt: skip
     lines = [f'{name} = "{example(each.kind)}"' for name, each in fits.items()]
     lines += ["[target]", 'surface = "hyperboloid"', "[layout]", 'machine = "grbl-laser-400"']
-    lines += [f'{name} = "{example(each.kind)}"' for name, each in declared(LayoutOptions).items()]
+    layout = {name: example(each.kind) for name, each in declared(LayoutOptions).items()}
+    layout["marks"] = "back"  # ticks are marks, which `none` leaves out
+    lines += [f'{name} = "{value}"' for name, value in layout.items()]
     file = tmp_path / "all.toml"
     file.write_text("\n".join(lines))
     made = design(str(file))
