@@ -24,7 +24,7 @@ from miurafab.workflow.json_text import json_text
 EXAMPLES = (
     "miurafab fit hypar:height=0.5 -o hypar.fold",
     "miurafab fit sphere --facets 12x12 --size 150mm -o sphere.fold",
-    "miurafab fit hypar --facets 8x8 --size bed --machine grbl-laser-400 -o largest.fold",
+    "miurafab fit hypar --facets 8x8 --size bed --machine grbl-pen-a4 -o h.fold",
     "miurafab fit hypar --min-edge 4mm --max-deviation 2mm -o coarsest.fold",
 )
 

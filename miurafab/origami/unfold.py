@@ -19,6 +19,7 @@ from miurafab.geometry.polygons import edge_lengths, facet_normals
 from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.development import Development, develop
+from miurafab.origami.meeting_borders import meeting_borders
 from miurafab.origami.piece import shelved
 from miurafab.origami.tessellation import Tessellation
 
@@ -71,7 +72,13 @@ def unfold_charts(
         scale=scale,
         target=target or {},
     )
-    return replace(with_angles_of_the_folded_form(pattern), seams=seams if len(seams) else None)
+    pattern = with_angles_of_the_folded_form(pattern)
+    if not len(seams):
+        return pattern
+    # the two ends of a band that goes all round have vertices of their own
+    ends_met = meeting_borders(pattern)
+    ends_met = ends_met[~np.isin(ends_met, seams).any(axis=1)]
+    return replace(pattern, seams=np.concatenate([seams, ends_met]))
 
 
 def _seams(ends: Ints) -> Ints:

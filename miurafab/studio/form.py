@@ -43,6 +43,8 @@ def _parts(field: Declared) -> Iterator[str]:
     yield f'<label for="{name}">{escape(field.label)} <small>{meaning}</small></label>'
     if isinstance(kind, Choice):
         yield f'<select id="{name}" name="{name}">'
+        if field.default is None:
+            yield f'<option value="">{escape(field.default_text)}</option>'
         for choice in kind.names:  # the default is not sent
             value = "" if choice == field.default else choice
             yield f'<option value="{value}">{choice}</option>'

@@ -123,7 +123,7 @@ def tradeoff(
     --------
     >>> import miurafab as mf
     >>> mf.tradeoff("hypar", (4, 6, 8))
-    <Tradeoff 3 sheets, 3 converged, distance 59.6 % / n>
+    <Tradeoff 3 sheets, 3 converged, distance 60.5 % / n>
     """
     own = {name: options.pop(name) for name in declared(TradeoffOptions) if name in options}
     asked = read_options(TradeoffOptions, own | {"sides": sides} if sides is not None else own)

@@ -121,12 +121,12 @@ def test_an_interrupted_fit_writes_its_best_sheet(run, monkeypatch, tmp_path):
     asked = miurafab.fit
     calls = iter([False, False, True])
 
-    def fit(target, *, on_progress):
+    def fit(target, *, on_progress, **others):
         def interrupt(fraction, note):
             if next(calls, False):
                 raise KeyboardInterrupt
 
-        return asked(target, on_progress=interrupt)
+        return asked(target, on_progress=interrupt, **others)
 
     monkeypatch.setattr(miurafab, "fit", fit, raising=False)
     limits = ("--facets", "6x6", "--max-deviation", "0.001", "--report", "r.json")

@@ -23,7 +23,7 @@ PREPARED = [
 NO_SWITCHES = "miurafab machine home"
 """The virtual machine has no homing switches: it refuses, exit code 3."""
 
-OF_OTHERS = {"--best", "--no-package-lock", "--round", "--glue"}
+OF_OTHERS = {"--best", "--no-package-lock", "--round", "--glue", "--largest"}
 """Options of other programs, and of benchmarks, that pages name."""
 
 

@@ -101,7 +101,7 @@ def test_an_edited_job_is_cut_only_if_that_is_forced(folder):
     file = folder / "sheet-02.nc"
     file.write_text(file.read_text() + "G0 X7 Y9\n", newline="\n")
     prepared = prepare(str(folder))
-    (found,) = prepared.edits
+    (found,) = prepared.findings
     assert (found.code, found.where) == ("edited", "sheet-02.nc")
     assert miurafab.preview(folder).as_dict()["status"] == "refused"
     assert miurafab.preview(prepared.directory).as_dict()["status"] == "refused"
@@ -111,7 +111,7 @@ def test_an_edited_job_is_cut_only_if_that_is_forced(folder):
     done = cut_prepared(prepared, port="virtual", sheets=[1], options=options)
     assert [each.code for each in done[0].findings] == ["edited"]
     (folder / "manifest.json").unlink()
-    assert "holds no manifest" in prepare(str(folder)).edits[0].sentence
+    assert "holds no manifest" in prepare(str(folder)).findings[0].sentence
 
 
 def test_a_frame_burns_nothing(tmp_path):
