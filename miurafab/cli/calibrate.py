@@ -16,7 +16,7 @@ _OPERATION = declared(Operation)
 
 EXAMPLES = (
     "miurafab calibrate --machine grbl-laser-400 --material card-250 -o trial",
-    "miurafab calibrate --machine grbl-co2-k40 --power 4W --feed 1800mm/min -o trial",
+    "miurafab calibrate --machine grbl-co2-k40 --power 4W --feed 1800 -o trial",
 )
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 EXAMPLES = (
     "miurafab preview jobs/hypar",
     "miurafab preview jobs/hypar/sheet-01.nc --machine grbl-laser-400",
-    "miurafab preview jobs/hypar --sheet 1 --align 20,20=22,21 --align 180,180=182,181",
+    "miurafab preview jobs/hypar --sheet 1 --align 5,5=6,5 --align 220,5=221,5",
 )
 
 

@@ -123,10 +123,7 @@ PROFILES_ACTIONS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {
     "show": (profiles, ("miurafab profiles show grbl-laser-400",)),
     "add": (
         add_machine,
-        (
-            "miurafab profiles add my-k40 --port /dev/ttyUSB0 --like grbl-co2-k40 --beam co2 "
-            "--power 38W",
-        ),
+        ("miurafab profiles add k40 --port COM3 --beam co2 --power 38W",),
     ),
 }
 MATERIALS_HELP = "List the materials, show and validate one, or add one from a calibration."
