@@ -12,9 +12,9 @@ from miurafab.gcode import block_errors
 from miurafab.gcode.block_errors import BlockError, Reason
 from miurafab.gcode.numbers import read_single, single, whole_byte
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+_NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)"  # one way to read it, however long
 _WORD = re.compile(rf"([A-Z])({_NUMBER})", re.ASCII)
-_LINE = re.compile(rf"(?:[A-Z]{_NUMBER})*", re.ASCII)
+_LINE = re.compile(rf"(?:[A-Z]{_NUMBER})*+", re.ASCII)
 
 
 def split_words(line: str) -> Iterator[tuple[str, str]]:

@@ -16,6 +16,7 @@ from miurafab.gcode.block_errors import BlockError
 from miurafab.gcode.execution import execute
 from miurafab.gcode.numbers import read_single, single, to_unsigned, whole_byte
 from miurafab.gcode.parser import Block, ModalState, parse_block
+from miurafab.gcode.words import split_words
 
 
 @dataclass(frozen=True)
@@ -136,3 +137,12 @@ def test_numbers_keep_eight_digits_and_overflow_as_the_firmware_does() -> None:
     assert whole_byte(256.0) == 0
     assert whole_byte(-1.0) == 255
     assert to_unsigned(float("nan")) == to_unsigned(2.0**32) == 0
+
+
+@pytest.mark.parametrize("number", ["9" * 4000, "9" * 4000 + ".", "." + "9" * 4000])
+def test_a_number_of_thousands_of_digits_is_read_at_once(number: str) -> None:
+    """A pattern with two ways to read digits took minutes before it refused what follows them."""
+    words = split_words(f"X{number}Y{number}%")
+    assert [next(words), next(words)] == [("X", number), ("Y", number)]
+    with pytest.raises(BlockError):
+        next(words)

@@ -28,12 +28,16 @@ from miurafab.surfaces.frame import origin_in
 _DIGITS = 700
 """As many as the sum of any two 64-bit numbers has."""
 
+LARGEST_SCALE = 1e12
+"""No scale, in mm a unit of the target, is larger, and none is smaller than its inverse."""
+
 
 def scale_in(document: Mapping[str, Any]) -> float:
     """``miurafab:scale``, 1 if it is missing. Raises ``PatternError``."""
     scale = document.get("miurafab:scale", 1.0)
-    if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0 < scale < math.inf:
-        raise PatternError(f"'miurafab:scale' is {scale!r}, not a positive number.")
+    known = isinstance(scale, int | float) and not isinstance(scale, bool)
+    if not known or not 1 / LARGEST_SCALE <= scale <= LARGEST_SCALE:
+        raise PatternError(f"'miurafab:scale' is {scale!r}, not a number from 1e-12 to 1e12.")
     return float(scale)
 
 

@@ -198,6 +198,7 @@ def test_mixed_polygons_are_padded() -> None:
         ({"file_frames": [{"frame_inherit": True, "frame_parent": 7}]}, "inherits 7"),
         ({"miurafab:grid": [3, 3]}, "miurafab:grid"),
         ({"miurafab:scale": -1}, "miurafab:scale"),
+        ({"miurafab:scale": 1e308}, "not a number from 1e-12"),
         ({"miurafab:pieces": [0]}, "one number for each facet"),
         ({"miurafab:pieces": 3}, "'miurafab:pieces' is not a list of whole numbers"),
         ({"miurafab:pieces": [0.5] * 6}, "'miurafab:pieces' is not a list of whole numbers"),
