@@ -11,7 +11,12 @@ import re
 
 from miurafab.errors import UnitError
 
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s].*?)?\s*")
+DECIMAL = r"(?:\d++(?:\.\d*+)?|\.\d++)"
+"""The pattern of a number without sign and exponent. It matches any digits in one way alone: of
+n digits of which each may stand before or after a point that is missing, an expression that fails
+behind them tries n ways, and n^2 with two such numbers."""
+
+_QUANTITY = re.compile(rf"\s*([-+]?{DECIMAL}(?:[eE][-+]?\d+)?)\s*([^\d\s].*?)?\s*")
 
 # The inch is exactly 25.4 mm (international yard and pound agreement, 1959).
 _LENGTHS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, '"': 25.4}

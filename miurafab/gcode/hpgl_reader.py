@@ -16,12 +16,13 @@ from miurafab.errors import GcodeError
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import BEAM_M3, BEAM_OFF, FEED, RAPID, Context, Program, ProgramBuilder
 from miurafab.profiles import OPERATIONS
+from miurafab.units import DECIMAL
 
 MM_PER_UNIT = 0.025
 _MM_MIN_PER_CM_S = 600.0
 _SPEED = 40.0  # cm/s, before any VS; common cutters have it
 _INSTRUCTION = re.compile(r"\s*([A-Za-z]{2})([-+0-9.,\s]*);?\s*")
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
+_NUMBER = re.compile(rf"[-+]?{DECIMAL}")
 
 
 def parse_hpgl(job: Job) -> Program:

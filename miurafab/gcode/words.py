@@ -11,8 +11,9 @@ from functools import lru_cache
 from miurafab.gcode import block_errors
 from miurafab.gcode.block_errors import BlockError, Reason
 from miurafab.gcode.numbers import read_single, single, whole_byte
+from miurafab.units import DECIMAL
 
-_NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)"  # one way to read it, however long
+_NUMBER = rf"[-+]?{DECIMAL}"
 _WORD = re.compile(rf"([A-Z])({_NUMBER})", re.ASCII)
 _LINE = re.compile(rf"(?:[A-Z]{_NUMBER})*+", re.ASCII)
 

@@ -15,6 +15,7 @@ from miurafab.findings import Finding
 from miurafab.gcode.dialect_words import OUTPUT
 from miurafab.gcode.job import Job, plain_code
 from miurafab.profiles import MachineProfile
+from miurafab.units import DECIMAL
 
 # Between the letter and the digits of a word may stand blanks, a sign, zeros and comments.
 _GAP = r"(?:[ \t/+0]|\([^)\r\n]*\))*"
@@ -23,7 +24,7 @@ _SPINDLE_ANYWHERE = re.compile(rf"[mM]{_GAP}[2345]")
 # The words in a line without comments and blanks.
 _M3 = re.compile(r"M\+?0*3(?:\.\d*)?(?![\d.])")
 _SPINDLE = re.compile(r"M\+?0*(30?|2|4|5)(?:\.\d*)?(?![\d.])")
-_POWER = re.compile(r"S(\d+\.?\d*|\.\d+)")
+_POWER = re.compile(rf"S({DECIMAL})")
 _DWELL = re.compile(r"G0*4(?![\d.])")
 _MIST_ANYWHERE = re.compile(rf"[mM]{_GAP}7")
 _MIST = re.compile(r"M\+?0*7(?:\.0*)?(?![\d.])")

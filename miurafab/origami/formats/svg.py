@@ -24,7 +24,7 @@ from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import ASSIGNMENTS
 from miurafab.origami.formats.lines import xml_root
 from miurafab.origami.formats.planar_graph import CreaseLines
-from miurafab.units import parse_length
+from miurafab.units import DECIMAL, parse_length
 
 _STROKES = {
     "B": "#000000", "M": "#ff0000", "V": "#0000ff", "C": "#00ff00", "F": "#ffff00",
@@ -39,7 +39,7 @@ _NAMES = {
 }  # fmt: skip
 _SHORTEST = 10.0
 """User units of the shortest line."""
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_NUMBER = re.compile(rf"[-+]?{DECIMAL}(?:[eE][-+]?\d+)?")
 _PATH = re.compile(r"([MmLlHhVvZzCcSsQqTtAa])|(" + _NUMBER.pattern + ")")
 
 Matrix = Floats

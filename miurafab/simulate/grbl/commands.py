@@ -13,10 +13,11 @@ from miurafab.simulate.grbl.motion_control import offsets_changed, remember, run
 from miurafab.simulate.grbl.output import rest_motors, say
 from miurafab.simulate.grbl.realtime import synchronize
 from miurafab.simulate.grbl.state import FirmwareState, Machine, RealtimeRequest, Routine, Wait
+from miurafab.units import DECIMAL
 
 _BAD_NUMBER, _UNKNOWN, _HOMING_OFF, _READ_FAILED, _NOT_IDLE = 2, 3, 5, 7, 8
 TextRoutine = Generator[Wait, None, str | None]
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)", re.ASCII)
+_NUMBER = re.compile(rf"[-+]?{DECIMAL}", re.ASCII)
 _LARGEST_SETTING = 255
 
 
