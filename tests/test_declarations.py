@@ -5,6 +5,7 @@ The tables in the pages are compared with the declarations in tests/examples/tes
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -145,6 +146,14 @@ class Form(HTMLParser):
 
     def handle_data(self, data):
         self.text += data
+
+
+def test_what_nobody_chose_on_the_page_is_not_sent() -> None:
+    """A list shows its first choice until another is taken, so that one has the empty value."""
+    page = resources.files("miurafab.studio").joinpath("page/studio.html").read_text("utf-8")
+    chosen = {name for name, each in (FIT | LAYOUT).items() if isinstance(each.kind, Choice)}
+    unset = re.findall(r'<select id="(\w+)"[^>]*><option value="">', filled(page).replace("\n", ""))
+    assert {"prefer", "marks", "close"} <= chosen == set(unset)
 
 
 def test_the_page_has_the_fields_that_are_declared_for_it() -> None:

@@ -2,7 +2,7 @@
 
 from miurafab.profiles.beam import OPERATIONS
 from miurafab.profiles.machine import Knife, MachineProfile, load_machine, read_machine
-from miurafab.profiles.material import GRAINS, Material, load_material
+from miurafab.profiles.material import GRAINS, Material, load_material, read_material
 from miurafab.profiles.shipped import (
     DEFAULT_MACHINE,
     DEFAULT_MATERIAL,
@@ -29,6 +29,7 @@ __all__ = [
     "load_machine",
     "load_material",
     "read_machine",
+    "read_material",
     "read_toml",
     "shipped_directory",
     "shipped_names",

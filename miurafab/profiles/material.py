@@ -186,6 +186,13 @@ class Material(Shown):
         return self.creases[kind].perforation or self.perforation
 
 
+def read_material(material: Material | AnyPath | None) -> Material:
+    """``material`` itself, or the one that it names; for None the default material."""
+    if isinstance(material, Material):
+        return material
+    return load_material(find_profile("materials", None) if material is None else material)
+
+
 def load_material(name: AnyPath) -> Material:
     """Read a material.
 

@@ -21,13 +21,7 @@ from miurafab.options import File, Whole, check_options, option
 from miurafab.origami.fitting.fit import fit as fit_request
 from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitRequest
 from miurafab.origami.fitting.result import FitResult
-from miurafab.profiles import (
-    MachineProfile,
-    Material,
-    find_profile,
-    load_material,
-    read_machine,
-)
+from miurafab.profiles import MachineProfile, Material, read_machine, read_material
 
 _FITS = 4
 """So many fits are made at most."""
@@ -78,7 +72,7 @@ def fit_to_bed(
 
     Raises :class:`~miurafab.errors.LayoutError` if no size can be found.
     """
-    profile, card = read_machine(machine), _material(material)
+    profile, card = read_machine(machine), read_material(material)
     options = with_stock(layout, wanted)
     size = DEFAULT_SIZE_MM
     for number in range(_FITS):
@@ -93,9 +87,3 @@ def fit_to_bed(
     raise LayoutError(
         f"No `size` was found at which the sheet that is fitted then fits; about {size:g} mm fit."
     )
-
-
-def _material(given: Material | AnyPath | None) -> Material:
-    if isinstance(given, Material):
-        return given
-    return load_material(find_profile("materials", given))

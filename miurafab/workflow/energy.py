@@ -14,7 +14,7 @@ from miurafab.origami.energy.bar_hinge import Paper, sheet_model
 from miurafab.origami.energy.curve import EnergyCurve, energy_curve
 from miurafab.origami.energy.path import Progress
 from miurafab.origami.energy.pieces import PieceEnergies, energies_of_pieces
-from miurafab.profiles import Material, load_material
+from miurafab.profiles import Material, read_material
 from miurafab.workflow.patterns import PatternLike, consistent_pattern
 
 
@@ -80,7 +80,7 @@ def energy(
     found = consistent_pattern(pattern)
     paper = None
     if material is not None:
-        stock = material if isinstance(material, Material) else load_material(material)
+        stock = read_material(material)
         if stock.modulus_pa is None:
             raise InputError(
                 f"The material '{stock.name}' gives no modulus; add a line such as "

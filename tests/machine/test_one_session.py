@@ -51,13 +51,6 @@ def bench() -> Iterator[Bench]:
     bench.wire.close()
 
 
-@pytest.fixture
-def screen() -> Iterator[Terminal]:
-    screen = Terminal()
-    yield screen
-    screen.close()
-
-
 def asked(bench: Bench, screen: Terminal, folder: Path) -> subprocess.Popen[bytes]:
     """A command in a terminal that has cut the first of two sheets and asks for Enter."""
     job = write_job(folder / "job", 2)

@@ -27,13 +27,6 @@ def bench() -> Iterator[Bench]:
     bench.wire.close()
 
 
-@pytest.fixture
-def screen() -> Iterator[Terminal]:
-    screen = Terminal()
-    yield screen
-    screen.close()
-
-
 def burning(bench: Bench, screen: Terminal, folder: Path) -> subprocess.Popen[bytes]:
     """A session in a terminal, in the midst of a job that was armed and started there."""
     job = folder / "long.nc"
