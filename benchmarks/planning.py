@@ -51,6 +51,7 @@ JOBS: dict[str, Callable[[], CreasePattern]] = {
     "band": fitted("plane", width=20, depth=1, facets=(120, 6), size=1800),
     "strip": strip,
     "hypar600": fitted("hypar", facets=(40, 40), size=600),
+    "hypar600-off": fitted("hypar", facets=(40, 40), size=600, polish="off"),
     "fan10k": lambda: fan(126, 79),
     "miura10k": lambda: miura(126, 79),
     "miura100k": lambda: miura(400, 250),

@@ -14,6 +14,7 @@ from miurafab.fabrication.partition.fit_box import Space, best_turn, scale_to_fi
 from miurafab.fabrication.plan_advice import advised_size
 from miurafab.fabrication.plan_size import Sizing
 from miurafab.fabrication.sheets import lay_out
+from miurafab.profiles import load_machine, load_material
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -102,3 +103,14 @@ def test_a_size_that_pays_is_told():
     assert whole.scale == pytest.approx(1 / 1.03)
     assert told(0.8 * scale).scale == pytest.approx(1 / 0.8)
     assert told(0.999 * scale) is None
+
+
+@pytest.mark.large
+def test_a_hypar_of_600_mm_takes_seven_sheets_and_a_little_less_takes_four():
+    pattern = mf.fit("hypar", facets=(40, 40), size=600, polish="off").pattern
+    machine, material = load_machine("grbl-laser-400"), load_material("card-250")
+    layout = lay_out(pattern, machine, material)
+    assert layout.totals.sheets <= 7
+    assert layout.totals.seam_mm <= 3700
+    told = advised_size(pattern, layout, machine, material, LayoutOptions())
+    assert (told.sheets, told.scale >= 0.85, told.seam_mm <= 1600) == (4, True, True)
