@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from miurafab.geometry.arrays import Floats
-from miurafab.origami.energy.equilibrium import Driven, EquilibriumState, Factored, solve
+from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, Factored, solve
 
 Progress = Callable[[float, str], None]
 
@@ -25,7 +25,7 @@ class Known(NamedTuple):
 
 
 def follow(
-    driven: Driven, start: EquilibriumState, drives: Floats, on_progress: Progress | None = None
+    driven: Balance, start: EquilibriumState, drives: Floats, on_progress: Progress | None = None
 ) -> list[EquilibriumState]:
     """The equilibria at ``drives`` (n,), the first of them near ``start``.
 

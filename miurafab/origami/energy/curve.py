@@ -20,7 +20,8 @@ import numpy as np
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
 from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate
-from miurafab.origami.energy.equilibrium import Driven, Factored, solve
+from miurafab.origami.energy.driven import Driven
+from miurafab.origami.energy.equilibrium import Factored, solve
 from miurafab.origami.energy.path import (
     NEARLY_FLAT,
     Path,

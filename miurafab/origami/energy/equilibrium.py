@@ -1,7 +1,7 @@
-"""Static equilibrium of bars and hinges with one quantity driven: a saddle-point Newton iteration.
+"""Static equilibrium of bars and hinges: a saddle-point Newton iteration.
 
-The driven quantity d(x), a fold angle or a distance, is held at s. Equilibrium is a stationary
-point of L = E_hinges + f.c + mu (d - s) with c = delta f, that is F = 0 for
+A quantity d(x) may be driven, a fold angle or a distance: it is held at s. Equilibrium is a
+stationary point of L = E_hinges + f.c + mu (d - s) with c = delta f, that is F = 0 for
 
     F_x = grad E_hinges + J' f + mu grad d,   F_c = c - delta f,   F_d = d - s
 
@@ -16,37 +16,25 @@ dn = W (A dx + F_a), with K = H + A' W A and W = 1 / (D + eps). K is as sparse a
 third of the saddle system in size, with no zeros on its diagonal. So one fill-reducing order of
 the vertices serves every factorisation, and no pivoting is needed. F is exact, so the solution
 depends neither on eps nor on the age of K, and K is factored again only when convergence slows.
-
-Parts of a sheet that hang on one crease, or on one facet, fold independently of the driven one. A
-guide moves each of them: a stiff hinge at one of its creases, whose rest angle r follows the driven
-angle s by the law of rigid folding, tan(r / 2) / tan(s / 2) constant. It holds without energy what
-nothing else holds.
-
-Six coordinates of one triangle are held, in axes along it, to exclude rigid motions.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import sparse
 
 from miurafab.geometry.arrays import Floats, Ints, vector_product
-from miurafab.geometry.sparse import Factor, factor_symmetric, minimum_degree
+from miurafab.geometry.sparse import Factor, factor_symmetric
+from miurafab.origami.energy.assembly import Assembly
 from miurafab.origami.energy.bar_hinge import BarHingeModel
-from miurafab.origami.energy.hinges import hinge_angles, hinge_derivatives, hinge_gradients
+from miurafab.origami.energy.hinges import hinge_derivatives, hinge_gradients
 
 TOLERANCE = 1e-11
 """Limit of every component of F (forces over the stiffest hinge, if that is over 1). Convergence is
 judged by F and not by the length of a step."""
-GUIDE = 100.0
-"""The stiffness of a guide. A facet on one crease leaves it at rest to 1e-13; two halves of a hypar
-that share one facet turn it by 1e-6, the torque of a half over this stiffness."""
 EPS = 1e-10
 """The compliance of inextensible bars in K. Larger values slow the iteration down under large bar
 forces, smaller values by rounding."""
@@ -103,21 +91,28 @@ class Solution(NamedTuple):
     converged: bool
 
 
-@dataclass(frozen=True, eq=False)
-class Driven:
-    """A model with one driven quantity: the fold angle of the hinge ``stencil`` (4,), or the
-    distance between the two vertices of ``stencil`` (2,).
+class Drive(NamedTuple):
+    """The driven quantity: its ``value``, ``gradient`` (k, 3) and ``hessian`` (k, k, 3, 3) by the
+    k vertices of its stencil.
+    """
 
-    ``guided`` (m, 4) are hinges that go with the driven fold angle.
+    value: float
+    gradient: Floats
+    hessian: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """The forces of a model and what drives it; this class drives nothing.
+
+    A subclass says what follows the ``target`` of a state: a driven quantity, or rest angles.
     """
 
     model: BarHingeModel
-    stencil: Ints
-    guided: Ints = field(default_factory=lambda: np.empty((0, 4), dtype=np.int64))
 
     @property
     def rest(self) -> EquilibriumState:
-        """The folded form without forces."""
+        """The form of the model without forces."""
         return EquilibriumState(self.model.points @ self.axes, np.zeros(len(self.model.bars)), 0.0)
 
     @cached_property
@@ -132,133 +127,91 @@ class Driven:
         z /= np.linalg.norm(z)
         return np.stack([x, vector_product(z, x), z], axis=1)
 
-    def value(self, points: Floats) -> float:
-        """The driven quantity at ``points`` (V, 3)."""
-        if len(self.stencil) == 4:
-            return float(hinge_angles(points, self.stencil[None])[0])
-        return float(np.linalg.norm(points[self.stencil[1]] - points[self.stencil[0]]))
+    @property
+    def hinges(self) -> Ints:
+        """(H, 4) the hinges that resist turning."""
+        return self.model.hinges
 
-    def load(self, state: EquilibriumState, target: float) -> float:
-        """dE / d target: what drives the driven quantity, and the guides with it."""
-        turned = hinge_angles(state.points, self.guided) - self._guides(target)
-        step = 1e-6
-        rate = (self._guides(target + step) - self._guides(target - step)) / (2 * step)
-        return -state.mu - GUIDE * float(turned @ rate)
+    @property
+    def drive_stencil(self) -> Ints:
+        """(k,) the vertices of the driven quantity; none here."""
+        return np.empty(0, dtype=np.int64)
 
-    def _guides(self, target: float) -> Floats:
-        """(m,) the rest angles of the guided hinges, with the driven angle at ``target``."""
-        if not len(self.guided):
-            return np.empty(0)
-        return np.asarray(2 * np.arctan(self._ratios * math.tan(target / 2)))
+    def moments(self, angle: Floats, target: float) -> tuple[Floats, Floats]:
+        """(H,) the moment of each hinge at its ``angle`` (H,), and its slope by the angle."""
+        return self.model.stiffness * (angle - self.model.rest), self.model.stiffness
 
-    @cached_property
-    def _ratios(self) -> Floats:
-        """(m,) tan(r / 2) / tan(s / 2) in the folded form."""
-        half = np.tan(hinge_angles(self.model.points, self.guided) / 2)
-        return np.asarray(half / math.tan(self.value(self.model.points) / 2))
-
-    @cached_property
-    def _hinges(self) -> Ints:
-        return np.concatenate([self.model.hinges, self.guided])
-
-    @cached_property
-    def _stiffness(self) -> Floats:
-        return np.concatenate([self.model.stiffness, np.full(len(self.guided), GUIDE)])
+    def drive(self, points: Floats, target: float) -> Drive:
+        """The driven quantity at ``points`` (V, 3); with nothing driven it is always on target."""
+        return Drive(target, np.zeros((0, 3)), np.zeros((0, 0, 3, 3)))
 
     def residual(self, state: EquilibriumState, target: float) -> Residual:
-        """F at ``state``, with ``target`` for the driven quantity."""
+        """F at ``state``, with what is driven at ``target``."""
         model, points = self.model, state.points
-        angle, gradient = hinge_gradients(points, self._hinges)
-        rest = np.concatenate([model.rest, self._guides(target)])
-        bend = (self._stiffness * (angle - rest))[:, None, None] * gradient
-        d = points[model.bars[:, 1]] - points[model.bars[:, 0]]
-        pull = (state.forces / model.lengths)[:, None] * d
-        value, drive = self._drive_gradient(points)
-        force = self._gather(bend, pull, state.mu * drive)
+        angle, gradient = hinge_gradients(points, self.hinges)
+        bend = self.moments(angle, target)[0][:, None, None] * gradient
+        pull = (state.forces / model.lengths)[:, None] * self._bars(points)
+        drive = self.drive(points, target)
+        force = self._gather(bend, pull, state.mu * drive.gradient)
         strain = model.strains(points) - model.compliance * state.forces
-        return Residual(force, strain, value - target)
+        return Residual(force, strain, drive.value - target)
 
     def size(self, residual: Residual) -> float:
         """The largest component of F; NaN where a triangle has degenerated."""
-        force = np.abs(residual.force).max(initial=0.0) / self._stiffest
+        force = np.abs(residual.force).max(initial=0.0) / self.stiffest
         strain = np.abs(residual.strain).max(initial=0.0)
         return float(np.max([force, strain, abs(residual.miss)]))
 
-    def factor(self, state: EquilibriumState) -> Factored:
+    def factor(self, state: EquilibriumState, target: float) -> Factored:
         """K at ``state``. Raises ``RuntimeError`` where it is singular."""
         model, points = self.model, state.points
-        angle, gradient, hessian = hinge_derivatives(points, self._hinges)
-        k = self._stiffness[:, None, None, None, None]
-        bend = k * (gradient[:, :, :, None, None] * gradient[:, None, None, :, :])
-        count = len(model.hinges)  # guides are near their rest
-        turned = model.stiffness * (angle[:count] - model.rest)
-        bend[:count] += turned[:, None, None, None, None] * hessian[:count]
-        bars = (points[model.bars[:, 1]] - points[model.bars[:, 0]]) / model.lengths[:, None]
+        angle, gradient, hessian = hinge_derivatives(points, self.hinges)
+        moment, slope = self.moments(angle, target)
+        outer = gradient[:, :, None, :, None] * gradient[:, None, :, None, :]
+        bend = slope[:, None, None, None, None] * outer
+        bend += moment[:, None, None, None, None] * hessian.swapaxes(2, 3)
+        bars = self._bars(points) / model.lengths[:, None]
         weights = 1.0 / (model.compliance + EPS)
         block = weights[:, None, None] * bars[:, :, None] * bars[:, None, :]
         block += (state.forces / model.lengths)[:, None, None] * np.eye(3)
-        stretch = np.stack([block, -block, -block, block], axis=1)
-        drive, turning = self._drive_hessian(points)
-        held = state.mu * turning + drive[:, :, None, None] * drive / EPS
-        values = (bend.swapaxes(2, 3), stretch, held.swapaxes(1, 2))
-        rows, starts, place = self._sparsity
-        data = np.bincount(place, np.concatenate([v.ravel() for v in values]), len(rows) + 1)[1:]
-        size = len(starts) - 1
-        matrix = sparse.csc_array((data, rows, starts), shape=(size, size))
-        return Factored(factor_symmetric(matrix, reorder=False), bars, weights, drive)
+        drive = self.drive(points, target)
+        across = drive.gradient[:, None, :, None] * drive.gradient[None, :, None, :]
+        held = state.mu * drive.hessian + across / EPS
+        matrix = self.assembly.matrix([bend, stretch_blocks(block), held[None]])
+        return Factored(factor_symmetric(matrix, reorder=False), bars, weights, drive.gradient)
 
     def step(self, factored: Factored, residual: Residual) -> EquilibriumState:
         """The Newton step (dx, dn) for ``residual`` with K as ``factored``."""
         bars, weights, drive = factored.bars, factored.weights, factored.drive
         pull = (weights * residual.strain)[:, None] * bars
-        no_bend = np.zeros((len(self._hinges), 4, 3))
+        no_bend = np.zeros((len(self.hinges), 4, 3))
         right = residual.force + self._gather(no_bend, pull, residual.miss / EPS * drive)
-        coordinates = np.zeros(self.model.points.size)
-        coordinates[self._free] = -factored.k.solve(right)
-        dx = coordinates.reshape(-1, 3)
+        dx = self.assembly.vectors(-factored.k.solve(right))
         first, second = self.model.bars.T
         stretch = np.einsum("bk,bk->b", bars, dx[second] - dx[first])
         return EquilibriumState(
             dx,
             weights * (stretch + residual.strain),
-            (float((drive * dx[self.stencil]).sum()) + residual.miss) / EPS,
+            (float((drive * dx[self.drive_stencil]).sum()) + residual.miss) / EPS,
         )
 
-    def _drive_gradient(self, points: Floats) -> tuple[float, Floats]:
-        if len(self.stencil) == 4:
-            angle, gradient = hinge_gradients(points, self.stencil[None])
-            return float(angle[0]), gradient[0]
-        apart = points[self.stencil[1]] - points[self.stencil[0]]
-        distance = float(np.linalg.norm(apart))
-        return distance, np.stack([-apart, apart]) / distance
+    @cached_property
+    def stiffest(self) -> float:
+        """The stiffness of the stiffest hinge, at least 1."""
+        return float(self.moments(np.zeros(len(self.hinges)), 0.0)[1].max(initial=1.0))
 
-    def _drive_hessian(self, points: Floats) -> tuple[Floats, Floats]:
-        """The driven quantity's gradient (k, 3) and Hessian (k, 3, k, 3)."""
-        if len(self.stencil) == 4:
-            _, gradients, hessians = hinge_derivatives(points, self.stencil[None])
-            return gradients[0], hessians[0]
-        distance, gradient = self._drive_gradient(points)
-        across = (np.eye(3) - np.outer(gradient[1], gradient[1])) / distance
-        signs = np.array([[1.0, -1.0], [-1.0, 1.0]])
-        return gradient, signs[:, None, :, None] * across[None, :, None, :]
+    @cached_property
+    def assembly(self) -> Assembly:
+        """The sums over hinges, bars and the driven quantity."""
+        stencils = (self.hinges, self.model.bars, self.drive_stencil[None])
+        return Assembly(len(self.model.points), stencils, self._held)
+
+    def _bars(self, points: Floats) -> Floats:
+        return np.asarray(points[self.model.bars[:, 1]] - points[self.model.bars[:, 0]])
 
     def _gather(self, bend: Floats, pull: Floats, drive: Floats) -> Floats:
         """The free coordinates of the sums at the vertices of hinge, bar and drive vectors."""
-        vectors = np.concatenate([bend.reshape(-1, 3), -pull, pull, drive])
-        count = len(self.model.points)
-        total = np.empty((count, 3))
-        for axis in range(3):
-            total[:, axis] = np.bincount(self._ends, vectors[:, axis], count)
-        return total.ravel()[self._free]
-
-    @cached_property
-    def _stiffest(self) -> float:
-        return float(self._stiffness.max(initial=1.0))
-
-    @cached_property
-    def _ends(self) -> Ints:
-        hinges, bars = self._hinges, self.model.bars
-        return np.concatenate([hinges.ravel(), bars[:, 0], bars[:, 1], self.stencil])
+        return self.assembly.gather([bend, np.stack([-pull, pull], axis=1), drive])
 
     @cached_property
     def _held(self) -> Ints:
@@ -270,59 +223,16 @@ class Driven:
         away = np.linalg.norm(centres - model.points.mean(axis=0), axis=1)
         return np.asarray(corners[np.argmin(away)])
 
-    @cached_property
-    def _free(self) -> Ints:
-        """The free coordinates (3 vertex + axis) in the order of elimination."""
-        first, second, third = self._held * 3
-        held = [first, first + 1, first + 2, second + 1, second + 2, third + 2]
-        coordinates = (self._elimination[:, None] * 3 + np.arange(3)).ravel()
-        return coordinates[~np.isin(coordinates, held)]
 
-    @cached_property
-    def _pairs(self) -> tuple[Ints, Ints]:
-        """The vertex pairs of all 3x3 blocks of K, in the order of computation."""
-        rows, columns = [], []
-        for stencils in (self._hinges, self.model.bars, self.stencil[None]):
-            size = stencils.shape[1]
-            rows.append(np.repeat(stencils, size, axis=1).ravel())
-            columns.append(np.tile(stencils, size).ravel())
-        return np.concatenate(rows), np.concatenate(columns)
-
-    @cached_property
-    def _elimination(self) -> Ints:
-        """(V,) vertices in a fill-reducing order, by minimum degree on the vertex graph."""
-        count = len(self.model.points)
-        rows, columns = self._pairs
-        ones = np.ones(len(rows))
-        graph = sparse.coo_array((ones, (rows, columns)), shape=(count, count)).tocsc()
-        graph.data[:] = -1.0
-        graph.setdiag(np.diff(graph.indptr) + 1.0)  # diagonally dominant: factored as it stands
-        return minimum_degree(graph)
-
-    @cached_property
-    def _sparsity(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Ints]:
-        """Rows and column starts of K (CSC), and the place of each computed value in its data: 1 +
-        the index, or 0 for a held coordinate.
-        """
-        free = self._free
-        new = np.full(self.model.points.size, -1, dtype=np.int64)
-        new[free] = np.arange(len(free))
-        of_vertex = new.reshape(-1, 3)
-        row, column = (of_vertex[ends] for ends in self._pairs)
-        rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
-        real = (rows >= 0) & (columns >= 0)
-        key = np.where(real, columns * len(free) + rows, -1).ravel()
-        keys, place = np.unique(key, return_inverse=True)
-        columns, rows = np.divmod(keys[keys >= 0], len(free))
-        starts = np.searchsorted(columns, np.arange(len(free) + 1))
-        offset = 1 - int((keys < 0).sum())
-        return rows.astype(np.int32), starts.astype(np.int32), place + offset
+def stretch_blocks(block: Floats) -> Floats:
+    """(n, 2, 2, 3, 3) the stiffness between both ends of bars, from ``block`` (n, 3, 3)."""
+    return np.stack([block, -block, -block, block], axis=1).reshape(-1, 2, 2, 3, 3)
 
 
 def solve(
-    driven: Driven, guess: EquilibriumState, target: float, factored: Factored | None = None
+    driven: Balance, guess: EquilibriumState, target: float, factored: Factored | None = None
 ) -> Solution:
-    """The equilibrium near ``guess`` with the driven quantity at ``target``.
+    """The equilibrium near ``guess`` with what is driven at ``target``.
 
     ``factored`` is an earlier K to start with. A step that does not lower the largest component of
     F is repeated with a new K, then shortened. Failure is a result, not an exception.
@@ -337,7 +247,7 @@ def solve(
             break
         if factored is None:
             try:
-                factored, fresh = driven.factor(state), True
+                factored, fresh = driven.factor(state, target), True
             except RuntimeError:  # exactly singular
                 break
         step = driven.step(factored, residual)
@@ -363,7 +273,7 @@ def solve(
 
 
 def _polished(
-    driven: Driven, state: EquilibriumState, target: float, factored: Factored | None
+    driven: Balance, state: EquilibriumState, target: float, factored: Factored | None
 ) -> EquilibriumState:
     """``state`` after one more step with the last K, if that lowers the residual."""
     if factored is None:

@@ -20,7 +20,8 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
 from miurafab.origami.energy.continuation import follow
-from miurafab.origami.energy.equilibrium import Driven, EquilibriumState
+from miurafab.origami.energy.driven import Driven
+from miurafab.origami.energy.equilibrium import EquilibriumState
 from miurafab.origami.energy.hinges import hinge_angles
 
 Progress = Callable[[float, str], None]

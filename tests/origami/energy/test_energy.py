@@ -27,7 +27,8 @@ from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.energy.bar_hinge import Paper, sheet_model
 from miurafab.origami.energy.continuation import follow
 from miurafab.origami.energy.curve import energy_curve
-from miurafab.origami.energy.equilibrium import Driven, EquilibriumState, solve
+from miurafab.origami.energy.driven import Driven
+from miurafab.origami.energy.equilibrium import EquilibriumState, solve
 from miurafab.origami.energy.hinges import hinge_angles, hinge_derivatives, hinge_gradients
 from miurafab.origami.energy.path import (
     NEARLY_FLAT,
@@ -147,7 +148,7 @@ def test_one_step_solves_the_saddle_system():
         )
         target = driven.value(rest.points) - 0.01
         residual = driven.residual(state, target)
-        step = driven.step(driven.factor(state), residual)
+        step = driven.step(driven.factor(state, target), residual)
         h = 1e-5
         there = driven.residual(state.plus(step, h), target)
         back = driven.residual(state.plus(step, -h), target)

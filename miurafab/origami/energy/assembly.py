@@ -1,0 +1,104 @@
+"""Sums over the vertices of a mesh: forces and stiffness of springs, each between a few vertices.
+
+A stencil is a row of vertices that one spring joins: two for a bar, four for a hinge. The matrix is
+as sparse as the stencils, and its sparsity and the order of elimination are found once. Six
+coordinates of one triangle are held, in axes along it, to exclude rigid motions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.sparse import minimum_degree
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """The sums of springs over ``count`` vertices.
+
+    ``stencils`` are the groups of springs, each (n, k) with k vertices a spring; ``held`` (3,) is
+    the held triangle.
+    """
+
+    count: int
+    stencils: tuple[Ints, ...]
+    held: Ints
+
+    def gather(self, vectors: Sequence[Floats]) -> Floats:
+        """The free coordinates of the sums at vertices of ``vectors``, (n, k, 3) for each group."""
+        flat = np.concatenate([v.reshape(-1, 3) for v in vectors])
+        total = np.empty((self.count, 3))
+        for axis in range(3):
+            total[:, axis] = np.bincount(self._ends, flat[:, axis], self.count)
+        return np.asarray(total.ravel()[self.free])
+
+    def matrix(self, blocks: Sequence[Floats]) -> sparse.csc_array:
+        """The sum of ``blocks``, (n, k, k, 3, 3) for each group, between the free coordinates."""
+        rows, starts, place = self._sparsity
+        values = np.concatenate([block.ravel() for block in blocks])
+        data = np.bincount(place, values, len(rows) + 1)[1:]
+        size = len(starts) - 1
+        return sparse.csc_array((data, rows, starts), shape=(size, size))
+
+    def vectors(self, coordinates: Floats) -> Floats:
+        """(V, 3) the free ``coordinates`` at their vertices, and zeros where they are held."""
+        whole = np.zeros(3 * self.count)
+        whole[self.free] = coordinates
+        return whole.reshape(-1, 3)
+
+    @cached_property
+    def free(self) -> Ints:
+        """The free coordinates (3 vertex + axis) in the order of elimination."""
+        first, second, third = self.held * 3
+        held = [first, first + 1, first + 2, second + 1, second + 2, third + 2]
+        coordinates = (self._elimination[:, None] * 3 + np.arange(3)).ravel()
+        return coordinates[~np.isin(coordinates, held)]
+
+    @cached_property
+    def _ends(self) -> Ints:
+        return np.concatenate([stencils.ravel() for stencils in self.stencils])
+
+    @cached_property
+    def _pairs(self) -> tuple[Ints, Ints]:
+        """The vertex pairs of all 3x3 blocks of the matrix, in the order of computation."""
+        rows, columns = [], []
+        for stencils in self.stencils:
+            size = stencils.shape[1]
+            rows.append(np.repeat(stencils, size, axis=1).ravel())
+            columns.append(np.tile(stencils, size).ravel())
+        return np.concatenate(rows), np.concatenate(columns)
+
+    @cached_property
+    def _elimination(self) -> Ints:
+        """(V,) vertices in a fill-reducing order, by minimum degree on the vertex graph."""
+        rows, columns = self._pairs
+        shape = (self.count, self.count)
+        graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=shape).tocsc()
+        graph.data[:] = -1.0
+        graph.setdiag(np.diff(graph.indptr) + 1.0)  # diagonally dominant: factored as it stands
+        return minimum_degree(graph)
+
+    @cached_property
+    def _sparsity(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Ints]:
+        """Rows and column starts of the matrix (CSC), and the place of each computed value in its
+        data: 1 + the index, or 0 for a held coordinate.
+        """
+        new = np.full(3 * self.count, -1, dtype=np.int64)
+        new[self.free] = np.arange(len(self.free))
+        of_vertex = new.reshape(-1, 3)
+        row, column = (of_vertex[ends] for ends in self._pairs)
+        rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
+        real = (rows >= 0) & (columns >= 0)
+        key = np.where(real, columns * len(self.free) + rows, -1).ravel()
+        keys, place = np.unique(key, return_inverse=True)
+        columns, rows = np.divmod(keys[keys >= 0], len(self.free))
+        starts = np.searchsorted(columns, np.arange(len(self.free) + 1))
+        offset = 1 - int((keys < 0).sum())
+        return rows.astype(np.int32), starts.astype(np.int32), place + offset
