@@ -33,7 +33,7 @@ HELP = (
     "f  frame the sheet     a then s  arm, start    n  next sheet  m  new material",
     "space  hold            r  resume               q  stop: reset, dark",
     "+ - 0  feed            ] [ p  power            :  a line for the controller",
-    "x  leave, dark (Ctrl-C: at once)               ?  hides these lines",
+    "Ctrl-X  reset now      x  leave, dark (Ctrl-C: now)  ?  hides these lines",
 )
 
 

@@ -10,8 +10,6 @@ controller's queue behind up to seconds of burning.
 
 from __future__ import annotations
 
-import math
-
 from miurafab.errors import ControllerError, MiurafabError, PersonNeeded
 from miurafab.findings import Finding
 from miurafab.gcode.program import BEAM_M3, PAUSE
@@ -19,7 +17,7 @@ from miurafab.grbl.events import Error, Ok, StatusReport
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.greeting import ANSWER_S, RESTARTED
 from miurafab.machine.judge_words import leaves_air_on
-from miurafab.machine.keys import HOLD, RESUME, NoKeys
+from miurafab.machine.keys import HOLD, RESUME
 from miurafab.machine.preflight import (
     check_build,
     check_settings,
@@ -40,7 +38,6 @@ _WAS_ARMED = Finding("armed", "The job ended with the laser armed, so the contro
 
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # between status queries while the last moves are made
-_KEY_S = 0.01  # between two reads of the keyboard, if there is one
 
 
 class GrblDriver(StreamDriver):
@@ -49,7 +46,6 @@ class GrblDriver(StreamDriver):
     def __init__(self, context: JobContext) -> None:
         super().__init__(context)
         plan, controller = context.plan, context.plan.machine.controller
-        self._patience = math.inf if isinstance(context.keys, NoKeys) else _KEY_S
         self._session = context.conversation
         self._known = context.known
         self._streamer = Streamer(
@@ -131,7 +127,7 @@ class GrblDriver(StreamDriver):
             elif session.now() >= poll_at:
                 session.ask_status()
                 poll_at = session.now() + (_END_POLL_S if streamer.finished else _POLL_S)
-            events = session.receive(min(poll_at - session.now(), self._patience))
+            events = session.receive(poll_at - session.now())
             for event in events:
                 streamer.take(event)
                 if isinstance(event, Ok | Error):
@@ -228,7 +224,7 @@ class GrblDriver(StreamDriver):
     def stop(self, error: MiurafabError | None) -> str:
         """See :class:`StreamDriver`."""
         session = self._session
-        if isinstance(error, JobAborted) and not self._burns_at_rest:
+        if isinstance(error, JobAborted) and not (error.at_once or self._burns_at_rest):
             off = session.hold_and_stop()
         else:
             off = session.stop(hold_first=isinstance(error, LineRefused))

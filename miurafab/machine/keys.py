@@ -15,11 +15,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Protocol
 
-HOLD, RESUME, ABORT = b"!", b"~", b""
+HOLD, RESUME, ABORT, RESET = b"!", b"~", b"", b"\x18"
 KEYS = {
     " ": HOLD,
     "r": RESUME,
     "q": ABORT,
+    "\x18": RESET,
     "+": b"\x91",
     "-": b"\x92",
     "0": b"\x90",
@@ -27,7 +28,9 @@ KEYS = {
     "[": b"\x9b",
     "p": b"\x99",
 }
-"""What each key sends (GRBL 1.1 ``config.h``): feed +10 %, -10 %, as written; power likewise."""
+"""What each key sends (GRBL 1.1 ``config.h``): feed +10 %, -10 %, as written; power likewise.
+Ctrl-X is GRBL's own soft reset: it ends a job at once, where ``q`` lets a dark motion come to rest.
+"""
 
 
 OVERRIDES_OFF = (b"\x90", b"\x95", b"\x99")
@@ -48,7 +51,7 @@ def keys_of(dialect: str) -> dict[str, bytes]:
     """The keys that a machine of this dialect obeys."""
     if obeys_overrides(dialect):
         return KEYS
-    return {key: order for key, order in KEYS.items() if order in (HOLD, RESUME, ABORT)}
+    return {key: order for key, order in KEYS.items() if order in (HOLD, RESUME, ABORT, RESET)}
 
 
 def session_keys(dialect: str) -> dict[str, bytes]:

@@ -33,6 +33,9 @@ _ANSWERS_IN = ("Idle", "Alarm")
 """The states in which GRBL answers its questions; ``error:8`` in the others (``system.c``)."""
 _REPORTS = 20
 """Of as many reports at rest one tells the overrides and the work offset (``config.h``: 10)."""
+_MOST_ON_A_NETWORK = 256
+"""Bytes: two lines of a raster at least; a reset behind 1,023 bytes was unheeded for 2.2 s by
+grblHAL's own simulator."""
 _ONLY_JOBS = ("marlin", "hpgl")
 
 
@@ -86,6 +89,10 @@ class PortSetup:
         """That of ``machine``."""
         controller = machine.controller
         return cls(machine.dialect, controller.rx_bytes, controller.wait)
+
+    def most_in_flight(self, port: str) -> int:
+        """The most bytes that may be under way to ``port`` at a time."""
+        return min(self.rx_bytes, _MOST_ON_A_NETWORK) if "://" in port else self.rx_bytes
 
 
 STOCK = PortSetup()

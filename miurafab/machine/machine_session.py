@@ -17,14 +17,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from miurafab.errors import ControllerError, MachineError, PersonNeeded
+from miurafab.errors import ControllerError, JobStopped, MachineError, PersonNeeded
 from miurafab.gcode.job import Job
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import StatusReport
 from miurafab.machine.console_lines import ConsoleLines
 from miurafab.machine.job_sending import OpenWire, send_job
 from miurafab.machine.jog_pad import JogPad, require_way
-from miurafab.machine.keys import ABORT, RESUME, Keys, NoKeys, session_keys
+from miurafab.machine.keys import ABORT, RESET, RESUME, Keys, NoKeys, session_keys
 from miurafab.machine.known_controller import (
     STOCK,
     KnownController,
@@ -40,18 +40,16 @@ from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import FlowTransport
 
 _POLL_S = 0.1
+_KEY_S = 0.01  # between two looks at the keyboard, if there is one
 _GO_MM_MIN = 3000.0
-_MOST_ON_A_NETWORK = 256
-"""Bytes: two lines of a raster at least; a reset behind 1,023 bytes was unheeded for 2.2 s by
-grblHAL's own simulator."""
 _REALTIME = ("?", "!", "~")
 
 
 class MachineSession:
     """One conversation with one machine over ``transport``; mutable, for one thread.
 
-    ``signals`` stop it; ``keys`` act at once in every wait. :meth:`open` greets the machine; the
-    actions do so by themselves the first time. ``owner`` is who holds the port (this process).
+    ``signals`` stop it; ``keys`` act at once in every wait. :meth:`open` greets the machine, as the
+    first action does by itself. ``owner`` is who holds the port (this process).
     ``on_state`` is called with each new state; ``lines`` are what the controller says to a person.
     """
 
@@ -63,12 +61,12 @@ class MachineSession:
         keys: Keys | None = None,
         owner: Owner | None = None,
     ) -> None:
-        most = (
-            min(setup.rx_bytes, _MOST_ON_A_NETWORK) if "://" in transport.name else setup.rx_bytes
-        )
+        most = setup.most_in_flight(transport.name)
         self.conversation = Session(transport, Connection(most), check=self._check)
         self.known = KnownController(self.conversation, setup.dialect)
         self._keys = keys or NoKeys()
+        if not isinstance(self._keys, NoKeys):
+            self.conversation.patience = _KEY_S
         self._wire = OpenWire(transport, self.conversation, self.known, self._keys, signals)
         self._transport = transport
         self._signals = signals
@@ -144,8 +142,8 @@ class MachineSession:
                         if not (session.connection.in_flight or self._pad.busy):
                             self.known.refresh()
                 self._tend_pad()
-            except JobAborted:
-                self.abort()
+            except JobAborted as wish:
+                self.abort(at_once=wish.at_once)
             if session.now() >= end:
                 return self.state
 
@@ -164,8 +162,8 @@ class MachineSession:
             return
         for key in self._keys.pressed():
             order = self._orders.get(key)
-            if order == ABORT:
-                raise JobAborted("The machine was stopped at the keyboard.")
+            if order in (ABORT, RESET):
+                raise JobAborted("The machine was stopped at a key.", at_once=order == RESET)
             if order is not None:
                 self.realtime(order)
 
@@ -312,15 +310,15 @@ class MachineSession:
         self.realtime(RESUME)  # nothing runs: the controller leaves the state Door
         return self.look()
 
-    def abort(self) -> bool:
-        """Stop whatever runs by a reset, after a dark motion has come to rest; whether the
-        controller then reports that the beam is off.
+    def abort(self, *, at_once: bool = False) -> bool:
+        """Stop whatever runs by a reset, after a dark motion has come to rest, unless ``at_once``;
+        whether the controller then reports that the beam is off.
         """
         self._pad.forget()
         session, self._at_risk = self.conversation, False
         status = session.status
         jogs = status is not None and status.state == "Jog" and not status.beam_on
-        dark = session.hold_and_stop() if jogs else session.stop()
+        dark = session.hold_and_stop() if jogs and not at_once else session.stop()
         self._at_risk = not dark
         return dark
 
@@ -335,9 +333,11 @@ class MachineSession:
             if not self._rests():
                 self.abort()
             raise
-        except BaseException:
+        except BaseException as error:
             self._signals.hold()
-            self.abort()
+            self.abort(at_once=isinstance(error, JobAborted) and error.at_once)
+            if isinstance(error, JobAborted):
+                raise JobStopped(error.sentence) from None
             raise
 
     def _rests(self) -> bool:

@@ -64,4 +64,10 @@ class StreamResult:
 
 
 class JobAborted(JobStopped):
-    """The user ended the job at the keyboard; the machine has time to come to rest."""
+    """The user ended the job at the keyboard; the machine has time to come to rest, but for one
+    that is wanted ``at_once``.
+    """
+
+    def __init__(self, sentence: str, *, at_once: bool = False) -> None:
+        super().__init__(sentence)
+        self.at_once = at_once

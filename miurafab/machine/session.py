@@ -12,6 +12,7 @@ controller can say that the beam is off.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from miurafab.errors import ControllerError, PortError
@@ -42,6 +43,7 @@ class Session:
     ``check`` is called before every read: it raises the exception that should interrupt the
     conversation. ``on_data`` is called with the bytes as they arrive. ``restarted``: the opening of
     the port reset the board. ``banner`` is what it greeted with, or what its ``$I`` says.
+    ``patience`` is the longest time between two calls of ``check``, in seconds.
     ``starts`` grows with each reset that was sent or greeted. ``overrides`` are as written until
     they are told.
     """
@@ -64,6 +66,7 @@ class Session:
         self.heard = 0.0
         self.starts = 0
         self.on_data: Callable[[bytes], None] = lambda data: None
+        self.patience = math.inf
         self._transport = transport
         self.transcript = transcript
         self._check = check
@@ -116,12 +119,13 @@ class Session:
             self.transcript.sent(self.now(), data)
 
     def receive(self, timeout: float) -> list[Event]:
-        """The events that arrive within ``timeout``; returns as soon as there are bytes.
+        """The events that arrive within ``timeout``, or within the patience, if that is shorter;
+        returns as soon as there are bytes.
 
         Raises :class:`~miurafab.errors.PortError` when the port goes away.
         """
         self._check()
-        data = self._transport.read(max(0.0, timeout))
+        data = self._transport.read(min(max(0.0, timeout), self.patience))
         if not data:
             return []
         self.heard = self.now()

@@ -31,16 +31,18 @@ from miurafab.child import python_command
 from miurafab.errors import JobStopped, MachineError, MiurafabError, PortError
 from miurafab.machine.dialects import make_safe, open_machine
 from miurafab.machine.greeting import RESTARTED
+from miurafab.machine.keys import RESET
 from miurafab.machine.known_controller import MachineState, PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.owner import Owner, this_owner
-from miurafab.machine.progress import Progress
+from miurafab.machine.progress import JobAborted, Progress
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.watchdog import BEAT, BEAT_S, STOPS, ParentWatch, framed
 from miurafab.profiles import MachineProfile
 
 _LOOK_S = 0.005  # between two looks at keys and signals
 _WATCH_S = 0.02  # between two looks at the orders while the machine is watched
+_NO_KEYS = bytes(set(range(32)) - set(RESET))
 _STOP_S = 15.0  # for the process to stop the machine, ask it, and end; stopping takes 10 s at most
 
 
@@ -154,7 +156,7 @@ class SessionProcess:
 
     def press(self, keys: str) -> None:
         """Pass on pressed keys, which act at once."""
-        data = keys.encode("ascii", "ignore").translate(None, bytes(range(32)))
+        data = keys.encode("ascii", "ignore").translate(None, _NO_KEYS)
         if data:
             self._tell(data)
 
@@ -270,9 +272,9 @@ def _next(parent: ParentWatch, signals: StopSignals) -> Any:
     """The next order, however long that takes."""
     while True:
         signals.check()
-        data = parent.next_order(_WATCH_S)
-        if data is not None:
-            return pickle.loads(data)
+        order = parent.next_order(_WATCH_S)
+        if order is not None:
+            return pickle.loads(order.data)
 
 
 @contextlib.contextmanager
@@ -301,12 +303,15 @@ def _serve(
     """Carry out orders and watch the machine between them, until the order to close."""
     while True:
         signals.check()
-        data = parent.next_order(0.0 if session.known.opened and session.blocks else _WATCH_S)
-        if data is not None:
-            order: SessionOrder = pickle.loads(data)
+        given = parent.next_order(0.0 if session.known.opened and session.blocks else _WATCH_S)
+        if given is not None:
+            order: SessionOrder = pickle.loads(given.data)
             if order.action == "close":
                 return
-            _carry_out(order, session, signals, tell)
+            if parent.resets != given.resets:
+                tell(Outcome(order.action, error=JobStopped("Stopped before it was begun.")))
+            else:
+                _carry_out(order, session, signals, tell)
         elif session.known.opened:
             try:
                 session.watch(_WATCH_S)
@@ -330,6 +335,9 @@ def _carry_out(
         tell(Outcome(order.action, error=JobStopped(f"Stopped by {signals.reason}.")))
         raise
     except MiurafabError as error:
+        if isinstance(error, JobAborted):  # by a key, in an action that leaves nothing running
+            session.abort(at_once=error.at_once)
+            error = JobStopped(error.sentence)
         tell(session.state)
         tell(Outcome(order.action, error=error))
         if isinstance(error, PortError):

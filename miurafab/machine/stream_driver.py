@@ -18,7 +18,7 @@ from miurafab.errors import JobStopped, MachineError, MiurafabError
 from miurafab.findings import Finding
 from miurafab.grbl.streamer import Refusal
 from miurafab.machine.journal import Journal
-from miurafab.machine.keys import ABORT, HOLD, Keys, keys_of
+from miurafab.machine.keys import ABORT, HOLD, RESET, Keys, keys_of
 from miurafab.machine.known_controller import KnownController
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import AS_WRITTEN, JobAborted, Overrides, Progress, StreamResult
@@ -120,6 +120,7 @@ class StreamDriver(ABC):
     def run(self) -> StreamResult:
         """Send the whole job; raises the error that ends it early."""
         findings = self.plan.forced + self.prepare()
+        self._take_keys()
         self.at_risk = True
         self._begin = self._tell_at = self._context.transport.now()
         self.stream()
@@ -148,11 +149,15 @@ class StreamDriver(ABC):
         if self.journal is not None:
             self.journal.taken(self.acknowledged, self.line, self._seconds)
             self.journal.check()
+        self._take_keys()
+        self.obey()
+
+    def _take_keys(self) -> None:
         known = keys_of(self.plan.machine.dialect)
         self.orders += [known[key] for key in self._context.keys.pressed() if key in known]
-        if ABORT in self.orders:
-            raise JobAborted(f"{self.plan.job.name} was stopped at the keyboard.")
-        self.obey()
+        at_once = RESET in self.orders
+        if at_once or ABORT in self.orders:
+            raise JobAborted(f"{self.plan.job.name} was stopped at the keyboard.", at_once=at_once)
 
     def attend_and_tell(self) -> None:
         """:meth:`attend`, and :meth:`tell` the progress of a machine that does not report it."""

@@ -2,7 +2,8 @@
 
 The starting program writes bytes to the standard input of this process: a :data:`BEAT` every
 second, each key that the user presses, the number of a stop, or an order (:data:`ORDER`, four bytes
-of its length, and that many). When the pipe closes (that program
+of its length, and that many). The key that resets at once makes what was ordered before it and
+is not begun void, by its number (:attr:`ParentWatch.resets`). When the pipe closes (that program
 has died) or is silent for :data:`SILENCE_S` (it hangs), this process stops as by SIGTERM: it resets
 the controller, the beam is off, and the journal gets its last record. So the user interface can die
 without harm.
@@ -16,7 +17,9 @@ import signal
 import threading
 import time
 from types import TracebackType
+from typing import NamedTuple
 
+from miurafab.machine.keys import RESET
 from miurafab.machine.signals import StopSignals
 
 BEAT = b"\0"
@@ -34,12 +37,20 @@ def framed(order: bytes) -> bytes:
     return ORDER + len(order).to_bytes(4, "big") + order
 
 
+class GivenOrder(NamedTuple):
+    """An order as it came, and the number of keys that reset at once before it."""
+
+    data: bytes
+    resets: int
+
+
 _SIGNALS = {code[0]: name for name, code in STOPS.items()}
 
 
 class ParentWatch:
     """``with ParentWatch(...)``: watch the starting program until the end of the block.
 
+    ``resets`` is the number of keys that reset at once, up to now.
     ``descriptor`` is the pipe's end to read; ``signals`` are told why, when it is gone. It is also
     the job's keyboard (:class:`~miurafab.machine.keys.Keys`): printable bytes are keys.
     """
@@ -50,10 +61,11 @@ class ParentWatch:
         self._silence = silence
         self._heard = time.monotonic()
         self._over = threading.Event()
+        self.resets = 0
         self._keys: list[str] = []
-        self._orders: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._orders: queue.SimpleQueue[GivenOrder] = queue.SimpleQueue()
 
-    def next_order(self, timeout: float) -> bytes | None:
+    def next_order(self, timeout: float) -> GivenOrder | None:
         """The next order, waiting up to ``timeout`` seconds; None if there is none."""
         try:
             return self._orders.get(timeout=timeout)
@@ -97,12 +109,13 @@ class ParentWatch:
             end = 5 + int.from_bytes(coming[1:5], "big")
             if len(coming) < max(5, end):
                 return 0
-            self._orders.put(bytes(coming[5:end]))
+            self._orders.put(GivenOrder(bytes(coming[5:end]), self.resets))
             return end
         name = _SIGNALS.get(coming[0])
         if name is not None:
             self._stop(name)
         elif coming[:1] != BEAT:
+            self.resets += coming[:1] == RESET
             self._keys.append(chr(coming[0]))
         return 1
 

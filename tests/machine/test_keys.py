@@ -115,6 +115,23 @@ def test_an_abort_comes_to_rest_and_resets(keys: list[tuple[float, str]]) -> Non
     assert all(s.t1 <= at + 0.2 for s in wire.device.beam_log)
 
 
+def test_ctrl_x_resets_at_once() -> None:
+    wire, said = run((4.0, "\x18"))
+    assert isinstance(said, str)
+    assert said.endswith("reports the beam off.")
+    assert b"!" not in wire.commands
+    at = next(at for at, data in wire.written if b"\x18" in data)
+    assert 0 <= at - 4.0 <= 0.02
+    wire.settle()
+    assert all(s.t1 <= at + 0.01 for s in wire.device.beam_log)
+
+
+def test_a_job_that_is_stopped_while_it_is_prepared_sends_no_line() -> None:
+    wire, said = run((0.0, "\x18"))
+    assert said == "rows.nc was stopped at the keyboard before a line of it was sent."
+    assert b"M4" not in wire.commands
+
+
 def test_an_abort_of_an_m3_job_is_dark_at_once() -> None:
     """A feed hold would leave the full power standing for $1."""
     wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))

@@ -16,7 +16,7 @@ from miurafab.errors import InputError, PortError
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import SerialTransport
 from miurafab.machine.virtual_server import PtyWire
-from miurafab.machine.watchdog import ParentWatch
+from miurafab.machine.watchdog import ParentWatch, framed
 
 
 class ComPort:
@@ -82,6 +82,17 @@ def test_the_faults_of_windows_are_told(
     with pytest.raises(PortError) as caught:
         com(monkeypatch, Refusing(0))
     assert str(caught.value).startswith(sentence)
+
+
+def test_a_reset_makes_what_was_ordered_before_it_void() -> None:
+    read, write = os.pipe()
+    with ParentWatch(read, StopSignals(), silence=60.0) as parent:
+        os.write(write, framed(b"before") + b"\x18" + framed(b"after"))
+        orders = [parent.next_order(20.0) for _ in range(2)]
+        assert orders == [(b"before", 0), (b"after", 1)]
+        assert parent.resets == 1
+        assert parent.pressed() == "\x18"
+    os.close(write)
 
 
 def test_where_no_thread_can_be_signalled_the_process_is(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import subprocess
 import sys
@@ -10,7 +11,7 @@ import sys
 import pytest
 from session_walk import HOMING, JOB, MACHINE, Cable, Walk
 
-from miurafab.errors import ControllerError, InputError, PersonNeeded
+from miurafab.errors import ControllerError, InputError, JobStopped, PersonNeeded
 from miurafab.machine.jog_pad import JogPad
 from miurafab.machine.keys import JOG_CANCEL
 from miurafab.machine.known_controller import PortSetup
@@ -32,6 +33,7 @@ class Wire(Cable):
         super().write(data)
 
     def write_now(self, data: bytes) -> None:
+        self.reset_at = self.now()
         self.write(data)
 
 
@@ -95,6 +97,38 @@ def test_a_refused_line_or_jog_costs_no_origin() -> None:
         here.say("G99")
     assert here.look().shift != (0.0, 0.0, 0.0)
     assert wire.sent.count(b"\x18") == 0
+
+
+class Pressed:
+    """Ctrl-X, pressed when the controller's clock has come to its time."""
+
+    def __init__(self, wire: Wire) -> None:
+        self._wire, self._at = wire, math.inf
+
+    def press(self, at: float) -> None:
+        self._at = at
+
+    def pressed(self) -> str:
+        due = self._wire.now() >= self._at
+        self._at = math.inf if due else self._at
+        return "\x18" * due
+
+
+@pytest.mark.parametrize("action", ["home", "go_to_origin"])
+def test_ctrl_x_resets_within_10_ms_whatever_is_waited_for(action: str) -> None:
+    """GRBL says nothing while it homes; while it jogs it is asked ten times a second."""
+    wire = Wire(VirtualGrbl(virtual_settings(MACHINE) | HOMING, baud=115_200))
+    keys = Pressed(wire)
+    here = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
+    here.unlock()
+    here.jog(x=-100, y=-100, feed_mm_min=6000)
+    begun, wire.sent = wire.now(), b""
+    keys.press(begun + 0.333)
+    with pytest.raises(JobStopped, match="stopped at a key"):
+        getattr(here, action)()
+    assert wire.sent.endswith(b"\x18")
+    assert b"!" not in wire.sent
+    assert 0 <= wire.reset_at - begun - 0.333 <= 0.011
 
 
 def test_a_session_that_is_left_with_the_beam_on_goes_dark() -> None:
