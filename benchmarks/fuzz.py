@@ -11,6 +11,8 @@ and kept in `fuzz-found`. The same seed makes the same files. `--count` is for e
 from __future__ import annotations
 
 import argparse
+import contextlib
+import json
 import random
 import resource
 import signal
@@ -20,8 +22,8 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import miurafab as mf
@@ -32,7 +34,8 @@ from miurafab.fabrication.stock import read_stock
 from miurafab.gcode.reading import read_program
 from miurafab.grbl import replies as grbl
 from miurafab.machine.actions import read_dump
-from miurafab.machine.journal import read_journal
+from miurafab.machine.journal import job_digest, read_journal
+from miurafab.machine.resume import resume
 from miurafab.marlin import replies as marlin
 from miurafab.options import read_options
 from miurafab.origami.fitting.request import FitOptions
@@ -47,8 +50,12 @@ from miurafab.surfaces.mesh_files import read_mesh
 from miurafab.surfaces.profile_files import read_profile
 from miurafab.units import parse_angle, parse_feed, parse_length
 from miurafab.wire.line_reader import LineReader
+from miurafab.workflow.check_job import check_job
 from miurafab.workflow.dry_run import read_gcode
-from miurafab.workflow.manifest import read_manifest
+from miurafab.workflow.job_directory import read_job
+from miurafab.workflow.job_files import settle_job
+from miurafab.workflow.manifest import LAYOUT, MANIFEST, read_manifest, sha256
+from miurafab.workflow.whole_folder import ORDER, STAGING
 
 CORPUS = Path(__file__).parent.parent / "tests" / "corpus"
 SLOW_S = 10.0
@@ -70,6 +77,7 @@ MACHINES = {
     ".plt": mf.load_machine("hpgl-cutter-a3"),
     ".nc": mf.load_machine("grbl-laser-400"),
 }
+JOB = read_gcode(CORPUS / "gcode" / "sheet.nc")
 
 
 def _pattern(path: Path) -> None:
@@ -98,6 +106,50 @@ def _layout(path: Path) -> None:
     text = path.read_bytes().decode("utf-8", "replace")
     read_head(text, path)
     read_layout(text, path)
+
+
+@contextlib.contextmanager
+def _about(path: Path) -> Iterator[None]:
+    """A refusal that may name something else than ``path``: a job, or a file that is made."""
+    try:
+        yield
+    except MiurafabError as fault:
+        raise InputError(f"{path}: {fault.sentence}") from None
+
+
+def _journal(path: Path) -> None:
+    runs = [replace(run, sha256=job_digest(JOB)) for run in read_journal(path)]
+    with _about(path):
+        resume(JOB, MACHINES[".nc"], runs)
+
+
+def _job(path: Path) -> None:
+    """A job one of whose files is damaged, with the sums of its manifest made right."""
+    manifest = path.with_name(MANIFEST)
+    if path != manifest:
+        document = json.loads(manifest.read_bytes())
+        document["files"] = {name: sha256(path.with_name(name)) for name in document["files"]}
+        manifest.write_text(json.dumps(document))
+    for finding in (*check_job(path.parent).findings, *read_job(path.parent, unread=True).findings):
+        wrong = _check_sentence(finding.sentence, None)
+        if wrong:
+            raise AssertionError(wrong)
+
+
+def _calibration(path: Path) -> None:
+    new = path.with_name("new.toml")
+    new.unlink(missing_ok=True)
+    with _about(path):
+        mf.add_material(new, path.parent, cell="A1", cut="X1", kerf=0.2)
+
+
+def _unfinished(path: Path) -> None:
+    """What a killed writer left, with a damaged order."""
+    staging = path.parent / STAGING
+    staging.mkdir(exist_ok=True)
+    (staging / ORDER).write_bytes(path.read_bytes())
+    (staging / LAYOUT).write_bytes(b"new")
+    settle_job(path.parent)
 
 
 def _replies(path: Path) -> None:
@@ -151,7 +203,10 @@ READERS: dict[str, Callable[[Path], object]] = {
     "hpgl": _gcode,
     "layout": _layout,
     "manifest": lambda path: read_manifest(path.parent),
-    "journal": read_journal,
+    "journal": _journal,
+    "job": _job,
+    "calibration": _calibration,
+    "unfinished": _unfinished,
     "dump": read_dump,
     "reply": _replies,
     "order": _order,
@@ -192,6 +247,7 @@ def fuzz(name: str, count: int, seed: int = 0, keep: Path | None = None) -> Tall
                 path.write_bytes(content)
                 slowest = tally.slowest_s
                 fault = _read(READERS[name], path, tally)
+                path.write_bytes(contents[at])
                 if tally.slowest_s > max(slowest, _LONG_S) and keep is not None:
                     keep.mkdir(exist_ok=True)
                     (keep / f"{name}-slowest{path.suffix}").write_bytes(content)

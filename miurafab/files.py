@@ -64,6 +64,19 @@ def state_folder() -> Path:
     return Path(home or Path.home() / ".local" / "state") / "miurafab"
 
 
+_NOT_IN_NAMES = frozenset('/\\:*?"<>|')
+"""Letters that some system has in no name of a file."""
+
+
+def as_file_name(text: str) -> str:
+    """``text`` as the name of a file on every system, unchanged where it is one.
+
+    >>> as_file_name('lid "3:4".fold')
+    'lid _3_4_.fold'
+    """
+    return "".join("_" if letter in _NOT_IN_NAMES else letter for letter in text)
+
+
 def file_name(name: object, where: str) -> str:
     """``name`` if it is the name of a file and no path; ``where`` begins the sentence if not.
 
@@ -73,7 +86,7 @@ def file_name(name: object, where: str) -> str:
     'sheet-01'
     """
     text = name if isinstance(name, str) else ""
-    if not text or not is_plain(text) or set(text) & set('/\\:*?"<>|') or text.strip(". ") == "":
+    if not text or not is_plain(text) or _NOT_IN_NAMES & set(text) or text.strip(". ") == "":
         raise InputError(f"{where} names {reprlib.repr(name)}, which is not the name of a file.")
     return text
 

@@ -3,7 +3,7 @@
 import fuzz
 import pytest
 
-COUNTS = {"fold": 20, "mesh": 40, "image": 40, "gcode": 60, "quantity": 6}
+COUNTS = {"fold": 20, "mesh": 40, "image": 40, "gcode": 60, "quantity": 6, "job": 8}
 """Of the others 120; together they take some seconds."""
 
 

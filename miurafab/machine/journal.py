@@ -18,13 +18,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError
-from miurafab.files import parse_json, read_bytes
+from miurafab.files import Reading, parse_json, read_bytes
 from miurafab.gcode.job import Job
 from miurafab.machine.append_log import DurableFile
 from miurafab.machine.progress import AS_WRITTEN, Overrides
@@ -147,13 +148,27 @@ def read_journal(path: Path) -> list[JournalRun]:
             runs.append(record)
         elif runs:
             runs[-1].update(record)
-    try:
-        found = [JournalRun(**run) for run in runs]
-    except TypeError as fault:
-        raise InputError(f"{path} is not a journal of this version: {fault}.") from None
+    with Reading(path, "a journal of this version", InputError):
+        found = [_run(run) for run in runs]
     if not found:
         raise InputError(f"{path} is not a journal: it holds no run with schema {SCHEMA!r}.")
     return found
+
+
+def _run(record: dict[str, Any]) -> JournalRun:
+    """The run of a ``record``. Raises ``TypeError``, ``ValueError`` for values of other kinds."""
+    run = JournalRun(**record)
+    texts = (run.job, run.sha256, run.machine, run.port, run.ended or "", run.why or "")
+    numbers = (run.lines, run.from_line, run.blocks or 0, run.taken, run.line, *run.overrides)
+    if not all(isinstance(text, str) for text in texts):
+        raise ValueError("it holds something else in place of a text")
+    if not all(type(number) is int and number >= 0 for number in numbers):
+        raise ValueError("it holds something else in place of a whole number")
+    if not isinstance(run.seconds, int | float) or not math.isfinite(run.seconds):
+        raise ValueError("it holds something else in place of a time")
+    if len(run.overrides) != len(AS_WRITTEN):
+        raise ValueError("it holds other overrides than those of feed, rapids and power")
+    return run
 
 
 def job_digest(job: Job) -> str:

@@ -98,9 +98,9 @@ def owner_of(port: str) -> Owner | None:
     """The session that holds ``port``, None if none says so or its process is gone."""
     try:
         owner = Owner(**json.loads(_file(port).read_text("utf-8")))
-    except (OSError, ValueError, TypeError):
+        return owner if str(owner) and _lives(owner.holder) else None
+    except (OSError, ValueError, TypeError, OverflowError):  # a damaged file names nobody
         return None
-    return owner if _lives(owner.holder) else None
 
 
 def holder_of(port: str) -> str:

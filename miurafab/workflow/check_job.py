@@ -23,7 +23,7 @@ from miurafab.display import Shown
 from miurafab.errors import InputError, LayoutError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.retrace import retraced
-from miurafab.files import AnyPath, as_path
+from miurafab.files import AnyPath, Reading, as_path
 from miurafab.findings import Finding, findings_json, refusals
 from miurafab.gcode.program import Program
 from miurafab.gcode.reading import read_program
@@ -131,7 +131,8 @@ def check_job(directory: AnyPath) -> JobCheck:
         findings += job.layout.findings
         for each, program in zip(job.jobs, programs, strict=True):
             findings += judge_program(each, program, job.machine, most_power=job.most_power)
-        findings += _traced(job, programs, manifest, traced)
+        with Reading(folder / LAYOUT, "a layout of this pattern", LayoutError):
+            findings += _traced(job, programs, manifest, traced)
     return JobCheck(folder, len(manifest.files), traced, tuple(findings))
 
 

@@ -116,9 +116,21 @@ def _is_drawn(ending: str) -> bool:
 def settle_job(directory: Path) -> None:
     """Finish what a process that died left of a job in ``directory``, before it is read.
 
-    Raises :class:`~miurafab.errors.InputError` where that cannot be done.
+    Raises :class:`~miurafab.errors.InputError` where that cannot be done, and for a link by which
+    something outside the job would be read or written.
     """
-    settle(directory, _is_of_job)
+    if directory.is_dir():
+        _stay_inside(directory)
+        settle(directory, _is_of_job)
+
+
+def _stay_inside(directory: Path) -> None:
+    here = directory.resolve()
+    for path in sorted(directory.iterdir()):
+        if path.is_symlink() and here not in path.resolve().parents:
+            raise InputError(
+                f"{path} is a link out of the job; put the file itself there, or remove the link."
+            )
 
 
 def _leave_alone(staging: Path, directory: Path, earlier: set[str]) -> None:
@@ -129,7 +141,7 @@ def _leave_alone(staging: Path, directory: Path, earlier: set[str]) -> None:
         there = directory / name
         if not there.exists() or name in earlier:
             continue
-        if there.is_dir() or there.read_bytes() != (staging / name).read_bytes():
+        if not there.is_file() or read_bytes(there, InputError) != (staging / name).read_bytes():
             raise InputError(
                 f"{there} is no part of a job and would be overwritten; move it away, or choose "
                 "another directory."
@@ -159,6 +171,7 @@ def keep_profiles(machine: Path, material: Path, directory: Path, staging: Path)
     """
     kinds: tuple[tuple[Kind, Path], ...] = (("firmware_profiles", machine), ("materials", material))
     for kind, path in kinds:
+        file_name(path.name, "The job")
         there = directory / path.name
         if path.resolve().parent == shipped_directory(kind).resolve():
             if there.exists():

@@ -131,7 +131,7 @@ def _edit(path: Path, digest: str | None) -> str:
     if digest is None:
         return "was added"
     if not path.is_file():
-        return "was removed"
+        return "is no file any more" if path.exists() else "was removed"
     return "" if sha256(path) == digest else "has changed"
 
 

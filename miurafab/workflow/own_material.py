@@ -19,6 +19,7 @@ from miurafab.workflow.calibrate import CHOICES, SCHEMA, written_operation
 from miurafab.workflow.job_files import settle_job
 
 _KEYS = ("machine", "material", "beam", "power", "wavelength", "cells", "scores", "squares")
+_KIND = "a calibration that 'miurafab calibrate' wrote; make it again"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
@@ -87,17 +88,18 @@ def add_material(
     base = own if own.is_file() else find_file("materials", str(choices["material"]))
     values = read_toml(base)
     values["title"] = title or f"{values['title']}, calibrated"
-    entry = _of_beam(values, choices)
-    if kerf is not None:
-        values["kerf"] = _mm(read_value("kerf", KERF, kerf))
-    if cell is not None:
-        chosen = _labelled(choices["cells"], cell, directory)
-        _take_dashes(values, chosen["perforation"])
-        entry["operations"]["perforate"] |= written_operation(chosen["operation"])
-    for label, group, operation in ((cut, "squares", "cut"), (score, "scores", "score")):
-        if label is not None:
-            chosen = _labelled(choices[group], label, directory)
-            entry["operations"][operation] |= written_operation(chosen["operation"])
+    with Reading(directory / CHOICES, _KIND, InputError):
+        entry = _of_beam(values, choices)
+        if kerf is not None:
+            values["kerf"] = _mm(read_value("kerf", KERF, kerf))
+        if cell is not None:
+            chosen = _labelled(choices["cells"], cell, directory)
+            _take_dashes(values, chosen["perforation"])
+            entry["operations"]["perforate"] |= written_operation(chosen["operation"])
+        for label, group, operation in ((cut, "squares", "cut"), (score, "scores", "score")):
+            if label is not None:
+                chosen = _labelled(choices[group], label, directory)
+                entry["operations"][operation] |= written_operation(chosen["operation"])
     said = ", ".join(
         f"{what} {value}"
         for what, value in (("flap", cell), ("square", cut), ("score", score), ("kerf", kerf))
@@ -121,9 +123,8 @@ def _choices(directory: Path) -> dict[str, Any]:
             f"{directory} holds no calibration ({CHOICES} is missing); make one with "
             "'miurafab calibrate'."
         )
-    kind = "a calibration that 'miurafab calibrate' wrote; make it again"
-    text = read_text(file, InputError, kind)
-    with Reading(file, kind, InputError):
+    text = read_text(file, InputError, _KIND)
+    with Reading(file, _KIND, InputError):
         found = parse_json(text)
         if found["schema"] != SCHEMA:
             raise InputError(f"{file} has schema {found['schema']!r}; this reads '{SCHEMA}'.")

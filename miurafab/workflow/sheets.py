@@ -16,7 +16,7 @@ from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.plan_advice import SizeAdvice, advised_size
 from miurafab.fabrication.sheets import DrawnLayout, lay_out
-from miurafab.files import AnyPath, as_path, read_bytes, write_draft
+from miurafab.files import AnyPath, as_file_name, as_path, read_bytes, write_draft
 from miurafab.gcode.job import Job
 from miurafab.options import declared, read_options, written_options
 from miurafab.options.documented import described
@@ -164,7 +164,7 @@ class SheetJob(Shown):
             used = self._put_pattern(folder, staging)
             if self.fitted is not None:
                 text = fold_text(seen_from(self.fitted, folder), self.name)
-                write_draft(staging / f"{self.name}.fold", text)
+                write_draft(staging / as_file_name(f"{self.name}.fold"), text)
             digest = sha256(used)
             write_draft(staging / LAYOUT, write_layout(layout, used.name, digest))
             besides = [] if used.parent == staging else [used]
@@ -180,10 +180,11 @@ class SheetJob(Shown):
         """The file of the pattern, which is put into ``staging`` unless it is in ``folder``."""
         if self.pattern_file is None:
             capped = CAPPED if self.opened and self.options.caps else ""
-            file = staging / f"{self.name}{capped or (OPENED if self.opened else '')}.fold"
+            changed = capped or (OPENED if self.opened else "")
+            file = staging / as_file_name(f"{self.name}{changed}.fold")
             write_draft(file, fold_text(seen_from(self.pattern, folder), self.name))
             return file
-        file = staging / self.pattern_file.name
+        file = staging / as_file_name(self.pattern_file.name)
         if (folder / file.name).resolve() == self.pattern_file.resolve():
             return self.pattern_file
         write_draft(file, read_bytes(self.pattern_file, PatternError))

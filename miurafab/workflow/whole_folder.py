@@ -35,6 +35,7 @@ _LOCK = ".lock"
 _PATIENCE_S = 10.0
 """A reader waits so long for a writer that is moving files up, which takes milliseconds."""
 _LOOK_S = 0.02
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 
 
 @contextmanager
@@ -48,8 +49,8 @@ def whole_folder(folder: Path, may_remove: Callable[[str], bool]) -> Iterator[Pa
     with _locked(folder):
         _carry_out(folder, may_remove)
         staging = folder / STAGING
-        if staging.is_symlink():
-            raise InputError(f"{staging} is a link, and not a folder of miurafab; remove it.")
+        if staging.is_symlink() or (staging.exists() and not staging.is_dir()):
+            raise InputError(f"{staging} is not a folder of miurafab; remove it.")
         shutil.rmtree(staging, ignore_errors=True)
         staging.mkdir()
         try:
@@ -70,6 +71,9 @@ def put_in_place(folder: Path, remove: Collection[str], first: Collection[str], 
     for name in put:
         _sync_file(staging / name)
     sync_folder(staging)
+    for name in (*first, *remove, *put):
+        if (folder / name).is_dir() and not (folder / name).is_symlink():
+            raise InputError(f"{folder / name} is a folder where a file belongs; move it away.")
     order = {"first": sorted(first), "remove": sorted(set(remove) - set(put)), "put": put}
     write_whole(staging / ORDER, json.dumps(order))
     _carry_out(folder, lambda name: True)
@@ -93,8 +97,9 @@ def settle(folder: Path, may_remove: Callable[[str], bool]) -> None:
                 raise
             time.sleep(_LOOK_S)
         except OSError as fault:
+            there = fault.filename2 or fault.filename or folder
             raise InputError(
-                f"{folder} was not finished, and cannot be written: {fault.strerror}."
+                f"{folder} was not finished, and {there} cannot be written: {fault.strerror}."
             ) from None
 
 
@@ -152,8 +157,10 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def _lock_file(path: Path, folder: Path) -> int:
+    if path.is_symlink() or path.is_dir():
+        raise InputError(f"{path} is not a lock of miurafab; remove it.")
     while True:
-        opened = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        opened = os.open(path, os.O_RDWR | os.O_CREAT | _NO_LINK, 0o666)
         try:
             if sys.platform == "win32":
                 msvcrt.locking(opened, msvcrt.LK_NBLCK, 1)
