@@ -83,6 +83,8 @@ if TYPE_CHECKING:
     from miurafab.workflow.fold import thick_panels as thick_panels
     from miurafab.workflow.job_directory import JobDirectory as JobDirectory
     from miurafab.workflow.job_directory import read_job as read_job
+    from miurafab.workflow.layers import Layers as Layers
+    from miurafab.workflow.layers import layers as layers
     from miurafab.workflow.listings import list_machines as list_machines
     from miurafab.workflow.listings import list_materials as list_materials
     from miurafab.workflow.listings import list_surfaces as list_surfaces

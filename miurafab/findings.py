@@ -97,9 +97,20 @@ RULES = {
     "no-fold-angles": Rule("note", "a format that tells mountains from valleys and no fold angles"),
     "no-seams": Rule("note", "a format that does not hold which edges meet along seams"),
     "assumed-folded-flat": Rule("note", "a file without fold angles, taken as folded flat"),
-    # A pattern, folded (miurafab.studio.work)
+    # A pattern, folded (miurafab.workflow.fold, miurafab.workflow.layers, miurafab.studio.work)
     "bent-facets": Rule("note", "a pattern that does not fold rigidly"),
     "contacts": Rule("warning", "facets that pass through each other on the way"),
+    "crossing-layers": Rule(
+        "warning", "facets that pass through each other as the sheet closes flat"
+    ),
+    "undecided-layers": Rule(
+        "warning", "facets folded flat whose order the closed form leaves open"
+    ),
+    "no-layer-order": Rule(
+        "note", "a sheet that does not reach the flat-folded end, so that it has no layer order"
+    ),
+    "cannot-fold-flat": Rule("refusal", "mountains and valleys that no order of layers satisfies"),
+    "more-layer-orders": Rule("note", "a search that ended before all layer orders were found"),
     # A layout (miurafab.fabrication.layout_findings)
     "weak-tabs": Rule("warning", "tabs with less glue than the material's `min_area`"),
     "fold-letters": Rule("note", "tabs without room for the letter of their fold"),

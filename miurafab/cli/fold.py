@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import miurafab
 from miurafab.cli.console import Console
@@ -11,6 +11,9 @@ from miurafab.cli.declared import argument, option, takes
 from miurafab.errors import DONE, NO
 from miurafab.files import new_file
 from miurafab.options import File, read_options
+
+if TYPE_CHECKING:
+    from miurafab.workflow.fold import Folding
 
 EXAMPLES = (
     "miurafab fold hypar.fold -o hypar.gif",
@@ -74,16 +77,20 @@ def fold(
             f"{folding.mismatch:.2g} mean edges), so its facets bend: from nearly flat to the "
             "folded form."
         )
-    console.answer(answer, lambda: _show(console, answer))
+    console.answer(answer, lambda: _show(console, folding, answer))
     return NO if panels is not None and not panels.folds else DONE
 
 
-def _show(console: Console, answer: dict[str, Any]) -> None:
+def _show(console: Console, folding: Folding, answer: dict[str, Any]) -> None:
     contacts, thick = answer["self_contacts"], answer["thickness"]
-    hidden = ("states", "self_contacts", "thickness")
+    hidden = ("states", "self_contacts", "layers", "findings", "thickness")
     facts = {key: value for key, value in answer.items() if key not in hidden and value is not None}
     facts["self_contacts"] = f"in {len(contacts)} frames" if contacts else "none"
+    if answer["layers"] is not None:
+        facts["overlapping_pairs"] = answer["layers"]["pairs"]
+        facts["layers_known"] = answer["layers"]["known"]
     console.facts(facts)
+    console.findings(folding.findings)
     for run in _runs(contacts):
         console.line(_sentence(run))
     if thick is not None:

@@ -17,6 +17,7 @@ import numpy as np
 from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError
 from miurafab.files import AnyPath, new_file, write_bytes, write_text
+from miurafab.findings import Finding, findings_json
 from miurafab.geometry.arrays import Floats
 from miurafab.options import Choice, Whole, declared, length, option, read_options, read_value
 from miurafab.options.documented import described
@@ -30,11 +31,13 @@ from miurafab.origami.folding.kinematics import (
     rigid_motion,
     states_between,
 )
+from miurafab.origami.folding.layers import LayerOrder, layer_order
 from miurafab.origami.folding.thick_panels import ThickPanels
 from miurafab.origami.folding.thick_panels import thick_panels as make_panels
 from miurafab.origami.formats.fold import write_fold
 from miurafab.origami.formats.mesh import glb_bytes
 from miurafab.workflow.fold_gif import target_frame, write_gif
+from miurafab.workflow.layers import layer_facts, layer_findings
 from miurafab.workflow.page import Slider, write_page
 from miurafab.workflow.patterns import PatternLike, consistent_pattern
 
@@ -76,11 +79,26 @@ class Folding(Shown):
     mismatch : float
         The loop mismatch of the rigid motion, in mean edges, also where the motion bends its
         facets instead.
+    layers : LayerOrder, optional
+        The order of the layers at the end. None for a motion that does not end folded flat.
     """
 
     motion: FoldingMotion
     contacts: tuple[Contact, ...]
     mismatch: float
+    layers: LayerOrder | None = None
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What a person should know about the layers at the end of the motion."""
+        if self.layers is not None:
+            return layer_findings(self.layers)
+        return (
+            Finding(
+                "no-layer-order",
+                "The motion does not end folded flat, so the sheet is given no order of layers.",
+            ),
+        )
 
     def save(
         self,
@@ -112,7 +130,7 @@ class Folding(Shown):
         motion, ending = self.motion, file.suffix.lower()
         pattern, title = motion.pattern, title or motion.pattern.name
         if ending == ".fold":
-            write_fold(pattern, file, title, motion)
+            write_fold(pattern, file, title, motion, self.layers)
         elif ending == ".glb":
             triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
             write_bytes(file, glb_bytes(motion.frames[0], triangles, motion.frames))
@@ -180,6 +198,8 @@ class Folding(Shown):
                 {"frame": c.frame, "state": c.state, "facets": [list(pair) for pair in c.facets]}
                 for c in self.contacts
             ],
+            "layers": None if self.layers is None else layer_facts(self.layers),
+            "findings": findings_json(self.findings),
         }
 
 
@@ -241,7 +261,8 @@ def fold(
                 f"The sheet does not fold rigidly (its facets miss each other by up to "
                 f"{mismatch:.2g} mean edges), and it cannot be bent either: {fault}"
             ) from None
-    return Folding(motion, contacts(motion, on_progress), mismatch)
+    order = layer_order(pattern) if motion.is_rigid else None
+    return Folding(motion, contacts(motion, on_progress), mismatch, order)
 
 
 described(fold, FoldOptions, without=("colour", "thickness"))

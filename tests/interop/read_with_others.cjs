@@ -1,5 +1,6 @@
 // What the packages `fold` and `rabbit-ear` make of a FOLD file, or `fold` of an OPX file: JSON on
-// standard output. usage: node read_with_others.cjs FILE
+// standard output; with the word layers, how rabbit-ear orders the layers of a FOLD file.
+// usage: node read_with_others.cjs FILE [layers]
 const { readFileSync } = require("node:fs");
 const FOLD = require("fold");
 const ear = require("rabbit-ear");
@@ -43,7 +44,17 @@ function withRabbitEar() {
   };
 }
 
+/** The layer orders of the pattern folded flat: 1 where the first of "f g" is above, -1 below. */
+function layers() {
+  const { vertices_coords, edges_vertices, edges_assignment, faces_vertices } = read();
+  const graph = ear.graph.populate({ vertices_coords, edges_vertices, edges_assignment, faces_vertices });
+  graph.vertices_coords = ear.graph.makeVerticesCoordsFlatFolded(graph);
+  console.log = () => {};  // the solver prints its times
+  const { root, branches } = ear.layer.solver(graph, 1e-6);
+  return { root, branches: branches ?? [] };
+}
+
 const answer = process.argv[2].endsWith(".opx")
   ? FOLD.convert.convertFromTo(text, "opx", "fold")
-  : { fold: withFold(), rabbit_ear: withRabbitEar() };
+  : process.argv[3] === "layers" ? layers() : { fold: withFold(), rabbit_ear: withRabbitEar() };
 process.stdout.write(JSON.stringify(answer));

@@ -19,6 +19,7 @@ from problems import fitted, regular
 
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.kinematics import rigid_motion
+from miurafab.origami.folding.layers import layer_order
 from miurafab.origami.folding.laying import laid_on
 from miurafab.origami.formats.fold import read_fold, write_fold
 from miurafab.origami.formats.lines import opx_text
@@ -45,10 +46,10 @@ def sheet(name: str) -> CreasePattern:
     return found
 
 
-def others(path: Path) -> dict[str, Any]:
+def others(path: Path, *what: str) -> dict[str, Any]:
     assert NODE is not None
     script = HERE / "read_with_others.cjs"
-    done = subprocess.run([NODE, script, path], capture_output=True, text=True, check=True)
+    done = subprocess.run([NODE, script, path, *what], capture_output=True, text=True, check=True)
     answer: dict[str, Any] = json.loads(done.stdout)
     return answer
 
@@ -102,6 +103,23 @@ def test_they_fold_an_exact_sheet_flat_as_we_do(name: str, tmp_path: Path) -> No
     assert counted["flat_folded_closure"] < 1e-9 * size
     # in the plane the two may lie back to front, which a turn in space allows
     assert apart(counted["flat_folded"], ours) < 1e-9
+
+
+@pytest.mark.parametrize(("name", "cells"), [("plane", 4), ("hypar", 8), ("cylinder", 6)])
+def test_they_find_our_order_of_the_layers_and_no_other(
+    name: str, cells: int, tmp_path: Path
+) -> None:
+    found = fitted(name, cells, cells, 0.0).pattern
+    assert found is not None
+    write_fold(found, tmp_path / "sheet.fold")
+    theirs = others(tmp_path / "sheet.fold", "layers")
+    assert theirs["branches"] == []  # each pair is decided, so the order is the only one
+    order = layer_order(found)
+    pairs = order.folded.shared.pairs.tolist()
+    assert sorted(theirs["root"]) == sorted(f"{one} {other}" for one, other in pairs)
+    signs = [theirs["root"][f"{one} {other}"] for one, other in pairs]
+    side = signs[0] * order.above[0]  # they may look at the sheet from its back
+    assert signs == (side * order.above).tolist()
 
 
 def test_they_find_a_developable_sheet_not_to_fold_flat(tmp_path: Path) -> None:

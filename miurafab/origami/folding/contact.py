@@ -11,8 +11,8 @@ the other triangle:
   the triangles cross where the two segments overlap.
 
 Touching is not meeting. The height of a corner shared by two facets is set to zero, so facets with
-a common side or corner need no special case. Layers of a sheet folded flat count as meeting, since
-no order of layers is known.
+a common side or corner need no special case. Layers of a sheet folded flat count as meeting;
+their order is that of :mod:`miurafab.origami.folding.layers`.
 """
 
 from __future__ import annotations

@@ -167,7 +167,7 @@ def place(pattern: CreasePattern, fold_angles: Floats) -> FacetPlacement:
     creases.
     """
     frames, facets = len(fold_angles), len(pattern.faces_vertices)
-    before, crease, depth = _tree(pattern)
+    before, crease, depth = facet_tree(pattern)
     turn = np.empty((frames, facets, 3, 3))
     shift = np.empty((frames, facets, 3))
     root = depth == 0
@@ -231,7 +231,7 @@ def _joined(pattern: CreasePattern) -> Ints:
     return np.flatnonzero(inner & ~np.isin(pattern.edges_assignment, ("B", "C")))
 
 
-def _tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
+def facet_tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
     """Breadth-first over the facets from the middle of each piece: (F,) the parent of each facet,
     the crease between them, and the number of creases from the middle.
     """

@@ -27,6 +27,7 @@ from miurafab.options import length, read_value
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.folding.layers import known_layer_order
 from miurafab.origami.formats.fold import read_fold, write_fold
 from miurafab.origami.formats.lines import (
     cp_text,
@@ -125,7 +126,7 @@ def write_pattern(
     form = pattern.chosen_form(form)
     ending = path.suffix.lower()
     if ending == ".fold":
-        write_fold(pattern, path, title)
+        write_fold(pattern, path, title, order=known_layer_order(pattern))
     elif ending in SOLIDS:
         _write_solid(pattern, path, form)
     else:

@@ -1,7 +1,8 @@
 """FOLD 1.2 files: written in one form, and read from any program that stores a crease pattern.
 
-The key frame is the flat crease pattern; ``file_frames[0]`` inherits it and holds the folded form,
-and the frames of a folding motion follow. In files of other programs the flat pattern may be in any
+The key frame is the flat crease pattern; ``file_frames[0]`` inherits it and holds the folded form.
+Where the order of the layers is known, a frame folded flat with ``faceOrders`` follows. The frames
+of a folding motion come last. In files of other programs the flat pattern may be in any
 frame, facets may run clockwise or be missing, and fold angles may have to come from the folded form
 (FOLD 1.2, https://github.com/edemaine/fold/blob/main/doc/spec.md).
 
@@ -36,6 +37,8 @@ from miurafab.geometry.polygons import (
 )
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.kinematics import FoldingMotion
+from miurafab.origami.folding.layers import LayerOrder
+from miurafab.origami.formats.fold_frames import written_frames
 from miurafab.origami.formats.planar_graph import enclosed_facets, oriented
 from miurafab.origami.formats.target_frame import (
     exact_frames,
@@ -54,11 +57,17 @@ ASSUMED = "assumed"
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "um": 1e-3}
 
 
-def fold_text(pattern: CreasePattern, title: str = "", motion: FoldingMotion | None = None) -> str:
+def fold_text(
+    pattern: CreasePattern,
+    title: str = "",
+    motion: FoldingMotion | None = None,
+    order: LayerOrder | None = None,
+) -> str:
     """``pattern`` as the text of a FOLD 1.2 file, one top-level key in each line.
 
-    The frames of a ``motion`` follow the folded form. Each inherits the flat pattern and has its
-    own coordinates and fold angles.
+    The pattern folded flat, with the ``order`` of its layers, and the frames of a ``motion`` follow
+    the folded form. Each inherits the flat pattern and has its own coordinates and fold angles. A
+    motion that ends folded flat has the order in its last frame.
     """
     keys: dict[str, Any] = {
         "file_spec": 1.2,
@@ -74,21 +83,9 @@ def fold_text(pattern: CreasePattern, title: str = "", motion: FoldingMotion | N
         "edges_foldAngle": np.degrees(pattern.edges_fold_angle).tolist(),
         "faces_vertices": _polygons(pattern.faces_vertices),
     }
-    frames = []
-    if pattern.folded_coords is not None:
-        frames.append(_folded_frame(pattern.folded_coords))
+    frames = written_frames(pattern, motion, order)
     if motion is not None:
         keys["file_classes"].append("animation")
-        for state, points, angles in zip(
-            motion.states.tolist(), motion.frames, motion.fold_angles, strict=True
-        ):
-            frames.append(
-                {
-                    "frame_title": f"s = {state:.6g}",
-                    **_folded_frame(points),
-                    "edges_foldAngle": np.degrees(angles).tolist(),
-                }
-            )
     if frames:
         keys["file_frames"] = frames
     if pattern.grid is not None:
@@ -115,17 +112,6 @@ def fold_text(pattern: CreasePattern, title: str = "", motion: FoldingMotion | N
     return in_own_frame("{\n" + ",\n".join(lines) + "\n}\n", pattern)
 
 
-def _folded_frame(points: Floats) -> dict[str, Any]:
-    return {
-        "frame_classes": ["foldedForm"],
-        "frame_attributes": ["3D"],
-        "frame_parent": 0,
-        "frame_inherit": True,
-        "frame_unit": "mm",
-        "vertices_coords": points.tolist(),
-    }
-
-
 def _polygons(faces: Ints) -> list[list[int]]:
     if (faces >= 0).all():
         whole: list[list[int]] = faces.tolist()
@@ -134,14 +120,19 @@ def _polygons(faces: Ints) -> list[list[int]]:
 
 
 def write_fold(
-    pattern: CreasePattern, path: Path, title: str = "", motion: FoldingMotion | None = None
+    pattern: CreasePattern,
+    path: Path,
+    title: str = "",
+    motion: FoldingMotion | None = None,
+    order: LayerOrder | None = None,
 ) -> None:
-    """Write ``pattern``, with a ``motion`` of it or without, to the FOLD file ``path``.
+    """Write ``pattern`` to the FOLD file ``path``, with what is given of a ``motion`` and of the
+    ``order`` of its layers.
 
     A mesh file that is its target is named from the folder of ``path``, so that both can move
     together.
     """
-    write_text(path, fold_text(seen_from(pattern, path.parent), title, motion))
+    write_text(path, fold_text(seen_from(pattern, path.parent), title, motion, order))
 
 
 def seen_from(pattern: CreasePattern, folder: Path) -> CreasePattern:
