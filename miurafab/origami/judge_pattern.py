@@ -145,7 +145,7 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
             f"{gaps[open_seams].max():.1e} mean edges in length or in place.",
             tuple(open_seams.tolist()),
         )
-    yield from _unlisted_seams(pattern)
+    yield from _unlisted(pattern)
     if found is not None:
         yield from _inexact(found)
     pairs = evidence.crossings
@@ -194,13 +194,19 @@ def proved(
     return tuple(sentence for codes, sentence in claims if not codes & broken)
 
 
-def _unlisted_seams(pattern: CreasePattern) -> Iterator[Finding]:
-    """Borders that meet in the folded form and are in none of the seams that the pattern names."""
+def unlisted_seams(pattern: CreasePattern) -> Ints:
+    """(n, 2) the border edges that meet in the folded form and are in none of the seams that the
+    pattern names.
+    """
     if pattern.seams is None:
-        return
+        return np.empty((0, 2), dtype=np.int64)
     pairs = meeting_borders(pattern)
-    pairs = pairs[~np.isin(pairs, pattern.seams).any(axis=1)]
-    if len(pairs):
+    return np.asarray(pairs[~np.isin(pairs, pattern.seams).any(axis=1)])
+
+
+def _unlisted(pattern: CreasePattern) -> Iterator[Finding]:
+    pairs = unlisted_seams(pattern)
+    if pattern.seams is not None and len(pairs):
         one, other = pairs[0].tolist()
         yield Finding(
             "seam",

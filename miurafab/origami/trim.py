@@ -148,17 +148,22 @@ class _Cutter:
     def _polygon(
         self, corners: list[int], nodes: list[int], parents: list[int], arcs: list[list[int]]
     ) -> Polygon:
-        """The facet inside ``arcs``, each the numbers of its intervals; cuts join their ends."""
+        """The facet inside ``arcs``, each the numbers of its intervals; cuts join their ends. A cut
+        from a place on an edge to another one on that edge is a part of the edge.
+        """
         polygon: list[int] = []
         sides: list[int] = []
         for n, arc in enumerate(arcs):
             polygon += [nodes[i] for i in arc]
             sides += [parents[i] for i in arc]
-            leaves = nodes[(arc[-1] + 1) % len(nodes)]
-            enters = nodes[arcs[(n + 1) % len(arcs)][0]]
-            bends = self._bends(corners, leaves, enters)
-            polygon += [leaves, *bends]
-            sides += [-1] * (1 + len(bends))
+            leaves, enters = (arc[-1] + 1) % len(nodes), arcs[(n + 1) % len(arcs)][0]
+            bends = self._bends(corners, nodes[leaves], nodes[enters])
+            polygon += [nodes[leaves], *bends]
+            skipped = {
+                parents[(leaves + i) % len(nodes)] for i in range((enters - leaves) % len(nodes))
+            }
+            along = skipped.pop() if len(skipped) == 1 and not bends else -1
+            sides += [along] * (1 + len(bends))
         return polygon, sides
 
     def _bends(self, corners: list[int], leaves: int, enters: int) -> list[int]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from miurafab.geometry.arrays import Bools, Floats
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.outline import Outline
 from miurafab.geometry.polygons import edge_lengths, facet_areas
+from miurafab.origami import trim
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.fit import fit
 from miurafab.origami.fitting.request import FitRequest
@@ -17,6 +19,7 @@ from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.nearness import nearness
 from miurafab.origami.trim import CREASE, SLIVER, inner_facets, trimmed
+from miurafab.origami.trim_cuts import EdgeCuts, edge_cuts
 from miurafab.origami.verify import audit
 from miurafab.surfaces.mesh import MeshSurface, mesh_surface
 from miurafab.surfaces.outline import WholeMesh, whole_mesh
@@ -200,6 +203,44 @@ def test_a_sheet_of_two_pieces_is_cut_as_one(bowl: tuple[CreasePattern, WholeMes
     inner = (one.edges_assignment != "B").sum() - (two.edges_assignment != "B").sum()
     assert inner == len(two.seams)
     assert audit(two).valid
+
+
+@pytest.mark.parametrize("parted", [False, True])
+@pytest.mark.parametrize("first", [False, True])
+def test_an_edge_that_dips_outside_stays_an_edge(
+    bowl: tuple[CreasePattern, WholeMesh],
+    monkeypatch: pytest.MonkeyPatch,
+    parted: bool,
+    first: bool,
+) -> None:
+    """The facets on both sides keep the part outside, so it is a crease or a seam, no border."""
+    pattern, target = in_two(bowl[0]) if parted else bowl[0], bowl[1]
+    middle = 7 * (COUNT + 1) + COUNT // 2
+    ends = pattern.edges_vertices == [middle, middle + COUNT + 1]
+    edge = int(np.flatnonzero(ends.all(axis=1))[0])
+    whole = trimmed(pattern, target, near(pattern, target))
+
+    def dipping(*given: Any) -> EdgeCuts:
+        cuts = edge_cuts(*given)
+        line = int(cuts.line[edge])
+        breaks, inside = list(cuts.breaks), cuts.starts_inside.copy()
+        assert not breaks[line]
+        assert inside[line]
+        breaks[line], inside[line] = (0.6,), first
+        return replace(cuts, breaks=tuple(breaks), starts_inside=inside)
+
+    monkeypatch.setattr(trim, "edge_cuts", dipping)
+    found = trimmed(pattern, target, near(pattern, target))
+    assert audit(found).valid
+    for letter in "BMVU":
+        more = np.sum(found.edges_assignment == letter) - np.sum(whole.edges_assignment == letter)
+        dips = letter == pattern.edges_assignment[edge]
+        assert more == (1 + parted if dips else 0), letter
+    assert len(seams(found)) == len(seams(whole)) + parted
+
+
+def seams(pattern: CreasePattern) -> Ints:
+    return np.empty((0, 2), dtype=np.int64) if pattern.seams is None else pattern.seams
 
 
 def in_two(pattern: CreasePattern) -> CreasePattern:

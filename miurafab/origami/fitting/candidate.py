@@ -23,6 +23,7 @@ from miurafab.origami.fitting.result import Attempt
 from miurafab.origami.fitting.score import GOOD, Score, score
 from miurafab.origami.fitting.starts import Start
 from miurafab.origami.invariants import exactness
+from miurafab.origami.judge_pattern import unlisted_seams
 from miurafab.origami.unfold import unfold_charts
 from miurafab.origami.verify import (
     DEGENERATE,
@@ -187,6 +188,13 @@ def _faults(
             "bow-tie",
             f"{marks.bow_ties} facets are folded over themselves; ask for more `facets` or "
             "`pieces`.",
+        )
+    unlisted = len(unlisted_seams(pattern))
+    if unlisted:
+        yield Finding(
+            "seam",
+            f"{unlisted} pairs of border edges meet in the folded form and are no seams; ask for "
+            "other `facets` or `pieces`.",
         )
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
     least = request.min_edge_mm or DEGENERATE * mean
