@@ -57,7 +57,7 @@ RULES = {
     "flat-foldable": Rule("refusal", "a sheet less flat-foldable than asked"),
     "smaller-part": Rule("warning", "a sheet on a smaller part of the mesh's rectangle"),
     "whole-facets": Rule("note", "whole facets at the border, since a cut leaves short edges"),
-    "far-from-target": Rule("warning", "a mid-surface that lies far from the target"),
+    "far-from-target": Rule("warning", "a sheet that lies over 1 % of its size from the target"),
     # A pattern, checked (miurafab.origami.verify)
     "no-target": Rule("note", "distances left out, since the target is missing or has changed"),
     "degenerate-edge": Rule("refusal", "an edge too short to be creased or cut"),

@@ -253,8 +253,11 @@ class _FitSearch:
                 "`min_edge`, or ask for fewer `facets` or a larger `size`."
             )
             findings.append(Finding("whole-facets", sentence))
-        if best.score.deviation > FAR:
-            sentence = "The mid-surface lies far from the target; ask for more `facets`."
+        if best.score.deviation > ENOUGH:
+            sentence = (
+                f"The sheet lies up to {best.deviation_mm:.3g} mm from the target, over 1 % of its "
+                "size; ask for other `facets`, more `pieces`, or a smaller part of the target."
+            )
             findings.append(Finding("far-from-target", sentence))
         return FitResult(
             status,

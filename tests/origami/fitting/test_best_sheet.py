@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+import miurafab as mf
 from miurafab.errors import OptionError
 from miurafab.geometry.angles import angle_between
 from miurafab.geometry.polygons import facet_means
@@ -143,3 +144,14 @@ def test_another_seed_gives_another_sheet_as_good() -> None:
     one, two = (result.pattern.vertices_coords for result in made)
     assert np.abs(one - two).max() > 1e-6
     assert math.isclose(made[0].score.total, made[1].score.total, rel_tol=0.5)
+
+
+@pytest.mark.parametrize(("name", "told"), [("pill", True), ("hypar", False)])
+def test_a_sheet_far_from_its_target_is_told_with_the_distance(name: str, told: bool) -> None:
+    """Without the fair polish the pill's sheet is 1.5 % of its diagonal off."""
+    result = mf.fit(name, facets=(20, 20), polish="off")
+    found = [finding for finding in result.findings if finding.code == "far-from-target"]
+    assert bool(found) == told
+    for finding in found:
+        assert result.deviation_mm is not None
+        assert f"up to {result.deviation_mm:.3g} mm" in finding.sentence
