@@ -5,7 +5,9 @@ BIN := .venv/bin
 
 LOCKED := $(BIN)/python -m pip install --quiet --require-hashes --requirement
 OURS := $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
-COMPILE = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header
+TOOLS := .venv/tools
+COMPILE = $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --upgrade
+AUDIT = $(TOOLS)/bin/pip-audit --strict --disable-pip --require-hashes
 
 .PHONY: demo test test-large lint lock audit sbom clean
 
@@ -41,16 +43,26 @@ lint: .venv/installed-dev
 	$(OURS)
 	touch $@
 
-lock: .venv/installed-dev
-	$(BIN)/python -m pip install --quiet uv
-	$(COMPILE) --upgrade pyproject.toml locks/build.in --output-file locks/run.txt
-	$(COMPILE) --upgrade pyproject.toml locks/build.in --extra dev --constraints locks/run.txt --output-file locks/dev.txt
+# The programs that write and judge the lock files, in an environment of their own.
+$(TOOLS)/installed: locks/tools.txt
+	$(PYTHON) -m venv $(TOOLS)
+	$(TOOLS)/bin/python -m pip install --quiet --require-hashes --requirement locks/tools.txt
+	touch $@
+
+lock: $(TOOLS)/installed
+	$(COMPILE) locks/tools.in --output-file locks/tools.txt
+	$(COMPILE) pyproject.toml locks/build.in --output-file locks/run.txt
+	$(COMPILE) pyproject.toml locks/build.in --extra dev --constraints locks/run.txt --output-file locks/dev.txt
+	$(COMPILE) pyproject.toml --extra bench --extra cluster --extra step --constraints locks/dev.txt --output-file locks/extras.txt
 	npm update --prefix tests/interop --package-lock-only --no-audit --no-fund
 
-# Asks the vulnerability service of PyPI, and so needs the network.
-audit: .venv/installed-dev
-	$(BIN)/python -m pip install --quiet pip-audit
-	$(BIN)/pip-audit --disable-pip --require-hashes --requirement locks/dev.txt
+# Asks the services of PyPI and npm for known weaknesses, and so needs the network. It fails where
+# one of them cannot tell of a single library.
+audit: $(TOOLS)/installed
+	$(AUDIT) --requirement locks/dev.txt
+	$(AUDIT) --requirement locks/extras.txt
+	$(AUDIT) --requirement locks/tools.txt
+	npm audit --prefix tests/interop --package-lock-only
 
 sbom:
 	$(PYTHON) locks/sbom.py

@@ -10,10 +10,11 @@ import subprocess
 import sys
 import tomllib
 import zipfile
-from importlib.metadata import packages_distributions
+from importlib.metadata import PackageNotFoundError, packages_distributions, requires
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = (sys.executable, "-m", "build", "--wheel", "--sdist", "--no-isolation")
@@ -54,19 +55,108 @@ def test_the_same_source_gives_the_same_packages(installed, tmp_path):
         assert first.read_bytes() == second.read_bytes(), kind
 
 
-@pytest.mark.parametrize(("lock", "extra"), [("run", None), ("dev", "dev")])
-def test_the_lock_files_pin_what_is_declared(lock, extra):
-    """Each dependency by its version, at least the declared one, with hashes."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = project["dependencies"] + (project["optional-dependencies"][extra] if extra else [])
+LOCKS = {
+    "run": ("build.in", ()),
+    "dev": ("build.in", ("dev",)),
+    "extras": (None, ("bench", "cluster", "step")),
+    "tools": ("tools.in", None),
+}
+"""What `make lock` makes each file of: a list beside it, and extras of pyproject.toml."""
+
+
+def pinned(lock):
+    """The entry of each library, with its hashes, by its plain name."""
     text = (ROOT / "locks" / f"{lock}.txt").read_text()
-    pins = dict(re.findall(r"^([\w.-]+)==([\w.]+)", text, re.MULTILINE))
-    for line in wanted:
-        name, _, least = line.partition(">=")
-        pinned = [int(part) for part in re.findall(r"\d+", pins[_plain(name).replace("_", "-")])]
-        assert pinned >= [int(part) for part in least.split(".")], line
     entries = re.split(r"^(?=[\w.-]+==)", text, flags=re.MULTILINE)[1:]
-    assert all("--hash=sha256:" in entry for entry in entries)
+    return {_plain(entry.partition("==")[0]): entry for entry in entries}
+
+
+def asked(lock):
+    """The requirements that the entries of ``lock`` come from."""
+    beside, extras = LOCKS[lock]
+    found = [] if beside is None else (ROOT / "locks" / beside).read_text().splitlines()
+    if extras is not None:
+        project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+        found += project["dependencies"]
+        found += [line for each in extras for line in project["optional-dependencies"][each]]
+    return [Requirement(line) for line in found if line and not line.startswith("#")]
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_the_lock_files_pin_what_is_declared(lock):
+    """Each dependency in a version that is allowed, each entry with hashes and with who needs it,
+    which is another entry or what the file is made of.
+    """
+    pins = pinned(lock)
+    for each in asked(lock):
+        version = re.match(r"[^=]+==([^ ;]+)", pins[_plain(each.name)])[1]
+        assert each.specifier.contains(version), each
+    sources = {f"-r locks/{LOCKS[lock][0]}", "miurafab (pyproject.toml)"}
+    for name, entry in pins.items():
+        hashes = re.findall(r"--hash=(\S+)", entry)
+        assert hashes, name
+        assert all(re.fullmatch(r"sha256:[0-9a-f]{64}", each) for each in hashes), name
+        users = [
+            line.removeprefix("via").strip()
+            for line in re.findall(r"^ *# *(.*\S)", entry, re.MULTILINE)
+            if line != "via" and "-c locks/" not in line
+        ]
+        assert users, name
+        assert {each for each in users if _plain(each) not in pins} <= sources, name
+
+
+def test_the_lock_files_pin_what_their_libraries_ask_for():
+    """As the installed ones say it: an installation with hashes admits no other."""
+    pins = pinned("dev")
+    judged = 0
+    for name in pins:
+        try:
+            needs = [Requirement(line) for line in requires(name) or ()]
+        except PackageNotFoundError:  # for another system or Python
+            continue
+        for each in needs:
+            if each.marker is None or each.marker.evaluate({"extra": ""}):
+                assert _plain(each.name) in pins, f"{each} of {name}"
+                judged += 1
+    assert judged > 50
+
+
+def test_the_lock_files_agree_on_versions():
+    run, dev, extras = (
+        {name: entry.split()[0] for name, entry in pinned(lock).items()}
+        for lock in ("run", "dev", "extras")
+    )
+    assert run.items() <= dev.items()
+    assert {name: extras[name] for name in extras.keys() & dev.keys()}.items() <= dev.items()
+
+
+def test_make_lock_makes_each_lock_file():
+    """From the lists and extras that the tests above take, and every other recipe installs them."""
+    recipe = (ROOT / "Makefile").read_text()
+    made = dict(re.findall(r"^\t\$\(COMPILE\) (.*) --output-file locks/(.*)\.txt$", recipe, re.M))
+    made = {lock: inputs.split() for inputs, lock in made.items()}
+    assert made.keys() == LOCKS.keys() == {p.stem for p in (ROOT / "locks").glob("*.txt")}
+    for lock, (beside, extras) in LOCKS.items():
+        given = [] if extras is None else ["pyproject.toml"]
+        given += [] if beside is None else [f"locks/{beside}"]
+        assert [word for word in made[lock] if "." in word and "txt" not in word] == given
+        told = re.findall(r"--extra (\S+)", " ".join(made[lock]))
+        assert told == list(extras or ())
+    for line in recipe.splitlines():
+        if "pip install" in line:
+            assert "--require-hashes" in line or "--no-deps" in line, line
+    audited = re.findall(r"\$\(AUDIT\) --requirement locks/(.*)\.txt", recipe)
+    assert sorted([*audited, "run"]) == sorted(LOCKS)  # what runs is part of dev
+
+
+def test_the_lock_file_of_npm_has_a_sum_for_each_package():
+    folder = ROOT / "tests" / "interop"
+    packages = json.loads((folder / "package-lock.json").read_text())["packages"]
+    wanted = json.loads((folder / "package.json").read_text())["dependencies"]
+    assert packages.pop("")["dependencies"] == wanted
+    for name, version in wanted.items():
+        assert packages[f"node_modules/{name}"]["version"] == version
+    assert all(each["integrity"].startswith("sha512-") for each in packages.values())
 
 
 def test_the_bill_of_materials_lists_every_library_of_the_lock_file():
@@ -132,6 +222,8 @@ def test_the_workflow_runs_on_the_systems_and_pythons_that_are_promised():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     promised = re.findall(r"Python :: (\d\.\d+)", " ".join(project["classifiers"]))
     workflow = (ROOT / ".github" / "workflows" / "tests.yml").read_text()
+    installs = re.findall(r"pip install (.*)", workflow)
+    assert all("--require-hashes" in each or "--no-deps" in each for each in installs)
     pythons = re.search(r"python: \[(.*)\]", workflow)[1]
     assert re.findall(r"[\d.]+", pythons) == promised
     assert re.search(r"os: \[(.*)\]", workflow)[1].split(", ") == [

@@ -30,7 +30,7 @@ HERE = Path(__file__).parent
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(
     NODE is None or not (HERE / "node_modules").is_dir(),
-    reason="needs Node and `npm install --no-package-lock` in tests/interop",
+    reason="needs Node and `npm ci` in tests/interop",
 )
 
 SHEETS = ("regular", "hypar", "hypar exact", "sphere exact", "saddle", "log-spiral")
