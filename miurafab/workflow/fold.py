@@ -32,6 +32,7 @@ from miurafab.origami.folding.kinematics import (
     states_between,
 )
 from miurafab.origami.folding.layers import LayerOrder, layer_order
+from miurafab.origami.folding.layers_apart import CLOSED, layer_shifts, split_facets
 from miurafab.origami.folding.thick_panels import ThickPanels
 from miurafab.origami.folding.thick_panels import thick_panels as make_panels
 from miurafab.origami.formats.fold import write_fold
@@ -129,15 +130,17 @@ class Folding(Shown):
         by_strain = read_options(FoldOptions, {"colour": colour}).colour == "strain"
         motion, ending = self.motion, file.suffix.lower()
         pattern, title = motion.pattern, title or motion.pattern.name
+        shifts = None if ending == ".fold" else layer_shifts(motion, self.layers)
         if ending == ".fold":
             write_fold(pattern, file, title, motion, self.layers)
         elif ending == ".glb":
-            triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
-            write_bytes(file, glb_bytes(motion.frames[0], triangles, motion.frames))
+            write_bytes(file, _glb(motion, shifts))
         elif ending == ".gif":
-            write_gif(file, motion, _strain(motion) if by_strain else None, on_progress)
+            write_gif(file, motion, _strain(motion) if by_strain else None, on_progress, shifts)
         else:
-            slider = Slider(_names(motion), target_frame(motion), _strain(motion), by_strain)
+            slider = Slider(
+                _names(motion), target_frame(motion), _strain(motion), by_strain, shifts
+            )
             write_page(file, title=title, pattern=pattern, motion=motion.frames, slider=slider)
 
     def save_angles(self, path: AnyPath) -> None:
@@ -272,6 +275,23 @@ def _strain(motion: FoldingMotion) -> Floats:
     """Strains as the page shows them: rounding, which a rigid motion has for strain, is none."""
     strain = facet_strain(motion.pattern, motion.frames)
     return np.where(strain < 1e-9, 0.0, strain)
+
+
+def _glb(motion: FoldingMotion, shifts: Floats | None) -> bytes:
+    """The motion; with ``shifts`` (F, 3) each facet has corners of its own, and in one more frame
+    the layers stand apart.
+    """
+    faces, frames = motion.pattern.faces_vertices, motion.frames
+    flat = np.pad(motion.pattern.vertices_coords, ((0, 0), (0, 1)))
+    if shifts is not None:
+        frames, numbered = split_facets(motion.frames, faces)
+        flat, _ = split_facets(flat, faces)
+        moves = np.repeat(shifts, (faces >= 0).sum(axis=1), axis=0)
+        last = frames[-1:]
+        frames = np.concatenate([frames[:-1], last + CLOSED * moves, last + moves])
+        faces = numbered
+    triangles, _ = triangulate(faces, flat[:, :2])
+    return glb_bytes(frames[0], triangles, frames)
 
 
 def _names(motion: FoldingMotion) -> tuple[str, ...]:

@@ -15,8 +15,9 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from miurafab.files import write_bytes
-from miurafab.geometry.arrays import Floats
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.folding.kinematics import FoldingMotion
+from miurafab.origami.folding.layers_apart import CLOSED, split_facets
 from miurafab.origami.picture import BACK, FRONT, axes, project
 
 WIDTH, HEIGHT = 640, 480
@@ -25,6 +26,7 @@ _AZIMUTH, _ELEVATION = -0.6 - math.pi / 2, 0.62
 _MARGIN, _BAR = 26, 4
 _PAGE, _RULE, _DONE, _MARK = (244, 245, 247), (213, 218, 224), (11, 107, 203), (29, 35, 41)
 _MILLISECONDS, _HOLD = 60, 700
+_PARTING = 9  # pictures in which the layers part
 
 # Control points of a ramp from blue over pale to red, dark at neither end, for strains.
 _RAMP = np.array([[69, 117, 180], [171, 217, 233], [255, 255, 191], [253, 174, 97], [215, 48, 39]])
@@ -35,21 +37,26 @@ def write_gif(
     motion: FoldingMotion,
     strain: Floats | None = None,
     on_progress: Callable[[float, str], None] | None = None,
+    shifts: Floats | None = None,
 ) -> None:
     """Write ``motion`` to ``path``: there and back, with a rest at either end and at the target.
 
     Facets are coloured by side, or by ``strain`` (T, F), from blue for none to red for the most.
+    With ``shifts`` (F, 3) the layers of the last frame then part by so much, mm.
     """
     images = []
-    for frame in range(len(motion.frames)):
-        images.append(picture(motion, frame, strain))
+    parts = [CLOSED] if shifts is None else [CLOSED, *np.linspace(0.0, 1.0, _PARTING)[1:].tolist()]
+    last = len(motion.frames) - 1
+    steps = [(frame, 0.0) for frame in range(last)] + [(last, part) for part in parts]
+    for count, (frame, part) in enumerate(steps, start=1):
+        images.append(picture(motion, frame, strain, shifts, part))
         if on_progress is not None:
-            on_progress((frame + 1) / len(motion.frames), f"frame {frame + 1}")
+            on_progress(count / len(steps), f"frame {count}")
     palette = _palette(images)
     shown = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     count = len(shown)
     durations = [_MILLISECONDS] * count
-    for rest in {0, count - 1, target_frame(motion)}:
+    for rest in {0, last, count - 1, target_frame(motion)}:
         durations[rest] = _HOLD
     order = [*range(count), *range(count - 2, 0, -1)]
     content = io.BytesIO()
@@ -65,11 +72,21 @@ def write_gif(
     write_bytes(path, content.getvalue())
 
 
-def picture(motion: FoldingMotion, frame: int, strain: Floats | None = None) -> Image.Image:
-    """One ``frame`` of ``motion`` as a picture of :data:`WIDTH` x :data:`HEIGHT` pixels."""
-    centre, scale = _camera(motion)
-    faces = motion.pattern.faces_vertices
-    view = project(motion.frames[frame], faces, _AZIMUTH, _ELEVATION)
+def picture(
+    motion: FoldingMotion,
+    frame: int,
+    strain: Floats | None = None,
+    shifts: Floats | None = None,
+    part: float = 0.0,
+) -> Image.Image:
+    """One ``frame`` of ``motion`` as a picture of :data:`WIDTH` x :data:`HEIGHT` pixels, with
+    ``part`` of the ``shifts`` (F, 3) of its layers.
+    """
+    centre, scale = _camera(motion, shifts)
+    points, faces = motion.frames[frame], motion.pattern.faces_vertices
+    if shifts is not None and part > 0:
+        points, faces = _apart(points, faces, part * shifts)
+    view = project(points, faces, _AZIMUTH, _ELEVATION)
     if strain is None:
         base, shade = np.where(view.front[:, None], FRONT, BACK), view.shade
     else:  # colours that mean a number stay near what they are
@@ -97,11 +114,21 @@ def target_frame(motion: FoldingMotion) -> int:
     return int(np.argmin(np.abs(np.where(np.isfinite(motion.states), motion.states, 1e9) - 1.0)))
 
 
-def _camera(motion: FoldingMotion) -> tuple[Floats, float]:
+def _apart(points: Floats, faces: Ints, shifts: Floats) -> tuple[Floats, Ints]:
+    """Each of ``faces`` (F, k) with corners of its own, moved by ``shifts`` (F, 3)."""
+    alone, numbered = split_facets(points, faces)
+    return alone + np.repeat(shifts, (faces >= 0).sum(axis=1), axis=0), numbered
+
+
+def _camera(motion: FoldingMotion, shifts: Floats | None) -> tuple[Floats, float]:
     """The middle of what is seen, on the screen, and the pixels a millimetre at which all frames
     fit.
     """
-    seen = (motion.frames @ axes(_AZIMUTH, _ELEVATION)[:2].T).reshape(-1, 2)
+    seen = motion.frames.reshape(-1, 3)
+    if shifts is not None:
+        apart, _ = _apart(motion.frames[-1], motion.pattern.faces_vertices, shifts)
+        seen = np.concatenate([seen, apart])
+    seen = seen @ axes(_AZIMUTH, _ELEVATION)[:2].T
     low, high = seen.min(axis=0), seen.max(axis=0)
     room = np.array([WIDTH - 2 * _MARGIN, HEIGHT - 2 * _MARGIN - 6 * _BAR])
     return (low + high) / 2, float((room / (high - low)).min())

@@ -21,6 +21,7 @@ from miurafab.origami.folding.angles_csv import angles_csv, contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.contact import self_intersections
 from miurafab.origami.folding.kinematics import FoldingMotion, facet_strain, place
+from miurafab.origami.folding.layers_apart import layer_shifts
 from miurafab.origami.folding.laying import laid_on
 from miurafab.origami.folding.thick_panels import thick_panels
 from miurafab.origami.formats.files import load
@@ -179,19 +180,20 @@ def test_a_gif_goes_there_and_back_and_rests_at_the_folded_form(tmp_path: Path) 
     folding.save(tmp_path / "a.gif")
     durations, coverage = [], []
     with Image.open(tmp_path / "a.gif") as image:
-        assert image.n_frames == 12
+        assert image.n_frames == 28  # 7 frames of the motion, 8 in which the layers part
         assert image.info["loop"] == 0
-        for frame in range(12):
+        for frame in range(28):
             image.seek(frame)
             durations.append(image.info["duration"])
             pixels = np.asarray(image.convert("RGB")).astype(int)
             coverage.append(int((np.abs(pixels - pixels[0, 0]).sum(axis=2) > 30).sum()))
     rests = {frame for frame, duration in enumerate(durations) if duration > 500}
     target = target_frame(folding.motion)
-    assert rests == {0, 6, target, 12 - target}
+    assert rests == {0, 6, 14, 22, target, 28 - target}
     assert coverage[0] == max(coverage)
     assert coverage[6] < coverage[0] / 2
-    assert coverage[1:6] == coverage[:6:-1]
+    assert coverage[6] < coverage[14]
+    assert coverage[1:14] == coverage[:14:-1]
 
 
 def test_facets_in_front_hide_those_behind() -> None:
@@ -220,3 +222,50 @@ def test_the_report_on_thickness_tells_every_crease() -> None:
         expected = math.tan(math.radians(abs(crease["fold_deg"])) / 2)
         assert crease["offset_mm"] == pytest.approx(expected)
     assert report["folds"] is True
+
+
+def test_the_last_pictures_part_the_layers(tmp_path: Path) -> None:
+    found = fitted("cylinder", 6, 6, 0.0).pattern
+    assert found is not None
+    folding = fold(found, 6)
+    order = folding.layers
+    assert order is not None
+    shifts = layer_shifts(folding.motion, order)
+    assert shifts is not None
+    # along the normal of the plane, and by as much as the order says
+    plane = folding.motion.frames[-1] - folding.motion.frames[-1].mean(axis=0)
+    normal = np.linalg.svd(plane)[2][2]
+    heights = shifts @ normal
+    assert np.abs(shifts - heights[:, None] * normal).max() < 1e-9 * np.abs(shifts).max()
+    above = np.subtract(*heights[order.folded.shared.pairs].T)
+    faces, points = found.faces_vertices[0], folding.motion.frames[-1]
+    front = np.cross(points[faces[1]] - points[faces[0]], points[faces[2]] - points[faces[1]])
+    side = np.sign(front @ normal) * (1 if order.folded.up[0] else -1)
+    assert (np.sign(above) * side == order.above).all()
+
+    folding.save(tmp_path / "sheet.glb")
+    corners = (found.faces_vertices >= 0).sum()
+    content = (tmp_path / "sheet.glb").read_bytes()
+    document = json.loads(content[20 : 20 + int.from_bytes(content[12:16], "little")])
+    targets = document["meshes"][0]["primitives"][0]["targets"]
+    assert len(targets) == len(folding.motion.frames) + 1
+    assert document["accessors"][targets[-1]["POSITION"]]["count"] == corners
+
+    folding.save(tmp_path / "sheet.gif")
+    with Image.open(tmp_path / "sheet.gif") as gif:
+        assert gif.n_frames == 2 * (len(folding.motion.frames) + 8) - 2
+
+
+def test_a_sheet_that_does_not_fold_flat_is_given_no_order() -> None:
+    told = fold(developable("hypar"), 4).report()
+    assert told["layers"] is None
+    assert [finding["code"] for finding in told["findings"]] == ["no-layer-order"]
+    exactly = fold(exact("hypar"), 4).report()
+    assert exactly["layers"]["known"] is True
+    assert exactly["layers"]["crossing"] == exactly["findings"] == []
+
+
+def test_a_sheet_that_crosses_itself_as_it_closes_is_told() -> None:
+    told = fold(folded_through_itself().pattern, 4).report()
+    assert told["layers"]["crossing"][0] == [0, 2]
+    assert [finding["code"] for finding in told["findings"]] == ["crossing-layers"]

@@ -68,8 +68,15 @@ def test_the_slider_moves_the_sheet(tmp_path: Path, cells: int, most_bytes: int)
         halfway = covered(page)
         assert move(page, 40) == "41 of 41, folded flat"
         closed = covered(page)
+        assert page.run('document.getElementById("layers-bar").hidden') is False
+        page.run('document.getElementById("apart").value = 100')
+        move(page, 40)
+        apart = covered(page)
+        move(page, 39)
+        assert page.run('document.getElementById("layers-bar").hidden') is True
         assert page.requests == [path.as_uri()]
     assert flat > 1.2 * halfway > 1.44 * closed > 1000
+    assert apart > 1.1 * closed
 
 
 def test_facets_are_coloured_by_strain_when_asked(tmp_path: Path) -> None:

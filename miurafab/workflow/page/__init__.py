@@ -26,6 +26,7 @@ from miurafab.gcode.program import strokes
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.folding.layers_apart import CLOSED
 from miurafab.version import __version__
 from miurafab.workflow.dry_run import LAYERS, SheetPreview, at_work, clock_text, length_text
 from miurafab.workflow.preview import Preview
@@ -42,13 +43,15 @@ _BEGINS_STROKE = np.uint8(128)
 class Slider:
     """The slider of a motion of T frames: a name for each frame in ``names`` (T, or none), the
     first frame ``start``, and the ``strain`` (T, F) of the facets, which colours can show; they do
-    from the start if ``show_strain``.
+    from the start if ``show_strain``. ``shifts`` (F, 3), mm, are those of the layers of the last
+    frame when they stand apart.
     """
 
     names: tuple[str, ...] = ()
     start: int = 0
     strain: Floats | None = None
     show_strain: bool = False
+    shifts: Floats | None = None
 
 
 def write_page(
@@ -187,6 +190,7 @@ def _fold(pattern: CreasePattern, motion: Floats | None, slider: Slider) -> dict
         "names": slider.names,
         "start": slider.start,
         "strain": _strain(slider, owners),
+        "layers": _layers(pattern, slider, owners),
     }
 
 
@@ -200,6 +204,23 @@ def _strain(slider: Slider, owners: Ints) -> dict[str, Any] | None:
         "shown": slider.show_strain,
         "values": _base64(np.rint(slider.strain / (most or 1.0) * 255), np.uint8),
         "owners": _base64(owners, np.uint32),
+    }
+
+
+def _layers(pattern: CreasePattern, slider: Slider, owners: Ints) -> dict[str, Any] | None:
+    """How far each facet moves along one direction when the layers stand apart, and its edges."""
+    if slider.shifts is None:
+        return None
+    facet, slot = np.nonzero(pattern.faces_edges >= 0)
+    farthest = slider.shifts[int(np.argmax(np.abs(slider.shifts).sum(axis=1)))]
+    along = farthest / (np.linalg.norm(farthest) or 1.0)
+    return {
+        "closed": CLOSED,
+        "along": along.round(6).tolist(),
+        "shifts": _base64(slider.shifts @ along, np.float32),
+        "owners": _base64(owners, np.uint32),
+        "sides": _base64(pattern.faces_edges[facet, slot], np.uint32),
+        "side_owners": _base64(facet, np.uint32),
     }
 
 

@@ -97,6 +97,7 @@ class FoldView {
     this.strains = fold.strain && decode(fold.strain.values, Uint8Array);
     this.owners = fold.strain && decode(fold.strain.owners, Uint32Array);
     this.creases = new Lines(this.stage, decode(fold.kinds, Uint8Array));
+    if (fold.layers) this.stack(fold.layers);
     this.crease = fold.lengths.reduce((sum, length) => sum + length, 0) / (this.edges.length / 2);
     this.legend();
     for (const [at, form] of this.forms.entries()) {
@@ -113,6 +114,7 @@ class FoldView {
       byId("forms").children[this.at].focus();
     });
     byId("motion").addEventListener("input", (event) => this.show(Number(event.target.value)));
+    byId("apart").addEventListener("input", () => this.show(Number(byId("motion").value)));
     byId("by-strain").addEventListener("change", () => this.stage.draw());
     byId("by-strain").checked = Boolean(fold.strain && fold.strain.shown);
     byId("fold-fit").addEventListener("click", () => this.fit());
@@ -124,6 +126,30 @@ class FoldView {
     });
     byId("fold").hidden = false;
     this.choose(Math.min(fold.first, this.forms.length - 1));
+  }
+
+  /** What draws the layers of the last frame apart: each facet moves, and with it its own sides. */
+  stack(layers) {
+    const sides = decode(layers.sides, Uint32Array);
+    const kinds = decode(this.fold.kinds, Uint8Array);
+    this.layers = {
+      closed: layers.closed,
+      along: layers.along,
+      shifts: decode(layers.shifts, Float32Array),
+      owners: decode(layers.owners, Uint32Array),
+      sideOwners: decode(layers.side_owners, Uint32Array),
+      ends: Uint32Array.from({ length: 2 * sides.length }, (_, at) => this.edges[2 * sides[at >> 1] + (at & 1)]),
+      lines: new Lines(this.stage, Uint8Array.from(sides, (side) => kinds[side])),
+    };
+  }
+
+  /** `points`, of which `each` in a row belong to one of `owners`, moved with their facets by `part`. */
+  apart(points, owners, each, part) {
+    const { along, shifts } = this.layers;
+    for (let at = 0; at < points.length; at += 1) {
+      points[at] += part * shifts[owners[Math.floor(at / 3 / each)]] * along[at % 3];
+    }
+    return points;
   }
 
   /** (frames x vertices x 3) coordinates in mm about the middle of the form. */
@@ -192,9 +218,19 @@ class FoldView {
     const count = this.form.coordinates.length / this.form.frames;
     const points = this.form.coordinates.subarray(frame * count, (frame + 1) * count);
     this.measure(points);
+    const corners = gather(points, this.triangles);
+    this.stacked = Boolean(this.layers) && this.form.frames > 1 && frame === this.form.frames - 1;
+    byId("layers-bar").hidden = !this.stacked;
+    if (this.stacked) {
+      const { closed, owners, sideOwners, ends, lines } = this.layers;
+      const part = Math.max(closed, Number(byId("apart").value) / 100);
+      this.apart(corners, owners, 3, part);
+      lines.place(this.apart(gather(points, ends), sideOwners, 2, part), 3);
+    } else {
+      this.creases.place(gather(points, this.edges), 3);
+    }
     gl.bindBuffer(gl.ARRAY_BUFFER, this.pointBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, gather(points, this.triangles), gl.DYNAMIC_DRAW);
-    this.creases.place(gather(points, this.edges), 3);
+    gl.bufferData(gl.ARRAY_BUFFER, corners, gl.DYNAMIC_DRAW);
     if (this.strains && this.form.frames > 1) this.colour(frame);
     if (this.form.frames > 1) {
       const name = this.fold.names[frame];
@@ -307,7 +343,8 @@ class FoldView {
     const pixels = (this.crease * this.stage.height) / (2 * this.distance * FIELD);
     const thick = Math.min(Math.max(0.09 * pixels, 0.45), THICKEST);
     const kinds = this.fold.assignments.map((letter) => ({ ...CREASES[letter], width: CREASES[letter].width * thick }));
-    this.stage.lines(this.creases, this.edges.length / 2, camera, kinds, { shown: this.shown(), nearer: 4e-4 });
+    const [lines, ends] = this.stacked ? [this.layers.lines, this.layers.ends] : [this.creases, this.edges];
+    this.stage.lines(lines, ends.length / 2, camera, kinds, { shown: this.shown(), nearer: 4e-4 });
     gl.depthMask(true);
   }
 }
