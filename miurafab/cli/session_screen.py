@@ -17,11 +17,9 @@ from typing import TextIO
 from miurafab.errors import MiurafabError
 from miurafab.machine.keys import DOWN, KEYS, LEFT, PAGE_DOWN, PAGE_UP, RIGHT, UP
 from miurafab.machine.known_controller import MachineState
-from miurafab.workflow.at_machine import Operator
+from miurafab.workflow.at_machine import STEPS, Operator
 from miurafab.workflow.dry_run import clock_text
 
-STEPS = (0.1, 1.0, 10.0, 50.0)
-"""The steps of the arrow keys in mm."""
 _WAYS = {UP: (0, 1), DOWN: (0, -1), RIGHT: (1, 0), LEFT: (-1, 0)}
 _SAID_LINES = 5
 _DRAW_S = 0.1

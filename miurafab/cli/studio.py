@@ -37,7 +37,7 @@ def studio(
         argument(
             "FILE|TARGET",
             "What to begin with: a pattern .fold, a named surface (hypar:height=0.5), a design "
-            ".toml or a mesh.",
+            ".toml, a mesh, or a job to cut: a job directory or a G-code file.",
         ),
     ] = None,
     /,
@@ -50,11 +50,11 @@ def studio(
     no_browser: Annotated[bool, option(Flag(), "Print the address and open no browser.")] = False,
     console: Console = Console(),
 ) -> int:
-    """Serve a page on this computer: from a surface to sheets in the browser.
+    """Serve a page on this computer: from a surface to sheets, and at the machine.
 
     The first line printed is the address of the page. It holds a key: nobody gets in without it.
-    Ctrl-C ends the studio. Nothing is sent to a machine: the page shows the 'miurafab cut' command
-    to paste into a terminal.
+    Ctrl-C ends the studio, and a machine that is connected is left dark. A page connects to a
+    machine, and burns a sheet, only when a person there asks for it twice.
     """
 
     def announce(address: str) -> None:

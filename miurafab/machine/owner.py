@@ -53,6 +53,8 @@ class Owner:
     @property
     def way_out(self) -> str:
         """Where to do what this process wanted the port for."""
+        if "studio" in self.command.split():
+            return "do it there, on the tab Machine"
         if "machine open" not in self.command:
             return "wait for its end, or stop it there"
         here = this_command().split()

@@ -12,20 +12,26 @@ upload          POST   keeps a file (its name in ``X-File-Name``, percent-encode
 fit, open       POST   starts to make or read a pattern
 sheets          POST   starts to lay it out
 cancel          POST   ends the task
+machine         GET    the session with a machine, and what was said since ``?after=N``
+machine/sheet/N GET    the strokes of sheet N of the job there
+machine/...     POST   what a person does at it (:mod:`~miurafab.studio.machine_orders`)
 =============== ====== ==========================================================================
 
 All addresses lie behind the key (:mod:`~miurafab.studio.guard`). A refusal is a sentence:
-``{"error": ...}``.
+``{"error": ...}``. One request at a time is answered from the bench; those of the machine wait for
+no other.
 """
 
 from __future__ import annotations
 
+import threading
 from importlib import resources
+from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 import miurafab
-from miurafab.errors import MiurafabError
+from miurafab.errors import InputError, MiurafabError
 from miurafab.origami.fitting.request import DEFAULT_FACETS, DEFAULT_SIZE_MM, FACETS
 from miurafab.profiles import (
     DEFAULT_MACHINE,
@@ -36,26 +42,47 @@ from miurafab.profiles import (
     load_material,
 )
 from miurafab.profiles.shipped import Kind
+from miurafab.studio.desk import Desk
 from miurafab.studio.form import by_label, filled
 from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
+from miurafab.studio.kept_jobs import keep_job
+from miurafab.studio.machine_orders import ROUTES, carry_out
+from miurafab.studio.machine_words import NO_JOB, plain
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
 from miurafab.studio.orders import read_fit, read_layout, read_source
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
 from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED
+from miurafab.workflow.at_machine import STEPS
 from miurafab.workflow.design import can_close
 
-PAGE = "studio.html"
-PARTS = ("icon.svg", "studio.css", "tools.js", "choices.js", "results.js", "studio.js")
+PAGE, MACHINE = "studio.html", "machine"
+PARTS = (
+    *("icon.svg", "studio.css", "machine.css", "tools.js", "choices.js", "results.js"),
+    *("machine.js", "sheet.js", "studio.js"),
+)
 """The files of the page, beside the page itself."""
 
 
 class Studio:
-    """Answers requests. ``first`` is the target with which the page starts, if any."""
+    """Answers requests, in any thread. ``first`` is the target with which the page starts, if any;
+    ``own_job`` a job directory or a G-code file that the command line named.
+    """
 
-    def __init__(self, bench: Bench, guard: Guard, first: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        bench: Bench,
+        guard: Guard,
+        first: dict[str, Any] | None = None,
+        *,
+        desk: Desk | None = None,
+        own_job: Path | None = None,
+    ) -> None:
         self.bench = bench
         self.guard = guard
+        self.desk = Desk() if desk is None else desk
+        self._own_job = own_job
+        self._lock = threading.Lock()
         self._first = first
         self._page = resources.files(__package__).joinpath("page")
         self._catalogue = _catalogue()
@@ -67,13 +94,46 @@ class Studio:
             return refused
         route = self.guard.route(request.path)
         assert route is not None
-        self.bench.take_in()
+        if route == MACHINE or route.startswith(f"{MACHINE}/"):
+            return self._machine(route.removeprefix(MACHINE).removeprefix("/"), request)
+        with self._lock:
+            self.bench.take_in()
+            try:
+                if request.method == "POST":
+                    return self._post(route, request)
+                return self._get(route, request.path.partition("?")[2])
+            except MiurafabError as fault:
+                return refusal(400, by_label(fault.sentence))
+
+    def _machine(self, route: str, request: HttpRequest) -> Response:
+        """What belongs to the session with a machine; nothing here waits for the bench, but the
+        job that is taken from it.
+        """
+        desk = self.desk
         try:
             if request.method == "POST":
-                return self._post(route, request)
-            return self._get(route, request.path.partition("?")[2])
+                if route not in ROUTES:
+                    return refusal(404, "The machine takes no such request.")
+                told = carry_out(desk, route, request.body, self._put_on)
+                return answer({**told, **desk.state()})
+            kind, _, number = route.partition("/")
+            if kind == "sheet" and number.isascii() and number.isdigit():
+                return answer(desk.drawing(int(number[:9])))
+            if route:
+                return refusal(404, "Nothing is at this address.")
+            after = request.path.partition("?after=")[2]
+            return answer(desk.state(int(after[:9]) if after.isascii() and after.isdigit() else 0))
         except MiurafabError as fault:
-            return refusal(400, by_label(fault.sentence))
+            return refusal(400, plain(fault.sentence))
+
+    def _put_on(self) -> None:
+        """Put the job of the last layout on the desk, or the one that the command line named."""
+        with self._lock:
+            laid_out = self.bench.job_folder()
+            job = self._own_job if laid_out is None else keep_job(laid_out)
+        if job is None:
+            raise InputError(NO_JOB)
+        self.desk.put_on(job, job.name if laid_out is None else laid_out.name)
 
     def _get(self, route: str, query: str) -> Response:
         if route in ("", *PARTS):
@@ -81,7 +141,8 @@ class Studio:
             content = self._page.joinpath(name).read_bytes()
             return own_file(name, filled(content.decode()).encode() if name == PAGE else content)
         if route == "catalogue":
-            return answer({**self._catalogue, "first": self._first})
+            own = None if self._own_job is None else self._own_job.name
+            return answer({**self._catalogue, "first": self._first, "own_job": own})
         if route == "state":
             return answer(self.bench.state())
         if route == "design.toml":
@@ -125,6 +186,7 @@ def _catalogue() -> dict[str, Any]:
             {"name": name, "title": load_machine(name).title}
             for name in known_names("firmware_profiles")
         ],
+        "steps": STEPS,
         "materials": [
             {"name": name, "title": load_material(name).title} for name in known_names("materials")
         ],

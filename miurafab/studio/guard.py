@@ -9,6 +9,7 @@ computer can reach it, too. Against them:
   browser gets it without a command line (:mod:`~miurafab.studio.door`);
 - a request that changes anything (POST) must have this page's ``Origin``, and repeat the key in a
   header, which neither a form nor another site can send;
+- no request may have another page's ``Origin``, and none may ask for a WebSocket: there are none;
 - a body must state its length, and the length has a limit, as has what is being sent at one time.
 """
 
@@ -63,6 +64,9 @@ class Guard:
         """Whether the request is for this server by a name of its own."""
         return headers.get("host", "").lower() in self._hosts
 
+    def _is_ours(self, origin: str) -> bool:
+        return origin.lower() in {f"http://{host}" for host in self._hosts}
+
     def route(self, path: str) -> str | None:
         """The part of ``path`` after the key, without its query; None if the key is wrong."""
         first, slash, rest = path.partition("?")[0].removeprefix("/").partition("/")
@@ -74,13 +78,18 @@ class Guard:
             return refusal(421, f"This server answers to {self._hosts[0]} only.")
         if method not in ("GET", "HEAD", "POST"):
             return refusal(405, f"This server does not answer the method {method[:16]!r}.")
+        origin = headers.get("origin")  # a browser names none where our page reads
+        if origin is not None and not self._is_ours(origin):
+            return refusal(403, "The request does not come from the studio's own page.")
+        if "upgrade" in headers:
+            return refusal(400, "This server speaks plain HTTP alone, and opens no WebSocket.")
         route = self.route(path)
         if route is None:
             return refusal(404, "Open the address that 'miurafab studio' printed, with its key.")
         return self._refuse_post(route, headers) if method == "POST" else None
 
     def _refuse_post(self, route: str, headers: Mapping[str, str]) -> Response | None:
-        if headers.get("origin", "").lower() not in {f"http://{host}" for host in self._hosts}:
+        if not self._is_ours(headers.get("origin", "")):
             return refusal(403, "The request does not come from the studio's own page.")
         if not same_key(headers.get(TOKEN_HEADER, ""), self.key):
             return refusal(403, "The request does not carry the studio's key; reload the page.")

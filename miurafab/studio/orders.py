@@ -55,12 +55,12 @@ def read_fit(body: bytes) -> FitOrder:
 
     Raises :class:`~miurafab.errors.InputError` or ``TargetError``.
     """
-    order = _read(body, ("target", "options"))
+    order = read_order(body, ("target", "options"))
     target = _table(order.get("target"), "The target")
     options = _options(order.get("options", {}), FIT)
     if "source" in target:
-        return FitOrder(None, {}, _text("source", target["source"]), options)
-    return _named(_text("surface", target.get("surface")), target.get("parameters", {}), options)
+        return FitOrder(None, {}, text_of("source", target["source"]), options)
+    return _named(text_of("surface", target.get("surface")), target.get("parameters", {}), options)
 
 
 def _named(surface: str, parameters: Any, options: Mapping[str, Value]) -> FitOrder:
@@ -75,7 +75,7 @@ def _named(surface: str, parameters: Any, options: Mapping[str, Value]) -> FitOr
 
 def read_source(body: bytes) -> str:
     """The source to open. Raises :class:`~miurafab.errors.InputError`."""
-    return _text("source", _read(body, ("source",)).get("source"))
+    return text_of("source", read_order(body, ("source",)).get("source"))
 
 
 def read_layout(body: bytes) -> LayoutOrder:
@@ -83,9 +83,9 @@ def read_layout(body: bytes) -> LayoutOrder:
 
     Raises :class:`~miurafab.errors.InputError`.
     """
-    order = _read(body, ("machine", "material", "options"))
-    machine = _listed("machine", order.get("machine"), known_names("firmware_profiles"))
-    material = _listed("material", order.get("material"), known_names("materials"))
+    order = read_order(body, ("machine", "material", "options"))
+    machine = listed("machine", order.get("machine"), known_names("firmware_profiles"))
+    material = listed("material", order.get("material"), known_names("materials"))
     options = _options(order.get("options", {}), LAYOUT)
     read_options(LayoutOptions, options)
     return LayoutOrder(machine, material, options)
@@ -102,14 +102,15 @@ def _options(given: Any, fields: Mapping[str, Declared]) -> dict[str, Value]:
             if value:
                 options[name] = True
             continue
-        text = _text(name, value)
+        text = text_of(name, value)
         if text:
             whole = isinstance(kind, Whole) and text.isascii() and text.isdigit()
             options[name] = int(text) if whole else text
     return options
 
 
-def _read(body: bytes, keys: tuple[str, ...]) -> dict[str, Any]:
+def read_order(body: bytes, keys: tuple[str, ...]) -> dict[str, Any]:
+    """The table in ``body``, JSON, with no other keys than ``keys``."""
     try:
         order = parse_json(body.decode("utf-8"))
     except (ValueError, RecursionError):
@@ -132,17 +133,19 @@ def _texts(values: Mapping[str, Any], keys: tuple[str, ...]) -> dict[str, str]:
     for key in values:
         if key not in keys:
             raise InputError(f"'{key[:40]}' cannot be set here; there are {', '.join(keys)}.")
-    texts = {key: _text(key, values[key]) for key in keys if key in values}
+    texts = {key: text_of(key, values[key]) for key in keys if key in values}
     return {key: text for key, text in texts.items() if text}
 
 
-def _text(key: str, value: Any) -> str:
+def text_of(key: str, value: Any) -> str:
+    """``value`` if it is a text of one line; ``key`` is its name."""
     if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable():
         raise InputError(f"'{key[:40]}' must be a text of one line.")
     return value.strip()
 
 
-def _listed(key: str, value: Any, names: list[str]) -> str:
+def listed(key: str, value: Any, names: list[str]) -> str:
+    """``value`` if it is one of ``names``; ``key`` says of what kind they are."""
     if value not in names:
         raise InputError(f"Choose a {key} of the list: {', '.join(names)}.")
     return str(value)

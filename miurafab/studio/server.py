@@ -1,8 +1,8 @@
 """The server: sockets on one side, :class:`~miurafab.studio.core.Studio` on the other.
 
-It listens on 127.0.0.1 only. The studio answers one request at a time and quickly; long work runs
-in another process. Uploads and results lie in a temporary folder, which is deleted when the server
-ends.
+It listens on 127.0.0.1 only. The studio answers quickly; long work runs in another process, as does
+the session with a machine, which ends dark before anything else when the server ends. Uploads and
+results lie in a temporary folder, which is deleted when the server ends.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.worker import Process
 from miurafab.surfaces.catalogue import make_surface, parse_target
 from miurafab.surfaces.mesh_files import mesh_suffix
+from miurafab.workflow.cut import GCODE_SUFFIXES
 from miurafab.workflow.design import design
 
 _IDLE_S = 60.0
@@ -46,7 +47,8 @@ def serve(
 ) -> None:
     """Serve the page until Ctrl-C, SIGTERM or SIGHUP.
 
-    The page starts with ``thing``: it opens a pattern (.fold), and chooses a TARGET. ``port`` 0 is
+    The page starts with ``thing``: it opens a pattern (.fold), chooses a TARGET, and has a job
+    (a job directory, a G-code file) for the machine. ``port`` 0 is
     any free port. ``announce`` is called with the address once the page can be opened. Raises
     :class:`~miurafab.errors.InputError` for a thing that cannot be read, and
     :class:`~miurafab.errors.PortError` for a port that cannot be opened.
@@ -59,13 +61,16 @@ def serve(
         folder = Path(tempfile.mkdtemp(prefix="miurafab-studio-")).resolve()
         at_end.callback(shutil.rmtree, folder, ignore_errors=True)
         bench = Bench(folder, Process)
-        first = None if thing is None else _put_on(bench, thing)
+        own_job = None if thing is None else _own_job(thing)
+        first = None if thing is None or own_job is not None else _put_on(bench, thing)
         at_end.callback(bench.cancel)
         at_end.callback(signals.hold)
         server = _Server(port, signals.check)
         at_end.callback(server.server_close)
         guard = Guard(server.server_port, new_key())
-        server.studio = Studio(bench, guard, first)
+        server.studio = Studio(bench, guard, first, own_job=own_job)
+        at_end.callback(server.studio.desk.leave)  # before anything else: the machine is dark
+        at_end.callback(signals.hold)
         if thing is not None and first is not None and first.get("open"):
             bench.open(first["source"])
         announce(guard.address)
@@ -74,6 +79,13 @@ def serve(
             page = server.door.file.as_uri()
             threading.Thread(target=webbrowser.open, args=(page,), daemon=True).start()
         server.serve_forever(poll_interval=0.1)
+
+
+def _own_job(thing: str) -> Path | None:
+    """The job directory or the G-code file that the command line names, if it names one."""
+    path = Path(thing)
+    is_job = path.is_dir() or (path.suffix.lower() in GCODE_SUFFIXES and path.is_file())
+    return path.resolve() if is_job else None
 
 
 def _put_on(bench: Bench, thing: str) -> dict[str, Any]:
@@ -106,7 +118,6 @@ class _Server(ThreadingHTTPServer):
     room: BodyRoom
 
     def __init__(self, port: int, check: Callable[[], None]) -> None:
-        self.lock = threading.Lock()
         self.room = BodyRoom()
         self._check = check
         try:
@@ -182,9 +193,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _handle(self, headers: dict[str, str], body: bytes) -> None:
         studio = self.server.studio
-        with self.server.lock:
-            response = studio.handle(HttpRequest(self.command, self.path, headers, body))
-        self._send(response)
+        self._send(studio.handle(HttpRequest(self.command, self.path, headers, body)))
 
     def _send(self, response: Response) -> None:
         body = response.body

@@ -179,6 +179,12 @@ class Bench:
                 self._settle()
                 return
 
+    def job_folder(self) -> Path | None:
+        """The job directory of the last layout, if there is one."""
+        if self.job is None:
+            return None
+        return self._folder / str(self.job["id"]) / str(self.job["name"])
+
     def design_text(self) -> str | None:
         """The design file of the pattern on the bench, None if it can have none."""
         asked = self._asked

@@ -8,7 +8,7 @@ steps, the second right after the first; and no sheet is started on material tha
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from miurafab.errors import InputError, MiurafabError, PersonNeeded
 from miurafab.machine.known_controller import MachineState
@@ -22,6 +22,8 @@ from miurafab.workflow.dry_run import clock_text
 from miurafab.workflow.sheet_plans import beside, journal_path, plan_sheets
 from miurafab.workflow.timeline import SheetProgress, Timeline
 
+STEPS = (0.1, 1.0, 10.0, 50.0)
+"""The steps of a jog key in mm."""
 _MOST_SAID = 200
 _DONE = {
     "home": "Homed.",
@@ -29,6 +31,30 @@ _DONE = {
     "set_origin": "The origin is where the head stands.",
     "frame": "The frame was traced.",
 }
+
+
+@dataclass(frozen=True)
+class Burn:
+    """What a start burns, for a person to read first.
+
+    ``sheet`` in a word or two; its ``strokes`` and ``seconds``; ``bounds_mm`` the box around them
+    in the coordinates of the job, None without strokes; ``material``, empty for a plain file;
+    ``power`` the most of it, as a fraction of full power, ``watts`` the
+    same for a laser whose power is known.
+    """
+
+    sheet: str
+    strokes: int
+    seconds: float
+    bounds_mm: tuple[float, float, float, float] | None
+    material: str
+    power: float
+    watts: float | None
+
+    def __str__(self) -> str:
+        box = self.bounds_mm
+        where = "" if box is None else f", X {box[0]:g} to {box[2]:g} Y {box[1]:g} to {box[3]:g} mm"
+        return f"{self.sheet}: {self.strokes} strokes, about {clock_text(self.seconds)}{where}"
 
 
 class Operator:
@@ -51,7 +77,7 @@ class Operator:
         self._process, self._options = process, options
         self._timeline: Timeline | None = None
         self._has_origin = False
-        self._described: dict[int, str] = {}
+        self._burns: dict[int, Burn] = {}
         process.order("open", wait=options.send.wait, reset=options.send.reset)
 
     @property
@@ -73,6 +99,13 @@ class Operator:
     def count(self) -> int:
         """The number of sheets."""
         return 0 if self.prepared is None else len(self.prepared.jobs)
+
+    @property
+    def wants_material(self) -> bool:
+        """Whether a person has to put in fresh material before a sheet of the job is started."""
+        if self.prepared is None or self.state is None or self.state.loaded is None:
+            return False
+        return not self.prepared.machine.bed.roll_fed and self.state.port != VIRTUAL
 
     # What came
 
@@ -128,10 +161,13 @@ class Operator:
         Whatever is asked disarms.
         """
         self.armed = False
+        self._require_idle()
+        self._process.order(action, **options)
+        self.busy = action
+
+    def _require_idle(self) -> None:
         if self.busy:
             raise InputError(f"Wait for the end of '{self.busy.replace('_', ' ')}', or stop it.")
-        self.busy = action
-        self._process.order(action, **options)
 
     def nudge(self, dx: float, dy: float) -> None:
         """One press of a jog key; nothing while an action is under way."""
@@ -161,20 +197,39 @@ class Operator:
         name = self.prepared.jobs[self.number - 1].name
         return name if count == 1 else f"{name} (sheet {self.number} of {count})"
 
-    def describe(self) -> str:
-        """What will burn: the sheet, its strokes, time, and place. A screen asks at each drawing,
-        so it is found once a sheet.
+    def put_on(self, prepared: Prepared) -> None:
+        """Take another job in place of that before; raises ``InputError`` for one that cannot be
+        cut, and while an action is under way.
         """
-        if self.number not in self._described:
-            self._described[self.number] = self._description()
-        return self._described[self.number]
+        prepared.chosen(None)
+        self._require_idle()
+        self.armed = False
+        self.prepared, self.number, self._burns = prepared, 1, {}
 
-    def _description(self) -> str:
-        expected = self._job().dry_runs[self.number - 1]
-        strokes = Timeline(expected, 0).strokes
-        box = expected.bounds_mm
-        where = "" if box is None else f", X {box[0]:g} to {box[2]:g} Y {box[1]:g} to {box[3]:g} mm"
-        return f"{self.sheet}: {strokes} strokes, about {clock_text(expected.seconds)}{where}"
+    def burn(self) -> Burn:
+        """What will burn. A screen asks at each drawing, so it is found once a sheet."""
+        if self.number not in self._burns:
+            self._burns[self.number] = self._burn()
+        return self._burns[self.number]
+
+    def describe(self) -> str:
+        """:meth:`burn` in words."""
+        return str(self.burn())
+
+    def _burn(self) -> Burn:
+        job = self._job()
+        expected, tool = job.dry_runs[self.number - 1], job.machine.tool
+        burning = expected.program.power[expected.program.beam_on]
+        power = float(burning.max()) / tool.s_max if len(burning) else 0.0
+        return Burn(
+            self.sheet,
+            Timeline(expected, 0).strokes,
+            expected.seconds,
+            expected.bounds_mm,
+            "" if job.directory is None else job.directory.layout.material,
+            power,
+            None if tool.laser is None else power * tool.laser.power,
+        )
 
     def choose(self, number: int) -> None:
         """Make ``number`` the next sheet, if there is such a one."""
@@ -193,13 +248,12 @@ class Operator:
 
     def arm(self) -> None:
         """The first step of a start; raises where the sheet may not be started now."""
-        job = self._job()
+        self._job()
         state = self.state
         if self.busy or state is None or not state.idle:
             word = self.busy or ("" if state is None else state.state)
             raise InputError(f"The machine must be idle before a job is armed; it is in '{word}'.")
-        changes = job.machine.bed.roll_fed or state.port == VIRTUAL
-        if state.loaded is not None and not changes:
+        if self.wants_material:
             raise PersonNeeded(
                 f"{state.loaded} has burnt on the sheet in the machine; put in fresh material and "
                 "say so first"

@@ -88,13 +88,18 @@ def doctor() -> Examination:
         except importlib.metadata.PackageNotFoundError:
             versions[name] = "missing"
             problems.append(f"{name} is not installed; run pip install {name}.")
-    ports = tuple(Port(device, text, _trouble(device)) for device, text in list_ports())
+    ports = serial_ports()
     problems.extend(f"{port.device}: {port.trouble}." for port in ports if port.trouble)
     problems.extend(_profile_problems())
     free = shutil.disk_usage(Path.cwd()).free // 1_000_000
     if free < ROOM_NEEDED_MB:
         problems.append(f"Only {free} MB are free on this disk; a job needs {ROOM_NEEDED_MB} MB.")
     return Examination(versions, ports, tuple(problems))
+
+
+def serial_ports() -> tuple[Port, ...]:
+    """The serial ports of this computer."""
+    return tuple(Port(device, text, _trouble(device)) for device, text in list_ports())
 
 
 def _names(requirements: list[str]) -> list[str]:

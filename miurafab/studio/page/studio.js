@@ -1,18 +1,21 @@
 // The page: asks for work, follows it, and shows what came of it.
 
 import { fillForms, fitOrder, layoutOrder, showSources, tooLarge } from "./choices.js";
+import { beginMachine, offerJob } from "./machine.js";
 import { showJob, showPattern } from "./results.js";
 import { ask, byId, copy } from "./tools.js";
 
-const TABS = ["shape", "layout"];
+const TABS = ["shape", "layout", "desk"];
 const DOING = { fit: "Fitting", open: "Opening", sheets: "Laying out" };
 let following = 0;
 let told = "";
+let ownJob = null;
 
 function show(state) {
   const { task, pattern, job, sources } = state;
   showPattern(pattern);
   showJob(job, pattern);
+  offerJob(job, ownJob);
   const running = Boolean(task?.running);
   byId("task").hidden = !running;
   if (running) {
@@ -111,6 +114,10 @@ function listen() {
   });
   document.addEventListener("input", () => fault(""));
   byId("cancel").addEventListener("click", () => order("cancel", {}));
+  byId("to-machine").addEventListener("click", () => {
+    turnTo("desk");
+    byId("desk-tab").focus();
+  });
   byId("go-on").addEventListener("click", () => {
     turnTo("layout");
     byId("layout-tab").focus();
@@ -146,6 +153,9 @@ async function begin() {
   try {
     const catalogue = await ask("catalogue");
     fillForms(catalogue);
+    ownJob = catalogue.own_job;
+    beginMachine(catalogue, fault);
+    if (ownJob) turnTo("desk");
     const { sources } = await ask("state");
     told = JSON.stringify(sources);
     showSources(sources, catalogue.first?.source);

@@ -37,7 +37,13 @@ function table(sheets, choose) {
 }
 
 // within another page (the studio) the drawing stands alone
-document.documentElement.classList.toggle("within", window.parent !== window);
+const within = window.parent !== window;
+document.documentElement.classList.toggle("within", within);
+if (within) { // where Escape aborts a machine, whatever has the focus
+  document.addEventListener("keydown", ({ key, repeat }) => {
+    if (key === "Escape" && !repeat) window.parent.postMessage(key, "*");
+  });
+}
 const data = JSON.parse(byId("data").textContent);
 const views = {};
 figures(data);

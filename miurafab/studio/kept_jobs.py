@@ -1,0 +1,37 @@
+"""The jobs that the studio cuts: copies in the user's state folder, with their journals.
+
+The studio's own folder goes with the studio, and a newer layout takes the place of an older one in
+it. A job that is cut must outlive both: its journal tells where an interrupted sheet goes on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from pathlib import Path
+
+from miurafab.files import state_folder, write_bytes
+from miurafab.workflow.manifest import MANIFEST
+
+_KEPT = 20
+"""The number of jobs kept; a further one removes the one that was put on longest ago."""
+
+
+def keep_job(job: Path) -> Path:
+    """A copy of the job directory ``job`` that stays; the earlier copy of an equal one."""
+    digest = hashlib.sha256((job / MANIFEST).read_bytes()).hexdigest()[:10]
+    home = state_folder() / "studio"
+    kept = home / f"{job.name}-{digest}"
+    if not kept.is_dir():
+        home.mkdir(parents=True, exist_ok=True)
+        coming = home / f".{kept.name}.new"
+        shutil.rmtree(coming, ignore_errors=True)
+        coming.mkdir()
+        for file in sorted(job.iterdir()):
+            write_bytes(coming / file.name, file.read_bytes())
+        coming.rename(kept)
+    kept.touch()
+    others = sorted(home.glob("[!.]*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    for old in others[_KEPT:]:
+        shutil.rmtree(old, ignore_errors=True)
+    return kept
