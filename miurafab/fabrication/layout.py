@@ -25,6 +25,7 @@ from miurafab.fabrication.labels import AbsentLabel
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.plan import Alternative
 from miurafab.fabrication.sheets import Layout, Placement, Sheet, Totals
+from miurafab.fabrication.slots import TabSlot
 from miurafab.fabrication.tabs import Tab
 from miurafab.files import Reading, file_name, parse_json
 from miurafab.findings import finding_from_json, findings_json
@@ -146,9 +147,20 @@ def _patch_table(patch: Patch) -> dict[str, Any]:
                 "mate_edge": tab.mate_edge,
                 "mate_patch": tab.mate_patch,
                 "fold": tab.fold,
+                "join": tab.join,
                 "polygon_mm": tab.polygon_mm.tolist(),
             }
             for tab in patch.tabs
+        ],
+        "slots": [
+            {
+                "tab": slot.tab,
+                "label": slot.label,
+                "edge": slot.edge,
+                "mate_patch": slot.mate_patch,
+                "polygon_mm": slot.polygon_mm.tolist(),
+            }
+            for slot in patch.slots
         ],
     }
 
@@ -171,10 +183,22 @@ def _patch(table: dict[str, Any]) -> Patch:
                 mate_patch=_mate(tab["mate_patch"]),
                 polygon_mm=_points(tab["polygon_mm"]),
                 fold=_text(tab.get("fold", "flat")),
+                join=_text(tab.get("join", "glue")),
             )
             for tab in table["tabs"]
         ),
+        slots=tuple(map(_slot, table.get("slots", ()))),
         copy=int(table.get("copy", 1)),
+    )
+
+
+def _slot(table: dict[str, Any]) -> TabSlot:
+    return TabSlot(
+        tab=int(table["tab"]),
+        label=_text(table["label"]),
+        edge=int(table["edge"]),
+        mate_patch=int(table["mate_patch"]),
+        polygon_mm=_points(table["polygon_mm"]),
     )
 
 

@@ -28,6 +28,7 @@ from miurafab.options import (
 )
 from miurafab.profiles import GRAINS
 
+JOINS = ("glue", "slots", "double")
 TAB_SIDES = ("lower", "upper", "alternate")
 MARKS = ("front", "back", "tabs", "none")
 BRIDGE_MM = 0.5
@@ -162,6 +163,14 @@ class LayoutOptions(Shown):
         group="Patches",
         default_text="where the pattern is already open",
     )
+    join: str = option(
+        Choice(JOINS),
+        "What holds a seam. glue: tabs under the facets; slots: tabs that are put through slots in "
+        "the facets, without glue; double: tabs on both patches, glued to each other behind.",
+        JOINS[0],
+        group="Tabs",
+        page="more",
+    )
     tab_height_mm: float | None = option(
         length(0.5, 100),
         "Height of the tabs.",
@@ -260,8 +269,19 @@ class LayoutOptions(Shown):
     )
     nesting: NestingOptions = field(default_factory=NestingOptions)
 
+    @property
+    def tabs_on_both_sides(self) -> bool:
+        """Whether either patch of a seam may bear tabs."""
+        return self.tab_side == "alternate" or self.join == "double"
+
     def __post_init__(self) -> None:
         check_options(self)
+        if self.full_facet and self.join != JOINS[0]:
+            raise OptionError(
+                "full_facet",
+                f"makes tabs as large as the facet over them, but `join` is {self.join}, where no "
+                "facet is glued; leave one of them out",
+            )
         if self.ticks_mm is not None and self.marks in ("tabs", "none"):
             raise OptionError(
                 "ticks",

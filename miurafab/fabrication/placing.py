@@ -47,13 +47,13 @@ def texts_of(
 ) -> Lettering:
     """The texts of all copies, upright on their sheets; ``labels`` (N) are those of the tabs."""
     sides = sides_of(options)
-    count = len(outlined.patches)
+    count, tabs = len(outlined.patches), outlined.lettered
     turns = np.arctan2(motion.matrix[:, 1, 0], motion.matrix[:, 0, 0])
     texts, absent, left_out, unmarked = [], [], 0, 0
     for first in range(0, len(patches), count):
         names = [patch.label for patch in patches[first : first + count]]
         own = turns[first : first + count]
-        found = place_texts(pattern, outlined.face_patch, names, outlined.tabs, labels, own, sides)
+        found = place_texts(pattern, outlined.face_patch, names, tabs, labels, own, sides)
         texts += [replace(text, patch=text.patch + first) for text in found.texts]
         absent += [replace(text, patch=text.patch + first) for text in found.absent]
         left_out += found.left_out

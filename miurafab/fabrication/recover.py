@@ -22,6 +22,8 @@ NEAR_MM = 0.15
 """A burnt line is that of the edge on whose place it lies so near; facets are larger."""
 SHORTEST_MM = 0.1
 """A shorter burnt segment has no direction worth measuring: a motor step is 0.0125 mm."""
+REST_MM = 1.0
+"""Where a tab leaves as much of its side at both ends, the cut there is a line of its own."""
 PARALLEL = 0.05
 """Radians; lines that differ by less do not fix the point where they meet."""
 
@@ -45,9 +47,8 @@ def recovered_corners(
     burnt: list[Floats],
 ) -> RecoveredCorners:
     """The corners of the patches, from the segments (n, 4) that were ``burnt`` on each sheet."""
-    patch, edge, shift = _edges(pattern, outlined, kerf_mm)
-    ends = pattern.vertices_coords[pattern.edges_vertices[edge]] + shift[:, None]
-    placed = np.einsum("nij,nkj->nki", motion.matrix[patch], ends)
+    patch, edge, ends, shift = _edges(pattern, outlined, kerf_mm)
+    placed = np.einsum("nij,nkj->nki", motion.matrix[patch], ends + shift[:, None])
     placed = placed + motion.shift[patch][:, None]
     middle, along = _lines(placed, motion.sheet[patch], burnt)
     middle -= np.einsum("nij,nj->ni", motion.matrix[patch], shift)
@@ -60,24 +61,35 @@ def recovered_corners(
 
 def _edges(
     pattern: CreasePattern, outlined: OutlinedPatches, kerf: float
-) -> tuple[Ints, Ints, Floats]:
-    """The (patch, edge) of each side of the patches, and how far its line lies outside, (n, 2)."""
+) -> tuple[Ints, Ints, Floats, Floats]:
+    """The (patch, edge) of each line on a side of the patches, its ends (n, 2, 2), and how far it
+    lies outside, (n, 2). A side has two lines where a tab leaves much of it: the fold of the tab,
+    and the cut beside it.
+    """
     beside = pattern.edges_faces
     owner = np.where(beside >= 0, outlined.face_patch[beside], -1)
-    based = np.full(len(beside), -1)
-    based[outlined.tabs.edge] = outlined.face_patch[outlined.tabs.own_face]
+    tabs, count = outlined.tabs, len(outlined.patches)
+    folded = tabs.edge * count + outlined.face_patch[tabs.own_face]
     ends = pattern.vertices_coords[pattern.edges_vertices]
     step = ends[:, 1] - ends[:, 0]
     right = np.stack([step[:, 1], -step[:, 0]], axis=1) / np.linalg.norm(step, axis=1)[:, None]
+    free = np.linalg.norm(ends[tabs.edge][:, None] - tabs.points[:, :2][:, :, None], axis=3)
+    apart = free.min(axis=(1, 2)) >= REST_MM
     parts = []
     for side in (0, 1):
         own, other = owner[:, side], owner[:, 1 - side]
         chosen = np.flatnonzero((own >= 0) & ((own != other) | (side == 0)))
-        cut = (own != other) & (based != own)
+        cut = (own != other) & ~np.isin(np.arange(len(own)) * count + own, folded)
         out = right if side == 0 else -right  # the facet lies left of its edge
-        parts.append((own[chosen], chosen, (out * (cut * kerf / 2)[:, None])[chosen]))
-    patches, edges, shifts = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return patches, edges, shifts
+        stands = owner[tabs.edge, side] == outlined.face_patch[tabs.own_face]
+        based = np.flatnonzero(apart & stands)
+        line = ends.copy()
+        line[tabs.edge[based]] = tabs.points[based, :2]
+        parts.append((own[chosen], chosen, line[chosen], (out * (cut * kerf / 2)[:, None])[chosen]))
+        beside_tab = tabs.edge[based]
+        parts.append((own[beside_tab], beside_tab, ends[beside_tab], out[beside_tab] * (kerf / 2)))
+    patches, edges, lines, shifts = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return patches, edges, lines, shifts
 
 
 def _lines(placed: Floats, sheet: Ints, burnt: list[Floats]) -> tuple[Floats, Floats]:

@@ -6,7 +6,9 @@ rules of the material. So a sheet can be proven stroke by stroke: nothing of the
 the order or the program is used here.
 
 What the layout says of a tab is proven, too: it stands on its edge, and moved to the edge that it
-is glued to, it lies inside the facet there. So are the outlines: they surround the facets and tabs.
+is glued to, it lies inside the facet there. Slots and double tabs are proven by their mates
+(:mod:`~miurafab.fabrication.retrace_joints`). So are the outlines: they surround the facets and
+tabs.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ from miurafab.fabrication.partition.patch_outline import (
     rings_of,
 )
 from miurafab.fabrication.placing import absent_labels, motion_of, texts_of
+from miurafab.fabrication.retrace_joints import NEAR_MM, held, joint_faults
 from miurafab.fabrication.route.order import StrokeSet
 from miurafab.fabrication.seams import Seams, all_seams
 from miurafab.fabrication.sheets import Layout, worked
@@ -39,9 +42,6 @@ from miurafab.fabrication.tabs import FOLDS, TabRegions, edge_axes
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import MachineProfile, Material
-
-NEAR_MM = 1e-4
-"""Coordinates in a layout are rounded to 1e-6 mm; its sums and turns stay below this."""
 
 _LETTERS = {name: letter for letter, name in FOLDS.items()}
 
@@ -60,6 +60,7 @@ def retraced(
     """
     material = worked(material, machine, options)
     outlined, labels, motion = patches_on_sheets(layout, pattern)
+    outlined = held(outlined, pattern, material, labels, options.join)
     margin = options.nesting.margin_mm
     margin = machine.bed.margin_mm if margin is None else margin
     lettering = texts_of(pattern, outlined, labels, layout.patches, motion, options)
@@ -74,6 +75,7 @@ def retraced(
         for each in ([] if back is None else [back]) + [front]
     ]
     faults = [*_tab_faults(pattern, outlined, labels), *_seam_faults(layout, pattern, outlined)]
+    faults += joint_faults(layout, pattern, outlined, labels, options.join)
     if layout.kit is not None and layout.kit != folders_kit(pattern):
         faults.append("The rows and angles of the folder's kit are not those of the pattern.")
     if not _same_labels(layout.absent, absent_labels(lettering, layout.patches)):
@@ -161,7 +163,7 @@ def _tabs(patches: tuple[Patch, ...], pattern: CreasePattern, face_patch: Ints) 
             if not len(own):
                 raise LayoutError(f"Tab {tab.label} stands on edge {edge}, of another patch.")
             edges[row, side], faces[row, side] = edge, own[0]
-        inner = tab.edge == tab.mate_edge
+        inner = tab.edge == tab.mate_edge and tab.join != "double"
         fold[row] = pattern.edges_assignment[tab.edge] if inner else _LETTERS.get(tab.fold, "F")
         points[row, : sizes[row]] = turned(tab.polygon_mm, -patch.rotation_deg) + patch.origin_mm
     seams = Seams(edges, faces, fold)

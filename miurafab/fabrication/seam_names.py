@@ -3,7 +3,8 @@
 A seam is one unbroken line along which two patches meet, or a patch meets itself. The tabs on it
 are counted along the outline of the patch with the lower number, on whichever side they stand. So
 neighbours on a seam have neighbouring labels, and a label without room on the sheet follows from
-those beside it. The tabs of a patch on one line of an open border are counted in the same way.
+those beside it. Both tabs of a pair that is glued to each other have one label. The tabs of a patch
+on one line of an open border are counted in the same way.
 
 Seams have small letters, so that they are neither M nor V, which follow the label of a tab, nor the
 P of a patch. Letters that look like a digit or a capital at their size are left out. After z comes
@@ -26,7 +27,9 @@ LETTERS = "abcdefhknrstuwxz"
 
 def tab_labels(pattern: CreasePattern, face_patch: Ints, tabs: TabRegions) -> tuple[str, ...]:
     """The label of each of N ``tabs``; ``face_patch`` (F,) is the patch of each facet."""
-    tab_of = {edge: tab for tab, edge in enumerate(tabs.edge.tolist())}
+    tabs_of: dict[int, list[int]] = {}
+    for tab, edge in enumerate(tabs.edge.tolist()):
+        tabs_of.setdefault(edge, []).append(tab)
     beyond = int(face_patch.max(initial=0)) + 1  # open borders come after all neighbours
     mates: dict[tuple[int, int], tuple[int, int]] = {}
     seams = all_seams(pattern, face_patch)
@@ -43,12 +46,14 @@ def tab_labels(pattern: CreasePattern, face_patch: Ints, tabs: TabRegions) -> tu
             lines += [(mate, line) for mate, line in _lines(edges, across) if mate >= patch]
         for mate, line in sorted(lines, key=lambda each: each[0]):
             pairs = ((edge, mates.get((patch, edge), (mate, edge))[1]) for edge in line)
-            found = (tab_of.get(edge) for pair in pairs for edge in pair)
             # A patch that meets itself has both sides of the seam; the first of them counts.
-            standing = [tab for tab in dict.fromkeys(found) if tab is not None and not labels[tab]]
+            met = dict.fromkeys(tuple(sorted(set(pair))) for pair in pairs)
+            found = [[tab for edge in pair for tab in tabs_of.get(edge, ())] for pair in met]
+            standing = [own for own in found if own and not labels[own[0]]]
             letter = next(letters) if standing else ""
-            for number, tab in enumerate(standing, start=1):
-                labels[tab] = f"{letter}{number}"
+            for number, own in enumerate(standing, start=1):
+                for tab in own:
+                    labels[tab] = f"{letter}{number}"
     return tuple(labels)
 
 

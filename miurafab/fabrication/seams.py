@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from miurafab.geometry.arrays import Bools, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.meeting_borders import (
     border_angles,
@@ -97,6 +97,18 @@ def border_seams(pattern: CreasePattern) -> Seams:
     angle = border_angles(pattern, pairs)
     fold = np.select([angle > FLAT_ANGLE, angle < -FLAT_ANGLE], ["V", "M"], "F")
     return Seams(pairs, faces, fold)
+
+
+def seam_angles(pattern: CreasePattern, seams: Seams) -> Floats:
+    """(S,) the fold angles along ``seams`` in radians, without their signs; 0 where the pattern
+    does not say them.
+    """
+    first = seams.edges[:, 0]
+    angle = np.nan_to_num(np.abs(pattern.edges_fold_angle[first]))
+    joined = np.flatnonzero((seams.edges[:, 1] >= 0) & (first != seams.edges[:, 1]))
+    if len(joined) and pattern.folded_coords is not None:
+        angle[joined] = np.abs(border_angles(pattern, np.sort(seams.edges[joined], axis=1)))
+    return angle
 
 
 def with_seams(pattern: CreasePattern) -> CreasePattern:

@@ -35,6 +35,7 @@ from miurafab.fabrication.placing import absent_labels, motion_of, texts_of
 from miurafab.fabrication.plan import Alternative, plan_patches
 from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
 from miurafab.fabrication.seams import all_seams
+from miurafab.fabrication.slots import require_slots
 from miurafab.fabrication.stock import LaidStock, lay_stock
 from miurafab.fabrication.strokes import Blank, sheet_strokes
 from miurafab.fabrication.tooling import made_by
@@ -241,6 +242,8 @@ def lay_out(
     pattern = capped(opened(pattern, options), options)
     jig = jig_of(pattern, options.jig_mm)
     material = worked(material, machine, options)
+    if options.join == "slots":
+        require_slots(material)
     stock = lay_stock(options, machine.bed, material.grain)
     plan = plan_patches(pattern, stock, material, options)
     require_foldable(pattern, material)

@@ -1,4 +1,4 @@
-"""The strokes of the sheets: creases, relief holes, texts and cut lines.
+"""The strokes of the sheets: creases, relief holes, slots, texts and cut lines.
 
 Strokes are made in the plane of the pattern, where a crease is one edge, and then moved with their
 patch. A crease within a patch is made as the material says for its kind: mountain (M, and U, not
@@ -30,6 +30,7 @@ from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate, unbroken
 from miurafab.fabrication.relief import Holes, circles, relief_holes
 from miurafab.fabrication.route.order import HOLE, OUTLINE, StrokeSet
+from miurafab.fabrication.slots import Slots, slot_strokes
 from miurafab.fabrication.ticks import Ticks, fold_ticks
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.geometry.arrays import Floats, Ints, run_starts
@@ -39,8 +40,10 @@ from miurafab.profiles import OPERATIONS, Material
 FOLDED = ("M", "V", "U")
 SLIT = ("B", "C")
 
-_INNER, _WASTE = 1, 2
-"""Ranks among cuts between :data:`HOLE` and :data:`OUTLINE`: slits in a patch, rings of waste."""
+SLOT, _INNER, _WASTE = 1, 2, 3
+"""Ranks among cuts between :data:`HOLE` and :data:`OUTLINE`: slots for tabs, slits in a patch,
+rings of waste.
+"""
 
 RIM = 1
 """The rank of rim numbers among what is engraved: after the labels."""
@@ -109,6 +112,7 @@ def sheet_strokes(
         *([] if ticks is None else [_bars(ticks)]),
         *(_made(own, kind, material) for kind, own in creases.items()),
         _relief(pattern, holes, material),
+        *([] if outlined.slots is None else [_slots(outlined, outlined.slots, material)]),
         _slits(pattern, outlined),
         outlines,
     ]
@@ -305,6 +309,20 @@ def _relief(pattern: CreasePattern, holes: Holes, material: Material) -> _Part:
         edge=holes.edge,
         group=np.arange(len(holes.vertex)),
         rank=np.full(len(holes.vertex), HOLE),
+    )
+
+
+def _slots(outlined: OutlinedPatches, slots: Slots, material: Material) -> _Part:
+    points, count = slot_strokes(slots, material.kerf_mm)
+    tabs = outlined.tabs.take(slots.tab)
+    return _Part(
+        operation=OPERATIONS.index("cut"),
+        points=points,
+        count=np.full(len(tabs), count),
+        patch=outlined.face_patch[tabs.mate_face],
+        edge=tabs.seams.edges[:, 1],
+        group=np.arange(len(tabs)),
+        rank=np.full(len(tabs), SLOT),
     )
 
 

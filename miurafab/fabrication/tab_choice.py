@@ -1,7 +1,8 @@
 """The tabs of a layout: which patch bears the tab of each seam, and tabs on open borders.
 
 Each seam gets one tab, on the patch that the options name, or on the other patch if there is more
-room for glue. Tabs on open borders are made where they are asked for.
+room for glue, or room for a slot. Double tabs stand on both. Tabs on open borders are made where
+they are asked for.
 """
 
 from __future__ import annotations
@@ -9,8 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from miurafab.fabrication.borders import chosen_edges, open_tabs
+from miurafab.fabrication.double_tabs import double_tabs, in_pairs
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.seams import Seams, all_seams, border_seams
+from miurafab.fabrication.slots import slotted_tabs
 from miurafab.fabrication.tabs import TabRegions, tab_regions
 from miurafab.geometry.arrays import Bools, Ints
 from miurafab.origami.crease_pattern import CreasePattern
@@ -29,9 +32,10 @@ def choose_tabs(
 
     The patch that ``options`` name bears the tab. If the tab has less glue area than the material
     requires, it goes to the other patch if it is larger there. If that is not enough, it is raised:
-    up to :data:`RAISED` times as high, and as wide as its base. If a patch is glued to
+    up to :data:`RAISED` times as high, and as wide as its base. A tab for a slot goes to the other
+    patch if there is room for it only there. If a patch is glued to
     itself, the lower pattern edge counts as the lower patch. ``tight`` patches (P,) may carry
-    standard tabs only.
+    standard tabs only, and tabs for slots that are no larger.
 
     Returns the tabs, (N,) whether each is not standard, and (M,) the edges where no patch can bear
     the tab that is wanted. Cuts in the pattern (assignment C) get no tab.
@@ -42,6 +46,33 @@ def choose_tabs(
     lower = patch[:, 0] < patch[:, 1]
     lower |= (patch[:, 0] == patch[:, 1]) & (seams.edges[:, 0] < seams.edges[:, 1])
     seams = seams.swapped(_by_lower(patch, options.tab_side) != lower)
+    free = np.ones(face_patch.max(initial=-1) + 1, dtype=bool) if tight is None else ~tight
+    if options.join == "slots":
+        tabs, unusual = _slotted(pattern, seams, face_patch, material, options, free)
+    elif options.join == "double":
+        tabs = double_tabs(pattern, seams, material, _drawn_twice(pattern, seams, face_patch))
+        unusual = np.zeros(len(tabs), dtype=bool)
+    else:
+        tabs, unusual = _glued(pattern, seams, face_patch, material, options, free)
+    edges = chosen_edges(pattern, options.border_tabs)
+    if len(edges):
+        tabs = tabs.joined(open_tabs(pattern, edges, material))
+        unusual = np.append(unusual, np.zeros(len(edges), dtype=bool))
+    kept = tabs.glue > 0
+    if options.join == "double":
+        kept = in_pairs(tabs, kept)
+    return tabs.take(kept), unusual[kept], np.unique(tabs.edge[~kept])
+
+
+def _glued(
+    pattern: CreasePattern,
+    seams: Seams,
+    face_patch: Ints,
+    material: Material,
+    options: LayoutOptions,
+    free: Bools,
+) -> tuple[TabRegions, Bools]:
+    """One tab for glue for each of N ``seams``, and (N,) whether each is not standard."""
 
     def made(seams: Seams, raised: Bools | None = None) -> TabRegions:
         bearing = _bearing(pattern, seams)
@@ -52,7 +83,6 @@ def choose_tabs(
     weak = tabs.glue < material.tabs.min_area_mm2
     unusual = np.zeros(len(seams), dtype=bool)
     if weak.any():
-        free = np.ones(face_patch.max() + 1, dtype=bool) if tight is None else ~tight
         better = made(seams.swapped(weak)).glue > tabs.glue
         swapped = weak & better & free[face_patch[seams.faces[:, 1]]]
         tabs = made(seams.swapped(swapped))
@@ -60,12 +90,32 @@ def choose_tabs(
         weak &= free[face_patch[tabs.own_face]]
         tabs = made(tabs.seams, weak)
         unusual = swapped | weak
-    edges = chosen_edges(pattern, options.border_tabs)
-    if len(edges):
-        tabs = tabs.joined(open_tabs(pattern, edges, material))
-        unusual = np.append(unusual, np.zeros(len(edges), dtype=bool))
-    kept = tabs.glue > 0
-    return tabs.take(kept), unusual[kept], tabs.edge[~kept]
+    return tabs, unusual
+
+
+def _slotted(
+    pattern: CreasePattern,
+    seams: Seams,
+    face_patch: Ints,
+    material: Material,
+    options: LayoutOptions,
+    free: Bools,
+) -> tuple[TabRegions, Bools]:
+    """One tab for a slot for each of N ``seams``, and (N,) whether each is larger than a tab for
+    glue may be, or on the other side.
+    """
+
+    def made(seams: Seams) -> TabRegions:
+        tight = ~free[face_patch[seams.faces[:, 0]]]
+        bearing, ticks = _bearing(pattern, seams), options.ticks_mm or 0.0
+        return slotted_tabs(pattern, seams, material, bearing, tight, ticks)
+
+    tabs = made(seams)
+    missing = ~tabs.usable
+    if missing.any():
+        there = made(seams.swapped(missing)).usable
+        tabs = made(seams.swapped(missing & there & free[face_patch[seams.faces[:, 1]]]))
+    return tabs, free[face_patch[tabs.own_face]]
 
 
 def border_tabs(pattern: CreasePattern, material: Material, options: LayoutOptions) -> TabRegions:
@@ -90,6 +140,16 @@ def _by_lower(patch: Ints, side: str) -> Bools:
     found = np.empty(len(patch), dtype=bool)
     found[order] = (place - first) % 2 == 0
     return found
+
+
+def _drawn_twice(pattern: CreasePattern, seams: Seams, face_patch: Ints) -> Bools:
+    """:func:`_bearing` of double tabs, which lie on no facet: only where two tabs of one patch are
+    drawn on one facet they must share it.
+    """
+    both = seams.joined(seams.swapped(np.ones(len(seams), dtype=bool)))
+    pairs = np.column_stack([face_patch[both.faces[:, 0]], both.faces[:, 1]])
+    _, which, times = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    return _bearing(pattern, both.take(times[which.reshape(-1)] > 1))
 
 
 def _bearing(pattern: CreasePattern, seams: Seams) -> Bools:

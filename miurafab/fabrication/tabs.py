@@ -62,7 +62,9 @@ class Tab:
     which the tab stands and ``mate_edge`` the edge that it is joined to: the same edge,
     unless two borders of the pattern are joined. ``mate_patch`` is the id of the patch to which it
     is glued; both are None on an open border. ``polygon_mm`` (n, 2) is its outline in the patch
-    frame, counter-clockwise from the base. ``fold`` is one of :data:`FOLDS`, or flat.
+    frame, counter-clockwise from the base. ``fold`` is one of :data:`FOLDS`, or flat. ``join`` is
+    what holds it: ``glue`` on the facet over it, ``slots``, or ``double``, the tab of the other
+    side.
     """
 
     number: int
@@ -72,6 +74,7 @@ class Tab:
     mate_patch: int | None
     polygon_mm: Floats
     fold: str = "flat"
+    join: str = "glue"
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,12 +239,26 @@ def tab_regions(
             largest[raised] = math.pi / 2
         points, sides = not_steeper(points, sides, largest)
         points, sides = not_slender(points, sides)
+    return in_plane(pattern, seams, points, sides)
+
+
+def in_plane(pattern: CreasePattern, seams: Seams, points: Floats, count: Ints) -> TabRegions:
+    """The tabs whose corners are ``points`` (N, m, 2) in the frame of the side that they are joined
+    to: x along it from its first end, y into its facet.
+    """
+    a, _, frame = edge_axes(pattern, seams.edges[:, 1], seams.faces[:, 1])
     glued = placed = a[:, None] + np.einsum("nij,nki->nkj", frame, points)
     if (seams.edges[:, 0] != seams.edges[:, 1]).any():
         # The side of the facet that bears the tab runs the opposite way.
         _, a, frame = edge_axes(pattern, seams.edges[:, 0], seams.faces[:, 0])
         placed = a[:, None] - np.einsum("nij,nki->nkj", frame, points)
-    return TabRegions(seams, placed, glued, sides)
+    return TabRegions(seams, placed, glued, count)
+
+
+def in_mate(pattern: CreasePattern, tabs: TabRegions) -> Floats:
+    """(N, m, 2) the corners of ``tabs`` in the frame of :func:`in_plane`."""
+    a, _, frame = edge_axes(pattern, tabs.seams.edges[:, 1], tabs.mate_face)
+    return np.asarray(np.einsum("nij,nkj->nki", frame, tabs.glued - a[:, None]))
 
 
 def edge_axes(pattern: CreasePattern, edges: Ints, faces: Ints) -> tuple[Floats, Floats, Floats]:

@@ -18,7 +18,7 @@ from scipy.spatial import KDTree
 from miurafab.fabrication.knife import with_aligning_cut
 from miurafab.fabrication.knife_tip import overcuts, tip_moves
 from miurafab.fabrication.route.order import HOLE, StrokeSet
-from miurafab.fabrication.strokes import RIM, SLIT
+from miurafab.fabrication.strokes import RIM, SLIT, SLOT
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.findings import Finding
 from miurafab.gcode.program import Program
@@ -44,6 +44,7 @@ KINDS = (
     "outline",
     "hole",
     "slit",
+    "slot",
     "label",
     "rim number",
     "tick",
@@ -221,17 +222,18 @@ def _kinds(strokes: StrokeSet, pattern: CreasePattern, tab_edges: Ints) -> Ints:
     path = strokes.toolpath
     cut = path.operation == OPERATIONS.index("cut")
     engraved = path.operation == OPERATIONS.index("engrave")
-    crease, tab_fold, outline, hole, slit, label, rim, tick = range(8)
+    crease, tab_fold, outline, hole, slit, slot, label, rim, tick = range(9)
     return np.select(
         [
             engraved & (strokes.rank == RIM),
             engraved & (path.edge >= 0),
             engraved,
             cut & (strokes.rank == HOLE),
+            cut & (strokes.rank == SLOT),
             path.edge < 0,
             np.isin(path.edge, tab_edges),
             np.isin(pattern.edges_assignment[path.edge], SLIT),
         ],
-        [rim, tick, label, hole, outline, tab_fold, slit],
+        [rim, tick, label, hole, slot, outline, tab_fold, slit],
         crease,
     )

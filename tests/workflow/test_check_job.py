@@ -19,6 +19,7 @@ from miurafab.profiles import load_material
 CASES = {
     "gores": (gores(), {"border_tabs": "all", "tab_side": "alternate"}),
     "trimmed": (trimmed(), {"max_patch": (90, 60), "bridges": 2, "quantity": 2}),
+    "knife": (gores(), {"machine": "grbl-knife-a3", "join": "slots"}),
     "plotter": (two_trimmed_pieces(), {"machine": "grbl-pen-a4", "full_facet": True}),
 }
 

@@ -169,7 +169,8 @@ class _Overview:
         if on_borders:
             glue.append(f"{count(on_borders, 'tab', 'tabs')} on open borders")
         if glue:
-            found.append(("Glue", glue))
+            held = {"glue": "Glue", "slots": "Slots", "double": "Glue, double tabs"}
+            found.append((held[self.views.join], glue))
         borders = self.views.layout.borders
         if pattern.pieces_count > 1 or len(borders) != 1:
             lines = [f"B{border.number}: {border.size}" for border in borders]

@@ -20,28 +20,60 @@ _FEW = 6
 _MOST_DRAWN = 60_000
 """The facets of all pictures in space together; with more, each step is a map of the flat sheet."""
 
-_TAB = (
+_LABEL = (
     "Each tab has a label, the letter of its seam and a number, and the way its own fold goes: M "
-    "for mountain, V for valley.",
-    "It goes under the facet with the same label, edge to edge with the line.",
+    "for mountain, V for valley."
 )
-_PATCHES = (
-    *_TAB,
-    "Patches are glued best half way unfolded, while the seam is nearly flat. Press until it "
-    "holds, then take the next tab.",
-)
-_PIECES = (
-    *_TAB,
-    "Pieces meet as they are folded: give each its shape first, then glue the seam from one end to "
-    "the other. The last seams are closed from outside, as on a paper globe.",
-)
+_HOW = {
+    "glue": ("It goes under the facet with the same label, edge to edge with the line.",),
+    "slots": (
+        "It is not glued. Lay it over the front of the facet with the same label and put its head "
+        "through the slot there: curl the head a little, or let one shoulder in first and then the "
+        "other.",
+        "Pull it through from behind until both shoulders are out and the edges meet. Its head "
+        "lies flat behind the facet. To open the seam again, curl the head and push it back.",
+    ),
+    "double": (
+        "It is glued to the tab with the same label on the other patch, front to front. Fold both "
+        "behind the shell, so that they stand there as one fin, and hold them with a clip until "
+        "the glue has set.",
+    ),
+}
+_PATCHES = {
+    "glue": "Patches are glued best half way unfolded, while the seam is nearly flat. Press until "
+    "it holds, then take the next tab.",
+    "slots": "Tabs go in best half way unfolded, while the seam is nearly flat. Begin at one end "
+    "of the seam and take one tab after the other.",
+    "double": "Patches are glued best half way unfolded. Begin at one end of the seam and take one "
+    "pair of tabs after the other.",
+}
+_PIECES = {
+    "glue": "Pieces meet as they are folded: give each its shape first, then glue the seam from "
+    "one end to the other. The last seams are closed from outside, as on a paper globe.",
+    "slots": "Pieces meet as they are folded: give each its shape first, then close the seam from "
+    "one end to the other. Heads go in from outside, so the last seams are closed like the first.",
+    "double": "Pieces meet as they are folded: give each its shape first, then glue the seam from "
+    "one end to the other. Tabs stand inside, so leave for last a seam that can be reached.",
+}
+_SHOWN = {
+    "glue": "the tabs are yellow, drawn as if the paper over them were clear.",
+    "slots": "the tabs are yellow, drawn as if the paper over their heads were clear, with the "
+    "slots across them.",
+    "double": "the tabs are yellow, standing behind the seam, drawn as if the paper before them "
+    "were clear.",
+}
+_FIGURES = {
+    "glue": ("Where tab a7 goes: under the facet a7", fold_figures.tab, 0.3),
+    "slots": ("Where tab a7 goes: through the slot a7", fold_figures.slotted_tab, 0.3),
+    "double": ("Where tab a7 goes: onto the other tab a7", fold_figures.double_tab, 0.3),
+}
 
 
-def glueing(tabs: int, pieces: int) -> tuple[str, ...]:
-    """How to glue ``tabs`` of a shell of several ``pieces``; nothing without tabs."""
+def glueing(tabs: int, pieces: int, join: str = "glue") -> tuple[str, ...]:
+    """How to join ``tabs`` of a shell of several ``pieces``; nothing without tabs."""
     if not tabs:
         return ()
-    return _PIECES if pieces > 1 else _PATCHES
+    return (_LABEL, *_HOW[join], (_PIECES if pieces > 1 else _PATCHES)[join])
 
 
 class GlueSections:
@@ -57,7 +89,8 @@ class GlueSections:
     def sections(self) -> tuple[Section, ...]:
         """The section on glueing, if anything is glued, and what else must be said."""
         totals, copies = self.layout.totals, self.layout.copies
-        lines = glueing(totals.tabs - totals.border_tabs, self.views.pattern.pieces_count)
+        pieces, join = self.views.pattern.pieces_count, self.views.join
+        lines = glueing(totals.tabs - totals.border_tabs, pieces, join)
         steps = self.steps
         alone = len(self.views.patches) == 1 and not any(step.closes for step in steps)
         notes = tuple(Prose(note, bold=True) for note in self.notes())
@@ -67,19 +100,16 @@ class GlueSections:
         each = f", each of the {copies} copies" if copies > 1 else ""
         blocks: list[Block] = []
         if lines:
-            tab = Figure("Where tab a7 goes: under the facet a7", fold_figures.tab, 0.3)
+            tab = Figure(*_FIGURES[join])
             blocks += [Figures(2, (tab,), 18.0), Numbered(lines)]
         blocks += notes
         if self.in_space:
-            says = (
-                "Below each step is its seam, larger: the tabs are yellow, drawn as if the paper "
-                "over them were clear."
-            )
-            blocks.append(Prose(says))
+            blocks.append(Prose(f"Below each step is its seam, larger: {_SHOWN[join]}"))
         columns = 2 if len(steps) <= _FEW else 3
         figures = tuple(self._figure(number, step) for number, step in enumerate(steps))
         blocks.append(Figures(columns, figures, 66.0 if columns == 2 else 48.0))
-        return (Section("glueing", f"In this order{each}", tuple(blocks)),)
+        name = "joining" if join == "slots" else "glueing"
+        return (Section(name, f"In this order{each}", tuple(blocks)),)
 
     @cached_property
     def steps(self) -> tuple[GlueStep, ...]:

@@ -2,7 +2,8 @@
 
 A tab lies under the facet of its mate. It is drawn in its place as if all paper over it were
 clear. Along its edge it has its length from the flat pattern, and across the edge its height, in
-the plane of the mate's facet.
+the plane of the mate's facet. A tab for a slot is drawn with the slot across it. Double tabs stand
+behind the shell, in the plane between the two facets.
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ class GlueView:
             canvas.lines((seen[heavy] * mm).reshape(-1, 4).tolist())
         on_top = [each for face in ordered for each in outlines.get(face, ())]
         for label, outline in on_top:
-            canvas.setFillColor(TAB)
+            canvas.setFillColor(TAB if label else INK)
             canvas.setStrokeColor(INK)
             canvas.setLineWidth(0.2 * mm)
             polygon(canvas, outline, stroke=True)
@@ -131,21 +132,53 @@ class GlueView:
             named(canvas, self.views.name(step.patch), x, y, 9.0)
 
     def _tabs_on(self, step: GlueStep) -> dict[int, list[tuple[str, Floats]]]:
-        """The labels and outlines in space of the tabs of a step, by the facet over each."""
+        """The labels and outlines in space of the tabs of a step, by the facet over each, and of
+        slots, without labels.
+        """
         found: dict[int, list[tuple[str, Floats]]] = {}
         for number in step.tabs:
             patch, tab = self._numbered[number]
             placed = self.glued(patch, tab)
-            if placed is not None:
-                found.setdefault(placed[0], []).append((tab.label, placed[1]))
+            if placed is None:
+                continue
+            found.setdefault(placed[0], []).append((tab.label, placed[1]))
+            if number in self.views.slots:
+                found[placed[0]].append(("", self._slot(number, placed[0])))
         return found
+
+    def _slot(self, number: int, mate: int) -> Floats:
+        """(4, 3) the slot for the tab of this number, in the facet ``mate``."""
+        patch, slot = self.views.slots[number]
+        flat = turned(slot.polygon_mm, -patch.rotation_deg) + patch.origin_mm
+        return self._in_space(slot.edge, flat, self._inward(slot.edge, mate))
+
+    def _in_space(self, edge: int, flat: Floats, away: Floats) -> Floats:
+        """The points ``flat`` (n, 2) of the pattern beside ``edge``, in space: along the
+        edge, and as far from it in the direction ``away`` (3,).
+        """
+        ends = self.pattern.edges_vertices[edge]
+        a, b = self.pattern.vertices_coords[ends]
+        along = (b - a) / np.linalg.norm(b - a)
+        across = np.abs((flat - a) @ np.array([-along[1], along[0]]))
+        start, end = self.points[ends]
+        way = (end - start) / np.linalg.norm(end - start)
+        return np.asarray(start + np.outer((flat - a) @ along, way) + np.outer(across, away))
+
+    def _inward(self, edge: int, face: int) -> Floats:
+        """The unit vector (3,) from ``edge`` into ``face``, in its plane."""
+        start, end = self.points[self.pattern.edges_vertices[edge]]
+        way = (end - start) / np.linalg.norm(end - start)
+        corners = self.pattern.faces_vertices[face]
+        inward = self.points[corners[corners >= 0]].mean(axis=0) - start
+        inward -= (inward @ way) * way
+        return np.asarray(inward / np.linalg.norm(inward))
 
     @cached_property
     def _numbered(self) -> dict[int, tuple[Patch, Tab]]:
         return {tab.number: (patch, tab) for patch in self.views.patches for tab in patch.tabs}
 
     def glued(self, patch: Patch, tab: Tab) -> tuple[int, Floats] | None:
-        """The facet to which a tab is glued and the tab (n, 3) there; None on an open border."""
+        """The facet that a tab is joined to and the tab (n, 3) there; None on an open border."""
         if tab.mate_edge is None:
             return None
         pattern, face_patch = self.pattern, self.views.face_patch
@@ -153,22 +186,13 @@ class GlueView:
         own = next(f for f in beside if f >= 0 and face_patch[f] == patch.id)
         others = (f for f in facing if f >= 0 and face_patch[f] == tab.mate_patch)
         mate = next(f for f in others if f != own or tab.edge != tab.mate_edge)
-        ends = pattern.edges_vertices[tab.edge]
-        a, b = pattern.vertices_coords[ends]
-        along = (b - a) / np.linalg.norm(b - a)
-        across = np.array([-along[1], along[0]])
-        corners = pattern.faces_vertices[own]
-        middle = pattern.vertices_coords[corners[corners >= 0]].mean(axis=0)
-        across *= -np.sign((middle - a) @ across)
-        local = turned(tab.polygon_mm, -patch.rotation_deg) + patch.origin_mm - a
-        start, end = self.points[ends]
-        way = (end - start) / np.linalg.norm(end - start)
-        corners = pattern.faces_vertices[mate]
-        inward = self.points[corners[corners >= 0]].mean(axis=0) - start
-        inward -= (inward @ way) * way
-        inward /= np.linalg.norm(inward)
-        shape = start + np.outer(local @ along, way) + np.outer(local @ across, inward)
-        return mate, np.asarray(shape)
+        flat = turned(tab.polygon_mm, -patch.rotation_deg) + patch.origin_mm
+        away = self._inward(tab.edge, mate)
+        if tab.join == "double":
+            normals = facet_normals(self.points, pattern.faces_vertices[[own, mate]])
+            away = -normals.sum(axis=0)
+            away /= max(float(np.linalg.norm(away)), 1e-12)
+        return mate, self._in_space(tab.edge, flat, away)
 
     def _towards(self, step: GlueStep) -> Floats:
         """The direction (3,) to a viewer who sees both sides of the seam, or the first patch.

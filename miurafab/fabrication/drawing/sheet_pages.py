@@ -12,6 +12,7 @@ from reportlab.lib.units import mm
 from reportlab.pdfbase.pdfmetrics import stringWidth
 
 from miurafab.fabrication.drawing.callouts import Callout, Taken, draw_callouts
+from miurafab.fabrication.drawing.neighbours import neighbours
 from miurafab.fabrication.drawing.page import (
     BOTTOM,
     HEIGHT,
@@ -31,7 +32,6 @@ from miurafab.fabrication.drawing.page import (
     paragraph,
     polygon,
     scale_bar,
-    tabs_called,
     text,
     tint,
     wrapped,
@@ -151,7 +151,10 @@ class SheetPages:
         top = HEIGHT - MARGIN - 19
         width = (ROOM - 6 * (_COLUMNS - 1)) / _COLUMNS
         blocks = [
-            (self.label(patch), [n for r in self.relations(patch) for n in wrapped(r, width, 7.5)])
+            (
+                self.label(patch),
+                [n for r in neighbours(self.views, patch) for n in wrapped(r, width, 7.5)],
+            )
             for patch in patches
         ]
         pages: list[list[_Words]] = [[]]
@@ -353,36 +356,14 @@ class SheetPages:
         facets = count(len(self.layout.patches[patch].faces), "facet", "facets")
         text(canvas, x, top - 6, self.label(patch), 11, bold=True)
         text(canvas, x + width, top - 6, facets, 8, colour=QUIET, align="right")
-        lines = [line for words in self.relations(patch) for line in wrapped(words, width, 8)]
+        lines = [
+            line for words in neighbours(self.views, patch) for line in wrapped(words, width, 8)
+        ]
         room = int((height - 12) / 4)
         if len(lines) > room:
             lines = [*lines[: room - 1], "and more: see the steps"]
         for number, line in enumerate(lines):
             text(canvas, x, top - 11.5 - 4 * number, line, 8)
-
-    def relations(self, patch: int) -> list[str]:
-        """A sentence for each neighbour of a patch and each side that bears the tabs."""
-        own: dict[int, list[str]] = {}
-        others: dict[int, list[str]] = {}
-        free = [t.label for t in self.layout.patches[patch].tabs if t.mate_patch is None]
-        for tab in self.layout.patches[patch].tabs:
-            if tab.mate_patch is not None:
-                own.setdefault(tab.mate_patch, []).append(tab.label)
-        for other in self.layout.patches:
-            for tab in other.tabs:
-                if tab.mate_patch == patch and other.id != patch:
-                    others.setdefault(other.id, []).append(tab.label)
-        found = []
-        for mate, labels in sorted(own.items()):
-            under = "its own far border" if mate == patch else self.label(mate)
-            found.append(f"{tabs_called(labels).capitalize()} under {under}")
-        found += [
-            f"Over {tabs_called(labels)} of {self.label(mate)}"
-            for mate, labels in sorted(others.items())
-        ]
-        if free:
-            found.append(f"{tabs_called(free).capitalize()} to the base or frame")
-        return found or ["Stands alone: nothing is glued to it."]
 
 
 def _clear_place(places: Floats, strokes: Floats, label: str, size: float) -> Floats:

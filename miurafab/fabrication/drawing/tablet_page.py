@@ -12,6 +12,7 @@ from functools import partial
 
 from reportlab.lib.units import mm
 
+from miurafab.fabrication.drawing.neighbours import neighbours
 from miurafab.fabrication.drawing.page import MARGIN, ROOM, Box
 from miurafab.fabrication.drawing.sections import Block, Figure, Figures, Numbered, Prose, Section
 from miurafab.fabrication.drawing.sheet_pages import SheetPages
@@ -87,7 +88,7 @@ def _sheets(views: Views) -> Iterator[Section]:
         pages = SheetPages(views, sheet, toolpath, "")
         figure = Figure("The sheet", partial(_sheet, pages=pages), pages.tall / ROOM)
         lines = (
-            Prose(f"{pages.label(each.patch)}: {'; '.join(pages.relations(each.patch))}")
+            Prose(f"{pages.label(each.patch)}: {'; '.join(neighbours(views, each.patch))}")
             for each in sheet.placements
         )
         yield Section(sheet.name, pages.subtitle(), (Figures(1, (figure,)), *lines))

@@ -34,6 +34,7 @@ from miurafab.fabrication.partition.boundary import boundaries
 from miurafab.fabrication.partition.patch_frame import Patch
 from miurafab.fabrication.seams import with_seams
 from miurafab.fabrication.sheets import DrawnLayout, Layout
+from miurafab.fabrication.slots import TabSlot
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.picture import View, project
@@ -47,12 +48,16 @@ OUTLINED = 30_000
 
 
 def edge_letters(layout: Layout, pattern: CreasePattern) -> NDArray[np.str_]:
-    """(E,) the assignment of each edge; a glued border has the assignment of its fold."""
+    """(E,) the assignment of each edge; a glued border has the assignment of its fold, and double
+    tabs are folded as mountains.
+    """
     letters = pattern.edges_assignment.copy()
     for patch in layout.patches:
         for tab in patch.tabs:
             if tab.mate_edge is None:
                 letters[tab.edge] = "U"
+            elif tab.join == "double":
+                letters[tab.edge] = "M"
             elif tab.edge != tab.mate_edge:
                 fold = {"mountain": "M", "valley": "V"}.get(tab.fold, "F")
                 letters[[tab.edge, tab.mate_edge]] = fold
@@ -127,6 +132,17 @@ class Views:
     def labels(self) -> dict[int, str]:
         """The label of each tab by its number."""
         return {tab.number: tab.label for patch in self.patches for tab in patch.tabs}
+
+    @cached_property
+    def join(self) -> str:
+        """What holds the seams."""
+        joins = (t.join for p in self.patches for t in p.tabs if t.mate_patch is not None)
+        return next(joins, "glue")
+
+    @cached_property
+    def slots(self) -> dict[int, tuple[Patch, TabSlot]]:
+        """The slot for each tab by its number, and the patch that has it."""
+        return {slot.tab: (patch, slot) for patch in self.patches for slot in patch.slots}
 
     def standing(self, border: OpenBorder) -> tuple[str, ...]:
         """The labels of the tabs on an open border."""

@@ -61,7 +61,7 @@ def improved(
     are the easiest to glue: they stay unless a patch is saved.
     """
     room = _room(pattern, border)
-    alternate = options.tab_side == "alternate"
+    alternate = options.tabs_on_both_sides
 
     def recut(patch: Ints, rectangles: Floats) -> Ints | None:
         """The split with shorter seams, or None if it is invalid."""

@@ -7,6 +7,7 @@ at the origin. If it must lie along the fibres of a sheet, it keeps the directio
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,9 +20,10 @@ from miurafab.fabrication.partition.patch_outline import (
     OutlinedPatches,
 )
 from miurafab.fabrication.seam_names import tab_labels
+from miurafab.fabrication.slots import TabSlot
 from miurafab.fabrication.stock import LaidStock
 from miurafab.fabrication.tabs import FOLDS, Tab
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 
 DIGITS = 6
@@ -35,7 +37,7 @@ class Patch:
     ``outline_mm`` (m, 2) is the cut line with tabs and kerf, counter-clockwise; ``waste_mm`` are
     further closed cut lines inside it, around enclosed waste (rare). A point p of the pattern is
     R(``rotation_deg``) (p - ``origin_mm``) in this frame. ``copy`` is the number of its model, from
-    1.
+    1. ``slots`` are those for the tabs of its neighbours.
     """
 
     id: int
@@ -47,6 +49,7 @@ class Patch:
     rotation_deg: float
     tabs: tuple[Tab, ...]
     copy: int = 1
+    slots: tuple[TabSlot, ...] = ()
 
     def from_pattern(self, points: Floats) -> Floats:
         """``points`` (n, 2) of the pattern, in the frame of the patch."""
@@ -101,6 +104,9 @@ def copied(patches: tuple[Patch, ...], quantity: int) -> tuple[Patch, ...]:
                 for tab in patch.tabs
             ),
             copy=copy + 1,
+            slots=tuple(
+                replace(slot, mate_patch=slot.mate_patch + count * copy) for slot in patch.slots
+            ),
         )
         for copy in range(quantity)
         for patch in patches
@@ -153,10 +159,29 @@ def _patch(
                 mate_patch=_mate(mates[tab]),
                 polygon_mm=framed(tabs.polygon(tab)),
                 fold=FOLDS.get(str(tabs.seams.fold[tab]), "flat"),
+                join=outlined.join if mates[tab] >= 0 else "glue",
             )
             for tab in patch.tabs.tolist()
         ),
+        slots=tuple(
+            TabSlot(
+                tab=int(numbers[tab]),
+                label=labels[tab],
+                edge=int(tabs.seams.edges[tab, 1]),
+                mate_patch=int(outlined.face_patch[tabs.own_face[tab]]),
+                polygon_mm=framed(corners),
+            )
+            for tab, corners in _slots(outlined, mates == number)
+        ),
     )
+
+
+def _slots(outlined: OutlinedPatches, own: Bools) -> Iterator[tuple[int, Floats]]:
+    """The number of the tab and the corners of each slot for one of the tabs ``own`` (N,)."""
+    slots = outlined.slots
+    for k in [] if slots is None else np.flatnonzero(own[slots.tab]).tolist():
+        assert slots is not None
+        yield int(slots.tab[k]), slots.corners[k]
 
 
 def _mate(number: np.int64) -> int | None:

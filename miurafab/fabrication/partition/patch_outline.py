@@ -9,17 +9,19 @@ the bed because of tabs on the other side of a seam or of higher tabs, it gets s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from miurafab.fabrication.double_tabs import in_pairs
 from miurafab.fabrication.kerf import allowance, cut_lines
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.boundary import Boundary, boundaries
 from miurafab.fabrication.partition.fit_box import Space
 from miurafab.fabrication.partition.split import split
+from miurafab.fabrication.slots import Slots, heads, slots_of
 from miurafab.fabrication.tab_choice import choose_tabs
 from miurafab.fabrication.tabs import TabRegions
 from miurafab.geometry.arrays import Bools, Floats, Ints
@@ -47,13 +49,32 @@ class OutlinedPatch:
 @dataclass(frozen=True, eq=False)
 class OutlinedPatches:
     """All ``patches`` of a pattern: ``face_patch`` (F,) the patch of each facet, ``tabs`` all tabs,
-    ``untabbed`` (u,) the edges where no side can bear the tab that is wanted.
+    ``untabbed`` (u,) the edges where no side can bear the tab that is wanted. ``join`` is what
+    holds the seams, ``slots`` the slots that tabs go through.
     """
 
     patches: list[OutlinedPatch]
     face_patch: Ints
     tabs: TabRegions
     untabbed: Ints
+    join: str = "glue"
+    slots: Slots | None = None
+
+    def joined(self, pattern: CreasePattern, material: Material, join: str) -> OutlinedPatches:
+        """The same, held as ``join`` says."""
+        slots = slots_of(pattern, self.tabs, material) if join == "slots" else None
+        return replace(self, join=join, slots=slots)
+
+    @property
+    def lettered(self) -> TabRegions:
+        """The tabs as they bear their labels: heads alone, and double tabs on no facet."""
+        if self.slots is not None:
+            return heads(self.tabs, self.slots)
+        if self.join == "double":
+            seams = self.tabs.seams
+            alone = np.column_stack([seams.faces[:, 0], np.full(len(seams), -1)])
+            return replace(self.tabs, seams=replace(seams, faces=alone))
+        return self.tabs
 
 
 def patch_space(sheet: Space, material: Material, options: LayoutOptions) -> Space:
@@ -108,6 +129,8 @@ def outline_split(
             break
         tight |= outgrown
     kept = _without_collisions(pattern, around, outlines, standing, tabs)
+    if options.join == "double":
+        kept = in_pairs(tabs, kept)
     untabbed = np.sort(np.concatenate([untabbed, tabs.edge[~kept]]))
     tabs = tabs.take(kept)
 
@@ -118,7 +141,8 @@ def outline_split(
     patches = [
         OutlinedPatch(*parts) for parts in zip(faces, standing, outlines, lines, strict=True)
     ]
-    return OutlinedPatches(patches, face_patch, tabs, untabbed)
+    outlined = OutlinedPatches(patches, face_patch, tabs, untabbed)
+    return outlined.joined(pattern, material, options.join)
 
 
 def rings_of(
@@ -126,16 +150,16 @@ def rings_of(
 ) -> tuple[list[list[Floats]], list[Ints]]:
     """The rings of each patch, and its tabs in order along them."""
     tab_of_edge = np.full(len(pattern.edges_vertices), -1)
-    tab_of_edge[tabs.edge] = np.arange(len(tabs))
     owner = face_patch[tabs.own_face]
+    order = np.argsort(owner, kind="stable")
+    first = np.searchsorted(owner[order], np.arange(len(around) + 1))
     outlines, standing = [], []
     for patch, boundary in enumerate(around):
         rings, own = [], []
+        borne = order[first[patch] : first[patch + 1]]
+        tab_of_edge[tabs.edge[borne]] = borne
         for loop in boundary.loops:
             found = tab_of_edge[loop.edges]
-            foreign = found >= 0
-            foreign[foreign] = owner[found[foreign]] != patch
-            found[foreign] = -1
             corners = pattern.vertices_coords[loop.vertices]
             parts = []
             before = 0
@@ -145,6 +169,7 @@ def rings_of(
                 before = at + 1
             rings.append(np.concatenate([*parts, corners[before:]]))
             own.append(found[found >= 0])
+        tab_of_edge[tabs.edge[borne]] = -1
         outlines.append(rings)
         standing.append(np.concatenate(own))
     return outlines, standing

@@ -72,7 +72,7 @@ def split(
     for place, piece in enumerate(pieces):
         number[piece.facets] = place
     border = standing(border_tabs(pattern, material, options))
-    if options.tab_side == "alternate":
+    if options.tabs_on_both_sides:
         whole = border
     else:
         # The seams between pieces bear their tabs on the same side however the pieces are split.
@@ -117,7 +117,7 @@ def _split(
         # Seen from the opposite corner of the grid, the upper patch is the lower patch.
         part = part.max() - part
         cells = None if cells is None else cells[::-1, ::-1]
-    both = cells is None or options.tab_side == "alternate"
+    both = cells is None or options.tabs_on_both_sides
     if cells is None or both:
         # It is not known yet which patch bears a tab, so every possible tab is counted.
         edges = np.concatenate([inner, inner])

@@ -6,8 +6,8 @@ an operation:
 - creases follow the postman's route (:mod:`~miurafab.fabrication.route.postman`); the dashes of a
   crease are made in the direction of the route;
 - texts are made one by one, the nearest remaining text next;
-- cuts are made in the order small holes, slits in patches, rings of waste, outlines, the nearest
-  remaining cut next; a closed stroke starts at its nearest point.
+- cuts are made in the order small holes, slots, slits in patches, rings of waste, outlines, the
+  nearest remaining cut next; a closed stroke starts at its nearest point.
 
 To spread heat, the next outline is the outline farthest from the last two, and so is the next patch
 for creases. Within a patch every second trail of the route is left out on the way through and made
@@ -44,7 +44,7 @@ class StrokeSet:
     rank: Ints
 
 
-OUTLINE = 3
+OUTLINE = 4
 """The rank of the outlines of patches, last of all."""
 
 
