@@ -97,7 +97,7 @@ RULES = {
     "no-fold-angles": Rule("note", "a format that tells mountains from valleys and no fold angles"),
     "no-seams": Rule("note", "a format that does not hold which edges meet along seams"),
     "assumed-folded-flat": Rule("note", "a file without fold angles, taken as folded flat"),
-    # A pattern, folded (miurafab.workflow.fold, miurafab.workflow.layers, miurafab.studio.work)
+    # A pattern, folded (miurafab.origami.folding.judge_motion, miurafab.workflow.layers)
     "bent-facets": Rule("note", "a pattern that does not fold rigidly"),
     "contacts": Rule("warning", "facets that pass through each other on the way"),
     "crossing-layers": Rule(
@@ -111,6 +111,11 @@ RULES = {
     ),
     "cannot-fold-flat": Rule("refusal", "mountains and valleys that no order of layers satisfies"),
     "more-layer-orders": Rule("note", "a search that ended before all layer orders were found"),
+    "way-lost": Rule("warning", "a motion that ends before its creases are where they shall be"),
+    "wrong-signs": Rule("warning", "creases that end on the other side than their letter tells"),
+    "stretched": Rule("note", "a motion that paper can follow only by stretching"),
+    "unstable": Rule("warning", "frames of a motion from which the sheet would snap away"),
+    "held-back": Rule("note", "creases that stay far from the fold angles asked for"),
     # A layout (miurafab.fabrication.layout_findings)
     "weak-tabs": Rule("warning", "tabs with less glue than the material's `min_area`"),
     "fold-letters": Rule("note", "tabs without room for the letter of their fold"),

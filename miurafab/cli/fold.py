@@ -51,7 +51,9 @@ def fold(
 ) -> int:
     """Fold a pattern and write its motion.
 
-    The pattern folds rigidly if it can; otherwise its facets bend as little as possible.
+    The closed form is used where it applies. Otherwise the facets bend as little as possible: from
+    nearly flat to the folded form of the file, or from flat by mountains and valleys alone. The
+    answer says which, and whether the facets could all stay flat.
     """
     from miurafab.workflow.fold import ENDINGS, FoldOptions, thickness_report
 
@@ -71,19 +73,22 @@ def fold(
     answer: dict[str, Any] = folding.report()
     answer |= {"file": None if out is None else str(out), "csv": None if csv is None else str(csv)}
     answer["thickness"] = None if panels is None else thickness_report(panels)
-    if not folding.motion.is_rigid:
-        console.note(
-            f"The sheet does not fold rigidly (its facets would miss each other by up to "
-            f"{folding.mismatch:.2g} mean edges), so its facets bend: from nearly flat to the "
-            "folded form."
-        )
     console.answer(answer, lambda: _show(console, folding, answer))
     return NO if panels is not None and not panels.folds else DONE
 
 
 def _show(console: Console, folding: Folding, answer: dict[str, Any]) -> None:
     contacts, thick = answer["self_contacts"], answer["thickness"]
-    hidden = ("states", "self_contacts", "layers", "findings", "thickness")
+    hidden = {
+        "states",
+        "self_contacts",
+        "layers",
+        "thickness",
+        "certificate",
+        "stretch",
+        "findings",
+    }
+    hidden |= {"wrong_edges", "unstable_directions"}
     facts = {key: value for key, value in answer.items() if key not in hidden and value is not None}
     facts["self_contacts"] = f"in {len(contacts)} frames" if contacts else "none"
     if answer["layers"] is not None:

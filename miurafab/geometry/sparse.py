@@ -105,6 +105,16 @@ def factor_symmetric(matrix: sparse.csc_array, *, reorder: bool = True) -> Facto
     return _factor(matrix, reorder)
 
 
+def negative_pivots(factor: Factor) -> int:
+    """The number of negative eigenvalues of a matrix factored by :func:`factor_symmetric`.
+
+    By J. J. Sylvester's law of inertia it is that of the pivots, since rows are not exchanged.
+    """
+    if not isinstance(factor, SuperLU):
+        raise TypeError("only the factor of a symmetric matrix has signs of pivots")
+    return int((factor.U.diagonal() < 0).sum())
+
+
 def minimum_degree(matrix: sparse.csc_array) -> Ints:
     """(n,) the rows of a symmetric ``matrix`` in the fill-reducing order of minimum degree."""
     return np.argsort(_factor(matrix, reorder=True).perm_c).astype(np.int64)

@@ -133,17 +133,7 @@ def _show(order: Order, pattern: CreasePattern, part: dict[str, Any], tell: Tell
         tell({"part": "motion", "missing": str(fault)})
         return
     folding.save(folder / MOTION, title=order.name)
-    told = folding.report()
-    findings = []
-    if not told["rigid"]:
-        bends = "It does not fold rigidly: its facets bend a little on the way."
-        findings.append(Finding("bent-facets", bends))
-    if told["self_contacts"]:
-        frames = f"{len(told['self_contacts'])} of {told['frames']} positions"
-        findings.append(
-            Finding("contacts", f"On the way facets pass through each other in {frames}.")
-        )
-    tell({"part": "motion", "files": {"page": MOTION}, "findings": findings_json(findings)})
+    tell({"part": "motion", "files": {"page": MOTION}, "findings": findings_json(folding.findings)})
 
 
 def _sheets(order: Order, tell: Tell) -> None:

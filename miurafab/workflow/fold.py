@@ -1,8 +1,9 @@
 """Folding, from a pattern to a file that moves: the motion, what it says, and how it is written.
 
-A sheet that folds rigidly goes from flat through its folded form to flat-folded, by closed form.
-Any other sheet goes from nearly flat to its folded form by bending its facets; it is never shown
-by drawing vertices along straight lines, which no paper could follow.
+A flat-foldable sheet of degree four goes from flat through its folded form to flat-folded, by
+closed form. Any other sheet with a folded form comes from nearly flat to it by bending its facets.
+Any other pattern leaves the plane with all creases together. A sheet is never shown by drawing
+vertices along straight lines, which no paper could follow.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from miurafab.display import Shown
-from miurafab.errors import InputError, PatternError
 from miurafab.files import AnyPath, new_file, write_bytes, write_text
 from miurafab.findings import Finding, findings_json
 from miurafab.geometry.arrays import Floats
@@ -23,16 +23,19 @@ from miurafab.options import Choice, Whole, declared, length, option, read_optio
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
-from miurafab.origami.folding.bending import bending_motion
+from miurafab.origami.folding.certificate import RigidCertificate
 from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.folding.judge_motion import motion_findings
 from miurafab.origami.folding.kinematics import (
+    CLOSED_FORM,
+    FROM_FLAT,
     FoldingMotion,
     facet_strain,
-    rigid_motion,
-    states_between,
 )
 from miurafab.origami.folding.layers import LayerOrder, layer_order
 from miurafab.origami.folding.layers_apart import CLOSED, layer_shifts, split_facets
+from miurafab.origami.folding.motion import FoundMotion, find_motion
+from miurafab.origami.folding.ramp_motion import RampVerdict
 from miurafab.origami.folding.thick_panels import ThickPanels
 from miurafab.origami.folding.thick_panels import thick_panels as make_panels
 from miurafab.origami.formats.fold import write_fold
@@ -73,33 +76,29 @@ class Folding(Shown):
 
     Parameters
     ----------
-    motion : FoldingMotion
-        The frames.
+    found : FoundMotion
+        The frames, how they were found, and whether facets stay flat.
     contacts : tuple of Contact
         The frames in which facets pass through each other.
-    mismatch : float
-        The loop mismatch of the rigid motion, in mean edges, also where the motion bends its
-        facets instead.
     layers : LayerOrder, optional
         The order of the layers at the end. None for a motion that does not end folded flat.
     """
 
-    motion: FoldingMotion
+    found: FoundMotion
     contacts: tuple[Contact, ...]
-    mismatch: float
     layers: LayerOrder | None = None
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
-        """What a person should know about the layers at the end of the motion."""
-        if self.layers is not None:
-            return layer_findings(self.layers)
-        return (
-            Finding(
-                "no-layer-order",
-                "The motion does not end folded flat, so the sheet is given no order of layers.",
-            ),
-        )
+    def motion(self) -> FoldingMotion:
+        """The frames."""
+        return self.found.motion
+
+    @property
+    def mismatch(self) -> float | None:
+        """The loop mismatch of the closed form, in mean edges, also where another motion is shown;
+        None where the closed form says nothing.
+        """
+        return self.found.mismatch
 
     def save(
         self,
@@ -185,18 +184,31 @@ class Folding(Shown):
         facts = {key: told[key] for key in ("motion", "max_mismatch", "max_strain", "frames")}
         return facts | {"frames_with_contacts": len(self.contacts)}
 
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What a person should know of the motion, and of the layers at its end."""
+        of_motion = motion_findings(self.found, self.contacts)
+        if self.layers is not None:
+            return of_motion + layer_findings(self.layers)
+        none = "The motion does not end folded flat, so the sheet is given no order of layers."
+        return (*of_motion, Finding("no-layer-order", none))
+
     def report(self) -> dict[str, Any]:
         """The JSON answer of ``fold``; ``states`` are null where they are infinite."""
-        motion = self.motion
+        motion, verdict = self.motion, self.found.verdict
         strain = facet_strain(motion.pattern, motion.frames)
         return {
             "motion": "rigid" if motion.mismatch is not None else "bending",
+            "method": motion.method,
             "rigid": motion.is_rigid,
+            "certificate": _certificate(self.found.certificate),
             "max_mismatch": self.mismatch,
             "max_strain": float(strain.max()),
             "frames": len(motion.frames),
             "pieces": motion.pattern.pieces_count,
             "states": motion.states.tolist(),
+            **({} if verdict is None else _verdict(verdict)),
+            "piercings": max((len(c.facets) for c in self.contacts), default=0),
             "self_contacts": [
                 {"frame": c.frame, "state": c.state, "facets": [list(pair) for pair in c.facets]}
                 for c in self.contacts
@@ -204,6 +216,30 @@ class Folding(Shown):
             "layers": None if self.layers is None else layer_facts(self.layers),
             "findings": findings_json(self.findings),
         }
+
+
+def _certificate(certificate: RigidCertificate | None) -> dict[str, Any] | None:
+    if certificate is None:
+        return None
+    return {
+        "rigid": certificate.rigid,
+        "state": certificate.state,
+        "residual": certificate.residual,
+        "moved_deg": math.degrees(certificate.moved),
+    }
+
+
+def _verdict(verdict: RampVerdict) -> dict[str, Any]:
+    return {
+        "stable": not verdict.unstable.any(),
+        "unstable_directions": verdict.unstable.tolist(),
+        "stretch": verdict.strain.tolist(),
+        "wrong_signs": verdict.wrong_signs,
+        "wrong_edges": verdict.wrong_edges.tolist(),
+        "seed_signs": verdict.seed_signs,
+        "angle_error_deg": math.degrees(verdict.angle_error),
+        "snaps": verdict.snaps,
+    }
 
 
 described(Folding.save, FoldOptions, without=("steps", "thickness"))
@@ -215,8 +251,9 @@ def fold(
 ) -> Folding:
     """Compute the folding motion of a pattern.
 
-    A sheet that folds rigidly goes from flat through its folded form to flat-folded. Any other
-    sheet goes from nearly flat to its folded form by bending its facets.
+    A sheet whose motion has a closed form goes from flat through its folded form to flat-folded.
+    Any other sheet with a folded form goes from nearly flat to that form by bending its facets. Any
+    other pattern goes from flat as far as its mountains and valleys tell.
 
     Parameters
     ----------
@@ -234,8 +271,7 @@ def fold(
     Raises
     ------
     PatternError
-        For a file that holds no pattern, and for a sheet that does not fold rigidly and has no
-        folded form towards which its facets could bend.
+        For a file that holds no pattern, and for a pattern whose creases do not fold together.
     OptionError
         For ``steps`` out of range.
 
@@ -247,25 +283,10 @@ def fold(
     """
     steps = read_options(FoldOptions, {"steps": steps}).steps
     pattern = consistent_pattern(pattern)
-    motion = rigid_motion(pattern, states_between(pattern, steps))
-    assert motion.mismatch is not None
-    mismatch = float(motion.mismatch.max())
-    if not motion.is_rigid:
-        if pattern.folded_coords is None:
-            raise PatternError(
-                f"The sheet does not fold rigidly: its facets miss each other by up to "
-                f"{mismatch:.2g} mean edges, and without a folded form in the file it is not known "
-                "towards what they would have to bend."
-            )
-        try:
-            motion = bending_motion(pattern, steps, on_progress)
-        except InputError as fault:
-            raise PatternError(
-                f"The sheet does not fold rigidly (its facets miss each other by up to "
-                f"{mismatch:.2g} mean edges), and it cannot be bent either: {fault}"
-            ) from None
-    order = layer_order(pattern) if motion.is_rigid else None
-    return Folding(motion, contacts(motion, on_progress), mismatch, order)
+    found = find_motion(pattern, steps, on_progress)
+    closed = found.motion.is_rigid and found.motion.method == CLOSED_FORM
+    order = layer_order(pattern) if closed else None
+    return Folding(found, contacts(found.motion, on_progress), order)
 
 
 described(fold, FoldOptions, without=("colour", "thickness"))
@@ -300,6 +321,8 @@ def _names(motion: FoldingMotion) -> tuple[str, ...]:
     for frame, state in enumerate(motion.states.tolist()):
         if state == 0.0:
             names.append("flat")
+        elif motion.method == FROM_FLAT:
+            names.append(f"{state:.0%} of the fold angles")
         elif math.isinf(state):
             names.append("folded flat")
         else:

@@ -85,12 +85,25 @@ def test_a_bent_motion_has_the_fold_angles_of_its_triangles() -> None:
     assert np.degrees(np.abs(motion.fold_angles[0])).max() < 30
 
 
-def test_what_neither_folds_nor_bends_says_both() -> None:
-    bare = replace(developable("hypar"), folded_coords=None)
-    with pytest.raises(PatternError, match=r"does not fold rigidly.*without a folded form"):
-        fold(bare, 8)
+def test_fold_angles_alone_lead_a_sheet_from_flat_to_its_folded_form() -> None:
+    pattern = developable("hypar")
+    assert pattern.folded_coords is not None
+    folding = fold(replace(pattern, folded_coords=None), 8)
+    assert folding.motion.method == "from flat"
+    assert folding.motion.states[-1] == 1.0
+    told = folding.report()
+    assert told["stable"]
+    assert told["wrong_signs"] == 0
+    assert not told["certificate"]["rigid"]
+    assert [finding["code"] for finding in told["findings"]] == ["bent-facets", "no-layer-order"]
+    last = laid_on(folding.motion.frames[-1], pattern.folded_coords)
+    size = float(np.linalg.norm(np.ptp(pattern.folded_coords, axis=0)))
+    assert np.abs(last - pattern.folded_coords).max() < 1e-6 * size
+
+
+def test_what_cannot_move_says_why() -> None:
     published = load(DATA / "peaks_coarse_flat.obj", folded=DATA / "peaks_coarse_fold.obj")
-    with pytest.raises(PatternError, match=r"does not fold rigidly.*cannot be bent either"):
+    with pytest.raises(PatternError, match=r"has no length.*'tolerance'"):
         fold(published, 8)
     with pytest.raises(InputError, match="'steps' is 1"):
         fold(regular(), 1)
@@ -259,7 +272,8 @@ def test_the_last_pictures_part_the_layers(tmp_path: Path) -> None:
 def test_a_sheet_that_does_not_fold_flat_is_given_no_order() -> None:
     told = fold(developable("hypar"), 4).report()
     assert told["layers"] is None
-    assert [finding["code"] for finding in told["findings"]] == ["no-layer-order"]
+    codes = [finding["code"] for finding in told["findings"]]
+    assert codes == ["bent-facets", "no-layer-order"]
     exactly = fold(exact("hypar"), 4).report()
     assert exactly["layers"]["known"] is True
     assert exactly["layers"]["crossing"] == exactly["findings"] == []
@@ -268,4 +282,4 @@ def test_a_sheet_that_does_not_fold_flat_is_given_no_order() -> None:
 def test_a_sheet_that_crosses_itself_as_it_closes_is_told() -> None:
     told = fold(folded_through_itself().pattern, 4).report()
     assert told["layers"]["crossing"][0] == [0, 2]
-    assert [finding["code"] for finding in told["findings"]] == ["crossing-layers"]
+    assert [finding["code"] for finding in told["findings"]] == ["contacts", "crossing-layers"]

@@ -37,6 +37,11 @@ POISSON_RATIO = 0.3
 """For a material that gives only its modulus; D changes by 4 % between 0.25 and 0.35."""
 DEGENERATE = 1e-9
 """In mean edges; the pattern is refused for a shorter edge or a lower triangle."""
+CREASE_RATIO = 0.01
+"""k_c / k_f of a flat sheet that folds: creases turn, and facets hardly bend."""
+SOFTNESS = 0.1
+"""The compliance of a bar over its length, in k_f, so that a sheet does not lock on its way from
+flat: 1 / (1000 k_c). Ten times softer is too soft, a hundred times stiffer locks."""
 FACET_BENDING = 0.55
 """C_B of Filipov et al. 2017, for quads whose sides do not stretch."""
 
@@ -163,17 +168,75 @@ def sheet_model(
     )
 
 
+def has_folds(pattern: CreasePattern) -> bool:
+    """Whether a mountain or valley of ``pattern`` lies between two facets."""
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    return bool((inner & np.isin(pattern.edges_assignment, ("M", "V"))).any())
+
+
+def flat_model(
+    pattern: CreasePattern, *, crease_ratio: float = CREASE_RATIO, softness: float = SOFTNESS
+) -> BarHingeModel:
+    """The bars and hinges of ``pattern`` in its flat form, which its creases want to leave.
+
+    The rest of a crease is its fold angle; a crease of letter U has no stiffness, and one of letter
+    F that of a facet. ``crease_ratio`` is k_c / k_f, and a bar of rest length L has the compliance
+    ``softness`` L. ``hinges`` are first those that bend facets, then the creases with stiffness.
+    The unit of length is the mean edge. Raises :class:`~miurafab.errors.PatternError` for a pattern
+    without a mountain or valley between two facets, and for one of several pieces.
+    """
+    if pattern.pieces_count > 1:
+        raise PatternError(f"The pattern has {pattern.pieces_count} pieces; fold one of them.")
+    unit = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
+    points = np.pad(pattern.vertices_coords, ((0, 0), (0, 1))) / unit
+    triangles, split = split_facets(points, pattern.faces_vertices)
+    inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+    letter = pattern.edges_assignment[inner]
+    across = _hinges(triangles, pattern.edges_vertices[inner])
+    diagonals = _hinges(triangles, split)
+    _refuse_degenerate(points, pattern.edges_vertices, np.concatenate([diagonals, across]))
+    bending = np.concatenate([diagonals, across[letter == "F"]])
+    sprung = np.isin(letter, ("M", "V"))
+    if not sprung.any():
+        raise PatternError("The pattern has no mountain or valley between two facets.")
+    creased = letter != "F"
+    hinges = np.concatenate([bending, across[sprung]])
+    weights = np.concatenate([np.ones(len(bending)), np.full(int(sprung.sum()), crease_ratio)])
+    goals = pattern.edges_fold_angle[inner[sprung]]
+    bars = np.concatenate([pattern.edges_vertices, diagonals[:, :2]])
+    lengths = edge_lengths(points, bars)
+    return BarHingeModel(
+        points=points,
+        bars=bars,
+        lengths=lengths,
+        compliance=softness * lengths,
+        hinges=hinges,
+        stiffness=weights * edge_lengths(points, hinges[:, :2]),
+        rest=np.concatenate([np.zeros(len(bending)), goals]),
+        creases=across[creased],
+        creases_edges=inner[creased],
+        mechanisms=np.zeros(int(creased.sum()), dtype=np.int64),
+        unit_mm=unit,
+    )
+
+
 def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:
     short = np.flatnonzero(edge_lengths(points, edges) < DEGENERATE)
     if len(short):
-        raise PatternError(f"Edge {short[0]} has no length, so its facets cannot bend about it.")
+        raise PatternError(
+            f"Edge {short[0]} has no length, so its facets cannot bend about it; convert the file "
+            "with a `tolerance` that joins its two ends."
+        )
     base = points[hinges[:, 1]] - points[hinges[:, 0]]
     for wing in (2, 3):
         out = points[hinges[:, wing]] - points[hinges[:, 0]]
         area = np.linalg.norm(vector_product(base, out), axis=1)
         thin = np.flatnonzero(area < DEGENERATE * np.linalg.norm(base, axis=1))
         if len(thin):
-            raise PatternError(f"A facet at vertex {hinges[thin[0], wing]} has no width.")
+            raise PatternError(
+                f"A facet at vertex {hinges[thin[0], wing]} has no width; convert the file with a "
+                "`tolerance` that joins the vertex to the line beside it."
+            )
 
 
 def _hinges(triangles: Ints, edges: Ints) -> Ints:

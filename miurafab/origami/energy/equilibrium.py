@@ -101,6 +101,19 @@ class Drive(NamedTuple):
     hessian: Floats
 
 
+class Touch(NamedTuple):
+    """n springs between four vertices each: their ``stencils`` (n, 4), and the ``forces`` (n, 4, 3)
+    and ``stiffness`` (n, 4, 4, 3, 3), gradient and Hessian of their energy.
+    """
+
+    stencils: Ints
+    forces: Floats
+    stiffness: Floats
+
+
+NO_TOUCH = Touch(np.empty((0, 4), dtype=np.int64), np.empty((0, 4, 3)), np.empty((0, 4, 4, 3, 3)))
+
+
 @dataclass(frozen=True, eq=False)
 class Balance:
     """The forces of a model and what drives it; this class drives nothing.
@@ -145,14 +158,18 @@ class Balance:
         """The driven quantity at ``points`` (V, 3); with nothing driven it is always on target."""
         return Drive(target, np.zeros((0, 3)), np.zeros((0, 0, 3, 3)))
 
+    def touch(self, points: Floats) -> Touch:
+        """The springs between facets that touch at ``points``; none here."""
+        return NO_TOUCH
+
     def residual(self, state: EquilibriumState, target: float) -> Residual:
         """F at ``state``, with what is driven at ``target``."""
         model, points = self.model, state.points
         angle, gradient = hinge_gradients(points, self.hinges)
         bend = self.moments(angle, target)[0][:, None, None] * gradient
-        pull = (state.forces / model.lengths)[:, None] * self._bars(points)
+        pull = (state.forces / model.lengths)[:, None] * self.bar_vectors(points)
         drive = self.drive(points, target)
-        force = self._gather(bend, pull, state.mu * drive.gradient)
+        force = self._gather(bend, pull, state.mu * drive.gradient, self.touch(points).forces)
         strain = model.strains(points) - model.compliance * state.forces
         return Residual(force, strain, drive.value - target)
 
@@ -170,14 +187,15 @@ class Balance:
         outer = gradient[:, :, None, :, None] * gradient[:, None, :, None, :]
         bend = slope[:, None, None, None, None] * outer
         bend += moment[:, None, None, None, None] * hessian.swapaxes(2, 3)
-        bars = self._bars(points) / model.lengths[:, None]
+        bars = self.bar_vectors(points) / model.lengths[:, None]
         weights = 1.0 / (model.compliance + EPS)
         block = weights[:, None, None] * bars[:, :, None] * bars[:, None, :]
         block += (state.forces / model.lengths)[:, None, None] * np.eye(3)
         drive = self.drive(points, target)
         across = drive.gradient[:, None, :, None] * drive.gradient[None, :, None, :]
         held = state.mu * drive.hessian + across / EPS
-        matrix = self.assembly.matrix([bend, stretch_blocks(block), held[None]])
+        touching = self.touch(points).stiffness
+        matrix = self.assembly.matrix([bend, stretch_blocks(block), held[None], touching])
         return Factored(factor_symmetric(matrix, reorder=False), bars, weights, drive.gradient)
 
     def step(self, factored: Factored, residual: Residual) -> EquilibriumState:
@@ -185,7 +203,8 @@ class Balance:
         bars, weights, drive = factored.bars, factored.weights, factored.drive
         pull = (weights * residual.strain)[:, None] * bars
         no_bend = np.zeros((len(self.hinges), 4, 3))
-        right = residual.force + self._gather(no_bend, pull, residual.miss / EPS * drive)
+        push = np.zeros((len(self.assembly.stencils[3]), 4, 3))
+        right = residual.force + self._gather(no_bend, pull, residual.miss / EPS * drive, push)
         dx = self.assembly.vectors(-factored.k.solve(right))
         first, second = self.model.bars.T
         stretch = np.einsum("bk,bk->b", bars, dx[second] - dx[first])
@@ -202,16 +221,18 @@ class Balance:
 
     @cached_property
     def assembly(self) -> Assembly:
-        """The sums over hinges, bars and the driven quantity."""
-        stencils = (self.hinges, self.model.bars, self.drive_stencil[None])
+        """The sums over hinges, bars, the driven quantity and touching facets."""
+        touching = self.touch(self.rest.points).stencils
+        stencils = (self.hinges, self.model.bars, self.drive_stencil[None], touching)
         return Assembly(len(self.model.points), stencils, self._held)
 
-    def _bars(self, points: Floats) -> Floats:
+    def bar_vectors(self, points: Floats) -> Floats:
+        """(B, 3) from the first to the second end of each bar."""
         return np.asarray(points[self.model.bars[:, 1]] - points[self.model.bars[:, 0]])
 
-    def _gather(self, bend: Floats, pull: Floats, drive: Floats) -> Floats:
-        """The free coordinates of the sums at the vertices of hinge, bar and drive vectors."""
-        return self.assembly.gather([bend, np.stack([-pull, pull], axis=1), drive])
+    def _gather(self, bend: Floats, pull: Floats, drive: Floats, push: Floats) -> Floats:
+        """The free coordinates of the sums at vertices of hinge, bar, drive and push vectors."""
+        return self.assembly.gather([bend, np.stack([-pull, pull], axis=1), drive, push])
 
     @cached_property
     def _held(self) -> Ints:

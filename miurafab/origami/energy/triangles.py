@@ -1,21 +1,16 @@
 """Facets of any shape split into triangles on their short diagonals, about which they bend.
 
 A quad is split on its shorter diagonal; if it is not convex, on the diagonal from its reflex
-corner, which lies inside. From a facet of more corners, ears are cut one by one: of the convex
-corners whose triangle holds no other corner, that with the shortest diagonal across it.
+corner, which lies inside. A facet of more corners is split so that its worst triangle is as good
+as can be: the triangle of the least area for the square of its longest side.
 """
 
 from __future__ import annotations
-
-import itertools
 
 import numpy as np
 
 from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.polygons import edge_lengths, facet_normals
-
-_THIN = 1e-9
-"""Of the area of its facet; a thinner triangle is no ear."""
 
 
 def split_facets(points: Floats, faces: Ints) -> tuple[Ints, Ints]:
@@ -32,10 +27,12 @@ def split_facets(points: Floats, faces: Ints) -> tuple[Ints, Ints]:
         diagonals.append(q[:, [0, 2]])
         owners.append(np.flatnonzero(size == 4))
     for face in np.flatnonzero(size > 4).tolist():
-        ears = _ears(points, faces[face, : size[face]].tolist())
-        triangles.append(np.array(ears))
-        diagonals.append(np.array([[after, before] for before, _, after in ears[:-1]]))
-        owners.append(np.full(len(ears) - 1, face))
+        corners = faces[face, : size[face]].tolist()
+        found = _best(points, corners)
+        triangles.append(np.array(found))
+        # the longest run is the whole facet, whose last side is no diagonal
+        diagonals.append(np.array([[last, first] for first, _, last in found[1:]]))
+        owners.append(np.full(len(found) - 1, face))
     order = np.argsort(np.concatenate(owners), kind="stable")
     return np.concatenate(triangles), np.concatenate(diagonals)[order]
 
@@ -54,32 +51,41 @@ def _turned(points: Floats, q: Ints) -> Ints:
     return np.where(across[:, None], np.roll(q, -1, axis=1), q)
 
 
-def _ears(points: Floats, rest: list[int]) -> list[list[int]]:
-    """The triangles of the polygon ``rest``, each with its ear in the middle; the last is left."""
-    normal = facet_normals(points, np.array([rest]))[0]
-    fan = np.array([[rest[0], *pair] for pair in itertools.pairwise(rest[1:])])
-    thin = _THIN * float(_areas(points, fan, normal).sum())
-    ears = []
-    while len(rest) > 3:
-        corners = np.stack([np.roll(rest, 1), rest, np.roll(rest, -1)], axis=1)
-        across = edge_lengths(points, corners[:, [0, 2]])
-        area = _areas(points, corners, normal)
-        sound = area > thin
-        for at in np.flatnonzero(sound).tolist():
-            others = np.setdiff1d(rest, corners[at])
-            sides = np.stack([corners[at], np.roll(corners[at], -1)], axis=1)
-            inside = np.ones(len(others), dtype=bool)
-            for side in sides:
-                three = np.column_stack([np.tile(side, (len(others), 1)), others])
-                inside &= _areas(points, three, normal) >= -thin
-            sound[at] = not inside.any()
-        ear = int(np.argmin(np.where(sound, across, np.inf))) if sound.any() else int(area.argmax())
-        ears.append(corners[ear].tolist())
-        rest = rest[:ear] + rest[ear + 1 :]
-    return [*ears, rest]
+def _best(points: Floats, face: list[int]) -> list[list[int]]:
+    """The triangles of the polygon ``face`` whose worst triangle is the best of all ways.
+
+    Dynamic programming over the runs of corners i..j: the best worst triangle of a run is known
+    from those of the two runs that a third corner parts it into (Klincsek 1980). Where all
+    triangles run round, they cover the polygon once, so diagonals lie inside.
+    """
+    normal = facet_normals(points, np.array([face]))[0]
+    count = len(face)
+    corners = points[face]
+    best = np.full((count, count), np.inf)
+    third = np.zeros((count, count), dtype=np.int64)
+    for run in range(2, count):
+        for i in range(count - run):
+            j = i + run
+            between = np.arange(i + 1, j)
+            worst = np.minimum(best[i, between], best[between, j])
+            worst = np.minimum(worst, _shapes(corners, i, between, j, normal))
+            third[i, j] = between[np.argmax(worst)]
+            best[i, j] = worst.max()
+    triangles, runs = [], [(0, count - 1)]
+    while runs:
+        i, j = runs.pop()
+        if j - i > 1:
+            k = int(third[i, j])
+            triangles.append([face[i], face[k], face[j]])
+            runs += [(i, k), (k, j)]
+    return triangles
 
 
-def _areas(points: Floats, triangles: Ints, normal: Floats) -> Floats:
-    """(n,) twice the areas of ``triangles`` (n, 3), positive where they run round ``normal``."""
-    p = points[triangles]
-    return np.asarray(vector_product(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) @ normal)
+def _shapes(corners: Floats, i: int, between: Ints, j: int, normal: Floats) -> Floats:
+    """Twice the area over the square of the longest side, of triangles i, ``between``, j."""
+    a, c = corners[i], corners[j]
+    b = corners[between]
+    area = vector_product(b - a, c - a) @ normal
+    sides = [((b - a) ** 2).sum(axis=1), ((c - b) ** 2).sum(axis=1)]
+    longest = np.maximum(np.maximum(*sides), ((c - a) ** 2).sum())
+    return np.asarray(np.where(longest > 0, area / np.where(longest > 0, longest, 1.0), -np.inf))

@@ -17,7 +17,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.path import NEARLY_FLAT, main_crease, path_of, towards, trace
 from miurafab.origami.energy.pieces import part_of, piece_models
-from miurafab.origami.folding.kinematics import FoldingMotion
+from miurafab.origami.folding.kinematics import FROM_FOLDED, FoldingMotion
 from miurafab.origami.folding.laying import laid_on_each_other
 
 
@@ -60,4 +60,4 @@ def bending_motion(
             turned[frame, model.creases_edges] = hinge_angles(points, model.creases)
     states = states[:count][::-1]
     frames = laid_on_each_other(pattern, states, frames)
-    return FoldingMotion(pattern, states, frames, turned, mismatch=None)
+    return FoldingMotion(pattern, states, frames, turned, mismatch=None, method=FROM_FOLDED)

@@ -31,9 +31,12 @@ from miurafab.origami.folding.multipliers import fold_angle_multipliers
 RIGID = 1e-6
 """The loop mismatch, in mean edges, up to which a sheet folds rigidly."""
 
-
 FOLDED_FLAT = np.pi - 1e-6
 """Larger fold angles in a file count as 180 degrees."""
+
+CLOSED_FORM = "closed form"
+FROM_FOLDED = "from the folded form"
+FROM_FLAT = "from flat"
 
 _POINT = 1e-6  # of the mean edge; a shorter crease has no direction
 
@@ -47,7 +50,8 @@ class FoldingMotion(Shown):
     pattern : CreasePattern
         The pattern that folds, with V vertices and E edges.
     states : (T,) float64
-        The state s of each frame: 0 is flat, 1 the folded form, infinity folded flat.
+        The state s of each frame: 0 is flat, 1 the folded form, infinity folded flat. Of a motion
+        from flat, the part of the fold angles that the creases strive for.
     frames : (T, V, 3) float64
         The vertices in each frame, mm.
     fold_angles : (T, E) float64
@@ -55,6 +59,9 @@ class FoldingMotion(Shown):
     mismatch : (T,) float64 or None
         The loop mismatch of each frame in mean edges; None where facets bend, so that loops close
         by construction.
+    method : str
+        How it was found: :data:`CLOSED_FORM`, :data:`FROM_FOLDED` by bending the facets of the
+        folded form, or :data:`FROM_FLAT` by turning all creases together.
     """
 
     pattern: CreasePattern
@@ -62,6 +69,7 @@ class FoldingMotion(Shown):
     frames: Floats
     fold_angles: Floats
     mismatch: Floats | None
+    method: str = CLOSED_FORM
 
     def _summary(self) -> str:
         kind = "bending" if self.mismatch is None else "rigid" if self.is_rigid else "not rigid"

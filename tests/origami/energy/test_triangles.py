@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -48,14 +50,31 @@ def test_a_quad_is_split_on_its_shorter_diagonal_and_a_dart_inside() -> None:
         assert set(diagonals[0].tolist()) == expected
 
 
-def test_ears_are_cut_at_the_shortest_diagonals() -> None:
-    """A rectangle with a small corner cut off loses that corner first."""
-    flat = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 2.5], [3.5, 3.0], [0.0, 3.0]])
-    _, diagonals = split_facets(in_space(flat), np.arange(5)[None])
-    assert {frozenset(pair) for pair in diagonals.tolist()} == {
-        frozenset({1, 3}),
-        frozenset({0, 3}),
-    }
+def all_splits(corners: list[int]) -> Iterator[list[list[int]]]:
+    """Every way to split a polygon into triangles."""
+    if len(corners) < 3:
+        yield []
+        return
+    for k in range(1, len(corners) - 1):
+        for left in all_splits(corners[: k + 1]):
+            for right in all_splits(corners[k:]):
+                yield [*left, [corners[0], corners[k], corners[-1]], *right]
+
+
+def worst_shape(flat: np.ndarray, triangles: np.ndarray) -> float:
+    sides = np.linalg.norm(flat[triangles] - flat[np.roll(triangles, 1, axis=1)], axis=2)
+    return float((2 * signed_areas(flat[triangles]) / sides.max(axis=1) ** 2).min())
+
+
+@settings(max_examples=20, deadline=None)
+@given(corners=st.integers(5, 7), seed=st.integers(0, 2**32 - 1))
+def test_the_worst_triangle_is_the_best_of_all_splits(corners: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    turn = 2 * np.pi * (np.arange(corners) + random.uniform(0, 0.4, corners)) / corners
+    flat = random.uniform(0.2, 1.0, (corners, 1)) * np.column_stack([np.cos(turn), np.sin(turn)])
+    triangles, _ = split_facets(in_space(flat), np.arange(corners)[None])
+    every = [worst_shape(flat, np.array(way)) for way in all_splits(list(range(corners)))]
+    assert worst_shape(flat, triangles) == pytest.approx(max(every), abs=1e-12)
 
 
 def test_corners_on_a_straight_side_leave_no_triangle_without_width() -> None:

@@ -1,0 +1,152 @@
+"""A sheet whose creases want to fold: their rest angles go along a ramp, and nothing is driven.
+
+At the part t of the ramp a crease rests at t rho_0, with rho_0 its fold angle in the pattern.
+Angles are counted on from the last state, so that half a turn can be reached and not be passed:
+beyond ``LIMIT`` a stiff spring pushes back, as the other facet would.
+
+Flat is where very many motions meet. K is indefinite there, and Newton's iteration goes to one of
+the saddles. :func:`descend` leaves out what makes K indefinite (Gauss-Newton): the energy is a sum
+of squares of fold angles and of strains, and only the tension of bars is kept beside their squares,
+
+    K = sum k grad rho grad rho' + sum n n' / delta + max(f, 0) / L + mu I,
+
+with mu after Levenberg and Marquardt. So it only ever lowers the energy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from miurafab.geometry.arrays import Floats
+from miurafab.geometry.sparse import factor_symmetric
+from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, stretch_blocks
+from miurafab.origami.energy.hinges import hinge_angles, hinge_gradients
+
+LIMIT = np.pi - 0.01
+"""Beyond this fold angle a facet meets its neighbour."""
+LIMIT_STIFFNESS = 1.0
+"""Of the spring beyond the limit, for the length of its hinge: that of a facet."""
+LARGEST_TURN = 1.0
+"""Radians by which one step of a descent may turn a hinge."""
+LARGEST_MOVE = 0.3
+"""Mean edges by which one step of a descent may move a vertex."""
+FIRST_MU, LEAST_MU, GREATEST_MU = 1e-3, 1e-12, 1e6
+SHARPER, BLUNTER = 1.0 / 3.0, 4.0
+"""The factors on mu after a step that is taken, and after one that is not."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ramped(Balance):
+    """A model whose hinges rest at the part ``target`` of their rest angles.
+
+    ``last`` (H,) are the fold angles of the last accepted state, from which angles are counted on.
+    It is the one array that changes, by :meth:`accept`.
+    """
+
+    last: Floats = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        if not len(self.last):
+            object.__setattr__(self, "last", np.zeros(len(self.model.hinges)))
+
+    def angles(self, points: Floats) -> Floats:
+        """(H,) the fold angles at ``points`` (V, 3), counted on from the last state."""
+        return self._counted_on(hinge_angles(points, self.hinges))
+
+    def accept(self, points: Floats) -> None:
+        """Count angles on from ``points`` (V, 3)."""
+        self.last[:] = self.angles(points)
+
+    def state(self, points: Floats) -> EquilibriumState:
+        """The state at ``points`` (V, 3) whose bars pull by their strain; all have a compliance."""
+        return EquilibriumState(points, self.model.strains(points) / self.model.compliance, 0.0)
+
+    def moments(self, angle: Floats, target: float) -> tuple[Floats, Floats]:
+        """The moments and slopes of hinges, with the springs beyond the limit."""
+        angle = self._counted_on(angle)
+        over = angle - np.clip(angle, -LIMIT, LIMIT)
+        moment = self.model.stiffness * (angle - target * self.model.rest) + self._stop * over
+        return moment, self.model.stiffness + np.where(over != 0, self._stop, 0.0)
+
+    def energy(self, points: Floats, target: float) -> float:
+        """The energy of hinges, limits and bars at ``points`` (V, 3)."""
+        model = self.model
+        angle = self.angles(points)
+        over = angle - np.clip(angle, -LIMIT, LIMIT)
+        bend = model.stiffness * (angle - target * model.rest) ** 2 + self._stop * over**2
+        soft = model.compliance > 0
+        strain = model.strains(points)[soft]
+        return 0.5 * float(bend.sum() + (strain**2 / model.compliance[soft]).sum())
+
+    def gauss_newton(self, points: Floats, target: float) -> tuple[Floats, sparse.csc_array]:
+        """The gradient of the energy at ``points`` (V, 3), and K without mu."""
+        model = self.model
+        angle, turn = hinge_gradients(points, self.hinges)
+        moment, slope = self.moments(angle, target)
+        bars = self.bar_vectors(points) / model.lengths[:, None]
+        forces = model.strains(points) / model.compliance
+        pull = forces[:, None] * bars
+        touch = self.touch(points)
+        bend = moment[:, None, None] * turn
+        pulls = np.stack([-pull, pull], axis=1)
+        gradient = self.assembly.gather([bend, pulls, np.zeros((0, 3)), touch.forces])
+        outer = turn[:, :, None, :, None] * turn[:, None, :, None, :]
+        block = bars[:, :, None] * bars[:, None, :] / model.compliance[:, None, None]
+        block += (np.maximum(forces, 0.0) / model.lengths)[:, None, None] * np.eye(3)
+        bent = slope[:, None, None, None, None] * outer
+        stretched = stretch_blocks(block)
+        none = np.zeros((1, 0, 0, 3, 3))
+        return gradient, self.assembly.matrix([bent, stretched, none, touch.stiffness])
+
+    def _counted_on(self, angle: Floats) -> Floats:
+        """``angle`` (H,) in (-pi, pi], with the whole turns nearest to the last state."""
+        return np.asarray(angle + 2 * np.pi * np.round((self.last - angle) / (2 * np.pi)))
+
+    @cached_property
+    def _stop(self) -> Floats:
+        ends = self.model.points[self.hinges[:, :2]]
+        return np.asarray(LIMIT_STIFFNESS * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
+
+class Descent(NamedTuple):
+    """Where a descent ended: ``points`` (V, 3), and the largest component of the ``force``."""
+
+    points: Floats
+    force: float
+
+
+def descend(ramped: Ramped, points: Floats, target: float, force: float, rounds: int) -> Descent:
+    """Lower the energy from ``points`` (V, 3) until no force is above ``force``.
+
+    It takes at most ``rounds`` steps. All bars need a compliance. ``ramped`` accepts each step.
+    """
+    energy, mu = ramped.energy(points, target), FIRST_MU
+    gradient, matrix = ramped.gauss_newton(points, target)
+    for _ in range(rounds):
+        if np.abs(gradient).max(initial=0.0) <= force or mu > GREATEST_MU:
+            break
+        raised = raised_diagonal(matrix, mu)
+        step = ramped.assembly.vectors(-factor_symmetric(raised, reorder=False).solve(gradient))
+        trial = points + step
+        turned = np.abs(ramped.angles(trial) - ramped.last).max(initial=0.0)
+        short = turned <= LARGEST_TURN and np.abs(step).max() <= LARGEST_MOVE
+        lower = ramped.energy(trial, target) if short else np.inf
+        if lower < energy:
+            points, energy, mu = trial, lower, max(mu * SHARPER, LEAST_MU)
+            ramped.accept(points)
+            gradient, matrix = ramped.gauss_newton(points, target)
+        else:
+            mu *= BLUNTER
+    return Descent(points, float(np.abs(gradient).max(initial=0.0)))
+
+
+def raised_diagonal(matrix: sparse.csc_array, by: float) -> sparse.csc_array:
+    """``matrix`` plus ``by`` times the unit matrix; its diagonal is stored."""
+    columns = np.repeat(np.arange(matrix.shape[1]), np.diff(matrix.indptr))
+    data = matrix.data + np.where(matrix.indices == columns, by, 0.0)
+    return sparse.csc_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)

@@ -1,0 +1,82 @@
+"""What a person should know of a motion: whether facets bend, stretch or meet, and how it ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from miurafab.findings import Finding
+from miurafab.origami.folding.angles_csv import Contact
+from miurafab.origami.folding.certificate import MOVED, RigidCertificate
+from miurafab.origami.folding.kinematics import FROM_FLAT
+from miurafab.origami.folding.motion import FoundMotion
+from miurafab.origami.folding.ramp_motion import RampVerdict
+
+STRETCH = 1e-4
+"""Paper tears at a few hundredths; below this nobody sees that a side stretches."""
+DRAWN = 1e-4
+"""A residual up to this may come from the rounding of a drawing."""
+HELD_BACK = math.radians(30.0)
+"""A mean distance from the fold angles asked for that is worth a remark."""
+
+
+def motion_findings(found: FoundMotion, contacts: Sequence[Contact]) -> tuple[Finding, ...]:
+    """The findings of a motion and of the frames in which it meets itself."""
+    return tuple(_findings(found, contacts))
+
+
+def _findings(found: FoundMotion, contacts: Sequence[Contact]) -> Iterator[Finding]:
+    motion, verdict = found.motion, found.verdict
+    if found.certificate is not None and not found.certificate.rigid:
+        yield _bends(found.certificate, motion.method == FROM_FLAT)
+    if verdict is not None:
+        yield from _of_ramp(verdict, float(motion.states[-1]))
+    if contacts:
+        frames = f"{len(contacts)} of {len(motion.frames)} positions"
+        yield Finding("contacts", f"On the way facets pass through each other in {frames}.")
+
+
+def _bends(certificate: RigidCertificate, from_flat: bool) -> Finding:
+    where = f"at {certificate.state:.0%} of its fold angles" if from_flat else "half-way"
+    if certificate.moved > MOVED:
+        turn = math.degrees(certificate.moved)
+        why = f"the nearest shape with flat facets has a crease turned by {turn:.2g} degrees more"
+    else:
+        why = f"the nearest shape with flat facets misses by {certificate.residual:.2g}"
+    rounding = ""
+    if certificate.residual <= DRAWN and certificate.moved <= MOVED:
+        rounding = "; so little may be the rounding of the drawing"
+    return Finding(
+        "bent-facets",
+        f"The sheet does not fold rigidly, so its facets bend: {where} {why}{rounding}.",
+    )
+
+
+def _of_ramp(verdict: RampVerdict, last: float) -> Iterator[Finding]:
+    if not verdict.complete:
+        yield Finding(
+            "way-lost",
+            f"The motion ends at {last:.0%} of the fold angles: beyond, no balance was found.",
+        )
+    if len(verdict.wrong_edges):
+        yield Finding(
+            "wrong-signs",
+            f"{verdict.wrong_signs:.1%} of the folds end on the other side than their letter "
+            f"tells, the first being edge {verdict.wrong_edges[0]}.",
+            tuple(verdict.wrong_edges.tolist()),
+        )
+    if verdict.strain.max() > STRETCH:
+        yield Finding(
+            "stretched",
+            f"On the way a side changes its length by up to {verdict.strain.max():.2g}: paper that "
+            "does not stretch would lock.",
+        )
+    if verdict.unstable.any():
+        frames = f"{int((verdict.unstable > 0).sum())} of {len(verdict.unstable)} positions"
+        yield Finding("unstable", f"In {frames} the sheet is not stable and would snap away.")
+    if verdict.angle_error > HELD_BACK:
+        yield Finding(
+            "held-back",
+            f"Creases stay {math.degrees(verdict.angle_error):.0f} degrees away, in the mean, from "
+            "the fold angles asked for: these do not go together.",
+        )

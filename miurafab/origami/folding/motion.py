@@ -1,0 +1,106 @@
+"""The motion of a pattern by whatever way applies to it, and what is known of it.
+
+1. *Closed form*: tangents of half fold angles keep their ratios. It is the motion if every loop
+   closes, as in sheets that are flat-foldable with vertices of degree four.
+2. *From the folded form*, if the file holds one: one crease is driven, facets bend.
+3. *From flat*, by mountains and valleys alone: all creases together. This is for any pattern.
+
+That the closed form does not close says nothing about other motions. So of the ways 2 and 3 it is
+certified whether all facets can stay flat (:mod:`miurafab.origami.folding.certificate`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from miurafab.errors import InputError, PatternError
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.bending import bending_motion
+from miurafab.origami.folding.certificate import RigidCertificate, certified
+from miurafab.origami.folding.kinematics import (
+    FoldingMotion,
+    first_facets,
+    half_tangents,
+    place,
+    rigid_motion,
+    states_between,
+)
+from miurafab.origami.folding.ramp_motion import MOST_WRONG, RampVerdict, ramp_motion
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class FoundMotion:
+    """A ``motion`` with what is known of it.
+
+    ``mismatch`` is that of the closed form, in mean edges, or None where it says nothing; the
+    ``certificate`` is None where the closed form is the motion, and the ``verdict`` where the
+    motion does not start from flat.
+    """
+
+    motion: FoldingMotion
+    mismatch: float | None
+    verdict: RampVerdict | None = None
+    certificate: RigidCertificate | None = None
+
+
+def find_motion(
+    pattern: CreasePattern, steps: int = 40, on_progress: Progress | None = None
+) -> FoundMotion:
+    """The motion of ``pattern`` in ``steps`` steps.
+
+    Raises :class:`~miurafab.errors.PatternError` for a pattern whose facets are not joined, in
+    which nothing folds, or whose folds do not go together.
+    """
+    first_facets(pattern, place(pattern, np.zeros((1, len(pattern.edges_vertices)))).depth)
+    mismatch = None
+    if _has_closed_form(pattern):
+        motion = rigid_motion(pattern, states_between(pattern, steps))
+        assert motion.mismatch is not None
+        mismatch = float(motion.mismatch.max())
+        if motion.is_rigid:
+            return FoundMotion(motion, mismatch)
+    bent = _bent(pattern, steps, on_progress)
+    if bent is not None:
+        motion, certificate = certified(bent)
+        return FoundMotion(motion, mismatch, None, certificate)
+    motion, verdict = ramp_motion(pattern, steps, on_progress)
+    if verdict.wrong_signs > MOST_WRONG:
+        raise _sequence(verdict)
+    motion, certificate = certified(motion)
+    return FoundMotion(motion, mismatch, verdict, certificate)
+
+
+def _has_closed_form(pattern: CreasePattern) -> bool:
+    try:
+        half_tangents(pattern)
+    except PatternError:  # a vertex to which the law of degree four does not apply
+        return False
+    return True
+
+
+def _bent(pattern: CreasePattern, steps: int, on_progress: Progress | None) -> FoldingMotion | None:
+    """The motion from the folded form; None without one, or where it is in no balance."""
+    if pattern.folded_coords is None:
+        return None
+    try:
+        return bending_motion(pattern, steps, on_progress)
+    except (InputError, PatternError):
+        return None
+
+
+def _sequence(verdict: RampVerdict) -> PatternError:
+    edge = int(verdict.wrong_edges[0])
+    early = ""
+    if verdict.seed_signs < 1:
+        early = f" ({1 - verdict.seed_signs:.0%} of them already as they leave the plane)"
+    return PatternError(
+        f"The pattern does not fold in one motion: with all creases turning together, "
+        f"{verdict.wrong_signs:.0%} of its folds end on the other side than their letter "
+        f"tells{early}, the first being edge {edge}. Either letters are wrong, or it folds in a "
+        "sequence, crease after crease, like a crane; fold its steps as patterns of their own."
+    )

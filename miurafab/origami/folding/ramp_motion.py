@@ -1,0 +1,136 @@
+"""The motion of any crease pattern from flat, piece by piece, and what it says of the pattern.
+
+Each piece goes its own way along the same ramp (:mod:`miurafab.origami.folding.from_flat`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from miurafab.errors import PatternError
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.bar_hinge import has_folds
+from miurafab.origami.energy.hinges import hinge_angles
+from miurafab.origami.energy.pieces import part_of
+from miurafab.origami.folding.from_flat import RampPath, fold_from_flat, ramp_parts
+from miurafab.origami.folding.kinematics import FROM_FLAT, FoldingMotion
+from miurafab.origami.folding.laying import laid_on_each_other
+from miurafab.origami.piece import Piece, pieces_of
+
+MOST_WRONG = 0.02
+"""A pattern with more creases of the wrong sign does not fold in one motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class RampVerdict:
+    """What the motion from flat says of a pattern.
+
+    ``wrong_edges`` end folded to the other side than their letter tells, the part ``wrong_signs``
+    of all folds; the part ``seed_signs`` of them follow their letter as they leave flat.
+    ``unstable`` (T,) is the number of directions in which each frame is no minimum of the energy,
+    ``strain`` (T,) the largest relative change of a side, ``angle_error`` the mean distance from
+    the fold angles asked for in the last frame, radians, and ``snaps`` the number of jumps. If
+    ``complete`` is False the way was lost before its end.
+    """
+
+    wrong_edges: Ints
+    wrong_signs: float
+    seed_signs: float
+    unstable: Ints
+    strain: Floats
+    angle_error: float
+    snaps: int
+    complete: bool
+
+
+def ramp_motion(
+    pattern: CreasePattern,
+    steps: int = 20,
+    on_progress: Callable[[float, str], None] | None = None,
+) -> tuple[FoldingMotion, RampVerdict]:
+    """The motion of ``pattern`` from flat, all creases together, and its verdict.
+
+    ``states`` are the parts of the fold angles of the pattern that creases strive for. Creases of
+    half a turn go to nine tenths of it. If the solver loses the path, the motion ends there. Raises
+    :class:`~miurafab.errors.PatternError` for a pattern in which nothing folds, for one whose
+    facets are too thin to bend, and for one that the solver cannot bring out of the plane.
+    """
+    pieces = pieces_of(pattern)
+    folding = [piece for piece in pieces if has_folds(piece.pattern)]
+    if not folding:
+        raise PatternError(
+            "The pattern has no mountain or valley between two facets, so nothing folds; give its "
+            "creases the letters M and V."
+        )
+    parts = ramp_parts(pattern, steps)
+    paths = []
+    for number, piece in enumerate(folding):
+        progress = part_of(on_progress, number, len(folding))
+        paths.append(fold_from_flat(piece.pattern, parts, on_progress=progress))
+    count = min(len(path.frames) for path in paths)
+    if not count:
+        raise _stuck(paths)
+    flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
+    frames = np.repeat(flat[None], count + 1, axis=0)
+    angles = np.zeros((count + 1, len(pattern.edges_vertices)))
+    for piece, path in zip(folding, paths, strict=True):
+        _enter(frames, angles, piece, path)
+    states = parts[: count + 1]
+    frames = laid_on_each_other(pattern, states, frames)
+    motion = FoldingMotion(pattern, states, frames, angles, mismatch=None, method=FROM_FLAT)
+    return motion, _verdict(folding, paths, count)
+
+
+def _enter(frames: Floats, angles: Floats, piece: Piece, path: RampPath) -> None:
+    """Put the frames of a ``path`` in their places in ``frames`` and ``angles``."""
+    model = path.model
+    edges = piece.edges[model.creases_edges]
+    for number, frame in enumerate(path.frames[: len(frames) - 1], 1):
+        frames[number, piece.vertices] = frame.points * model.unit_mm
+        turned = hinge_angles(frame.points, model.creases)
+        before = angles[number - 1, edges]
+        angles[number, edges] = turned + 2 * np.pi * np.round((before - turned) / (2 * np.pi))
+
+
+def _verdict(folding: list[Piece], paths: list[RampPath], count: int) -> RampVerdict:
+    wrong = [_wrong_edges(*pair) for pair in zip(folding, paths, strict=True)]
+    folds = sum(len(path.sprung) for path in paths)
+    errors = [path.angle_error * len(path.sprung) for path in paths]
+    unstable = np.zeros(count + 1, dtype=np.int64)
+    strain = np.zeros(count + 1)
+    for path in paths:
+        for number, frame in enumerate(path.frames[:count], 1):
+            unstable[number] += frame.unstable
+            stretch = float(np.abs(path.model.strains(frame.points)).max())
+            strain[number] = max(strain[number], stretch)
+    return RampVerdict(
+        wrong_edges=np.concatenate(wrong),
+        wrong_signs=sum(len(edges) for edges in wrong) / folds,
+        seed_signs=sum(int(path.follow.sum()) for path in paths) / folds,
+        unstable=unstable,
+        strain=strain,
+        angle_error=sum(errors) / folds,
+        snaps=sum(path.snaps for path in paths),
+        complete=all(path.converged for path in paths),
+    )
+
+
+def _wrong_edges(piece: Piece, path: RampPath) -> Ints:
+    """The edges of the whole pattern that end with the wrong sign."""
+    inner = np.flatnonzero((piece.pattern.edges_faces >= 0).all(axis=1))
+    sprung = inner[np.isin(piece.pattern.edges_assignment[inner], ("M", "V"))]
+    sprung = sprung[piece.pattern.edges_fold_angle[sprung] != 0]
+    return np.asarray(piece.edges[sprung[path.wrong]])
+
+
+def _stuck(paths: list[RampPath]) -> PatternError:
+    follow = np.concatenate([path.follow for path in paths])
+    return PatternError(
+        f"The pattern could not be brought out of the plane: {1 - follow.mean():.0%} of its folds "
+        "cannot start to the side that their letter tells. Either letters are wrong, or it folds "
+        "in a sequence, crease after crease, which one motion of all creases cannot show."
+    )

@@ -1,0 +1,209 @@
+"""Patterns that fold from flat by mountains and valleys alone, against what is known of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import flat_patterns
+import numpy as np
+import pytest
+
+from miurafab.errors import PatternError
+from miurafab.geometry.polygons import edge_lengths
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.bar_hinge import flat_model
+from miurafab.origami.energy.hinges import hinge_angles
+from miurafab.origami.energy.seed import linear_seed
+from miurafab.origami.folding.certificate import certified
+from miurafab.origami.folding.from_flat import FIRMER, fold_from_flat, ramp_parts
+from miurafab.origami.folding.judge_motion import motion_findings
+from miurafab.origami.folding.kinematics import CLOSED_FORM, FROM_FLAT, facet_strain
+from miurafab.origami.folding.motion import find_motion
+from miurafab.origami.folding.ramp_motion import ramp_motion
+
+RIGID = {
+    "waterbomb base": flat_patterns.waterbomb_base,
+    "bird base": flat_patterns.bird_base,
+    "Yoshimura": lambda: flat_patterns.yoshimura(4, 4),
+    "Kresling": lambda: flat_patterns.kresling(4, 3),
+    "waterbombs": lambda: flat_patterns.waterbombs(3, 2),
+    "Resch": lambda: flat_patterns.resch(3, 2),
+}
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_a_known_pattern_folds_with_flat_facets(name: str) -> None:
+    pattern = RIGID[name]()
+    found = find_motion(pattern, 10)
+    motion, verdict, certificate = found.motion, found.verdict, found.certificate
+    assert motion.method == FROM_FLAT
+    assert motion.is_rigid
+    assert verdict is not None
+    assert certificate is not None
+    assert certificate.rigid
+    assert certificate.residual <= 1e-12
+    assert verdict.complete
+    assert not len(verdict.wrong_edges)
+    assert verdict.seed_signs == 1.0
+    assert not verdict.unstable.any()
+    assert motion_findings(found, ()) == ()
+    assert facet_strain(pattern, motion.frames).max() <= 1e-12
+    assert motion.mismatch is not None
+    assert motion.mismatch.max() <= 1e-11  # the facets placed one by one at the fold angles
+    # flat at first, then farther at every step
+    assert np.ptp(motion.frames[0, :, 2]) <= 1e-9
+    assert (np.diff(np.abs(motion.fold_angles).mean(axis=1)) > 0).all()
+
+
+def test_a_waterbomb_base_folds_as_spherical_trigonometry_says() -> None:
+    """With q = sin(rho_M / 2), cos rho_V = 2 (1 - q^2) / (1 + q^2) - 1: M -60, V 78.46 degrees."""
+    pattern = flat_patterns.waterbomb_base()
+    motion = find_motion(pattern, 12).motion
+    mountains = motion.fold_angles[1:, pattern.edges_assignment == "M"]
+    valleys = motion.fold_angles[1:, pattern.edges_assignment == "V"]
+    assert mountains == pytest.approx(mountains[:, :1].repeat(2, 1), abs=1e-9)
+    q2 = np.sin(mountains[:, :1] / 2) ** 2
+    wanted = np.arccos(2 * (1 - q2) / (1 + q2) - 1)
+    assert valleys == pytest.approx(wanted.repeat(4, 1), abs=1e-9)
+    q2 = math.sin(math.radians(30)) ** 2
+    assert math.degrees(math.acos(2 * (1 - q2) / (1 + q2) - 1)) == pytest.approx(78.463, abs=1e-3)
+
+
+def test_a_miura_ori_comes_to_its_closed_form_without_using_it() -> None:
+    """tan(rho_straight / 2) = cos(alpha) tan(rho_zigzag / 2) at every vertex and in every frame."""
+    pattern = flat_patterns.miura(4)
+    assert find_motion(pattern, 6).motion.method == CLOSED_FORM
+    motion, verdict = ramp_motion(pattern, 6)
+    motion, certificate = certified(motion)
+    assert certificate.rigid
+    assert not verdict.unstable.any()
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    across = np.abs(np.ptp(pattern.vertices_coords[pattern.edges_vertices], axis=1)[:, 0]) < 1e-9
+    half = np.tan(np.abs(motion.fold_angles[1:]) / 2)
+    straight, zigzag = half[:, inner & across], half[:, inner & ~across]
+    assert zigzag == pytest.approx(zigzag[:, :1].repeat(zigzag.shape[1], 1), abs=1e-9)
+    wanted = math.cos(math.radians(65)) * zigzag[:, :1]
+    assert straight == pytest.approx(wanted.repeat(straight.shape[1], 1), abs=1e-9)
+
+
+def test_a_vertex_that_is_not_flat_foldable_folds_rigidly_all_the_same() -> None:
+    """One vertex of degree four always does; its closed form is not that of flat-foldable ones."""
+    tips = [(math.cos(turn), math.sin(turn)) for turn in np.radians([0, 70, 150, 230])]
+    lines = flat_patterns.border(*tips)
+    letters = ("V", "V", "M", "V")
+    lines += [((0.0, 0.0), tip, letter, 60.0) for tip, letter in zip(tips, letters, strict=True)]
+    found = find_motion(flat_patterns.drawn(lines), 8)
+    assert found.mismatch is not None
+    assert found.mismatch > 1e-3
+    assert found.motion.is_rigid
+    assert found.certificate is not None
+    assert found.certificate.residual <= 1e-12
+
+
+def test_a_square_twist_bends_and_says_where() -> None:
+    found = find_motion(flat_patterns.square_twist(), 10)
+    assert not found.motion.is_rigid
+    assert found.certificate is not None
+    assert not found.certificate.rigid
+    assert found.verdict is not None
+    assert not len(found.verdict.wrong_edges)
+    assert found.verdict.complete
+    assert "bent-facets" in {finding.code for finding in motion_findings(found, ())}
+
+
+def inverted(pattern: CreasePattern, edge: int) -> CreasePattern:
+    letter, angle = pattern.edges_assignment.copy(), pattern.edges_fold_angle.copy()
+    letter[edge] = "M" if letter[edge] == "V" else "V"
+    angle[edge] *= -1
+    return replace(pattern, edges_assignment=letter, edges_fold_angle=angle)
+
+
+def test_a_wrong_letter_shows_as_the_sheet_leaves_the_plane() -> None:
+    pattern = flat_patterns.miura(4)
+    assert linear_seed(flat_model(pattern)).follow.all()
+    inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+    edge = int(inner[len(inner) // 2 - 3])
+    wrong = inverted(pattern, edge)
+    follow = linear_seed(flat_model(wrong)).follow
+    assert inner[~follow].tolist() == [edge]
+    with pytest.raises(PatternError, match=r"does not fold in one motion.* [0-9]+% of its folds"):
+        find_motion(wrong, 8)
+
+
+def test_a_frame_is_a_minimum_by_finite_differences() -> None:
+    """Every direction that keeps all lengths raises the energy of the bird base."""
+    pattern = flat_patterns.bird_base()
+    path = fold_from_flat(pattern, ramp_parts(pattern, 6))
+    frame, model = path.frames[3], path.model
+    assert frame.stiff
+    stiffness = model.stiffness * np.where(model.rest == 0, FIRMER, 1.0)
+
+    def lagrangian(x: np.ndarray, forces: np.ndarray) -> float:
+        points = x.reshape(-1, 3)
+        turned = hinge_angles(points, model.hinges) - frame.part * model.rest
+        return float(0.5 * stiffness @ turned**2 + forces @ model.strains(points))
+
+    size = frame.points.size
+    x, h, unit = frame.points.ravel(), 1e-4, np.eye(size)
+
+    def slope(of, x: np.ndarray) -> np.ndarray:
+        return np.array([(of(x + h * e) - of(x - h * e)) / (2 * h) for e in unit])
+
+    none = np.zeros(len(model.bars))
+    lengths = np.array(
+        [
+            (model.strains((x + h * e).reshape(-1, 3)) - model.strains((x - h * e).reshape(-1, 3)))
+            / (2 * h)
+            for e in unit
+        ]
+    ).T
+    forces = np.linalg.lstsq(lengths.T, -slope(lambda y: lagrangian(y, none), x), rcond=None)[0]
+    assert np.abs(slope(lambda y: lagrangian(y, forces), x)).max() <= 1e-6
+    hessian = np.array(
+        [
+            slope(
+                lambda y, e=e: (
+                    (lagrangian(y + h * e, forces) - lagrangian(y - h * e, forces)) / (2 * h)
+                ),
+                x,
+            )
+            for e in unit
+        ]
+    )
+    _, values, rows = np.linalg.svd(lengths)
+    free = rows[int((values > 1e-6).sum()) :]
+    inside = np.linalg.eigvalsh(free @ (hessian + hessian.T) @ free.T / 2)
+    assert (np.abs(inside[:6]) <= 1e-4).all()  # rigid motions of the whole
+    assert inside[6] > 1e-3
+
+
+def test_pieces_fold_each_by_itself() -> None:
+    lines = []
+    for shift in (0.0, 5.0):
+        for one, other, letter, angle in two_squares():
+            lines.append(((one[0] + shift, one[1]), (other[0] + shift, other[1]), letter, angle))
+    pattern = flat_patterns.drawn(lines)
+    motion, verdict = ramp_motion(pattern, 5)
+    assert pattern.pieces_count == 2
+    folds = np.isin(pattern.edges_assignment, ("M", "V"))
+    assert np.degrees(motion.fold_angles[-1, folds]) == pytest.approx([162.0, 162.0], abs=1e-6)
+    flat = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
+    assert edge_lengths(motion.frames[-1], pattern.edges_vertices) == pytest.approx(flat)
+    assert verdict.wrong_signs == 0
+
+
+def two_squares() -> list[flat_patterns.Line]:
+    sides = flat_patterns.border((0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (0, 1))
+    return [*sides, ((1.0, 0.0), (1.0, 1.0), "V", 180.0)]
+
+
+@pytest.mark.large
+@pytest.mark.parametrize("facets", [20, 30])
+def test_large_miuras_fold_from_flat(facets: int) -> None:
+    motion, verdict = ramp_motion(flat_patterns.miura(facets), 20)
+    motion, certificate = certified(motion)
+    assert certificate.rigid
+    assert certificate.residual <= 1e-12
+    assert not verdict.unstable.any()
+    assert not len(verdict.wrong_edges)
