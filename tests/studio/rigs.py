@@ -24,7 +24,8 @@ class Pumped:
     The configuration folder of the test names its port, so that a studio lists it.
     """
 
-    def __init__(self, *faults: str, speed: float = 1.0) -> None:
+    def __init__(self, *faults: str, speed: float = 1.0, limit: float = 120.0) -> None:
+        self._limit = limit
         self.bench = Bench(*faults, speed=speed)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._pump, daemon=True)
@@ -32,7 +33,7 @@ class Pumped:
 
     def _pump(self) -> None:
         with contextlib.suppress(AssertionError):  # the limit of a test that hangs
-            self.bench.run(self._over.is_set, 120.0)
+            self.bench.run(self._over.is_set, self._limit)
 
     def __enter__(self) -> Bench:
         self._thread.start()

@@ -33,6 +33,17 @@ def test_another_name_for_this_server_is_refused(host):
         assert sentence(refused(method, f"/{KEY}/", host=host), 421)
 
 
+def test_no_other_site_reads_and_nobody_opens_a_websocket():
+    host = f"127.0.0.1:{PORT}"
+    for origin in ("null", "https://evil.example", f"{ORIGIN}.evil.example", ""):
+        assert sentence(refused("GET", f"/{KEY}/machine", host=host, origin=origin), 403)
+    assert refused("GET", f"/{KEY}/machine", host=host, origin=ORIGIN) is None
+    for origin in ({}, {"origin": ORIGIN}):
+        assert sentence(refused("GET", f"/{KEY}/", host=host, upgrade="websocket", **origin), 400)
+    cross = {"host": host, "upgrade": "websocket", "origin": "https://evil.example"}
+    assert sentence(refused("GET", f"/{KEY}/machine", **cross), 403)
+
+
 @pytest.mark.parametrize(
     "path",
     ["/", "", "*", "/state", f"/{KEY}", f"/{KEY[:-1]}/", f"/{KEY}k/", f"//{KEY}/", f"/x/{KEY}/",

@@ -292,7 +292,9 @@ function listen() {
     event.preventDefault();
     if (byId("line").value.trim() && await order("say", { text: byId("line").value })) byId("line").value = "";
   });
-  byId("abort").addEventListener("click", abort);
+  // At the press and not at the release; a click without a press is one of the keyboard.
+  byId("abort").addEventListener("pointerdown", abort);
+  byId("abort").addEventListener("click", ({ detail }) => { if (detail === 0) abort(); });
   document.addEventListener("keydown", (event) => {
     if (event.key !== "Escape" || event.isComposing || event.repeat) return;
     abort();

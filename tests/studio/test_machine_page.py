@@ -1,0 +1,134 @@
+"""The tab Machine in a browser: arm, burn, hold, go on, abort from anywhere, and take over."""
+
+import threading
+
+import pytest
+from browser import CHROMIUM
+from rigs import ROWS
+from test_studio_page import Seen
+
+import miurafab
+from miurafab.studio.core import Studio
+from miurafab.studio.desk import Desk
+from miurafab.studio.guard import Guard
+from miurafab.studio.server import _Server
+from miurafab.studio.session import Bench
+from miurafab.workflow.page import write_page
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
+
+
+class AtDesk(Seen):
+    """The page, with the tab Machine in front."""
+
+    def click(self, name):
+        self.run(f"document.getElementById('{name}').click()")
+
+    def ready(self, name):
+        """Wait until a button can be pressed, and press it."""
+        self.until(f"!document.getElementById('{name}').disabled")
+        self.click(name)
+
+    def title(self, words):
+        self.until(f"document.getElementById('state-title').textContent === '{words}'", 30)
+
+    def escape(self):
+        for kind in ("keyDown", "keyUp"):
+            self.call(
+                "Input.dispatchKeyEvent",
+                type=kind, key="Escape", code="Escape", windowsVirtualKeyCode=27,
+            )  # fmt: skip
+
+    def burn(self):
+        """Arm, read, and start; until strokes are burnt."""
+        self.ready("arm")
+        self.until("!document.getElementById('armed').hidden")
+        assert self.run("document.activeElement.id") == "disarm"
+        self.click("start")
+        self.until("document.getElementById('strokes-bar').value > 2", 30)
+
+
+@pytest.fixture
+def studio(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    job = tmp_path / "rows.nc"
+    job.write_text(ROWS)
+    server = _Server(0, lambda: None)
+    guard = Guard(server.server_port, "k" * 32)
+    (tmp_path / "bench").mkdir()
+    desk = Desk(speed=3.0)
+    server.studio = Studio(Bench(tmp_path / "bench", None), guard, desk=desk, own_job=job)
+    serving = threading.Thread(target=server.serve_forever, args=(0.05,))
+    serving.start()
+    yield server.studio
+    desk.leave()
+    server.shutdown()
+    serving.join()
+    server.server_close()
+
+
+def test_a_sheet_is_burnt_held_and_aborted_from_every_screen(studio, tmp_path):
+    page_file = tmp_path / "drawing.html"
+    write_page(page_file, title="plane", pattern=miurafab.fit("plane", facets="4x4").pattern)
+    studio.bench.files["1", "drawing.html"] = page_file
+    address = studio.guard.address
+    with AtDesk(tmp_path / "profile") as page:
+        page.open(address)
+        page.until("document.documentElement.dataset.ready === 'yes'")
+        assert not page.run("document.getElementById('desk').hidden")  # it began with a job
+        assert page.run("document.getElementById('watch').hidden")
+        page.click("connect")
+        page.title("Ready")
+        page.ready("put-on")
+        page.until("!document.getElementById('job-work').hidden")
+        page.burn()
+        page.click("hold")
+        page.title("Held")
+        page.click("resume")
+        page.title("Moving")
+        assert not page.run("document.getElementById('abort').disabled")
+
+        page.click("shape-tab")
+        assert page.run("document.getElementById('abort').offsetParent !== null")
+        page.escape()
+        page.title("Alarm")
+        assert "press Unlock" in page.run("document.getElementById('state-advice').textContent")
+        page.click("desk-tab")
+        unlock = "#desk .buttons [data-do=unlock]"
+        page.run(f"document.querySelector({unlock!r}).click()")
+        page.title("Ready")
+
+        # Within a drawing that has the focus, the key works as well.
+        page.burn()
+        page.run(
+            "{ const frame = document.createElement('iframe'); frame.id = 'drawing';"
+            "frame.setAttribute('sandbox', 'allow-scripts'); frame.src = 'files/1/drawing.html';"
+            "document.getElementById('desk').prepend(frame);"
+            "frame.addEventListener('load', () => { frame.dataset.there = 'yes'; frame.focus(); });}"
+        )
+        page.until("document.getElementById('drawing').dataset.there === 'yes'")
+        assert page.run("document.activeElement.id") == "drawing"
+        page.escape()
+        page.title("Alarm")
+        page.run(f"document.querySelector({unlock!r}).click()")
+        page.title("Ready")
+
+        # The page dies in mid-job: the one that is opened then watches, and takes over.
+        page.burn()
+        page.open(address)
+        page.until("document.documentElement.dataset.ready === 'yes'")
+        page.until("!document.getElementById('watching').hidden")
+        assert page.run("document.getElementById('hold').disabled")
+        page.click("take")
+        page.until("document.getElementById('watching').hidden")
+        page.ready("hold")
+        page.title("Held")
+        for width in (1280, 768, 390):
+            page.call(
+                "Emulation.setDeviceMetricsOverride",
+                width=width, height=844, deviceScaleFactor=1, mobile=width < 600,
+            )  # fmt: skip
+            assert page.run("document.documentElement.scrollWidth") <= width
+        page.click("leave")
+        page.until("!document.getElementById('connect-form').hidden")
+        assert all(asked.startswith((address, "data:", "blob:")) for asked in page.requests)
