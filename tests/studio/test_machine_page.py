@@ -104,7 +104,7 @@ def test_a_sheet_is_burnt_held_and_aborted_from_every_screen(studio, tmp_path):
             "{ const frame = document.createElement('iframe'); frame.id = 'drawing';"
             "frame.setAttribute('sandbox', 'allow-scripts'); frame.src = 'files/1/drawing.html';"
             "document.getElementById('desk').prepend(frame);"
-            "frame.addEventListener('load', () => { frame.dataset.there = 'yes'; frame.focus(); });}"
+            "frame.onload = () => { frame.dataset.there = 'yes'; frame.focus(); }; }"
         )
         page.until("document.getElementById('drawing').dataset.there === 'yes'")
         assert page.run("document.activeElement.id") == "drawing"
