@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,7 +28,7 @@ from miurafab.options import File, Flag, Text, Whole, read_options
 from miurafab.profiles.own import own_defaults
 
 if TYPE_CHECKING:
-    from miurafab.machine.signals import StopSignals
+    from miurafab.machine.keys import Keys
     from miurafab.workflow.cut import Prepared
     from miurafab.workflow.cut_options import CutOptions
     from miurafab.workflow.cut_sheets import CutSheet
@@ -159,11 +159,13 @@ def _stream(
     from miurafab.workflow.dry_run import clock_text
 
     def before(number: int, count: int) -> None:
-        _wait(console, f"Sheet {number} of {count}: {_put_in(prepared, number)}, press Enter.")
+        request = f"Sheet {number} of {count}: {_put_in(prepared, number)}, press Enter."
+        _wait(console, keys, request)
 
     def after_frame(number: int) -> None:
         if waits:
-            _wait(console, f"That is the frame of sheet {number}; Enter cuts, Ctrl-C does not.")
+            request = f"That is the frame of sheet {number}; Enter cuts, Ctrl-C does not."
+            _wait(console, keys, request)
 
     attended = sys.stdin.isatty()
     waits = pause if pause is not None else port != "virtual" and attended
@@ -208,13 +210,13 @@ def _share(
 
     with console.progress("cutting") as bar, terminal_keys() as keys:
 
-        def before(number: int, port: str, signals: StopSignals) -> bool:
+        def before(number: int, port: str, over: Callable[[], bool]) -> bool:
             console.note(
                 f"Sheet {number} of {len(prepared.jobs)} at {port}: {_put_in(prepared, number)} "
                 "there, press Enter."
             )
             while not {"\n", "\r"} & set(keys.pressed()):
-                if signals.caught is not None:
+                if over():
                     return False
                 time.sleep(_LOOK_S)
             return True
@@ -309,10 +311,15 @@ def _hint_at_resume(console: Console, prepared: Prepared) -> Iterator[None]:
         raise
 
 
-def _wait(console: Console, request: str) -> None:
+def _wait(console: Console, keys: Keys, request: str) -> None:
     """Ask for Enter; the end of the input is nobody's."""
+    from miurafab.machine.keys import ConsoleKeys
+
     console.note(request)
-    if not sys.stdin.readline():
+    if isinstance(keys, ConsoleKeys):  # which can be looked at, and no signal ends a reading
+        while not {"\n", "\r"} & set(keys.pressed()):
+            time.sleep(_LOOK_S)
+    elif not sys.stdin.readline():
         raise PersonNeeded("Nobody pressed Enter, and the input has ended; nothing more was cut.")
 
 

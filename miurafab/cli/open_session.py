@@ -86,8 +86,7 @@ def open_(
     - or 100, power + or - or 100 act at once. However it ends, the machine is left dark.
     """
     from miurafab.machine.known_controller import require_talk
-    from miurafab.machine.session_process import SessionProcess
-    from miurafab.machine.signals import StopSignals
+    from miurafab.machine.session_process import SessionProcess, suspending_signals
     from miurafab.machine.transport import VIRTUAL, require_port
     from miurafab.profiles import read_machine
     from miurafab.workflow.at_machine import Operator
@@ -106,7 +105,7 @@ def open_(
     profile = read_machine(machine) if prepared is None else prepared.machine
     require_talk(profile.dialect)
     screen = sys.stdin.isatty() and sys.stdout.isatty() and not console.wants_json
-    with StopSignals() as signals:
+    with suspending_signals() as signals:
         signals.at_once = False
         speed = 1.0 if port == VIRTUAL and screen else None
         process = SessionProcess(profile, port, signals, speed)

@@ -3,7 +3,7 @@
 :func:`session_apart` does the work of :func:`~miurafab.machine.sender.session_here` in another
 process (:mod:`~miurafab.machine.session_process`), so that no fault of the user interface can hurt
 it. The starting program shows progress and asks the user. While it waits for the user, a thread of
-it tells the other process that it lives.
+it tells the other process that it lives, and ends the waiting when the session has ended.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from contextlib import contextmanager, nullcontext
 from functools import partial
 from typing import Any, Unpack
 
-from miurafab.errors import JobStopped, MachineError
+from miurafab.errors import JobStopped, MachineError, MiurafabError
 from miurafab.machine.keys import Keys, NoKeys
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.sender import Files, Progress, SheetSession, StreamResult
-from miurafab.machine.session_process import Outcome, SessionProcess
+from miurafab.machine.session_process import Outcome, SessionProcess, suspending_signals
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile
 
@@ -42,7 +42,7 @@ def session_apart(
     block stops the machine.
     """
     own = signals is None
-    with StopSignals() if signals is None else nullcontext(signals) as signals:
+    with suspending_signals() if signals is None else nullcontext(signals) as signals:
         signals.at_once = False
         session = _SessionApart(machine, port, keys or NoKeys(), virtual_speed, signals, own)
         try:
@@ -81,6 +81,10 @@ def stream_apart(
         return session.cut(plan, on_progress=on_progress, **files)
 
 
+class _Lost(Exception):
+    """The session ended while a person was waited for."""
+
+
 class _SessionApart:
     """The session, as the starting program sees it; mutable."""
 
@@ -99,6 +103,7 @@ class _SessionApart:
         self._keys, self._signals, self._own = keys, signals, own
         self._process: SessionProcess | None = None
         self._failed: Outcome | None = None
+        self._last = ""
 
     def frame(self, plan: JobPlan) -> StreamResult:
         """See :class:`~miurafab.machine.sender.SheetSession`."""
@@ -120,23 +125,48 @@ class _SessionApart:
             self._process.order("load")
 
     @contextmanager
-    def waits(self) -> Iterator[None]:
+    def waits(self) -> Iterator[Callable[[], bool]]:
         """See :class:`~miurafab.machine.sender.SheetSession`."""
         answered = threading.Event()
         keeper = threading.Thread(target=self._keep_alive, args=(answered,), name="miurafab waits")
         keeper.start()
         try:
             with self._signals.raising() if self._own else nullcontext():
-                yield
+                yield self._is_lost
+        except _Lost:
+            pass
         finally:
             answered.set()
             keeper.join()
+        if self._is_lost() and self._signals.caught is None:
+            raise self._loss()
 
     def _keep_alive(self, answered: threading.Event) -> None:
         process = self._process
-        while process is not None and not process.over and not answered.wait(_LOOK_S):
+        while process is not None and not self._is_lost() and not answered.wait(_LOOK_S):
             while not process.over and (message := process.poll()) is not None:
                 self._note(message)
+        if self._is_lost() and self._own and self._signals.caught is None and not answered.is_set():
+            self._signals.interrupt(_Lost())
+
+    def _is_lost(self) -> bool:
+        """Whether the session has ended, or what was ordered has failed."""
+        return self._failed is not None or (self._process is not None and self._process.over)
+
+    def _loss(self) -> MiurafabError:
+        """How the session ended."""
+        process = self._process
+        if self._failed is not None and self._failed.error is not None:
+            return self._failed.error
+        assert process is not None
+        process.end()
+        if self._signals.caught is not None and not process.begun:
+            return JobStopped(
+                f"{self._last} was stopped by {self._signals.reason} before a line of it was sent."
+            )
+        return MachineError(
+            f"The process that sent {self._last} {process.death}; {process.make_safe()}."
+        )
 
     def _note(self, message: object) -> None:
         if self._failed is None and isinstance(message, Outcome) and message.error is not None:
@@ -162,21 +192,12 @@ class _SessionApart:
         if self._process is None:
             self._process = self._start()
         process = self._process
+        self._last = plan.job.name
         process.order(action, plan=plan, **files)
         result = self._attend(process, on_progress)
-        if result is not None:
-            return result
-        if self._failed is not None and self._failed.error is not None:
-            raise self._failed.error
-        process.end()
-        if self._signals.caught is not None and not process.begun:
-            raise JobStopped(
-                f"{plan.job.name} was stopped by {self._signals.reason} before a line of it was "
-                "sent."
-            )
-        raise MachineError(
-            f"The process that sent {plan.job.name} {process.death}; {process.make_safe()}."
-        )
+        if result is None:
+            raise self._loss()
+        return result
 
     def _attend(
         self,

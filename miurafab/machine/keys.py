@@ -13,7 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Protocol
+from typing import Any, Protocol
 
 HOLD, RESUME, ABORT, RESET = b"!", b"~", b"", b"\x18"
 KEYS = {
@@ -100,6 +100,25 @@ def terminal_keys(*, arrows: bool = False) -> Iterator[Keys]:
     else:
         with _posix_keys(arrows) as keys:
             yield keys
+
+
+def suspend_here() -> None:
+    """Stop this process until its terminal's shell lets it go on, the terminal as shells want it.
+
+    In the background, setting the terminal would stop it again. Windows suspends no programs.
+    """
+    if sys.platform == "win32":
+        return
+    descriptor = sys.stdin.fileno() if sys.stdin.isatty() else None
+    modes: list[Any] = []
+    if descriptor is not None:
+        modes = termios.tcgetattr(descriptor)
+        plain = [*modes]
+        plain[3] = modes[3] | termios.ICANON | termios.ECHO
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, plain)
+    os.kill(os.getpid(), signal.SIGSTOP)
+    if descriptor is not None and os.tcgetpgrp(descriptor) == os.getpgrp():
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, modes)
 
 
 class Typed:
@@ -193,6 +212,7 @@ class ConsoleKeys:
 if sys.platform != "win32":
     import os
     import select
+    import signal
     import termios
 
     class _PosixKeys:

@@ -72,8 +72,11 @@ class SheetSession(Protocol):
     def load(self) -> None:
         """Fresh material is in the machine."""
 
-    def waits(self) -> AbstractContextManager[None]:
-        """A block in which a person is waited for: the session lives on, and a signal ends it."""
+    def waits(self) -> AbstractContextManager[Callable[[], bool]]:
+        """A block in which a person is waited for: the session lives on, and a signal ends it.
+
+        It gets a function that tells whether the session has ended by itself, and raises that.
+        """
 
 
 class _SessionHere:
@@ -81,7 +84,13 @@ class _SessionHere:
 
     def __init__(self, session: MachineSession, signals: StopSignals) -> None:
         self.frame, self.cut, self._session = session.frame, session.cut, session
-        self.waits = signals.raising
+        self._signals = signals
+
+    @contextmanager
+    def waits(self) -> Iterator[Callable[[], bool]]:
+        """See :class:`SheetSession`."""
+        with self._signals.raising():
+            yield lambda: False
 
     def load(self) -> None:
         """See :class:`SheetSession`."""

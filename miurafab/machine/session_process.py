@@ -10,7 +10,8 @@ machine, the progress of a job, and the outcome of each order. The two processes
   resets the controller (:meth:`SessionProcess.make_safe`).
 
 Ctrl-C in a terminal reaches both at once; the starting program passes on a signal that it alone
-gets. It sends pickled orders and single bytes; it receives pickled messages.
+gets. Ctrl-Z suspends the starting program alone, when what burns is held. It sends pickled orders
+and single bytes; it receives pickled messages.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import contextlib
 import os
 import pickle
 import queue
+import signal
 import subprocess
 import sys
 import threading
@@ -31,17 +33,18 @@ from miurafab.child import python_command
 from miurafab.errors import JobStopped, MachineError, MiurafabError, PortError
 from miurafab.machine.dialects import make_safe, open_machine
 from miurafab.machine.greeting import RESTARTED
-from miurafab.machine.keys import RESET
+from miurafab.machine.keys import RESET, obeys_overrides, suspend_here
 from miurafab.machine.known_controller import MachineState, PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.owner import Owner, this_owner
 from miurafab.machine.progress import JobAborted, Progress
-from miurafab.machine.signals import StopSignals
-from miurafab.machine.watchdog import BEAT, BEAT_S, STOPS, ParentWatch, framed
+from miurafab.machine.signals import StopSignals, Suspension
+from miurafab.machine.watchdog import BEAT, BEAT_S, STOPS, SUSPENDED, ParentWatch, framed
 from miurafab.profiles import MachineProfile
 
 _LOOK_S = 0.005  # between two looks at keys and signals
 _WATCH_S = 0.02  # between two looks at the orders while the machine is watched
+_BURNING = ("cut", "frame")
 _NO_KEYS = bytes(set(range(32)) - set(RESET))
 _STOP_S = 15.0  # for the process to stop the machine, ask it, and end; stopping takes 10 s at most
 
@@ -91,6 +94,13 @@ class Heard:
 Message = Begun | MachineState | Progress | Outcome | Heard
 
 
+def suspending_signals() -> StopSignals:
+    """The signals of a program with sessions in other processes: those are told of Ctrl-Z."""
+    signals = StopSignals()
+    signals.suspension = Suspension(suspend_here)
+    return signals
+
+
 class SessionProcess:
     """The other process, as the starting program sees it; ``death`` says how it ended.
 
@@ -113,6 +123,8 @@ class SessionProcess:
         self._complaints = b""
         self._beat_at = 0.0
         self._give_up_at: float | None = None
+        self._burns = 0
+        self._wishes = 0 if signals.suspension is None else signals.suspension.wishes
         self._process = subprocess.Popen(
             python_command(__name__),
             stdin=subprocess.PIPE,
@@ -132,6 +144,8 @@ class SessionProcess:
         for reader in self._readers:
             reader.start()
         self._send(PortOpening(machine, port, virtual_speed, this_owner(), tuple(sys.argv)))
+        if signals.suspension is not None:
+            signals.suspension.sessions.add(self)
 
     def _read(self, pipe: IO[bytes]) -> None:
         with contextlib.suppress(EOFError, pickle.UnpicklingError):
@@ -152,6 +166,7 @@ class SessionProcess:
 
     def order(self, action: str, **options: Any) -> None:
         """Have an action of the session carried out, after those that were ordered before."""
+        self._burns += action in _BURNING
         self._send(SessionOrder(action, options))
 
     def press(self, keys: str) -> None:
@@ -176,6 +191,8 @@ class SessionProcess:
             self.state = message
         elif isinstance(message, Outcome) and isinstance(message.value, MachineState):
             self.state = message.value
+        if isinstance(message, Outcome):
+            self._burns -= message.action in _BURNING
         now = time.monotonic()
         if self._signals.caught is not None and self._give_up_at is None:
             self._give_up_at = now + _STOP_S
@@ -185,7 +202,24 @@ class SessionProcess:
         if now >= self._beat_at:
             self._tell(BEAT)
             self._beat_at = now + BEAT_S
+        wished = self._signals.suspension
+        if wished is not None and wished.wishes != self._wishes:
+            self._wishes = wished.wishes
+            self._be_suspended(wished)
         return message
+
+    def _be_suspended(self, wished: Suspension) -> None:
+        """Have what burns held, and say that this program will be silent (Ctrl-Z).
+
+        A machine whose beam may stay on in a hold is stopped: nobody would look at it.
+        """
+        if self._burns and obeys_overrides(self._machine.dialect):
+            self.press(" ")
+        elif self._burns:
+            self.stop()
+        self._tell(SUSPENDED)
+        self._beat_at = 0.0
+        wished.told(self)
 
     def stop(self) -> None:
         """Have whatever runs, and the session, ended by a reset now."""
@@ -201,6 +235,8 @@ class SessionProcess:
 
     def end(self) -> None:
         """Close the pipe, on every way out; that stops the machine if it still runs."""
+        if self._signals.suspension is not None:
+            self._signals.suspension.sessions.discard(self)
         with contextlib.suppress(OSError):
             self._down.close()
         try:
@@ -247,6 +283,8 @@ def main() -> None:
     """Open the port, carry out orders until the end, and leave the machine dark."""
     up = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints must not get between the messages
+    if sys.platform != "win32":
+        signal.signal(signal.SIGTSTP, signal.SIG_IGN)  # Ctrl-Z is for the starting program
 
     def tell(message: Message) -> None:
         data = pickle.dumps(message, protocol=5)  # whole, so that a signal cannot tear it

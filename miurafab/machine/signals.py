@@ -4,13 +4,16 @@ While a job runs, the first of SIGINT, SIGTERM, SIGHUP (SIGBREAK on Windows) rai
 ``KeyboardInterrupt`` wherever the program is, so that the reset is on the wire within
 milliseconds. Those that follow are ignored: the stopping itself, which takes a second, must not
 be stopped.
+
+Ctrl-Z (SIGTSTP) suspends a program that has a session in another process only when that process
+was told (:class:`Suspension`): it would stand still with the machine in mid-job.
 """
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any
@@ -23,6 +26,34 @@ _WORDS = {
 }
 
 
+class Suspension:
+    """A wish to suspend this program, which ``here`` fulfils when all ``sessions`` were told.
+
+    ``wishes`` counts them; each session compares it with what it has told.
+    """
+
+    def __init__(self, here: Callable[[], None]) -> None:
+        self.wishes = 0
+        self.sessions: set[object] = set()
+        self._here = here
+        self._told: set[object] = set()
+
+    def wish(self) -> None:
+        """The person at the terminal wants it."""
+        self.wishes += 1
+        self._told.clear()
+        self._suspend_if_told()
+
+    def told(self, session: object) -> None:
+        """The other process of ``session`` knows it."""
+        self._told.add(session)
+        self._suspend_if_told()
+
+    def _suspend_if_told(self) -> None:
+        if self._told >= self.sessions:
+            self._here()
+
+
 class StopSignals:
     """``with StopSignals() as signals``; in another thread than the main one it does nothing.
 
@@ -32,6 +63,9 @@ class StopSignals:
     """
 
     def __init__(self) -> None:
+        self.suspension: Suspension | None = None
+        self._waiting = False
+        self._news: BaseException | None = None
         self.at_once = True
         self.cause: str | None = None
         self.caught: str | None = None
@@ -61,13 +95,29 @@ class StopSignals:
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """A block in which a signal raises at once, whatever is waited for."""
+        """A block in which a signal raises at once, whatever is waited for, and news, too."""
         before, self.at_once = self.at_once, True
+        self._waiting = True
         try:
             self.check()
             yield
         finally:
+            self._waiting = False
             self.at_once = before
+
+    def interrupt(self, news: BaseException) -> None:
+        """From another thread: raise ``news`` in the main one's block of :meth:`raising`.
+
+        Where no signal reaches a thread (Windows), it is raised when what is waited for returns.
+        """
+        main = threading.main_thread().ident
+        if not self._old or main is None:
+            return
+        self._news = news
+        if hasattr(signal, "pthread_kill"):
+            signal.pthread_kill(main, signal.SIGINT)
+        else:
+            signal.raise_signal(signal.SIGINT)
 
     def __enter__(self) -> StopSignals:
         if threading.current_thread() is threading.main_thread():
@@ -79,7 +129,14 @@ class StopSignals:
                 # background job with SIGINT ignored is no wish: who interrupts a laser means it.)
                 if name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
                     self._old[number] = signal.signal(number, self._handle)
+            number = getattr(signal, "SIGTSTP", None)
+            if self.suspension is not None and number is not None:
+                self._old[number] = signal.signal(number, self._suspend)
         return self
+
+    def _suspend(self, number: int, frame: FrameType | None) -> None:
+        assert self.suspension is not None
+        self.suspension.wish()
 
     def __exit__(
         self,
@@ -91,6 +148,11 @@ class StopSignals:
             signal.signal(number, handler)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
+        news, self._news = self._news, None
+        if news is not None and number == signal.SIGINT:
+            if self._waiting:
+                raise news
+            return
         if self.caught is None:
             self.caught = signal.Signals(number).name
             if self.at_once:

@@ -30,6 +30,8 @@ SILENCE_S = 5.0
 STOPS = {"SIGINT": b"\1", "SIGTERM": b"\2", "SIGHUP": b"\3", "SIGBREAK": b"\4"}
 """The bytes that stop this process as the signal of that name does."""
 ORDER = b"\5"
+SUSPENDED = b"\6"
+"""The starting program is suspended by a person (Ctrl-Z): its silence is meant until it beats."""
 
 
 def framed(order: bytes) -> bytes:
@@ -60,6 +62,7 @@ class ParentWatch:
         self._signals = signals
         self._silence = silence
         self._heard = time.monotonic()
+        self._patient = False
         self._over = threading.Event()
         self.resets = 0
         self._keys: list[str] = []
@@ -114,14 +117,16 @@ class ParentWatch:
         name = _SIGNALS.get(coming[0])
         if name is not None:
             self._stop(name)
-        elif coming[:1] != BEAT:
+        elif coming[:1] in (BEAT, SUSPENDED):
+            self._patient = coming[:1] == SUSPENDED
+        else:
             self.resets += coming[:1] == RESET
             self._keys.append(chr(coming[0]))
         return 1
 
     def _guard(self) -> None:
         while not self._over.wait(self._silence / 20):
-            if time.monotonic() - self._heard > self._silence:
+            if not self._patient and time.monotonic() - self._heard > self._silence:
                 self._lost("the silence of the program that started it")
                 return
 

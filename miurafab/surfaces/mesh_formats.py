@@ -69,6 +69,8 @@ def read_off(content: bytes) -> tuple[Floats, Ints]:
     polygons, at = [], vertices * width
     for _ in range(faces):
         corners = int(tokens[at])
+        if corners < 1:  # or it would be read again, as often as there are faces
+            raise ValueError(f"face {len(polygons) + 1} has {corners} corners")
         polygons.append(tokens[at + 1 : at + 1 + corners])
         if len(polygons[-1]) < corners:
             raise ValueError(f"it ends within face {len(polygons)} of {faces}")
@@ -101,6 +103,8 @@ def read_ply_strips(content: bytes) -> tuple[Floats, Ints] | None:
             kind = words[1]
         elif words[:1] == ["element"]:
             elements.append((words[1], int(words[2]), []))
+            if elements[-1][1] > len(body):
+                raise ValueError(f"it is too short for {words[2]} of '{words[1]}'")
         elif words[:1] == ["property"] and elements:
             elements[-1][2].append(words[1:])
     values = _ply_ascii(elements, body) if kind == "ascii" else _ply_binary(elements, body, kind)
@@ -135,6 +139,8 @@ def _ply_ascii(elements: _PlyElements, body: bytes) -> dict[str, dict[str, Any]]
             for words in properties:
                 if words[0] == "list":
                     length = int(tokens[at])
+                    if length < 0:
+                        raise ValueError(f"a list in it has {length} entries")
                     columns[words[-1]].append([int(t) for t in tokens[at + 1 : at + 1 + length]])
                     at += 1 + length
                 else:
@@ -162,6 +168,8 @@ def _ply_binary(elements: _PlyElements, body: bytes, kind: str) -> dict[str, dic
                 if words[0] == "list":
                     size = np.frombuffer(body, order + _PLY_TYPES[words[1]], 1, at)
                     length, at = int(size[0]), at + size.nbytes
+                    if length < 0:
+                        raise ValueError(f"a list in it has {length} entries")
                 item = np.frombuffer(body, order + _PLY_TYPES[words[-2]], length, at)
                 at += item.nbytes
                 columns[words[-1]].append(item if words[0] == "list" else item[0])

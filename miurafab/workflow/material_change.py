@@ -40,7 +40,7 @@ class MaterialChange:
         prepared: Prepared,
         ports: Sequence[str],
         pause: bool | None,
-        before_sheet: Callable[[int, str, StopSignals], bool] | None,
+        before_sheet: Callable[[int, str, Callable[[], bool]], bool] | None,
         signals: StopSignals,
     ) -> None:
         self.missing = False
@@ -53,12 +53,18 @@ class MaterialChange:
         """What a machine does where a program waits for a person: nobody is at its keys."""
         return at_pause(self._waits[port], None)
 
-    def is_in(self, number: int, port: str) -> bool:
-        """Whether fresh material is in the machine at ``port``, for sheet ``number``."""
+    def is_in(self, number: int, port: str, lost: Callable[[], bool]) -> bool:
+        """Whether fresh material is in the machine at ``port``, for sheet ``number``; nobody is
+        asked on where the machine is ``lost``.
+        """
+
+        def over() -> bool:
+            return self._signals.caught is not None or lost()
+
         if not self._waits[port]:
             return True
         with self._one_at_a_time:
             ask = self._before_sheet
-            is_in = ask is not None and ask(number, port, self._signals)
-        self.missing = self.missing or not is_in
+            is_in = ask is not None and ask(number, port, over)
+        self.missing = self.missing or not (is_in or over())
         return is_in

@@ -18,6 +18,7 @@ from miurafab.machine.job_process import session_apart
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import Head, JobPlan
 from miurafab.machine.sender import SheetSession
+from miurafab.machine.session_process import suspending_signals
 from miurafab.machine.signals import StopSignals
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.cut_options import CutOptions
@@ -47,7 +48,7 @@ def share_sheets(
     options: CutOptions,
     *,
     pause: bool | None = None,
-    before_sheet: Callable[[int, str, StopSignals], bool] | None = None,
+    before_sheet: Callable[[int, str, Callable[[], bool]], bool] | None = None,
     on_start: Callable[[str, Finding], None] | None = None,
     on_progress: Callable[[float, str], None],
 ) -> tuple[Shared, ...]:
@@ -55,7 +56,8 @@ def share_sheets(
     order of the sheets.
 
     Before each further sheet of a machine ``before_sheet`` waits for fresh material there, in a
-    thread of that machine; False (or no such function) leaves the sheet to another machine.
+    thread of that machine, and ends with False when the function that it gets says that nothing
+    is to be waited for; False (or no such function) leaves the sheet to another machine.
     ``on_start`` gets the port and each finding on where a sheet lies and begins there.
     ``on_progress`` gets the fraction done and a note when a sheet is done or has failed. A machine
     that fails is part of the answer. With ``options.resume`` each machine first resumes the sheet
@@ -81,7 +83,7 @@ def share_sheets(
     if twice:
         raise InputError(f"The port {min(twice)} is named twice.")
     plans = dict(plan_sheets(prepared, sheets, options))
-    with StopSignals() as signals:
+    with suspending_signals() as signals:
         signals.at_once = False
         material = MaterialChange(prepared, ports, pause, before_sheet, signals)
         work = _Work(prepared, options, plans, ports, signals, material, on_start, on_progress)
@@ -151,8 +153,12 @@ class _Work:
                     number = (self._own[port] or self._left).popleft()
                 except IndexError:
                     return
-                if done and not self._fresh_is_in(number, port, session):
-                    self._left.appendleft(number)
+                try:
+                    if done and not self._fresh_is_in(number, port, session):
+                        self._left.appendleft(number)
+                        return
+                except MiurafabError as error:
+                    self._note(number, port, str(error))
                     return
                 self._tell_start(number, port, first=not done)
                 plan = self._plans[number]
@@ -170,8 +176,8 @@ class _Work:
                 at = head_after(self._prepared, number, plan)
 
     def _fresh_is_in(self, number: int, port: str, session: SheetSession) -> bool:
-        with session.waits():
-            is_in = self._material.is_in(number, port)
+        with session.waits() as lost:
+            is_in = self._material.is_in(number, port, lost)
         session.load()
         return is_in
 

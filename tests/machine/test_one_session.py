@@ -23,6 +23,7 @@ from miurafab.machine.sender import StreamResult
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.watchdog import SILENCE_S
 from miurafab.profiles import load_machine
+from miurafab.simulate.beam import standing_seconds
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 from miurafab.workflow.cut import prepare
 from miurafab.workflow.cut_options import CutOptions
@@ -34,8 +35,10 @@ pytestmark = pytest.mark.skipif(
 FAST = 30.0
 """Virtual seconds a real second."""
 ASKED = "press Enter"
+IDLE_S = 0.0255
+"""The step idle delay ($1) of the bench, for which a hold may leave the last power on."""
+BEGIN, STROKE = "G21 G90 G94\nM4 S0\n", "G0 X5 Y5\nG1 X15 S500 F2000\n"
 LARGE = (
-    "cable",
     "holder killed",
     "command killed",
     "Ctrl-C in sheet 2",
@@ -110,7 +113,7 @@ def test_the_session_lives_while_a_person_is_waited_for_and_greets_once(
 
 
 @pytest.mark.parametrize(
-    "fault", ["Ctrl-C", *(pytest.param(n, marks=pytest.mark.large) for n in LARGE)]
+    "fault", ["Ctrl-C", "cable", *(pytest.param(n, marks=pytest.mark.large) for n in LARGE)]
 )
 def test_a_fault_while_a_person_is_waited_for_or_later_ends_dark(
     fault: str, bench: Bench, screen: Terminal, tmp_path: Path
@@ -123,8 +126,7 @@ def test_a_fault_while_a_person_is_waited_for_or_later_ends_dark(
         assert ended(bench, process) == 130
         assert "was stopped by Ctrl-C" in " ".join(screen.shown.split())
     elif fault == "holder killed":
-        os.kill(holder, signal.SIGKILL)
-        screen.type(b"\n")
+        os.kill(holder, signal.SIGKILL)  # told at once, without a key
         assert ended(bench, process) == 3
         assert "was killed by signal 9; the controller was reset" in " ".join(screen.shown.split())
     elif fault == "command killed":
@@ -132,7 +134,6 @@ def test_a_fault_while_a_person_is_waited_for_or_later_ends_dark(
         process.wait()
     elif fault == "cable":
         bench.wire.unplug()
-        screen.type(b"\n")
         assert ended(bench, process) == 3
         assert "went away" in screen.shown
     else:
@@ -154,6 +155,72 @@ def test_a_fault_while_a_person_is_waited_for_or_later_ends_dark(
     if "sheet 2" not in fault:
         assert len(bench.device.beam_log) == burnt
         assert bench.commands.count(b"\n") <= lines + 2  # what it asked meanwhile
+
+
+def stopped(process: subprocess.Popen[bytes]) -> bool:
+    """Whether it is suspended, as a shell would see it."""
+    return Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
+
+
+@pytest.mark.parametrize(
+    "then", ["r", *(pytest.param(n, marks=pytest.mark.large) for n in ("kill", "Ctrl-C"))]
+)
+def test_ctrl_z_holds_the_machine_dark_until_a_person_is_back(
+    then: str, screen: Terminal, tmp_path: Path
+) -> None:
+    """Longer than a silent program counts as hung. The process with the port goes on working."""
+    bench = Bench(speed=4.0)
+    job = tmp_path / "strokes.nc"
+    job.write_text(BEGIN + STROKE * 45 + "M5\n")
+    process = bench.cut(job, "--at", "0,0", **screen.options() | {"text": False})
+    bench.until_burning(process)
+    (holder,) = children(process)
+    at = screen.type(b"\x1a")
+    bench.run(lambda: stopped(process))
+    bench.run(lambda: bench.device.state.startswith("Hold") and not bench.device.beam_on)
+    (hold,) = [when for when, _, data in bench.came if b"!" in data]
+    assert hold - at < 0.5
+    assert not bench.device.beam_on
+    burnt = len(bench.device.beam_log)
+    late = bench.device.now + (SILENCE_S + 0.7) * 4.0
+    bench.run(lambda: bench.device.now > late)
+    assert stopped(process)
+    assert Path(f"/proc/{holder}").exists()
+    assert len(bench.device.beam_log) == burnt
+    assert b"\x18" not in bench.commands
+    if then == "kill":
+        process.kill()
+        bench.run(lambda: b"\x18" in bench.commands)
+        process.wait()
+    else:
+        process.send_signal(signal.SIGCONT)
+        bench.run(lambda: not stopped(process))
+        screen.type(b"\x03" if then == "Ctrl-C" else b"r")
+        bench.run(lambda: bool(screen.shown) and process.poll() is not None, 60)
+        assert process.wait() == (130 if then == "Ctrl-C" else 0)
+    bench.run(lambda: not Path(f"/proc/{holder}").exists())
+    bench.device.advance(60.0)
+    assert not bench.device.beam_on
+    assert standing_seconds(bench.device.beam_log) <= IDLE_S
+    assert (b"\x18" in bench.commands) == (then != "r")
+    if then == "r":
+        burnt_mm = sum(abs(each.x1 - each.x0) for each in bench.device.beam_log)
+        assert burnt_mm == pytest.approx(45 * 10.0, abs=1.0)  # in steps
+    bench.wire.close()
+
+
+def test_ctrl_z_while_a_person_is_waited_for_changes_nothing(
+    bench: Bench, screen: Terminal, tmp_path: Path
+) -> None:
+    process = asked(bench, screen, tmp_path)
+    screen.type(b"\x1a")
+    bench.run(lambda: stopped(process))
+    process.send_signal(signal.SIGCONT)
+    bench.run(lambda: not stopped(process))
+    assert b"!" not in bench.commands
+    screen.type(b"\n")
+    assert ended(bench, process) == 0
+    bench.assert_dark()
 
 
 def test_a_machine_is_homed_once_a_sheet_and_the_head_keeps_its_place(tmp_path: Path) -> None:

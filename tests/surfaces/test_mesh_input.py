@@ -331,6 +331,31 @@ def object_of(number: int, vertices: np.ndarray, faces: np.ndarray) -> str:
     )
 
 
+CORNERS = "0 0 0\n1 0 0\n0 1 0\n1 1 0.1\n"
+PLY = "ply\nformat {} 1.0\nelement vertex 4\n" + "".join(f"property float {c}\n" for c in "xyz")
+STRIPS = "element tristrips {}\nproperty list int int v\nend_header\n"
+ENDLESS = {
+    "faces.off": f"OFF\n4 99999999999 0\n{CORNERS}-1 0 1 2\n",
+    "lists.ply": PLY.format("ascii") + STRIPS.format(9) + CORNERS + 9 * "-1\n",
+    "strips.ply": PLY.format("ascii") + STRIPS.format("9" * 25) + CORNERS + "-1 1 2 3\n",
+    "nothing.ply": PLY.format("ascii")
+    + "element nothing 99999999999\n"
+    + STRIPS.format(0)
+    + CORNERS,
+    "binary.ply": PLY.format("binary_little_endian") + STRIPS.format(9) + 48 * "\0" + 99 * "\xff",
+}
+
+
+@pytest.mark.parametrize("name", ENDLESS)
+def test_a_mesh_of_more_than_its_file_can_hold_is_refused_at_once(
+    tmp_path: Path, name: str
+) -> None:
+    """A list of -1 entries took no byte, and was read for ever."""
+    (tmp_path / name).write_bytes(ENDLESS[name].encode("latin-1"))
+    with pytest.raises(TargetError, match=rf"{name} cannot be read as a mesh: .*(-1|too short)"):
+        read_mesh(tmp_path / name)
+
+
 def test_a_3mf_package_is_read_in_its_unit_with_components_and_transforms(tmp_path: Path) -> None:
     vertices, faces = mesh("triangles-8")
     inner = object_of(1, vertices / 10, faces)
