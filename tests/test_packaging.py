@@ -58,7 +58,7 @@ def test_the_same_source_gives_the_same_packages(installed, tmp_path):
 LOCKS = {
     "run": ("build.in", ()),
     "dev": ("build.in", ("dev",)),
-    "extras": (None, ("bench", "cluster", "step")),
+    "extras": (None, ("bench", "cluster", "layers", "step")),
     "tools": ("tools.in", None),
 }
 """What `make lock` makes each file of: a list beside it, and extras of pyproject.toml."""
@@ -136,6 +136,8 @@ def test_make_lock_makes_each_lock_file():
     made = dict(re.findall(r"^\t\$\(COMPILE\) (.*) --output-file locks/(.*)\.txt$", recipe, re.M))
     made = {lock: inputs.split() for inputs, lock in made.items()}
     assert made.keys() == LOCKS.keys() == {p.stem for p in (ROOT / "locks").glob("*.txt")}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert {"dev", *LOCKS["extras"][1]} == project["optional-dependencies"].keys()
     for lock, (beside, extras) in LOCKS.items():
         given = [] if extras is None else ["pyproject.toml"]
         given += [] if beside is None else [f"locks/{beside}"]
