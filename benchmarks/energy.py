@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from miurafab.origami.energy.curve import energy_curve
-from miurafab.origami.energy.equilibrium import Driven
+from miurafab.origami.energy.driven import Driven
 from miurafab.origami.fitting.fit import FitRequest, fit
 from miurafab.surfaces.catalogue import make_surface
 

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from miurafab.origami.crease_pattern import CreasePattern as CreasePattern
     from miurafab.origami.energy.curve import EnergyCurve as EnergyCurve
     from miurafab.origami.energy.pieces import PieceEnergies as PieceEnergies
+    from miurafab.origami.energy.pull import PullCurve as PullCurve
     from miurafab.origami.fitting.request import FitOptions as FitOptions
     from miurafab.origami.fitting.request import FitRequest as FitRequest
     from miurafab.origami.fitting.result import FitResult as FitResult

@@ -1,4 +1,4 @@
-"""``miurafab energy``: how hard a folded sheet resists being unfolded."""
+"""``miurafab energy``: how hard a folded sheet resists being unfolded or pulled."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ from miurafab.options import File, Text
 if TYPE_CHECKING:
     from miurafab.origami.energy.curve import EnergyCurve
     from miurafab.origami.energy.pieces import PieceEnergies
+    from miurafab.origami.energy.pull import PullCurve
 
 EXAMPLES = (
     "miurafab energy hypar.fold",
     "miurafab energy hypar.fold --material card-250 -o energy.csv",
+    "miurafab energy hypar.fold --pull corners --strain 0.2 --cycles 3",
 )
 
 
@@ -42,22 +44,24 @@ def energy(
         option(
             Text("NAME"),
             "Give the energy in joules for this material: a shipped name or a TOML file with a "
-            "modulus.",
+            "modulus. With --pull it is the usual material, if none is named.",
         ),
     ] = None,
     console: Console = Console(),
     **given: Any,
 ) -> int:
-    """Measure the energy on the way from folded to flat.
+    """Measure the energy on the way from folded to flat, or the force of a pull.
 
     Prints the barrier and where it is, the stable states, and the stiffness at the folded form.
-    Exits with 1 if the way to flat was lost. Each of several pieces is measured by itself.
+    Exits with 1 if the way to flat was lost. Each of several pieces is measured by itself. With
+    --pull it prints the force in newtons at the largest extension of each cycle, and how much
+    longer the sheet stays when it is let go.
     """
     if out is not None:
         from miurafab.origami.plotting import RESULTS
 
         new_file(out, "The energy", RESULTS)
-    with console.progress("unfolding") as progress:
+    with console.progress("pulling" if "pull" in given else "unfolding") as progress:
         curve = miurafab.energy(file, material=material, on_progress=progress, **given)
     answer = curve.report()
     if out is not None:
@@ -67,13 +71,22 @@ def energy(
     return DONE if curve.converged else NO
 
 
-def _show(console: Console, curve: EnergyCurve | PieceEnergies, answer: dict[str, Any]) -> None:
-    console.facts({key: answer[key] for key in answer if key not in ("stable_states", "pieces")})
-    if "pieces" in answer:
-        keys = ("piece", "facets", "rigid", "bistable", "barrier", "barrier_angle_deg", "stiffness")
-        rows = [[piece.get(key, "") for key in keys] for piece in answer["pieces"]]
-        console.rows([key.replace("_", " ") for key in keys], rows)
+def _show(
+    console: Console, curve: EnergyCurve | PieceEnergies | PullCurve, answer: dict[str, Any]
+) -> None:
+    hidden = ("stable_states", "pieces", "cycles", "curve", "pulled")
+    console.facts({key: answer[key] for key in answer if key not in hidden})
+    if "cycles" in answer:
+        _rows(console, answer["cycles"], "cycle strain force_n set_mm work_j dissipated_j")
+    elif "pieces" in answer:
+        keys = "piece facets rigid bistable barrier barrier_angle_deg stiffness"
+        _rows(console, answer["pieces"], keys)
     elif answer["stable_states"]:
         rows = [[state["angle_deg"], state["energy"]] for state in answer["stable_states"]]
         console.rows(("stable at (deg)", f"energy ({answer['energy_unit']})"), rows)
     console.line(curve.verdict())
+
+
+def _rows(console: Console, entries: list[dict[str, Any]], keys: str) -> None:
+    rows = [[entry.get(key, "") for key in keys.split()] for entry in entries]
+    console.rows([key.replace("_", " ") for key in keys.split()], rows)

@@ -12,7 +12,7 @@ import numpy as np
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.perforation import perforate
+from miurafab.fabrication.perforation import burnt_shares, perforate
 from miurafab.fabrication.wording import count
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Bools, Floats, Ints
@@ -142,8 +142,7 @@ def _creases(pattern: CreasePattern, material: Material) -> list[Finding]:
         ends = pattern.vertices_coords[pattern.edges_vertices[edges]]
         made = perforate(ends[:, 0], ends[:, 1], material, kind)
         dashes = np.bincount(made.crease, minlength=len(edges))
-        drawn = np.linalg.norm(made.ends - made.starts, axis=1) + material.kerf_mm
-        share = np.bincount(made.crease, drawn, len(edges)) / lengths[edges]
+        share = burnt_shares(made, lengths[edges], material.kerf_mm)
         rule = material.perforation_of(kind)
         usual = rule.cut_mm / (rule.cut_mm + rule.gap_mm)
         single += edges[dashes == 1].tolist()

@@ -75,6 +75,12 @@ def unbroken(starts: Floats, ends: Floats, material: Material, kind: str = "moun
     return _drawn(starts, ends, length, _Fit(ones, bridge, end, nothing, nothing), material.kerf_mm)
 
 
+def burnt_shares(dashes: Dashes, lengths: Floats, kerf_mm: float) -> Floats:
+    """(N,) the part of each crease, of ``lengths`` (N,) in mm, that ``dashes`` burn through."""
+    burnt = np.linalg.norm(dashes.ends - dashes.starts, axis=1) + kerf_mm
+    return np.asarray(np.bincount(dashes.crease, burnt, len(lengths)) / lengths)
+
+
 @dataclass(frozen=True, eq=False)
 class _Fit:
     """(N,) for each crease: the number of dashes, the bridge at each end, the lengths of the end

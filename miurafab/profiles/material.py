@@ -91,6 +91,26 @@ def _all_perforated() -> dict[str, Crease]:
 
 
 @dataclass(frozen=True)
+class CreaseStiffness:
+    """How stiff a crease is that is not cut into, and where it yields; for forces in newtons."""
+
+    crease_length_mm: float = option(
+        length(0, 10_000, above=True),
+        "The length of a strip of the flat sheet that is as stiff as the crease at its end: the "
+        "bending stiffness over that of the crease.",
+        REQUIRED,
+    )
+    yield_angle: float | None = option(
+        angle(0, 180, above=True),
+        "How far the crease turns from rest before its rest angle begins to move.",
+        default_text="never yields",
+    )
+    hardening: float = option(
+        number(0, 0.99), "The part of the stiffness that is left beyond that.", 0.1
+    )
+
+
+@dataclass(frozen=True)
 class TabRule:
     """Glue tabs."""
 
@@ -128,7 +148,9 @@ class Material(Shown):
         How it is worked, for each kind of beam that it has settings for.
     modulus_pa : float or None
         Young's modulus in bending, None where the file does not give it. Only energies in joules
-        need it.
+        and forces in newtons need it.
+    folding : CreaseStiffness or None
+        How stiff the creases are, None where the file does not give it. Only forces need it.
     creases : dict of str to Crease
         How each of :data:`CREASE_KINDS` is made.
     relief_hole_mm : float
@@ -145,6 +167,7 @@ class Material(Shown):
     tabs: TabRule
     beams: dict[str, BeamSettings]
     modulus_pa: float | None = None
+    folding: CreaseStiffness | None = None
     creases: dict[str, Crease] = field(default_factory=_all_perforated)
     relief_hole_mm: float = 0.0
     grain: str = "none"
@@ -237,6 +260,7 @@ def load_material(name: AnyPath) -> Material:
         tabs=table.table("tabs").options(TabRule),
         beams=_beams(table.table("beams")),
         modulus_pa=table.value("modulus", modulus(1e5, 1e12), None),
+        folding=table.table("folding").options(CreaseStiffness) if table.has("folding") else None,
         creases=creases,
         relief_hole_mm=relief_hole,
         grain=table.value("grain", Choice(GRAINS), "none"),

@@ -1,28 +1,38 @@
-"""``miurafab energy`` as a function: the energy of a pattern in a material."""
+"""``miurafab energy`` as a function: energy on the way to flat, or force against extension."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
-from miurafab.errors import InputError
+from miurafab.errors import InputError, OptionError
 from miurafab.files import AnyPath
-from miurafab.options import Whole, number, option, read_options
+from miurafab.options import Choice, Either, Pair, Whole, number, option, read_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
+from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import Paper, sheet_model
 from miurafab.origami.energy.curve import EnergyCurve, energy_curve
 from miurafab.origami.energy.path import Progress
 from miurafab.origami.energy.pieces import PieceEnergies, energies_of_pieces
+from miurafab.origami.energy.pull import CORNERS, PullCurve, pull
 from miurafab.profiles import Material, read_material
 from miurafab.workflow.patterns import PatternLike, consistent_pattern
+from miurafab.workflow.uncut import uncut_shares
+
+STRAIN, CYCLES = 0.2, 3
 
 
 @dataclass(frozen=True)
 class EnergyOptions:
     """The options of an energy curve beside its pattern and its material."""
 
-    steps: int = option(Whole(1, 100_000), "Steps from the folded form to flat.", default=40)
+    steps: int = option(
+        Whole(1, 100_000),
+        "Steps from the folded form to flat, or to the largest extension.",
+        default=40,
+    )
     crease: int | None = option(
         Whole(),
         "The edge whose fold angle is driven.",
@@ -30,6 +40,22 @@ class EnergyOptions:
     )
     crease_ratio: float = option(
         number(0), "Stiffness of the creases over that of the facets.", default=0.0
+    )
+    pull: str | tuple[int, int] | None = option(
+        Either(Choice((CORNERS,)), Pair(Whole(), "V1,V2")),
+        "Pull two vertices apart, two opposite corners of the grid or those given, and tell the "
+        "force in newtons.",
+        default_text="none",
+    )
+    strain: float | None = option(
+        number(-0.9, 10),
+        "With `pull`: how much farther apart, over the distance in the folded form.",
+        default_text=f"{STRAIN:g}",
+    )
+    cycles: int | None = option(
+        Whole(1, 1000),
+        "With `pull`: how often to pull and let go.",
+        default_text=str(CYCLES),
     )
 
 
@@ -41,8 +67,9 @@ def energy(
     material: Material | AnyPath | None = None,
     on_progress: Progress | None = None,
     **options: Any,
-) -> EnergyCurve | PieceEnergies:
-    """Compute the energy of a pattern on the way from its folded form to flat.
+) -> EnergyCurve | PieceEnergies | PullCurve:
+    """Compute the energy of a pattern on the way from its folded form to flat, or with ``pull`` the
+    force against extension.
 
     Parameters
     ----------
@@ -50,21 +77,24 @@ def energy(
         The pattern, or a file that :func:`load` reads. It needs a folded form.
     material : Material, str or os.PathLike, optional
         A profile with a modulus, its shipped name or its TOML file: energies are then in joules.
-        Without it their unit is k_f times the mean edge.
+        Without it their unit is k_f times the mean edge. A force needs a material, by default the
+        usual one.
     on_progress : callable, optional
         Called with a fraction in 0..1 and a short text.
     {options}
 
     Returns
     -------
-    EnergyCurve or PieceEnergies
+    EnergyCurve, PieceEnergies or PullCurve
         With barrier and stable states; ``.plot()`` draws it, ``.save("x.png")`` writes it. A
         pattern of several pieces has a curve for each, since each piece folds by itself.
+        With ``pull``, the force over the extension in newtons, with its cycles.
 
     Raises
     ------
     InputError
-        For a material without a modulus.
+        For a material without a modulus, and with ``pull`` for one without the stiffness of its
+        creases.
     PatternError
         For a pattern without a folded form.
     OptionError
@@ -73,20 +103,24 @@ def energy(
     Examples
     --------
     >>> import miurafab as mf
-    >>> mf.energy(mf.fit("plane", facets=(4, 4)), steps=5).rigid
+    >>> sheet = mf.fit("plane", facets=(4, 4), size=80)
+    >>> mf.energy(sheet, steps=5).rigid
     True
+    >>> pulled = mf.energy(sheet, pull="corners", strain=0.1, cycles=2, material="paper-100")
+    >>> pulled.converged, len(pulled.report()["cycles"])
+    (True, 2)
+
+    Source
+    ------
+    E. T. Filipov et al., "Bar and hinge models for scalable analysis of origami", International
+    Journal of Solids and Structures 124 (2017), for the stiffness of facets and creases.
     """
     asked = read_options(EnergyOptions, options | {"steps": steps})
+    _check(asked)
     found = consistent_pattern(pattern)
-    paper = None
-    if material is not None:
-        stock = read_material(material)
-        if stock.modulus_pa is None:
-            raise InputError(
-                f"The material '{stock.name}' gives no modulus; add a line such as "
-                'modulus = "3GPa" to its file, or leave `material` out.'
-            )
-        paper = Paper(stock.thickness_mm, stock.modulus_pa)
+    if asked.pull is not None:
+        return _pulled(found, asked, read_material(material), on_progress)
+    paper = None if material is None else _paper(read_material(material))
     if found.pieces_count > 1:
         return energies_of_pieces(
             found,
@@ -100,6 +134,63 @@ def energy(
     return energy_curve(
         found, asked.steps, crease=asked.crease, model=model, on_progress=on_progress
     )
+
+
+def _check(asked: EnergyOptions) -> None:
+    if asked.pull is None:
+        for name, value in (("strain", asked.strain), ("cycles", asked.cycles)):
+            if value is not None:
+                raise OptionError(name, "is for a sheet that is pulled; add a `pull`")
+        return
+    if asked.strain == 0:
+        raise OptionError("strain", "is 0, which pulls nothing")
+    if asked.crease is not None:
+        raise OptionError("crease", "is driven on the way to flat; leave it out with `pull`")
+    if asked.crease_ratio:
+        raise OptionError(
+            "crease_ratio", "does not go with `pull`, which takes its creases from the material"
+        )
+
+
+def _pulled(
+    pattern: CreasePattern,
+    asked: EnergyOptions,
+    stock: Material,
+    on_progress: Progress | None,
+) -> PullCurve:
+    if stock.folding is None:
+        raise InputError(
+            f"The material '{stock.name}' does not say how stiff its creases are; add a table "
+            '[folding] with a line such as crease_length = "50mm" to its file (docs/forces.md says '
+            "how to measure it)."
+        )
+    folding = stock.folding
+    paper = replace(
+        _paper(stock),
+        crease_length_mm=folding.crease_length_mm,
+        yield_angle=math.inf if folding.yield_angle is None else folding.yield_angle,
+        hardening=folding.hardening,
+    )
+    assert asked.pull is not None
+    return pull(
+        pattern,
+        paper,
+        asked.pull,
+        strain=STRAIN if asked.strain is None else asked.strain,
+        cycles=CYCLES if asked.cycles is None else asked.cycles,
+        steps=asked.steps,
+        uncut=uncut_shares(pattern, stock),
+        on_progress=on_progress,
+    )
+
+
+def _paper(stock: Material) -> Paper:
+    if stock.modulus_pa is None:
+        raise InputError(
+            f"The material '{stock.name}' gives no modulus; add a line such as "
+            'modulus = "3GPa" to its file, or leave `material` out.'
+        )
+    return Paper(stock.thickness_mm, stock.modulus_pa)
 
 
 described(energy, EnergyOptions)

@@ -15,8 +15,10 @@ from miurafab.errors import InputError
 from miurafab.origami.energy.plot import energy_table
 from miurafab.origami.fitting.fit import FitRequest, fit
 from miurafab.profiles import load_material
+from miurafab.profiles.material import Crease
 from miurafab.surfaces.catalogue import make_surface
 from miurafab.workflow.energy import energy
+from miurafab.workflow.uncut import uncut_shares
 
 
 @pytest.fixture(scope="module")
@@ -103,9 +105,61 @@ def test_plots_are_the_same_every_time(run, saved, hypar, tmp_path, kind, start)
     assert out.read_bytes() == again.read_bytes()
 
 
+def test_a_pull_is_told_in_newtons(run, saved, hypar, tmp_path):
+    asked = ["--pull", "corners", "--strain", "0.1", "--cycles", "2", "--steps", "6"]
+    done = run("energy", saved, *asked, "--json", "-o", tmp_path / "pull.csv")
+    assert (done.returncode, done.stderr) == (0, "")
+    answer = json.loads(done.stdout)
+    curve = energy(hypar, 6, pull="corners", strain=0.1, cycles=2)
+    assert answer == json.loads(json.dumps(curve.report())) | {"file": str(tmp_path / "pull.csv")}
+    assert answer["pulled"] == [0, 80]
+    assert answer["thickness_mm"] == load_material("card-250").thickness_mm
+    assert answer["force_n"] == max(answer["curve"]["force_n"]) > 0
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "pull.csv").read_text(encoding="utf-8"))))
+    assert [float(row["force_n"]) for row in rows] == pytest.approx(answer["curve"]["force_n"])
+    top = max(rows, key=lambda row: float(row["extension_mm"]))
+    assert float(top["extension_mm"]) == pytest.approx(0.1 * answer["distance_mm"])
+    assert {row["way"] for row in rows} == {"out", "back"}
+    done = run("energy", saved, *asked, "-o", tmp_path / "pull.svg")
+    assert " N pull it to a strain of 0.1" in done.stdout
+    assert (tmp_path / "pull.svg").read_bytes().startswith(b"<?xml")
+    named = json.loads(run("energy", saved, *asked[2:], "--pull", "0,80", "--json").stdout)
+    assert named["curve"] == answer["curve"]
+
+
+def test_the_share_that_is_uncut_is_what_dashes_leave(hypar):
+    """Card: 1.2 mm of each 2 mm are burnt, and 0.6 mm bridges are left at both ends."""
+    material = load_material("card-250")
+    shares = uncut_shares(hypar, material)
+    lengths = np.linalg.norm(
+        np.diff(hypar.vertices_coords[hypar.edges_vertices], axis=1)[:, 0], axis=1
+    )
+    creases = np.isin(hypar.edges_assignment, ["M", "V"])
+    assert (shares[~creases] == 1).all()
+    usual = 0.4 + 2 * 0.6 / lengths[creases]
+    assert np.abs(shares[creases] - usual).max() <= 2 / lengths[creases].min()
+    assert 0.4 < shares[creases].min() <= shares[creases].max() < 0.6
+    scored = replace(material, creases={kind: Crease("score") for kind in material.creases})
+    assert (uncut_shares(hypar, scored) == 1).all()
+    parted = replace(material, creases={kind: Crease("cut") for kind in material.creases})
+    assert uncut_shares(hypar, parted)[creases] == pytest.approx(1.2 / lengths[creases])
+
+
+def test_a_material_without_stiff_creases_cannot_be_pulled(hypar):
+    material = replace(load_material("card-250"), folding=None)
+    with pytest.raises(InputError, match="how stiff its creases are"):
+        energy(hypar, material=material, pull="corners")
+
+
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
+        (["--strain", "0.2"], "--strain is for a sheet that is pulled"),
+        (["--pull", "0,1"], "two corners of one facet"),
+        (["--pull", "0,99"], "0 to 80"),
+        (["--pull", "corners", "--crease", "20"], "leave it out with --pull"),
+        (["--pull", "corners", "--crease-ratio", "1"], "--crease-ratio does not go with --pull"),
+        (["--pull", "corners", "--strain", "0"], "--strain is 0"),
         (["-o", "e.pdf"], "does not end in one of .png, .svg, .csv"),
         (["-o", "nowhere/e.csv"], "does not exist"),
         (["--steps", "0"], "--steps is 0"),

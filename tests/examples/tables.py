@@ -16,7 +16,7 @@ from miurafab.options import declared
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.profiles.beam import Laser, Meant, Operation
 from miurafab.profiles.machine import Bed, Controller, Knife, MotionLimits, ZAxis
-from miurafab.profiles.material import Perforation, TabRule
+from miurafab.profiles.material import CreaseStiffness, Perforation, TabRule
 from miurafab.workflow.cut_options import CutOptions
 
 _PLACE = re.compile(r"(<!-- table: (\w+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
@@ -80,7 +80,11 @@ TABLES = {
         bed=[Bed], motion=[MotionLimits], z=[ZAxis], controller=[Controller], tool=[Laser, Knife]
     ),
     "material": lambda: _keys(
-        perforation=[Perforation], tabs=[TabRule], **{"beams.BEAM": [Meant]}, operations=[Operation]
+        perforation=[Perforation],
+        folding=[CreaseStiffness],
+        tabs=[TabRule],
+        **{"beams.BEAM": [Meant]},
+        operations=[Operation],
     ),
     "checks": _checks,
     "findings": _findings,

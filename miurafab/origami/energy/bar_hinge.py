@@ -12,13 +12,18 @@ of Dudte et al., Nature Materials 15 (2016), only bent facets cost energy. The u
 pattern's mean edge L and the unit of energy is k_f L, unless a material gives
 
     k of a diagonal = 0.55 D (l / t)^(1/3),   D = E t^3 / (12 (1 - nu^2))
+    k of a crease   = share D l / L*
 
-(E. T. Filipov, K. Liu, T. Tachi, M. Schenk and G. H. Paulino, Bar and hinge models for scalable
-analysis of origami, Int. J. Solids Struct. 124 (2017).)
+with the share of the crease's length that is left uncut, and the length scale L* of a crease: a
+strip of paper of this length is as stiff as the crease at its end (E. T. Filipov, K. Liu, T. Tachi,
+M. Schenk and G. H. Paulino, Bar and hinge models for scalable analysis of origami, Int. J. Solids
+Struct. 124 (2017); L* is that of F. Lechenault, B. Thiria and M. Adda-Bedia, Mechanical response of
+a creased sheet, Phys. Rev. Lett. 112 (2014)).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -80,18 +85,29 @@ class BarHingeModel:
     def energy(self, points: Floats) -> float:
         """The energy at ``points`` (V, 3); bars of compliance 0 add nothing."""
         bend = hinge_angles(points, self.hinges) - self.rest
+        return 0.5 * float((self.stiffness * bend**2).sum()) + self.stretching(points)
+
+    def stretching(self, points: Floats) -> float:
+        """The part of the energy that is in the bars."""
         soft = self.compliance > 0
         strain = self.strains(points)[soft]
-        stretch = float((strain**2 / self.compliance[soft]).sum())
-        return 0.5 * (float((self.stiffness * bend**2).sum()) + stretch)
+        return 0.5 * float((strain**2 / self.compliance[soft]).sum())
 
 
 @dataclass(frozen=True)
 class Paper:
-    """The material of a sheet: ``thickness_mm`` and Young's ``modulus_pa``."""
+    """The material of a sheet: ``thickness_mm`` and Young's ``modulus_pa``.
+
+    Creases have the length scale ``crease_length_mm``; without it they turn freely. They yield at
+    ``yield_angle`` radians from rest, and then have the part ``hardening`` of their stiffness left
+    (:mod:`~miurafab.origami.energy.yielding`).
+    """
 
     thickness_mm: float
     modulus_pa: float
+    crease_length_mm: float | None = None
+    yield_angle: float = math.inf
+    hardening: float = 0.1
 
     @property
     def bending_stiffness(self) -> float:
@@ -105,12 +121,15 @@ def sheet_model(
     *,
     paper: Paper | None = None,
     crease_ratio: float = 0.0,
+    uncut: Floats | float = 1.0,
     unit_mm: float | None = None,
 ) -> BarHingeModel:
     """The bars and hinges of ``pattern``, at rest in its folded form.
 
     ``crease_ratio`` is k_c / k_f, or with ``paper`` the stiffness of a crease over that of a
-    diagonal of its length. ``unit_mm`` is the unit of length, by default the mean edge. Raises
+    diagonal of its length. Where ``paper`` has a crease length, that decides, with the share
+    ``uncut`` of each edge (E,) or of all. ``unit_mm`` is the unit of length, by default the mean
+    edge. Raises
     :class:`~miurafab.errors.PatternError` for a pattern without a folded form or without a crease,
     and for one of several pieces.
     """
@@ -136,17 +155,25 @@ def sheet_model(
     _refuse_degenerate(points, pattern.edges_vertices, np.concatenate([diagonals, across]))
     creases = across[~flat]
     bending = np.concatenate([diagonals, across[flat]])
-    hinges, weights, rest = bending, np.ones(len(bending)), np.zeros(len(bending))
-    if crease_ratio > 0:
+    springs = crease_ratio > 0 or (paper is not None and paper.crease_length_mm is not None)
+    hinges, rest = bending, np.zeros(len(bending))
+    if springs:
         hinges = np.concatenate([bending, creases])
-        weights = np.concatenate([weights, np.full(len(creases), crease_ratio)])
         rest = np.concatenate([rest, hinge_angles(points, creases)])
-    along = edge_lengths(points, hinges[:, :2])
-    unit_joule = None
+    lengths = edge_lengths(points, hinges[:, :2])
+    stiffness, unit_joule = lengths, None
     if paper is not None:
         slender = float(np.cbrt(unit / paper.thickness_mm))
         unit_joule = FACET_BENDING * paper.bending_stiffness * slender
-        along = np.cbrt(along)
+        stiffness = np.cbrt(lengths)
+    weights = np.full(len(hinges), crease_ratio)
+    weights[: len(bending)] = 1.0
+    stiffness = weights * stiffness
+    if paper is not None and paper.crease_length_mm is not None:
+        assert unit_joule is not None
+        scale = paper.bending_stiffness * unit / paper.crease_length_mm / unit_joule
+        share = np.broadcast_to(uncut, len(pattern.edges_vertices))[inner[~flat]]
+        stiffness[len(bending) :] = share * scale * lengths[len(bending) :]
     bars = np.concatenate([pattern.edges_vertices, diagonals[:, :2]])
     return BarHingeModel(
         points=points,
@@ -154,14 +181,12 @@ def sheet_model(
         lengths=edge_lengths(points, bars),
         compliance=np.zeros(len(bars)),
         hinges=hinges,
-        stiffness=weights * along,
+        stiffness=stiffness,
         rest=rest,
         creases=creases,
         creases_edges=inner[~flat],
         mechanisms=(
-            np.zeros(len(creases), dtype=np.int64)
-            if crease_ratio > 0
-            else _mechanisms(pattern, creases)
+            np.zeros(len(creases), dtype=np.int64) if springs else _mechanisms(pattern, creases)
         ),
         unit_mm=unit,
         unit_joule=unit_joule,

@@ -8,13 +8,23 @@ from typing import NamedTuple
 import numpy as np
 
 from miurafab.geometry.arrays import Floats
-from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, Factored, solve
+from miurafab.origami.energy.driven import Driven
+from miurafab.origami.energy.equilibrium import (
+    Balance,
+    EquilibriumState,
+    Factored,
+    Solution,
+    solve,
+)
 
 Progress = Callable[[float, str], None]
 
 HISTORY = 4
 """The number of states for the prediction: a cubic through the last four."""
 MAX_HALVINGS = 7
+MAX_FALSI = 30
+ZERO_LOAD = 1e-9
+"""The load at a state without load, over the largest of its neighbours."""
 
 
 class Known(NamedTuple):
@@ -24,31 +34,65 @@ class Known(NamedTuple):
     state: EquilibriumState
 
 
+class Walk:
+    """A way along equilibria of ``driven``, from ``start``; it holds the last states."""
+
+    def __init__(self, driven: Balance, start: EquilibriumState) -> None:
+        self.driven, self.start = driven, start
+        self.known: list[Known] = []
+        self._factored: Factored | None = None
+
+    @property
+    def last(self) -> Known:
+        """Where the way has come to."""
+        return self.known[-1]
+
+    def to(self, drive: float) -> bool:
+        """Go on to ``drive``; whether it was reached.
+
+        The polynomial through the last four states predicts the next. A step that does not converge
+        is halved, up to seven times.
+        """
+        goals = [drive]
+        while goals:
+            solution = self.towards(goals[-1])
+            if solution.converged:
+                self.take(Known(goals.pop(), solution.state))
+            elif self.known and len(goals) <= MAX_HALVINGS:
+                goals.append((self.last.drive + goals[-1]) / 2)
+            else:
+                return False
+        return True
+
+    def towards(self, drive: float) -> Solution:
+        """The equilibrium at ``drive`` in one step, without going there."""
+        guess = extrapolate(self.known, drive) if self.known else self.start
+        solution = solve(self.driven, guess, drive, self._factored)
+        self._factored = solution.factored
+        return solution
+
+    def take(self, new: Known) -> None:
+        """Go to ``new``, which is in equilibrium."""
+        self.driven.arrive(new.state)
+        self.known = [*(k for k in self.known[1 - HISTORY :] if k.drive != new.drive), new]
+
+    def turn(self) -> None:
+        """Turn back: earlier states predict nothing of what follows."""
+        self.known = self.known[-1:]
+
+
 def follow(
     driven: Balance, start: EquilibriumState, drives: Floats, on_progress: Progress | None = None
 ) -> list[EquilibriumState]:
     """The equilibria at ``drives`` (n,), the first of them near ``start``.
 
-    The polynomial through the last four states predicts the next. A step that does not converge is
-    halved, up to seven times; if that fails, the list is shorter than ``drives``.
+    If one cannot be reached (:meth:`Walk.to`), the list is shorter than ``drives``.
     """
-    known: list[Known] = []
-    states: list[EquilibriumState] = []
-    factored: Factored | None = None
+    walk, states = Walk(driven, start), []
     for number, drive in enumerate(drives):
-        goals = [float(drive)]
-        while goals:
-            guess = extrapolate(known, goals[-1]) if known else start
-            solution = solve(driven, guess, goals[-1], factored)
-            factored = solution.factored
-            if solution.converged:
-                new = Known(goals.pop(), solution.state)
-                known = [*(k for k in known[1 - HISTORY :] if k.drive != new.drive), new]
-            elif known and len(goals) <= MAX_HALVINGS:
-                goals.append((known[-1].drive + goals[-1]) / 2)
-            else:
-                return states
-        states.append(known[-1].state)
+        if not walk.to(float(drive)):
+            break
+        states.append(walk.last.state)
         if on_progress is not None:
             on_progress((number + 1) / len(drives), f"step {number} of {len(drives) - 1}")
     return states
@@ -62,3 +106,25 @@ def extrapolate(known: Sequence[Known], drive: float) -> EquilibriumState:
         others = np.delete(at, i)
         guess = guess.plus(k.state, float(np.prod((drive - others) / (at[i] - others))))
     return guess
+
+
+def without_load(driven: Driven, known: Sequence[Known], before: int) -> Known:
+    """The state without load between two neighbours in ``known``, by regula falsi (Illinois)."""
+    left, right = known[before], known[before + 1]
+    a, b = ((known.drive, driven.load(known.state, known.drive)) for known in (left, right))
+    scale = max(abs(a[1]), abs(b[1]))
+    best = left if abs(a[1]) < abs(b[1]) else right
+    load = min(a[1], b[1], key=abs)
+    factored: Factored | None = None
+    for _ in range(MAX_FALSI):
+        if abs(load) <= ZERO_LOAD * scale:
+            break
+        drive = (a[0] * b[1] - b[0] * a[1]) / (b[1] - a[1])
+        solution = solve(driven, extrapolate(known, drive), drive, factored)
+        if not solution.converged:
+            break
+        factored, load = solution.factored, driven.load(solution.state, drive)
+        best = Known(drive, solution.state)
+        a = (a[0], a[1] / 2) if (load < 0) == (b[1] < 0) else b
+        b = (drive, load)
+    return best

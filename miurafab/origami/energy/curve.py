@@ -19,9 +19,8 @@ import numpy as np
 
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
-from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate
-from miurafab.origami.energy.driven import Driven
-from miurafab.origami.energy.equilibrium import Factored, solve
+from miurafab.origami.energy.continuation import HISTORY, Known, without_load
+from miurafab.origami.energy.equilibrium import solve
 from miurafab.origami.energy.path import (
     NEARLY_FLAT,
     Path,
@@ -38,9 +37,6 @@ if TYPE_CHECKING:
 
 NOISE = 1e-15
 """Energies up to this, in the model's unit, are rounding; the sheet then folds rigidly."""
-MAX_FALSI = 30
-ZERO_LOAD = 1e-9
-"""Relative torque tolerance at a stationary point of the energy."""
 SMALL_TURN = 1e-3
 """Radians to either side of the folded form, for the difference quotient of its stiffness."""
 
@@ -209,30 +205,9 @@ def _stationary(traced: Traced, path: Path) -> tuple[list[StableState], list[Sta
         ]
         rising = path.loads[k] * (traced.drives[k + 1] - traced.drives[k]) > 0
         states = maxima if rising else minima
-        states.append(_zero_load(traced.driven, known, int(k) - first))
+        found = without_load(traced.driven, known, int(k) - first)
+        states.append(StableState(found.drive, traced.driven.model.energy(found.state.points)))
     return maxima, minima
-
-
-def _zero_load(driven: Driven, known: list[Known], before: int) -> StableState:
-    """The state without load between two neighbours in ``known``, by regula falsi (Illinois)."""
-    left, right = known[before], known[before + 1]
-    a, b = ((known.drive, driven.load(known.state, known.drive)) for known in (left, right))
-    scale = max(abs(a[1]), abs(b[1]))
-    best = left if abs(a[1]) < abs(b[1]) else right
-    load = min(a[1], b[1], key=abs)
-    factored: Factored | None = None
-    for _ in range(MAX_FALSI):
-        if abs(load) <= ZERO_LOAD * scale:
-            break
-        drive = (a[0] * b[1] - b[0] * a[1]) / (b[1] - a[1])
-        solution = solve(driven, extrapolate(known, drive), drive, factored)
-        if not solution.converged:
-            break
-        factored, load = solution.factored, driven.load(solution.state, drive)
-        best = Known(drive, solution.state)
-        a = (a[0], a[1] / 2) if (load < 0) == (b[1] < 0) else b
-        b = (drive, load)
-    return StableState(best.drive, driven.model.energy(best.state.points))
 
 
 def _stiffness(traced: Traced) -> float:

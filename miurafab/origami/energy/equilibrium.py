@@ -158,6 +158,9 @@ class Balance:
         """The driven quantity at ``points`` (V, 3); with nothing driven it is always on target."""
         return Drive(target, np.zeros((0, 3)), np.zeros((0, 0, 3, 3)))
 
+    def arrive(self, state: EquilibriumState) -> None:
+        """Take note that the path has come to ``state``. Elastic hinges have no memory."""
+
     def touch(self, points: Floats) -> Touch:
         """The springs between facets that touch at ``points``; none here."""
         return NO_TOUCH

@@ -1,0 +1,152 @@
+"""Force against extension, against closed forms and balances of energy."""
+
+import itertools
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from problems import regular
+
+from miurafab.errors import InputError, PatternError
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.bar_hinge import Paper
+from miurafab.origami.energy.pull import pull
+from miurafab.origami.fitting.fit import FitRequest, fit
+from miurafab.origami.folding.kinematics import rigid_motion
+from miurafab.surfaces.catalogue import make_surface
+
+PAPER = Paper(0.2, 3e9, crease_length_mm=50.0, yield_angle=0.3, hardening=0.1)
+
+
+@cache
+def hypar():
+    """A hypar of 6 x 6 facets, which does not fold rigidly."""
+    surface = make_surface("hypar", {"height": 0.5})[0]
+    return fit(FitRequest(surface=surface, facets=(6, 6), size_mm=80.0)).pattern
+
+
+def kite(fold, width, length):
+    """Two triangles on one crease; only the crease turns when their tips are pulled."""
+    half, middle = fold / 2, length / 2
+    out, up = width * math.cos(half), width * math.sin(half)
+    return CreasePattern(
+        vertices_coords=np.array([[0, -middle], [0, middle], [-width, 0], [width, 0]]),
+        edges_vertices=np.array([[0, 1], [1, 2], [2, 0], [0, 3], [3, 1]]),
+        edges_assignment=np.array(["V", "B", "B", "B", "B"]),
+        edges_fold_angle=np.array([fold, 0, 0, 0, 0]),
+        faces_vertices=np.array([[0, 1, 2], [1, 0, 3]]),
+        folded_coords=np.array([[0, -middle, 0], [0, middle, 0], [-out, 0, up], [out, 0, up]]),
+    )
+
+
+def returned(angles, rest, yield_angle, hardening):
+    """The torque over k after each of ``angles``: the return map, written out for one crease."""
+    slip, torques = 0.0, []
+    more = hardening / (1 - hardening)
+    for angle in angles:
+        s = angle - rest - slip - more * slip
+        if abs(s) > yield_angle:
+            slip += (1 - hardening) * math.copysign(abs(s) - yield_angle, s)
+        torques.append(angle - rest - slip)
+    return np.array(torques)
+
+
+@pytest.mark.parametrize("hardening", [0.0, 0.1, 0.5])
+@pytest.mark.parametrize("strain", [0.3, -0.4])
+def test_one_crease_pulls_as_in_closed_form(hardening, strain):
+    """d = 2 w cos(rho / 2), so F = (d tau) / (d d / d rho), with tau of the return map."""
+    fold, width, length = math.radians(100), 30.0, 40.0
+    paper = replace(PAPER, hardening=hardening)
+    curve = pull(kite(fold, width, length), paper, (2, 3), strain=strain, steps=25, uncut=0.4)
+    assert curve.converged
+    sign = math.copysign(1.0, curve.forces[-2])
+    rho = 2 * np.arccos(curve.distances / (2 * width))
+    k = 0.4 * paper.bending_stiffness * length / paper.crease_length_mm  # J per radian
+    torque = k * returned(rho, fold, paper.yield_angle, hardening)
+    force = torque / (-width * 1e-3 * np.sin(rho / 2))
+    assert curve.forces == pytest.approx(force, abs=1e-7 * np.abs(force).max())
+    assert sign == math.copysign(1.0, strain)
+    assert curve.dissipated[-1] > 0
+
+
+@pytest.mark.parametrize("unit", [1.0, 3.0])
+def test_a_stiff_miura_ori_pulls_as_its_rigid_motion_does(unit):
+    """F = d/dd of the sum of k (rho - rho_0)^2 / 2 along the motion, if facets hardly bend."""
+    pattern = regular(5, 5).scaled(unit)
+    paper = Paper(0.2, 3e9, crease_length_mm=1e7)
+    curve = pull(pattern, paper, strain=0.05, cycles=1, steps=8)
+    states = np.linspace(1.0, 0.5, 2001)
+    motion = rigid_motion(pattern, states)
+    apart = np.linalg.norm(motion.frames[:, -1] - motion.frames[:, 0], axis=1)
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    ends = pattern.vertices_coords[pattern.edges_vertices[inner]]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    k = paper.bending_stiffness * lengths / paper.crease_length_mm
+    turned = motion.fold_angles[:, inner] - motion.fold_angles[0, inner]
+    energy = 0.5 * (k * turned**2).sum(axis=1)
+    force = np.gradient(energy, apart * 1e-3)
+    out = curve.loading == 1
+    expected = np.interp(curve.distances[out], apart, force)
+    assert curve.forces[out] == pytest.approx(expected, abs=2e-3 * expected.max())
+
+
+def test_an_elastic_cycle_gives_its_energy_back():
+    curve = pull(hypar(), replace(PAPER, yield_angle=math.inf), cycles=2, steps=10)
+    assert curve.converged
+    most = curve.stored.max()
+    ends = [int(np.flatnonzero(curve.cycles == cycle)[-1]) for cycle in (1, 2)]
+    assert np.abs(curve.stored[ends]).max() <= 1e-12 * most
+    assert np.abs(curve.extensions[ends]).max() <= 1e-6 * curve.distances[0]
+    assert np.abs(curve.dissipated).max() == 0
+    assert curve.changes()[0] <= 1e-9 * np.abs(curve.forces).max()
+    assert not curve.slips.any()
+
+
+def test_work_is_what_is_stored_and_dissipated_to_second_order():
+    errors = []
+    for steps in (10, 20, 40):
+        curve = pull(hypar(), PAPER, strain=0.25, steps=steps)
+        assert curve.converged
+        balance = curve.stored + curve.dissipated
+        errors.append(np.abs(curve.works - balance).max() / balance.max())
+    assert errors[-1] <= 2e-3
+    for coarse, fine in itertools.pairwise(errors):
+        assert coarse >= 3 * fine
+
+
+def test_the_first_cycle_differs_and_later_ones_repeat():
+    curve = pull(hypar(), PAPER, strain=0.25, steps=20)
+    top = np.abs(curve.forces).max()
+    first, later = curve.changes()
+    assert first >= 0.05 * top
+    assert later <= 1e-3 * top
+    report = curve.report()
+    assert report["set_mm"] > 0.01 * curve.distances[0]
+    assert report["cycles"][2]["set_mm"] == pytest.approx(report["cycles"][1]["set_mm"], abs=1e-6)
+    assert (np.diff(curve.dissipated) >= 0).all()
+    released = [int(np.flatnonzero(curve.cycles == cycle)[-1]) for cycle in (1, 2, 3)]
+    assert np.abs(curve.forces[released]).max() <= 1e-8 * top
+
+
+def test_the_force_grows_with_the_cube_of_a_sheet_scaled_alike():
+    """F L / D is a number of the shape: twice all lengths, thickness too, is eight times D."""
+    one = pull(hypar(), PAPER, cycles=1, steps=8)
+    twice = replace(PAPER, thickness_mm=0.4, crease_length_mm=100.0)
+    other = pull(hypar().scaled(2.0), twice, cycles=1, steps=8)
+    assert other.forces == pytest.approx(4 * one.forces, rel=1e-6, abs=1e-9)
+    assert other.stored == pytest.approx(8 * one.stored, rel=1e-6, abs=1e-12)
+
+
+def test_what_cannot_be_pulled_is_said():
+    for ends, part in (((0, 0), "two different"), ((0, 99), "0 to 48"), ((0, 8), "one facet")):
+        with pytest.raises(InputError, match=part):
+            pull(hypar(), PAPER, ends)
+    with pytest.raises(PatternError, match="no corners"):
+        pull(replace(hypar(), grid=None), PAPER)
+    lost = pull(hypar(), PAPER, strain=3.0, steps=6, cycles=1)
+    assert not lost.converged
+    assert "smaller `strain`" in lost.verdict()
+    reached = lost.report()["cycles"][0]["strain"]
+    assert 0 < reached < 3
