@@ -7,8 +7,11 @@ rows and columns, so that its seams run both ways; its facets are about as long 
 mm, and it has at least 12 tabs. A needle has a base shorter than 2.5 mm or is more
 than twice as high as its base; a raised tab is no wider than its base. *Before* is the rule of the
 time when tabs could be needles: a base of 2 mm, any height up to that asked for, and raised tabs of
-any angle. The area that is lost is that of the needles, so smaller facets lose more. The exit code
-is 1 if a tab is a needle, or if a design keeps less than 87 % of its glue.
+any angle. The area that is lost is that of the needles, so smaller facets lose more. *Allowed* is a
+bound on what any tab may keep: on an edge of length L a base is L less the inset at both ends, at
+least 2.5 mm, and a tab no wider than its base and twice as high has twice the square of it. The
+exit code is 1 if a tab is a needle, or if a design keeps less than 87 % of its glue, and less than
+LEAST_OF_ALLOWED of what is allowed.
 """
 
 from __future__ import annotations
@@ -29,12 +32,14 @@ import numpy as np
 from miurafab.fabrication import tabs as rule
 from miurafab.fabrication.tab_choice import choose_tabs
 from miurafab.fabrication.tabs import MIN_BASE_MM, SLENDER, TabRegions
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cylinder import cylinder_over_polyline
 from miurafab.origami.unfold import unfold
 from miurafab.profiles import load_material
 
 LEAST_KEPT = 0.87
+LEAST_OF_ALLOWED = 0.9
 LEAST_TABS = 12
 FACETS_MM = (6.0, 22.0)
 """As in the shipped designs, whose narrowest facets have 6.2 mm."""
@@ -43,12 +48,20 @@ FORMER_BASE_MM = 2.0
 
 @dataclass(frozen=True)
 class Measured:
-    """The tabs of a design, the needles among them and before, and the glue area kept."""
+    """The tabs of a design, the needles among them and before, the share of the glue area that is
+    kept, and a bound on the share that may be.
+    """
 
     tabs: int
     needles: int
     needles_before: int
     kept: float
+    allowed: float
+
+    @property
+    def enough(self) -> bool:
+        """Whether it keeps the area that is asked for, or nearly what is allowed."""
+        return self.kept >= min(LEAST_KEPT, LEAST_OF_ALLOWED * self.allowed)
 
 
 def design(seed: int, facets: tuple[float, float] = FACETS_MM) -> tuple[CreasePattern, np.ndarray]:
@@ -110,7 +123,11 @@ def measured(seed: int, facets: tuple[float, float] = FACETS_MM) -> Measured | N
     if len(before) < LEAST_TABS:
         return None
     kept = float(now.areas.sum() / before.areas.sum())
-    return Measured(len(now), needles(now), needles(before), kept)
+    lengths = edge_lengths(pattern.vertices_coords, pattern.edges_vertices[before.edge])
+    base = lengths - 2 * rule.inset_of(material)
+    most = np.minimum(before.areas, SLENDER * np.where(base >= MIN_BASE_MM, base, 0.0) ** 2)
+    allowed = float(most.sum() / before.areas.sum())
+    return Measured(len(now), needles(now), needles(before), kept, allowed)
 
 
 def sample(count: int, seed: int, facets: tuple[float, float] = FACETS_MM) -> list[Measured]:
@@ -135,12 +152,14 @@ def main() -> int:
         "needles": sum(each.needles for each in found),
         "designs_with_needles_before": sum(each.needles_before > 0 for each in found),
         "least_kept": round(min(each.kept for each in found), 4),
+        "least_allowed": round(min(each.allowed for each in found), 4),
+        "least_of_allowed": round(min(each.kept / each.allowed for each in found), 4),
         "mean_kept": round(float(np.mean([each.kept for each in found])), 4),
     }
     print("\n".join(f"{name:28} {value}" for name, value in figures.items()))
     if given.json is not None:
         given.json.write_text(json.dumps(figures, indent=1) + "\n")
-    return 1 if figures["needles"] or figures["least_kept"] < LEAST_KEPT else 0
+    return 0 if not figures["needles"] and all(each.enough for each in found) else 1
 
 
 if __name__ == "__main__":

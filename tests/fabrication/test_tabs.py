@@ -273,6 +273,9 @@ def test_random_designs_have_no_needles_and_keep_their_glue():
         assert each.kept >= needles.LEAST_KEPT
     small = needles.sample(20, 1, (4.0, 16.0))
     assert sum(each.needles for each in small) == 0 < sum(each.needles_before for each in small)
+    assert all(each.enough for each in small)
+    worst = needles.measured(106, (4.0, 16.0))
+    assert 0.97 * worst.allowed < worst.kept < worst.allowed < 0.5
 
 
 def test_the_longest_bare_run_is_told():
