@@ -17,6 +17,7 @@ from miurafab.errors import LayoutError, ProfileError
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.program import strokes
+from miurafab.gcode.reading import read_program
 from miurafab.posting import LINE_CHARS, NO_PATCH, post
 from miurafab.profiles import OPERATIONS, MachineProfile, Material, load_machine, load_material
 
@@ -275,6 +276,24 @@ def test_a_pen_is_lowered_and_lifted_at_each_stroke() -> None:
         *["G0 X10 Y10", "M3 S90", "G4 P0.15", "G1 X20 Y10", "G1 X20 Y20.5", "G1 X10 Y10"],
         *["M3 S30", "G4 P0.15", "M5", "G0 X0 Y0", "M2"],
     ]
+
+
+@given(toolpaths())
+@settings(max_examples=40)
+def test_a_pen_stays_down_where_strokes_meet(path: Toolpath) -> None:
+    pen = replace(
+        with_tool(LASER, kind="pen", s_down=90, s_up=30, settle_s=0.15, beam_mode="M3"),
+        settings={32: 0.0},
+    )
+    job = post(path, pen, CARD)
+    assert job.text.splitlines().count("M3 S90") == len(joined(path))
+    program = read_program(job, pen)
+    drawn = np.stack([program.start, program.end], axis=1)[program.beam_on][:, :, :2]
+    inner = np.ones(len(path.points), dtype=bool)
+    inner[path.offsets[1:] - 1] = False
+    asked = np.stack([path.points[inner], path.points[np.flatnonzero(inner) + 1]], axis=1)
+    assert drawn.shape == asked.shape
+    assert np.abs(drawn - asked).max(initial=0.0) <= 1e-3
 
 
 def test_a_firmware_without_laser_mode_switches_at_each_stroke() -> None:

@@ -20,7 +20,7 @@ from miurafab.posting.absolute_moves import hops
 from miurafab.posting.between import Between, heights_of
 from miurafab.posting.dialects import depth, made_by_knife, words_of
 from miurafab.posting.relative_moves import apart, chains
-from miurafab.posting.strokes import Points, Runs, points_of, repeated, runs_of
+from miurafab.posting.strokes import Points, Runs, points_of, repeated, runs_of, without_lifts
 from miurafab.posting.text import ByteRows, comment
 from miurafab.profiles import OPERATIONS, MachineProfile, Material
 
@@ -48,7 +48,7 @@ def post(
     between two passes over the same place. Between two runs, with the beam off, the head goes to
     the height of the next and the air is switched; after the last it goes back to Z0. The job
     starts and ends dark. A knife's strokes are those of its holder
-    (:mod:`miurafab.fabrication.knife`).
+    (:mod:`miurafab.fabrication.knife`). A pen stays down between strokes that meet.
 
     Raises :class:`~miurafab.errors.LayoutError` for a stroke that leaves the bed, has no length
     at 0.001 mm or is not finite, for a name that cannot stand in a comment and for what a knife
@@ -61,6 +61,8 @@ def post(
     if knife is not None:
         left_out = made_by_knife(toolpath, knife, machine)
         toolpath = tip_way(without_operations(toolpath, left_out), knife, machine.bed.margin_mm)
+    if machine.tool.kind == "pen":
+        toolpath = without_lifts(toolpath)
     operations = material.on(machine).operations
     runs = runs_of(toolpath, [operations[name].passes for name in OPERATIONS])
     heights = heights_of(runs, machine, material)

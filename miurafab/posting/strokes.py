@@ -69,6 +69,29 @@ def repeated(toolpath: Toolpath, runs: Runs) -> Toolpath:
     )
 
 
+def without_lifts(toolpath: Toolpath) -> Toolpath:
+    """``toolpath`` with each stroke that begins where the one before ends, to the micrometre,
+    joined to it, if both are of one operation and one patch: a pen need not leave the sheet there.
+    """
+    if not len(toolpath):
+        return toolpath
+    begin, end = (np.rint(each * 1000.0) for each in (toolpath.starts[1:], toolpath.ends[:-1]))
+    meets = (begin == end).all(axis=1)
+    meets &= (np.diff(toolpath.operation) == 0) & (np.diff(toolpath.patch) == 0)
+    first = np.append(True, ~meets)
+    points = np.ones(len(toolpath.points), dtype=bool)
+    points[toolpath.offsets[1:-1][meets]] = False
+    count = np.add.reduceat(np.add.reduceat(points, toolpath.offsets[:-1]), np.flatnonzero(first))
+    return replace(
+        toolpath,
+        points=toolpath.points[points],
+        offsets=np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
+        operation=toolpath.operation[first],
+        patch=toolpath.patch[first],
+        edge=toolpath.edge[first],
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Points:
     """The points of the strokes, in the order of making.

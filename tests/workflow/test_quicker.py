@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
+import times
 from problems import regular
 
 import miurafab as mf
@@ -33,6 +35,21 @@ def test_the_ways_that_are_told_are_as_quick_as_told(tmp_path):
         made = mf.sheets(pattern, machine=knife, material=file)
         assert way.seconds == pytest.approx(made.seconds, rel=0.05)
         assert made.seconds < 0.95 * job.seconds
+
+
+def test_the_table_of_docs_is_of_the_jobs_that_it_names(capsys, tmp_path):
+    file = tmp_path / "times.json"
+    assert times.main(["--facets", "3x3", "--size", "60mm", "--json", str(file)]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 2 + 4
+    laser, knife, pen, dashed = json.loads(file.read_text())
+    assert (pen["machine"], pen["creases"]) == (dashed["machine"], "as usual")
+    # A pen that draws lines is lifted less, and so is quicker.
+    assert 2 * pen["lifts"] < dashed["lifts"]
+    assert 1.5 * pen["seconds"] < dashed["seconds"]
+    assert laser["seconds"] < pen["seconds"] < knife["seconds"]
+    assert max(knife["ways"].values()) < knife["seconds"]
+    job = mf.sheets(mf.fit("hypar", facets=(3, 3), size=60), machine=pen["machine"])
+    assert job.seconds == pen["seconds"]
 
 
 @pytest.mark.parametrize(
