@@ -106,13 +106,12 @@ def factor_symmetric(matrix: sparse.csc_array, *, reorder: bool = True) -> Facto
 
 
 def negative_pivots(factor: Factor) -> int:
-    """The number of negative eigenvalues of a matrix factored by :func:`factor_symmetric`.
+    """The number of negative eigenvalues of a matrix factored by a function of this module.
 
-    By J. J. Sylvester's law of inertia it is that of the pivots, since rows are not exchanged.
+    By J. J. Sylvester's law of inertia it is that of the pivots, since rows are not exchanged. A
+    Cholesky factor has none.
     """
-    if not isinstance(factor, SuperLU):
-        raise TypeError("only the factor of a symmetric matrix has signs of pivots")
-    return int((factor.U.diagonal() < 0).sum())
+    return int((factor.U.diagonal() < 0).sum()) if isinstance(factor, SuperLU) else 0
 
 
 def minimum_degree(matrix: sparse.csc_array) -> Ints:

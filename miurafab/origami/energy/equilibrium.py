@@ -25,6 +25,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.sparse import Factor, factor_symmetric
@@ -130,11 +131,14 @@ class Balance:
 
     @cached_property
     def axes(self) -> Floats:
-        """(3, 3) orthonormal columns: along the first side of the held triangle, and in its plane.
+        """(3, 3) the axes of the own points of the model; a state has ``points @ axes``."""
+        return self.axes_at(self.model.points)
 
-        The points of a state are ``points @ axes``.
+    def axes_at(self, points: Floats) -> Floats:
+        """(3, 3) orthonormal columns: along the first side of the held triangle at ``points``
+        (V, 3), and in its plane.
         """
-        p = self.model.points[self._held]
+        p = points[self._held]
         x = (p[1] - p[0]) / np.linalg.norm(p[1] - p[0])
         z = vector_product(x, p[2] - p[0])
         z /= np.linalg.norm(z)
@@ -199,7 +203,11 @@ class Balance:
         held = state.mu * drive.hessian + across / EPS
         touching = self.touch(points).stiffness
         matrix = self.assembly.matrix([bend, stretch_blocks(block), held[None], touching])
-        return Factored(factor_symmetric(matrix, reorder=False), bars, weights, drive.gradient)
+        return Factored(self.factored(matrix), bars, weights, drive.gradient)
+
+    def factored(self, matrix: sparse.csc_array) -> Factor:
+        """The factor of a ``matrix`` of :attr:`assembly`."""
+        return factor_symmetric(matrix, reorder=False)
 
     def step(self, factored: Factored, residual: Residual) -> EquilibriumState:
         """The Newton step (dx, dn) for ``residual`` with K as ``factored``."""

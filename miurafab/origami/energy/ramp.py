@@ -23,7 +23,7 @@ import numpy as np
 from scipy import sparse
 
 from miurafab.geometry.arrays import Floats
-from miurafab.geometry.sparse import factor_symmetric
+from miurafab.geometry.sparse import Factor, SymmetricSolver, factor_symmetric
 from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, stretch_blocks
 from miurafab.origami.energy.hinges import hinge_angles, hinge_gradients
 
@@ -65,6 +65,13 @@ class Ramped(Balance):
     def state(self, points: Floats) -> EquilibriumState:
         """The state at ``points`` (V, 3) whose bars pull by their strain; all have a compliance."""
         return EquilibriumState(points, self.model.strains(points) / self.model.compliance, 0.0)
+
+    def factored(self, matrix: sparse.csc_array) -> Factor:
+        """The factor of ``matrix``: by Cholesky, five times as fast, where it is definite."""
+        try:
+            return self._solver.factor(matrix)
+        except RuntimeError:  # an unstable state
+            return factor_symmetric(matrix, reorder=False)
 
     def moments(self, angle: Floats, target: float) -> tuple[Floats, Floats]:
         """The moments and slopes of hinges, with the springs beyond the limit."""
@@ -108,6 +115,10 @@ class Ramped(Balance):
         return np.asarray(angle + 2 * np.pi * np.round((self.last - angle) / (2 * np.pi)))
 
     @cached_property
+    def _solver(self) -> SymmetricSolver:
+        return SymmetricSolver()
+
+    @cached_property
     def _stop(self) -> Floats:
         ends = self.model.points[self.hinges[:, :2]]
         return np.asarray(LIMIT_STIFFNESS * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
@@ -131,7 +142,7 @@ def descend(ramped: Ramped, points: Floats, target: float, force: float, rounds:
         if np.abs(gradient).max(initial=0.0) <= force or mu > GREATEST_MU:
             break
         raised = raised_diagonal(matrix, mu)
-        step = ramped.assembly.vectors(-factor_symmetric(raised, reorder=False).solve(gradient))
+        step = ramped.assembly.vectors(-ramped.factored(raised).solve(gradient))
         trial = points + step
         turned = np.abs(ramped.angles(trial) - ramped.last).max(initial=0.0)
         short = turned <= LARGEST_TURN and np.abs(step).max() <= LARGEST_MOVE

@@ -21,7 +21,6 @@ import numpy as np
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats
-from miurafab.geometry.sparse import factor_symmetric
 from miurafab.origami.energy.bar_hinge import BarHingeModel, flat_model, has_folds
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.ramp import Ramped, raised_diagonal
@@ -54,38 +53,41 @@ class RigidCertificate:
     moved: float
 
 
-def nearest_rigid(model: BarHingeModel, points: Floats) -> tuple[Floats, float]:
-    """The shape (V, 3) with rigid facets nearest to ``points`` (V, 3), and its residual.
+class RigidFacets:
+    """The facets of ``model`` (:func:`~miurafab.origami.energy.bar_hinge.flat_model`) as rigid."""
 
-    ``model`` is that of :func:`~miurafab.origami.energy.bar_hinge.flat_model`, in its unit.
-    """
-    facets = len(model.hinges) - int((model.rest != 0).sum())
-    bare = replace(
-        model,
-        points=points,
-        hinges=model.hinges[:facets],
-        stiffness=np.ones(facets),
-        rest=np.zeros(facets),
-        creases=model.hinges,
-        compliance=np.ones(len(model.bars)),
-    )
-    free = Ramped(bare)
-    turned = points @ free.axes
-    best, least = turned, np.inf
-    for _ in range(ROUNDS):
-        strain = np.abs(bare.strains(turned)).max(initial=0.0)
-        residual = max(strain, np.abs(hinge_angles(turned, free.hinges)).max(initial=0.0))
-        if not residual < least:
-            break
-        best, least = turned, float(residual)
-        if residual <= EXACT:
-            break
-        gradient, matrix = free.gauss_newton(turned, 0.0)
-        raised = raised_diagonal(matrix, LEAST_LENGTH)
-        turned = turned - free.assembly.vectors(
-            factor_symmetric(raised, reorder=False).solve(gradient)
+    def __init__(self, model: BarHingeModel) -> None:
+        facets = len(model.hinges) - int((model.rest != 0).sum())
+        bare = replace(
+            model,
+            hinges=model.hinges[:facets],
+            stiffness=np.ones(facets),
+            rest=np.zeros(facets),
+            creases=model.hinges,
+            compliance=np.ones(len(model.bars)),
         )
-    return best @ free.axes.T, least
+        self._free = Ramped(bare)
+
+    def nearest(self, points: Floats) -> tuple[Floats, float]:
+        """The shape (V, 3) nearest to ``points`` (V, 3), in the unit of the model, and what is
+        left of c and rho_f there.
+        """
+        free = self._free
+        axes = free.axes_at(points)
+        turned = points @ axes
+        best, least = turned, np.inf
+        for _ in range(ROUNDS):
+            strain = np.abs(free.model.strains(turned)).max(initial=0.0)
+            left = max(strain, np.abs(hinge_angles(turned, free.hinges)).max(initial=0.0))
+            if not left < least:
+                break
+            best, least = turned, float(left)
+            if left <= EXACT:
+                break
+            gradient, matrix = free.gauss_newton(turned, 0.0)
+            raised = raised_diagonal(matrix, LEAST_LENGTH)
+            turned = turned - free.assembly.vectors(free.factored(raised).solve(gradient))
+        return best @ axes.T, least
 
 
 def certified(motion: FoldingMotion) -> tuple[FoldingMotion, RigidCertificate]:
@@ -96,6 +98,7 @@ def certified(motion: FoldingMotion) -> tuple[FoldingMotion, RigidCertificate]:
     """
     pattern = motion.pattern
     models = [(p, flat_model(p.pattern)) for p in pieces_of(pattern) if has_folds(p.pattern)]
+    rigid = [RigidFacets(model) for _, model in models]
     frames, angles = motion.frames.copy(), motion.fold_angles.copy()
     moving = np.flatnonzero(np.abs(motion.fold_angles).max(axis=1, initial=0.0) > 0)
     if not len(moving):
@@ -104,9 +107,9 @@ def certified(motion: FoldingMotion) -> tuple[FoldingMotion, RigidCertificate]:
     worst = RigidCertificate(True, float(motion.states[middle]), 0.0, 0.0)
     for frame in [middle, *moving[moving != middle]]:
         residual, moved = 0.0, 0.0
-        for piece, model in models:
+        for (piece, model), facets in zip(models, rigid, strict=True):
             own = piece.vertices
-            points, left = nearest_rigid(model, frames[frame, own] / model.unit_mm)
+            points, left = facets.nearest(frames[frame, own] / model.unit_mm)
             frames[frame, own] = points * model.unit_mm
             residual = max(residual, left)
             edges = piece.edges[model.creases_edges]
@@ -116,11 +119,15 @@ def certified(motion: FoldingMotion) -> tuple[FoldingMotion, RigidCertificate]:
             moved = max(moved, float(np.abs(turn).max(initial=0.0)))
             angles[frame, edges] = before + turn
         found = RigidCertificate(
-            residual <= RIGID and moved <= MOVED, float(motion.states[frame]), residual, moved
+            bool(residual <= RIGID and moved <= MOVED),
+            float(motion.states[frame]),
+            float(residual),
+            moved,
         )
         if not found.rigid:
             return motion, found
         worst = max(worst, found, key=lambda each: each.residual)
+    # a facet edge of letter F does not turn
     angles[:, pattern.edges_assignment == "F"] = 0.0
     mismatch = loop_mismatch(pattern, place(pattern, angles))
     if mismatch.max(initial=0.0) > RIGID:

@@ -27,7 +27,7 @@ from miurafab.geometry.sparse import negative_pivots
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, flat_model
 from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate
-from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, solve
+from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, Factored, solve
 from miurafab.origami.energy.ramp import Ramped, descend
 from miurafab.origami.energy.seed import linear_seed
 
@@ -144,7 +144,11 @@ class _Walk:
 
     def __init__(self, model: BarHingeModel, random: np.random.Generator) -> None:
         self.ramped = Ramped(model)
+        firmer = np.where(model.rest == 0, FIRMER, 1.0) * model.stiffness
+        hard = replace(model, compliance=np.zeros_like(model.compliance), stiffness=firmer)
+        self.stiff = Ramped(hard)
         self.known: list[Known] = []
+        self._factored: Factored | None = None
         self.step = FIRST
         self.snaps = 0
         self._random = random
@@ -164,7 +168,7 @@ class _Walk:
         if not found.converged or turned.max(initial=0.0) > LARGEST_TURN:
             return False
         self.ramped.accept(found.state.points)
-        self.known = [Known(part, found.state)]
+        self.known, self._factored = [Known(part, found.state)], found.factored
         self.step = FIRST
         return True
 
@@ -173,7 +177,8 @@ class _Walk:
         while self.known[-1].drive < goal - 1e-12:
             here = self.known[-1].drive
             part = min(goal, here + nominal * self.step)
-            found = solve(self.ramped, extrapolate(self.known, part), part)
+            found = solve(self.ramped, extrapolate(self.known, part), part, self._factored)
+            self._factored = found.factored
             turned = np.abs(self.ramped.angles(found.state.points) - self.ramped.last)
             if found.converged and turned.max(initial=0.0) <= LARGEST_TURN:
                 self.ramped.accept(found.state.points)
@@ -187,11 +192,8 @@ class _Walk:
 
     def frame(self) -> RampFrame:
         """The last state with stiff bars, if they find a stable balance near it, or as it is."""
-        here, soft = self.known[-1], self.ramped
-        model = soft.model
-        firmer = np.where(model.rest == 0, FIRMER, 1.0) * model.stiffness
-        model = replace(model, compliance=np.zeros_like(model.compliance), stiffness=firmer)
-        stiff = replace(soft, model=model, last=soft.last.copy())
+        here, soft, stiff = self.known[-1], self.ramped, self.stiff
+        stiff.last[:] = soft.last
         found = solve(stiff, here.state, here.drive)
         if found.converged:
             turned = np.abs(stiff.angles(found.state.points) - soft.last).max(initial=0.0)
