@@ -130,7 +130,9 @@ def _job(path: Path) -> None:
         document = json.loads(manifest.read_bytes())
         document["files"] = {name: sha256(path.with_name(name)) for name in document["files"]}
         manifest.write_text(json.dumps(document))
-    for finding in (*check_job(path.parent).findings, *read_job(path.parent, unread=True).findings):
+    with _about(path):
+        found = (*check_job(path.parent).findings, *read_job(path.parent, unread=True).findings)
+    for finding in found:
         wrong = _check_sentence(finding.sentence, None)
         if wrong:
             raise AssertionError(wrong)

@@ -33,6 +33,11 @@ MOST_TEXT_BYTES = 1 << 22
 MOST_DIGITS = 18
 """Whole numbers of so many digits fit into 64 bits."""
 
+_LONGEST_NAME, _LONGEST_PATH = 255, 4000
+"""In bytes; what is longer is an error of the system (Linux: NAME_MAX, PATH_MAX)."""
+_LONGEST_PART = 200
+"""... of a name to which an ending or a word is added."""
+
 _FAULTS = (ValueError, TypeError, LookupError, ArithmeticError, RecursionError, MemoryError)
 _TEMPORARY = ".miurafab-{}.new"
 
@@ -51,7 +56,14 @@ def as_path(value: object, what: str) -> Path:
     if not text or not is_plain(text):
         why = "no path" if not text or "\0" in text else "a name with control or unreadable letters"
         raise InputError(f"{what} is {text!r}, which is {why}.")
-    return Path(text)
+    path = Path(text)
+    if len(os.fsencode(text)) > _LONGEST_PATH or any(map(_is_long, path.parts)):
+        raise InputError(f"{what} is {text[:40]!r}..., which is too long for the name of a file.")
+    return path
+
+
+def _is_long(name: str) -> bool:
+    return len(os.fsencode(name)) > _LONGEST_NAME
 
 
 def state_folder() -> Path:
@@ -74,7 +86,12 @@ def as_file_name(text: str) -> str:
     >>> as_file_name('lid "3:4".fold')
     'lid _3_4_.fold'
     """
-    return "".join("_" if letter in _NOT_IN_NAMES else letter for letter in text)
+    name = "".join("_" if letter in _NOT_IN_NAMES else letter for letter in text)
+    ending = Path(name).suffix
+    if len(name.encode("utf-8")) <= _LONGEST_PART:
+        return name
+    stem = name.removesuffix(ending).encode("utf-8")[:_LONGEST_PART].decode("utf-8", "ignore")
+    return stem.rstrip() + ending
 
 
 def file_name(name: object, where: str) -> str:
@@ -86,7 +103,8 @@ def file_name(name: object, where: str) -> str:
     'sheet-01'
     """
     text = name if isinstance(name, str) else ""
-    if not text or not is_plain(text) or _NOT_IN_NAMES & set(text) or text.strip(". ") == "":
+    bad = not is_plain(text) or len(os.fsencode(text)) > _LONGEST_NAME - 20
+    if not text or bad or _NOT_IN_NAMES & set(text) or text.strip(". ") == "":
         raise InputError(f"{where} names {reprlib.repr(name)}, which is not the name of a file.")
     return text
 

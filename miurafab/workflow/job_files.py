@@ -7,6 +7,7 @@ A full disk, an error or a power loss leaves the earlier job or the new one
 from __future__ import annotations
 
 import errno
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -125,9 +126,9 @@ def settle_job(directory: Path) -> None:
 
 
 def _stay_inside(directory: Path) -> None:
-    here = directory.resolve()
-    for path in sorted(directory.iterdir()):
-        if path.is_symlink() and here not in path.resolve().parents:
+    here = Path(os.path.realpath(directory))
+    for path in sorted(directory.iterdir()):  # realpath, since Path.resolve raises for a ring
+        if path.is_symlink() and here not in Path(os.path.realpath(path)).parents:
             raise InputError(
                 f"{path} is a link out of the job; put the file itself there, or remove the link."
             )

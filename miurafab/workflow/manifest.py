@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from miurafab.errors import InputError
+from miurafab.errors import InputError, is_plain
 from miurafab.fabrication.layout import read_head
 from miurafab.files import Reading, file_name, parse_json, read_bytes, read_text, write_draft
 from miurafab.findings import Finding
@@ -24,6 +24,7 @@ from miurafab.version import __version__
 LAYOUT, MANIFEST = "layout.json", "manifest.json"
 SCHEMA = "miurafab-job/1"
 TOOL = f"miurafab {__version__}"
+_LONGEST_TOOL = 100
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,10 @@ def read_manifest(directory: Path) -> Manifest:
             file_name(name, str(path))
         for name in profiles:
             file_name(name.partition("/")[2], str(path))
-        return Manifest(str(document["tool"]), options, files, profiles)
+        tool = str(document["tool"])
+        if not is_plain(tool) or len(tool) > _LONGEST_TOOL:
+            raise ValueError("its 'tool' is no name and version")
+        return Manifest(tool, options, files, profiles)
 
 
 def pattern_name(folder: Path, manifest: Manifest) -> str:

@@ -53,7 +53,9 @@ def test_the_job_is_whole(job):
 @pytest.mark.parametrize("how", READ)
 def test_a_link_out_of_the_job_is_not_followed(job, tmp_path, name, how):
     """Neither to what is the same, nor to a device without an end, nor to nothing."""
-    for target in (CORPUS / name, Path("/dev/zero"), Path("../gone"), tmp_path):
+    ring = tmp_path / "ring"
+    ring.symlink_to(ring)
+    for target in (CORPUS / name, Path("/dev/zero"), Path("../gone"), tmp_path, ring):
         (job / name).unlink(missing_ok=True)
         (job / name).symlink_to(target)
         with pytest.raises(InputError, match=f"{name} is a link out of the job"):
@@ -115,21 +117,52 @@ def test_what_is_not_of_miurafab_is_named_and_left_alone(job, name):
     assert seen(job) == before
 
 
-@pytest.mark.parametrize("name", ["Sättel 鞍's 😀", 'a "3:4*b|c<d>?"'])
+NAMED = {"letters": "Sättel 鞍's 😀", "signs": 'a "3:4*b|c<d>?"', "long": 35 * "鞍😀"}
+
+
+@pytest.mark.parametrize("name", NAMED.values(), ids=NAMED)
 def test_a_pattern_of_any_name_becomes_a_job(tmp_path, name):
     path = tmp_path / f"{name}.fold"
     try:
         path.write_bytes((CORPUS / "p.fold").read_bytes())
     except OSError:
-        pytest.skip("this system has no such name")
+        path = tmp_path / f"{name[:60]}.fold"
+        path.write_bytes((CORPUS / "p.fold").read_bytes())
     made = miurafab.sheets(path).write(tmp_path / "a job")
     assert miurafab.check_job(made.path).valid
     (copy,) = made.path.glob("*.fold")
+    assert len(os.fsencode(copy.name)) <= 220
     assert copy.read_bytes() == path.read_bytes()
     assert not set(copy.name) & set(':*?"<>|')
-    inside = made.path / f"{name}.fold"
+    inside = made.path / path.name
     inside.write_bytes(path.read_bytes())
     assert miurafab.check_job(miurafab.sheets(inside).write(made.path).path).valid
+
+
+def rewrite(path, **values):
+    path.write_text(json.dumps(json.loads(path.read_text()) | values))
+
+
+@pytest.mark.parametrize("value", ["x" * 240, "a/b", "..", "", "a\x1b[2J", 3, None])
+def test_a_name_that_no_file_can_have_is_refused_in_a_sentence(job, value):
+    """A name of 300 letters was an error of the system."""
+    for key in ("machine", "material"):
+        before = (job / LAYOUT).read_text()
+        rewrite(job / LAYOUT, **{key: value})
+        with pytest.raises(InputError, match=r"layout\.json.* is not the name of a file"):
+            miurafab.read_job(job)
+        (job / LAYOUT).write_text(before)
+    rewrite(job / "manifest.json", files={str(value): "00"})
+    if isinstance(value, str):
+        with pytest.raises(InputError, match=r"manifest\.json names .* is not the name of a file"):
+            miurafab.check_job(job)
+
+
+@pytest.mark.parametrize("tool", ["a\x1b[2J", "miurafab" + 200 * "[", "\ud800"])
+def test_a_tool_of_a_manifest_is_a_plain_name(job, tool):
+    rewrite(job / "manifest.json", tool=tool)
+    with pytest.raises(InputError, match=r"manifest\.json .*'tool' is no name and version"):
+        miurafab.check_job(job)
 
 
 WRONG = (

@@ -156,7 +156,7 @@ def read_fold(path: Path) -> CreasePattern:
     mesh = pattern.target.get("mesh")
     if not isinstance(mesh, str):
         return pattern
-    whole = str((path.parent / mesh).resolve())
+    whole = os.path.realpath(path.parent / mesh)  # Path.resolve raises for a ring of links
     return replace(pattern, target={**pattern.target, "mesh": whole})
 
 
