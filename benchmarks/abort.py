@@ -5,7 +5,7 @@
 The virtual controller is on a pseudo-terminal and notes when each byte came. In a headless
 Chromium the page shows the job and is busy: it computes for 40 of every 50 ms. A run is a mouse
 click on the button, from the moment in which it is handed to the browser. With ``--http`` a run is
-the request alone, while two other pages ask for the state without a pause.
+the request alone, while two other pages ask for the state fifty times a second.
 """
 
 from __future__ import annotations
@@ -124,12 +124,12 @@ class Rig:
 
     @contextlib.contextmanager
     def asked(self) -> Iterator[None]:
-        """Two pages that ask for the state without a pause."""
+        """Two pages that ask for the state fifty times a second."""
         over = threading.Event()
 
         def follow() -> None:
             page = Page(self.guard.address)
-            while not over.is_set():
+            while not over.wait(0.02):
                 page.get("machine")
 
         threads = [threading.Thread(target=follow) for _ in range(2)]

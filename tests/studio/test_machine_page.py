@@ -3,6 +3,7 @@
 import threading
 
 import pytest
+import studio_picture
 from browser import CHROMIUM
 from rigs import ROWS
 from test_studio_page import Seen
@@ -45,7 +46,9 @@ class AtDesk(Seen):
         self.until("!document.getElementById('armed').hidden")
         assert self.run("document.activeElement.id") == "disarm"
         self.click("start")
-        self.until("document.getElementById('strokes-bar').value > 2", 30)
+        self.until(
+            "document.getElementById('strokes-words').textContent.startsWith('stroke 3')", 30
+        )
 
 
 @pytest.fixture
@@ -129,6 +132,8 @@ def test_a_sheet_is_burnt_held_and_aborted_from_every_screen(studio, tmp_path):
                 width=width, height=844, deviceScaleFactor=1, mobile=width < 600,
             )  # fmt: skip
             assert page.run("document.documentElement.scrollWidth") <= width
+        studio_picture.picture(page, tmp_path / "machine.png")
+        assert (tmp_path / "machine.png").read_bytes().startswith(b"\x89PNG")
         page.click("leave")
         page.until("!document.getElementById('connect-form').hidden")
         assert all(asked.startswith((address, "data:", "blob:")) for asked in page.requests)

@@ -122,8 +122,7 @@ function showJob({ job, sheet, sheets = [], next, progress, work, practice }) {
   set("next", next ?? "");
   toggle("progress", Boolean(progress));
   if (progress) {
-    byId("strokes-bar").max = Math.max(1, progress.strokes);
-    byId("strokes-bar").value = progress.stroke;
+    byId("strokes-bar").value = progress.share;
     set("strokes-words", progress.words);
   }
   if (!job) return;
@@ -323,5 +322,5 @@ export function beginMachine(catalogue, onFault) {
   chooseStep(step);
   offerJob(null, catalogue.own_job);
   listen();
-  follow();
+  return follow();
 }

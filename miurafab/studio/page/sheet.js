@@ -27,7 +27,7 @@ export function mark(done, head) {
 function fit(canvas) {
   const [x0, y0, x1, y1] = sheet.view;
   const width = canvas.clientWidth || 600;
-  const height = Math.max(160, Math.min(0.62 * window.innerHeight, (width * (y1 - y0)) / (x1 - x0)));
+  const height = Math.max(160, Math.min(0.52 * window.innerHeight, (width * (y1 - y0)) / (x1 - x0)));
   const dense = window.devicePixelRatio || 1;
   canvas.style.height = `${height}px`;
   if (canvas.width !== Math.round(width * dense) || canvas.height !== Math.round(height * dense)) {

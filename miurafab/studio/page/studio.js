@@ -154,7 +154,7 @@ async function begin() {
     const catalogue = await ask("catalogue");
     fillForms(catalogue);
     ownJob = catalogue.own_job;
-    beginMachine(catalogue, fault);
+    await beginMachine(catalogue, fault);
     if (ownJob) turnTo("desk");
     const { sources } = await ask("state");
     told = JSON.stringify(sources);
