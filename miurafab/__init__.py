@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from miurafab.origami.fitting.request import FitRequest as FitRequest
     from miurafab.origami.fitting.result import FitResult as FitResult
     from miurafab.origami.folding.kinematics import FoldingMotion as FoldingMotion
+    from miurafab.origami.folding.plates import ThickPlates as ThickPlates
     from miurafab.origami.folding.thick_panels import ThickPanels as ThickPanels
     from miurafab.origami.formats.files import load as load
     from miurafab.origami.tradeoff import Tradeoff as Tradeoff
@@ -81,7 +82,6 @@ if TYPE_CHECKING:
     from miurafab.workflow.fit import fit as fit
     from miurafab.workflow.fold import Folding as Folding
     from miurafab.workflow.fold import fold as fold
-    from miurafab.workflow.fold import thick_panels as thick_panels
     from miurafab.workflow.job_directory import JobDirectory as JobDirectory
     from miurafab.workflow.job_directory import read_job as read_job
     from miurafab.workflow.layers import Layers as Layers
@@ -91,6 +91,8 @@ if TYPE_CHECKING:
     from miurafab.workflow.listings import list_surfaces as list_surfaces
     from miurafab.workflow.own_machine import add_machine as add_machine
     from miurafab.workflow.own_material import add_material as add_material
+    from miurafab.workflow.panels import save_panels as save_panels
+    from miurafab.workflow.panels import thick_panels as thick_panels
     from miurafab.workflow.patterns import check as check
     from miurafab.workflow.preview import Preview as Preview
     from miurafab.workflow.preview import preview as preview

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option, takes
-from miurafab.errors import DONE, NO
+from miurafab.errors import DONE, NO, InputError
 from miurafab.files import new_file
 from miurafab.options import File, read_options
 
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 EXAMPLES = (
     "miurafab fold hypar.fold -o hypar.gif",
     "miurafab fold hypar.fold -o hypar.html --colour strain",
-    "miurafab fold miura.fold --thickness 2mm",
+    "miurafab fold miura.fold --thickness 2mm --panels panels.dxf",
+    "miurafab fold miura.fold --thickness 4mm --method bennett",
 )
 
 
@@ -46,6 +47,10 @@ def fold(
     csv: Annotated[
         Path | None, option(File(), "Write the fold angle of every crease in every frame.")
     ] = None,
+    panels: Annotated[
+        Path | None,
+        option(File(), "Write the panels: outlines (.dxf, .svg) or solids (.stl, .glb)."),
+    ] = None,
     console: Console = Console(),
     **given: str,
 ) -> int:
@@ -55,11 +60,16 @@ def fold(
     nearly flat to the folded form of the file, or from flat by mountains and valleys alone. The
     answer says which, and whether the facets could all stay flat.
     """
-    from miurafab.workflow.fold import ENDINGS, FoldOptions, thickness_report
+    from miurafab.workflow.fold import ENDINGS, FoldOptions
+    from miurafab.workflow.panels import PANEL_ENDINGS, thickness_report
 
     asked = read_options(FoldOptions, given)
     if out is not None:
         new_file(out, "The motion", ENDINGS)
+    if panels is not None:
+        new_file(panels, "The drawing of the panels", PANEL_ENDINGS)
+        if asked.thickness_mm is None:
+            raise InputError(f"{panels} needs a `thickness` of the panels, such as 3mm.")
     pattern = miurafab.load(file)
     with console.progress("folding") as progress:
         folding = miurafab.fold(pattern, asked.steps, on_progress=progress)
@@ -67,14 +77,19 @@ def fold(
             folding.save(out, title=file.stem, colour=asked.colour, on_progress=progress)
         if csv is not None:
             folding.save_angles(csv)
-        panels = None
+        thick = None
         if asked.thickness_mm is not None:
-            panels = miurafab.thick_panels(pattern, asked.thickness_mm, on_progress=progress)
+            thick = miurafab.thick_panels(
+                pattern, asked.thickness_mm, method=asked.method, on_progress=progress
+            )
+        if thick is not None and panels is not None:
+            miurafab.save_panels(thick, panels, title=file.stem)
     answer: dict[str, Any] = folding.report()
     answer |= {"file": None if out is None else str(out), "csv": None if csv is None else str(csv)}
-    answer["thickness"] = None if panels is None else thickness_report(panels)
+    answer["thickness"] = None if thick is None else thickness_report(thick)
     console.answer(answer, lambda: _show(console, folding, answer))
-    return NO if panels is not None and not panels.folds else DONE
+    made = answer["thickness"]
+    return DONE if made is None or made.get("usable", made["folds"]) else NO
 
 
 def _show(console: Console, folding: Folding, answer: dict[str, Any]) -> None:
@@ -98,7 +113,9 @@ def _show(console: Console, folding: Folding, answer: dict[str, Any]) -> None:
     console.findings(folding.findings)
     for run in _runs(contacts):
         console.line(_sentence(run))
-    if thick is not None:
+    if thick is not None and thick["method"] == "bennett":
+        _show_plates(console, thick)
+    elif thick is not None:
         _show_thickness(console, thick)
 
 
@@ -127,10 +144,11 @@ def _sentence(run: list[dict[str, Any]]) -> str:
 
 def _show_thickness(console: Console, thick: dict[str, Any]) -> None:
     creases = thick["creases"]
-    sides = [crease["hinge_side"] for crease in creases]
+    sides = [crease["closing_side"] for crease in creases]
     console.facts(
         {
             "folds": thick["folds"],
+            "least_useful_area": thick["least_useful_area"],
             "least_scale": thick["least_scale"],
             "greatest_thickness_mm": thick["greatest_thickness_mm"],
             "close_on_top": sides.count("top"),
@@ -145,14 +163,40 @@ def _show_thickness(console: Console, thick: dict[str, Any]) -> None:
     console.rows(
         ("edge", "assignment", "fold deg", "cut back on", "by mm"),
         [
-            (c["edge"], c["assignment"], c["fold_deg"], c["hinge_side"], c["offset_mm"])
+            (c["edge"], c["assignment"], c["fold_deg"], c["closing_side"], c["offset_mm"])
             for c in widest
         ],
         title="the creases that are cut back most (--json lists all)",
     )
+    if thick["folds"] and not thick["usable"]:
+        console.line(
+            f"of the smallest panel {thick['least_useful_area']:.0%} is left on one side, too "
+            "little to use"
+        )
     for facet in thick["facets_too_small"][:8]:
         limit = facet["greatest_thickness_mm"]
         console.line(f"facet {facet['facet']} is too small: it can be {limit:.3g} mm thick")
     for collision in thick["collisions"][:8]:
         a, b = collision["facets"]
         console.line(f"at s = {collision['state']:.3g} panels {a} and {b} collide")
+
+
+def _show_plates(console: Console, thick: dict[str, Any]) -> None:
+    patches = thick["patches"]
+    console.facts(
+        {
+            "folds": thick["folds"],
+            "patches": len(patches),
+            "brackets": sum(len(patch["brackets"]) for patch in patches),
+            "highest_over_lowest_axis_mm": max(patch["range_mm"] for patch in patches),
+            "clear_up_to_deg": min(patch["clear_deg"] for patch in patches),
+        },
+        title=f"plates {thick['thickness_mm']:g} mm thick on shifted hinges",
+    )
+    for number, patch in enumerate(patches):
+        if patch["collision"] is not None:
+            a, b = patch["collision"]
+            console.line(
+                f"patch {number}: beyond {patch['clear_deg']:.3g} degrees plates {a} and {b} "
+                "collide"
+            )

@@ -19,7 +19,7 @@ from miurafab.display import Shown
 from miurafab.files import AnyPath, new_file, write_bytes, write_text
 from miurafab.findings import Finding, findings_json
 from miurafab.geometry.arrays import Floats
-from miurafab.options import Choice, Whole, declared, length, option, read_options, read_value
+from miurafab.options import Choice, Whole, length, option, read_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
@@ -36,13 +36,12 @@ from miurafab.origami.folding.layers import LayerOrder, layer_order
 from miurafab.origami.folding.layers_apart import CLOSED, layer_shifts, split_facets
 from miurafab.origami.folding.motion import FoundMotion, find_motion
 from miurafab.origami.folding.ramp_motion import RampVerdict
-from miurafab.origami.folding.thick_panels import ThickPanels
-from miurafab.origami.folding.thick_panels import thick_panels as make_panels
 from miurafab.origami.formats.fold import write_fold
 from miurafab.origami.formats.mesh import glb_bytes
 from miurafab.workflow.fold_gif import target_frame, write_gif
 from miurafab.workflow.layers import layer_facts, layer_findings
 from miurafab.workflow.page import Slider, write_page
+from miurafab.workflow.panels import METHODS
 from miurafab.workflow.patterns import PatternLike, consistent_pattern
 
 if TYPE_CHECKING:
@@ -67,6 +66,11 @@ class FoldOptions:
     thickness_mm: float | None = option(
         length(above=True),
         "Also say how to make panels of this thickness; exit 1 if such panels cannot fold.",
+    )
+    method: str = option(
+        Choice(METHODS),
+        "How panels make room: cut back beside creases, or plates on shifted hinges.",
+        default="tapered",
     )
 
 
@@ -242,7 +246,7 @@ def _verdict(verdict: RampVerdict) -> dict[str, Any]:
     }
 
 
-described(Folding.save, FoldOptions, without=("steps", "thickness"))
+described(Folding.save, FoldOptions, without=("steps", "thickness", "method"))
 
 
 @verb
@@ -289,7 +293,7 @@ def fold(
     return Folding(found, contacts(found.motion, on_progress), order)
 
 
-described(fold, FoldOptions, without=("colour", "thickness"))
+described(fold, FoldOptions, without=("colour", "thickness", "method"))
 
 
 def _strain(motion: FoldingMotion) -> Floats:
@@ -328,71 +332,3 @@ def _names(motion: FoldingMotion) -> tuple[str, ...]:
         else:
             names.append("the folded form" if frame == target else f"s = {state:.3g}")
     return tuple(names)
-
-
-@verb
-def thick_panels(
-    pattern: PatternLike, thickness: float, *, on_progress: Progress | None = None
-) -> ThickPanels:
-    """Compute how panels have to be made so that they fold as a pattern does.
-
-    Parameters
-    ----------
-    pattern : CreasePattern, FitResult, str or os.PathLike
-        A pattern that folds rigidly, or a file that :func:`load` reads.
-    thickness : float
-        The thickness of the panels, mm.
-    on_progress : callable, optional
-        Called with a fraction in 0..1 and a short text.
-
-    Returns
-    -------
-    ThickPanels
-
-    Raises
-    ------
-    InputError
-        For a sheet that does not fold rigidly.
-    OptionError
-        For a thickness that is not positive.
-
-    Examples
-    --------
-    >>> import miurafab as mf
-    >>> sheet = mf.fit("plane", facets=(4, 4), flat_foldable="exact")
-    >>> mf.thick_panels(sheet, "0.5mm").thickness_mm
-    0.5
-    """
-    panel_mm = read_value("thickness", declared(FoldOptions)["thickness"].kind, thickness)
-    return make_panels(consistent_pattern(pattern), panel_mm, on_progress)
-
-
-def thickness_report(panels: ThickPanels) -> dict[str, Any]:
-    """The part of the JSON answer of ``fold`` about thick panels."""
-    pattern = panels.pattern
-    creases = np.flatnonzero(panels.hinge_side != "")
-    finite = panels.offset_mm[creases][np.isfinite(panels.offset_mm[creases])]
-    return {
-        "thickness_mm": panels.thickness_mm,
-        "folds": panels.folds,
-        "least_scale": panels.least_scale,
-        "greatest_thickness_mm": float(panels.limit_mm.min()),
-        "max_offset_mm": float(finite.max(initial=0.0)),
-        "facets_too_small": [
-            {"facet": int(facet), "greatest_thickness_mm": float(panels.limit_mm[facet])}
-            for facet in panels.too_small
-        ],
-        "collisions": [
-            {"state": state, "facets": [one, other]} for state, one, other in panels.collisions
-        ],
-        "creases": [
-            {
-                "edge": int(edge),
-                "assignment": str(pattern.edges_assignment[edge]),
-                "fold_deg": math.degrees(pattern.edges_fold_angle[edge]),
-                "hinge_side": str(panels.hinge_side[edge]),
-                "offset_mm": float(panels.offset_mm[edge]),
-            }
-            for edge in creases
-        ],
-    }

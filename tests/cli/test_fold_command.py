@@ -69,6 +69,23 @@ def test_thickness_decides_the_exit_code(run, rigid):
     assert "is too small" in thick.stdout
 
 
+def test_panels_are_written_and_little_use_is_told(run, rigid, tmp_path):
+    out = tmp_path / "panels.dxf"
+    done = run("fold", rigid, "--steps", "4", "--thickness", "1mm", "--panels", out, "--json")
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["thickness"]["least_useful_area"] > 0.5
+    assert "TopPly" in out.read_text()
+    limit = json.loads(done.stdout)["thickness"]["greatest_thickness_mm"]
+    nearly = run("fold", rigid, "--steps", "4", "--thickness", f"{0.98 * limit}mm")
+    assert nearly.returncode == 1
+    assert "too little to use" in nearly.stdout
+    plates = run("fold", rigid, "--steps", "4", "--thickness", "1mm", "--method", "bennett")
+    assert plates.returncode == 0
+    assert "clear up to deg" in plates.stdout
+    assert "thickness" in sentence(run("fold", rigid, "--panels", out), 2)
+    assert "panels.doc" in sentence(run("fold", rigid, "--panels", tmp_path / "panels.doc"), 2)
+
+
 def test_what_cannot_be_folded_is_one_sentence(run, rigid, stiff, tmp_path):
     assert "a.mp4" in sentence(run("fold", rigid, "-o", tmp_path / "a.mp4"), 2)
     assert "none.fold" in sentence(run("fold", tmp_path / "none.fold"), 2)

@@ -26,8 +26,9 @@ from miurafab.origami.folding.laying import laid_on
 from miurafab.origami.folding.thick_panels import thick_panels
 from miurafab.origami.formats.files import load
 from miurafab.origami.formats.fold import read_fold
-from miurafab.workflow.fold import fold, thickness_report
+from miurafab.workflow.fold import fold
 from miurafab.workflow.fold_gif import picture, target_frame
+from miurafab.workflow.panels import thickness_report
 
 DATA = Path(__file__).parent.parent / "data"
 
@@ -231,7 +232,7 @@ def test_the_report_on_thickness_tells_every_crease() -> None:
     inner = (pattern.edges_faces >= 0).all(axis=1)
     assert [crease["edge"] for crease in report["creases"]] == np.flatnonzero(inner).tolist()
     for crease in report["creases"]:
-        assert crease["hinge_side"] == {"V": "top", "M": "bottom"}[crease["assignment"]]
+        assert crease["closing_side"] == {"V": "top", "M": "bottom"}[crease["assignment"]]
         expected = math.tan(math.radians(abs(crease["fold_deg"])) / 2)
         assert crease["offset_mm"] == pytest.approx(expected)
     assert report["folds"] is True

@@ -168,8 +168,12 @@ def states_between(pattern: CreasePattern, steps: int, last: float = np.inf) -> 
     return np.asarray(states, dtype=np.float64)
 
 
-def place(pattern: CreasePattern, fold_angles: Floats) -> FacetPlacement:
+def place(
+    pattern: CreasePattern, fold_angles: Floats, axes: Floats | None = None
+) -> FacetPlacement:
     """The placement of all facets in T frames with the creases at ``fold_angles`` (T, E), radians.
+
+    The facets turn about their creases, or about axes at the heights ``axes`` (E,) over them, mm.
 
     Raises :class:`~miurafab.errors.PatternError` if the facets of a piece are not all joined by
     creases.
@@ -190,6 +194,8 @@ def place(pattern: CreasePattern, fold_angles: Floats) -> FacetPlacement:
         sign = np.where(pattern.edges_faces[edge, 0] == parent, -1.0, 1.0)
         rotation = _rotations(along[edge], sign * fold_angles[:, edge])
         hinge = np.pad(tail[edge], ((0, 0), (0, 1)))
+        if axes is not None:
+            hinge[:, 2] = axes[edge]
         slip = hinge - np.einsum("tnij,nj->tni", rotation, hinge)
         turn[:, here] = turn[:, parent] @ rotation
         shift[:, here] = shift[:, parent] + np.einsum("tnij,tnj->tni", turn[:, parent], slip)

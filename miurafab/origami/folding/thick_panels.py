@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,13 +29,16 @@ from numpy.typing import NDArray
 from miurafab.display import Shown
 from miurafab.errors import InputError
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.polygons import next_corners, previous_corners
+from miurafab.geometry.polygons import filled, next_corners, previous_corners, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.angles_csv import ON_EACH_OTHER
 from miurafab.origami.folding.contact import self_intersections, triangulate
 from miurafab.origami.folding.kinematics import first_facets, fold_angles_at, place, rigid_motion
 
 SIDES = ("top", "bottom")
+LEAST_USEFUL = 0.25
+"""A panel of which less is left on one side cannot be used."""
+
 STATES = (0.05, 0.35, 0.7, 0.999)
 """The states at which solids are tested, as parts of the median fold angle. At flat and in the
 folded form panels touch along their sides.
@@ -51,11 +55,11 @@ class ThickPanels(Shown):
         The pattern of the panels, with E edges and F facets.
     thickness_mm : float
         The thickness of the panels.
-    hinge_side : (E,) str
-        "top" where the panels close on the top (valleys), "bottom" where they close on the bottom
-        (mountains), "" on borders and flat creases.
+    closing_side : (E,) str
+        Where the panels close and are cut back: "top" for valleys, "bottom" for mountains, "" on
+        borders and flat creases. The hinge is in the middle of the thickness.
     offset_mm : (E,) float64
-        The distance from the crease to the surface of the panels on the hinge side, infinite for
+        The distance from the crease to the surface of the panels on the closing side, infinite for
         a crease folded by 180 degrees.
     limit_mm : (F,) float64
         The thickness up to which each facet keeps all its sides.
@@ -65,7 +69,7 @@ class ThickPanels(Shown):
 
     pattern: CreasePattern
     thickness_mm: float
-    hinge_side: NDArray[np.str_]
+    closing_side: NDArray[np.str_]
     offset_mm: Floats
     limit_mm: Floats
     collisions: tuple[tuple[float, int, int], ...]
@@ -87,6 +91,58 @@ class ThickPanels(Shown):
     def folds(self) -> bool:
         """Whether the sheet folds with this thickness."""
         return not len(self.too_small) and not self.collisions
+
+    @cached_property
+    def plies(self) -> Floats:
+        """(2, F, k, 2) the outlines of the panels on the top and on the bottom, mm. Corners that a
+        facet does not have are its first.
+
+        A ply from the middle to the surface that is cut to such an outline, with upright sides,
+        stays within its panel.
+        """
+        faces, made = self.pattern.faces_vertices, []
+        for sign in (1.0, -1.0):
+            moves = corner_moves(self.pattern, _closing(self.pattern, self._angles * sign))
+            corners = self.pattern.vertices_coords[faces] + self.thickness_mm / 2 * moves
+            made.append(np.where((faces >= 0)[..., None], corners, corners[:, :1]))
+        return np.stack(made)
+
+    @property
+    def useful(self) -> Floats:
+        """(F,) the part of each facet that is left on its smaller side; 0 where it is too small."""
+        whole = signed_areas(self.pattern.vertices_coords[filled(self.pattern.faces_vertices)])
+        left = np.stack([signed_areas(ply) for ply in self.plies]).min(axis=0)
+        return np.where(self.limit_mm > self.thickness_mm, left / whole, 0.0)
+
+    @property
+    def usable(self) -> bool:
+        """Whether the sheet folds and :data:`LEAST_USEFUL` is left of each panel."""
+        return self.folds and bool((self.useful >= LEAST_USEFUL).all())
+
+    def solids(self) -> tuple[Floats, Ints, Ints]:
+        """The panels when flat: points (n, 3) in mm, triangles (m, 3) over them with normals that
+        point outwards, and the facet (n,) with which each point moves.
+
+        Points on a hinge come once for each panel. Raises :class:`~miurafab.errors.InputError` if a
+        facet is too small.
+        """
+        if len(self.too_small):
+            raise InputError(
+                f"Facet {self.too_small[0]} is too small for panels of {self.thickness_mm:g} mm, "
+                "so that it has no outline; enlarge the sheet or choose a smaller `thickness`."
+            )
+        solids = _Solids.of(self.pattern, self.thickness_mm)
+        hinge = np.pad(self.pattern.vertices_coords, ((0, 0), (0, 1)))
+        points = np.concatenate([hinge, solids.corners])[solids.triangles].reshape(-1, 3)
+        keys = np.column_stack([np.repeat(solids.triangle_facet, 3), solids.triangles.reshape(-1)])
+        _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        return points[first], number.reshape(-1, 3), keys[first, 0]
+
+    @property
+    def _angles(self) -> Floats:
+        """(E,) the fold angles of the creases, and 0 of borders."""
+        inner = (self.pattern.edges_faces >= 0).all(axis=1)
+        return np.where(inner, self.pattern.edges_fold_angle, 0.0)
 
 
 def thick_panels(
@@ -129,7 +185,7 @@ def facet_limits(pattern: CreasePattern, angle: Floats) -> Floats:
     for sign in (1.0, -1.0):
         closing = _closing(pattern, angle * sign)
         shut = np.isinf(closing).any(axis=1)
-        moves = _corner_moves(pattern, np.where(np.isinf(closing), 0.0, closing))
+        moves = corner_moves(pattern, np.where(np.isinf(closing), 0.0, closing))
         along, length = _sides(pattern)
         shrink = np.einsum("fkd,fkd->fk", moves - _next(pattern.faces_vertices, moves), along)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -189,7 +245,7 @@ class _Solids:
         hinge, beside = faces[facet, slot], _next(faces, faces)[facet, slot]
         corners, triangles, owners = [], [], []
         for at, sign in enumerate((1.0, -1.0)):
-            moves = _corner_moves(pattern, _closing(pattern, pattern.edges_fold_angle * sign))
+            moves = corner_moves(pattern, _closing(pattern, pattern.edges_fold_angle * sign))
             flat = (pattern.vertices_coords[faces] + thickness / 2 * moves)[facet, slot]
             corners.append(np.pad(flat, ((0, 0), (0, 1)), constant_values=sign * thickness / 2))
             shift = vertices + at * count
@@ -197,7 +253,8 @@ class _Solids:
             corner = number[facet, slot] + shift
             after = _next(faces, number)[facet, slot] + shift
             walls = ((hinge, beside, after), (hinge, after, corner))
-            triangles += [cap + shift, *(np.stack(wall, axis=1) for wall in walls)]
+            made = [cap + shift, *(np.stack(wall, axis=1) for wall in walls)]
+            triangles += made if sign > 0 else [each[:, ::-1] for each in made]
             owners += [owner, facet, facet]
         return cls(
             np.concatenate(corners),
@@ -240,8 +297,8 @@ def _sides(pattern: CreasePattern) -> tuple[Floats, Floats]:
     return along, length
 
 
-def _corner_moves(pattern: CreasePattern, closing: Floats) -> Floats:
-    """(F, k, 2) w, the inward move of each corner over half the thickness."""
+def corner_moves(pattern: CreasePattern, closing: Floats) -> Floats:
+    """(F, k, 2) the move of each corner that moves the sides inwards by ``closing`` (F, k)."""
     along, _ = _sides(pattern)
     before = previous_corners(pattern.faces_vertices)
     row = np.arange(len(along))[:, None]

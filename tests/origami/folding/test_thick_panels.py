@@ -29,9 +29,9 @@ def one_crease(angle: float) -> CreasePattern:
 @pytest.mark.parametrize("angle", [-2.0, -0.3, 0.4, math.pi / 2, 3.0])
 def test_one_crease_is_cut_back_by_the_bisecting_plane(angle: float) -> None:
     panels = thick_panels(one_crease(angle), 2.0)
-    assert panels.hinge_side[0] == ("top" if angle > 0 else "bottom")
+    assert panels.closing_side[0] == ("top" if angle > 0 else "bottom")
     assert panels.offset_mm[0] == pytest.approx(math.tan(abs(angle) / 2))
-    assert (panels.hinge_side[1:] == "").all()
+    assert (panels.closing_side[1:] == "").all()
     assert (panels.offset_mm[1:] == 0).all()
     # a square loses its two long sides where the cut has crossed it
     assert panels.limit_mm == pytest.approx(20 / math.tan(abs(angle) / 2))

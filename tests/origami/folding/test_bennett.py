@@ -1,0 +1,232 @@
+"""Plates on shifted hinges: loops close through the whole motion, and no solids collide."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+import trimesh
+from problems import fitted, regular
+
+from miurafab.errors import InputError, PatternError
+from miurafab.geometry.polygons import signed_areas
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding import plates as plates_module
+from miurafab.origami.folding.bennett import bennett_heights, nearest_heights, thick_loop_gap
+from miurafab.origami.folding.kinematics import fold_angles_at, place
+from miurafab.origami.folding.plates import ThickPlates, thick_plates
+from miurafab.origami.folding.thick_panels import LEAST_USEFUL, thick_panels
+from miurafab.workflow.panels import save_panels
+
+STATES = np.geomspace(0.1, 10.0, 10)
+
+
+@cache
+def exact(name: str, cells: int = 6) -> CreasePattern:
+    found = fitted(name, cells, cells, 0.0).pattern
+    assert found is not None
+    return found
+
+
+@cache
+def plywood() -> ThickPlates:
+    """Four by four facets of a hypar, 200 mm long, in plywood of 4 mm."""
+    return thick_plates(exact("hypar", 4), 4.0)
+
+
+@pytest.mark.parametrize("name", ["plane", "hypar", "paraboloid", "cylinder"])
+def test_any_heights_that_close_at_one_state_close_at_all(name: str) -> None:
+    pattern = exact(name)
+    assert bennett_heights(pattern).free == 2 * (6 - 1)
+    wished = np.random.default_rng(3).uniform(-1, 1, len(pattern.edges_vertices))
+    heights = nearest_heights(pattern, wished)
+    assert np.abs(heights).max() > 0.1
+    assert thick_loop_gap(pattern, heights, STATES).max() <= 1e-11
+    # without the shares of the sectors they do not
+    assert thick_loop_gap(pattern, wished, STATES).min() > 1e-3
+    # and what is nearest to them is they
+    assert np.abs(nearest_heights(pattern, heights) - heights).max() < 1e-9
+
+
+def test_a_regular_miura_climbs_by_one_thickness_a_row() -> None:
+    for cells in (4, 6):
+        heights = bennett_heights(exact("plane", cells))
+        assert heights.thickness / 2 == pytest.approx(1 / (2 * (cells - 1)), rel=1e-6)
+        assert np.abs(heights.axis).max() <= 1 + 1e-9
+
+
+def test_axes_and_plates_keep_their_sides() -> None:
+    for name in ("hypar", "cylinder"):
+        heights = bennett_heights(exact(name, 6))
+        pattern = heights.pattern
+        assert heights.thickness > 0
+        inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+        for edge in inner.tolist():
+            plates = heights.bottom[pattern.edges_faces[edge]]
+            if pattern.edges_assignment[edge] == "V":
+                assert heights.axis[edge] >= (plates + heights.thickness).max() - 1e-7
+            else:
+                assert heights.axis[edge] <= plates.min() + 1e-7
+
+
+def test_one_patch_in_plywood_moves_without_collision_from_flat_to_flat() -> None:
+    (patch,) = plywood().patches
+    assert (patch.clear_deg, patch.collision) == (180.0, None)
+    assert plywood().folds
+    assert patch.range_mm < 16 * 4
+    # the plates move with the angles of the thin sheet, about axes that stay in both plates
+    assert thick_loop_gap(patch.pattern, patch.axis_mm, STATES).max() <= 1e-11
+    solids = patch.solids()
+    thin = place(patch.pattern, fold_angles_at(patch.pattern, np.array([1.0]))).turn[0]
+    placed = patch.placed(solids, np.array([1.0]))[0]
+    first = solids.facet == 5
+    corners = solids.corners[first]
+    moved = placed[first] - placed[first][0]
+    assert np.abs(moved - (corners - corners[0]) @ thin[5].T).max() < 1e-10
+
+
+@pytest.mark.parametrize("fault", ["higher plates", "axes in the middle", "thicker plates"])
+def test_collisions_are_found_where_heights_are_wrong(fault: str) -> None:
+    (patch,) = plywood().patches
+    wrong = {
+        "higher plates": replace(patch, bottom_mm=patch.bottom_mm + np.arange(16) % 2 * 3.0),
+        "axes in the middle": replace(
+            patch, axis_mm=0 * patch.axis_mm, bottom_mm=0 * patch.bottom_mm - 2.0
+        ),
+        "thicker plates": replace(patch, thickness_mm=6.0),
+    }[fault]
+    found = plates_module._cleared(wrong)
+    assert found.clear_deg < 180
+    assert found.collision is not None
+
+
+def test_sheets_without_plates_are_parted_into_patches() -> None:
+    made = thick_plates(exact("hypar", 6), 2.0)
+    assert len(made.patches) == 4
+    facets = np.concatenate([patch.facets for patch in made.patches])
+    assert sorted(facets.tolist()) == list(range(36))
+    assert made.folds
+    whole = bennett_heights(exact("hypar", 6))
+    assert not whole.exists
+
+
+@pytest.mark.parametrize("name", ["plane", "hypar"])
+def test_the_guide_tells_what_is_made(name: str) -> None:
+    heights = bennett_heights(exact(name))
+    guide = (Path(__file__).parents[3] / "docs" / "folding.md").read_text()
+    row = next(line for line in guide.splitlines() if line.startswith(f"| {name} | 10 |"))
+    assert f"| {heights.thickness / 2:.4f} |" in row
+    made = thick_plates(exact(name), 2.0)
+    patches = "one" if len(made.patches) == 1 else f"{len(made.patches)} patches"
+    most = max(patch.range_mm for patch in made.patches) / 2.0
+    assert row.endswith(f"| {patches} | {most:.1f} t | 180° |")
+    assert all(patch.clear_deg == 180.0 for patch in made.patches)
+
+
+def test_what_has_no_shifted_hinges_is_refused() -> None:
+    developable = fitted("hypar", 4, 4).pattern
+    assert developable is not None
+    with pytest.raises(PatternError, match="does not fold"):
+        thick_plates(developable, 4.0)
+    with pytest.raises(InputError, match="greater than zero"):
+        thick_plates(regular(), 0.0)
+
+
+def test_plates_are_written_as_outlines_and_brackets(tmp_path: Path) -> None:
+    (patch,) = plywood().patches
+    save_panels(plywood(), tmp_path / "plates.dxf")
+    space = ezdxf.readfile(tmp_path / "plates.dxf").modelspace()
+    by_layer: dict[str, list[np.ndarray]] = {}
+    for line in space.query("POLYLINE"):
+        points = np.array([tuple(vertex.dxf.location)[:2] for vertex in line.vertices])
+        by_layer.setdefault(line.dxf.layer, []).append(points)
+    assert {name: len(lines) for name, lines in by_layer.items()} == {
+        "Plate": 16,
+        "Hinge": 24,
+        "BracketFoot": len(patch.brackets),
+        "Bracket": len(patch.brackets),
+    }
+    # plates are facets less the clearance, of which 0.2 mm is on each side
+    facets = patch.pattern.vertices_coords[patch.pattern.faces_vertices]
+    around = np.linalg.norm(facets - np.roll(facets, 1, axis=1), axis=2).sum(axis=1)
+    lost = signed_areas(facets) - signed_areas(np.array(by_layer["Plate"]))
+    assert lost == pytest.approx(0.2 * around, rel=0.01)
+    heights = sorted(float(np.ptp(points[:, 1])) for points in by_layer["Bracket"])
+    assert heights == pytest.approx(sorted(b.high - b.low for b in patch.brackets), abs=1e-5)
+    labels = [text.dxf.text for text in space.query("TEXT")]
+    assert f"f5 {patch.bottom_mm[5]:+.2f}" in labels
+
+
+def test_plates_are_written_as_solids_that_move(tmp_path: Path) -> None:
+    (patch,) = plywood().patches
+    parts = 16 + len(patch.brackets)
+    save_panels(plywood(), tmp_path / "plates.stl")
+    mesh = trimesh.load(tmp_path / "plates.stl")
+    assert mesh.is_watertight
+    bracket_mm3 = sum(
+        float(signed_areas(b.foot[None])[0]) * (b.high - b.low) for b in patch.brackets
+    )
+    expected = 4.0 * signed_areas(patch.outlines).sum() + bracket_mm3
+    assert mesh.volume == pytest.approx(expected, rel=1e-4)
+    assert len(mesh.split()) == parts
+    save_panels(plywood(), tmp_path / "plates.glb")
+    content = (tmp_path / "plates.glb").read_bytes()
+    document = json.loads(content[20 : 20 + int.from_bytes(content[12:16], "little")])
+    assert len(document["meshes"][0]["primitives"][0]["targets"]) == 24
+    trimesh.load(io.BytesIO(content), file_type="glb")
+
+
+def test_tapered_panels_are_written_as_plies_with_the_hinge_between(tmp_path: Path) -> None:
+    panels = thick_panels(regular(), 2.0)
+    save_panels(panels, tmp_path / "panels.dxf")
+    space = ezdxf.readfile(tmp_path / "panels.dxf").modelspace()
+    found: dict[str, list[np.ndarray]] = {}
+    for line in space.query("POLYLINE"):
+        points = np.array([tuple(vertex.dxf.location)[:2] for vertex in line.vertices])
+        found.setdefault(line.dxf.layer, []).append(points)
+    facets, creases = len(regular().faces_vertices), int((panels.closing_side != "").sum())
+    assert {name: len(lines) for name, lines in found.items()} == {
+        "TopPly": facets,
+        "Hinge": 2 * creases,
+        "BottomPly": facets,
+    }
+    # of a crease that closes on the top, the top plies keep d away, and the bottom plies reach it
+    edge = int(np.flatnonzero(panels.closing_side == "top")[0])
+    start, end = regular().vertices_coords[regular().edges_vertices[edge]]
+    normal = np.array([start[1] - end[1], end[0] - start[0]]) / np.linalg.norm(end - start)
+    facet = int(regular().edges_faces[edge, 0])
+    top, bottom = found["TopPly"][facet], panels.plies[1, facet]
+    assert np.abs((top - start) @ normal).min() == pytest.approx(panels.offset_mm[edge], rel=1e-5)
+    assert np.abs((bottom - start) @ normal).min() < 1e-9
+    save_panels(panels, tmp_path / "panels.stl")
+    points, triangles, _ = panels.solids()  # panels touch along hinges, so each is taken alone
+    assert trimesh.Trimesh(points, triangles, process=False).is_watertight
+    mesh = trimesh.load(tmp_path / "panels.stl")
+    # corners move in proportion to the height, so Simpson's rule is exact on either side
+    middle = regular().vertices_coords[regular().faces_vertices]
+    volume = sum(
+        (signed_areas(middle) + 4 * signed_areas((middle + ply) / 2) + signed_areas(ply)).sum() / 6
+        for ply in panels.plies
+    )
+    assert mesh.volume == pytest.approx(volume, rel=1e-5)
+    for ending in (".svg", ".glb"):
+        save_panels(panels, tmp_path / f"panels{ending}")
+        assert (tmp_path / f"panels{ending}").stat().st_size > 1000
+
+
+def test_panels_of_which_little_is_left_are_of_no_use() -> None:
+    thin, thick = thick_panels(regular(), 1.0), thick_panels(regular(), 20.0)
+    assert thin.usable
+    assert thin.useful.min() > 0.7
+    limit = float(thick.limit_mm.min())
+    nearly = thick_panels(regular(), 0.98 * limit)
+    assert nearly.folds
+    assert not nearly.usable
+    assert nearly.useful.min() < LEAST_USEFUL
+    assert thick_panels(regular(), 1.1 * limit).useful.min() == 0.0
