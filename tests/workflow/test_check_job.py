@@ -8,6 +8,7 @@ import re
 import shutil
 
 import pytest
+import shapely
 from piece_problems import gores, trimmed, two_trimmed_pieces
 
 import miurafab as mf
@@ -237,6 +238,34 @@ def test_an_outline_without_its_overcut_is_named(tmp_path):
     short = "".join(lines[: last - 1] + lines[last + 1 :])  # the outline comes last
     edited(job, "sheet-01.nc", lambda _: short)
     assert any("overcut of 0.5 mm" in each for each in sentences(job, "stroke"))
+
+
+def test_a_window_of_a_file_without_facets_stays_open_and_is_cut_out(tmp_path):
+    """hole.fold of the shared cases: a frame of four facets round a window whose edges are B."""
+    square = [[0, 0], [3, 0], [3, 3], [0, 3]]
+    inner = [[1, 1], [2, 1], [2, 2], [1, 2]]
+    ring = [[k, (k + 1) % 4] for k in range(4)]
+    file = tmp_path / "hole.fold"
+    document = {
+        "file_spec": 1.1,
+        "vertices_coords": square + inner,
+        "edges_vertices": ring + [[a + 4, b + 4] for a, b in ring] + [[k, k + 4] for k in range(4)],
+        "edges_assignment": [*"BBBBBBBBMVMV"],
+    }
+    file.write_text(json.dumps(document))
+    job = mf.sheets(file, scale=40)
+    (patch,) = job.layout.patches
+    assert not patch.tabs
+    assert sorted(len(corners) for corners in job.pattern.faces_vertices.tolist()) == [4] * 4
+    # The cut line keeps half a kerf outside the frame, and half a kerf inside the window.
+    (window,) = patch.waste_mm
+    for line, side in ((patch.outline_mm, 120.15), (window, 39.85)):
+        assert shapely.Polygon(line).area == pytest.approx(side**2, abs=0.01)
+    assert [round(each.length_mm, 9) for each in job.layout.borders] == [480.0, 160.0]
+    job.write(tmp_path / "job")
+    found = mf.check_job(tmp_path / "job")
+    assert found.traced["outline"] == 2
+    assert [each.code for each in found.findings if each.severity == "refusal"] == []
 
 
 def test_what_is_not_proven_is_said(tmp_path):
