@@ -5,8 +5,8 @@
 Before is the split into the fewest patches, nested; after is the plan
 (:mod:`miurafab.fabrication.plan`). The bound is that of the area of the patches. ``smallest`` is
 the area of the smallest patch over their mean. Times are processor times of split, tabs and
-nesting. ``miura100k`` takes minutes and is done where it is named. With --largest, the largest size
-of each job on one sheet is given.
+nesting. ``miura100k`` takes as long as the rest and is done where it is named. With --largest, the
+largest size of each job on one sheet is given.
 """
 
 from __future__ import annotations

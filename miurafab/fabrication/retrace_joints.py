@@ -75,11 +75,12 @@ def _slot_faults(
     layout: Layout, pattern: CreasePattern, outlined: OutlinedPatches, labels: tuple[str, ...]
 ) -> Iterator[str]:
     tabs, slots = outlined.tabs, outlined.slots
-    listed = [tab.number for patch in layout.model.patches for tab in patch.tabs]
+    listed = (tab.number for patch in layout.model.patches for tab in patch.tabs)
+    rows = {number: row for row, number in enumerate(listed)}
     told: dict[int, tuple[int, int, int, Floats]] = {}
     for patch in layout.model.patches:
         for each in patch.slots:
-            row = listed.index(each.tab) if each.tab in listed else -1
+            row = rows.get(each.tab, -1)
             if row in told or row < 0 or slots is None:
                 yield f"The slot for tab {each.label} in {patch.label} is for no tab of its own."
             corners = turned(each.polygon_mm, -patch.rotation_deg) + patch.origin_mm
