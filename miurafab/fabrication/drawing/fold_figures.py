@@ -120,49 +120,56 @@ _LEFT = np.array([[6, 4], [36, 4], [32, 28], [2, 28]])
 _RIGHT = np.array([[49, 4], [76, 4], [72, 28], [45, 28]])
 _TAB = np.array([[35.6, 6.5], [44.5, 9.0], [41.2, 24.0], [32.6, 25.5]])
 _HEADED = np.array([[35, 10], [39.4, 7.4], [46, 11.5], [44, 22.5], [36.5, 26], [33, 22]])
-"""Two facets and a tab between them, in a drawing 78 wide and 32 high; and a tab with a head."""
+_SLOT = np.array([[51.2, 8.5], [52.4, 8.5], [49.8, 23.5], [48.6, 23.5]])
+"""Two facets, a tab between them, a tab with a head, and its slot; all with y from 4 to 28."""
 
 
 def tab(canvas: Pen, box: Box) -> None:
     """A tab with its label and letter, and the facet under which it goes."""
-    _tabs(canvas, box, (_TAB,), "V", (38.6, "a7", 55.0))
+    names = (("a7V", 38.6), ("a7", 55.0), ("P1", 17.0), ("P2", 66.0))
+    _joint(canvas, box, (_LEFT, _TAB, _RIGHT), ((_LEFT[1:3], "V"),), names)
 
 
 def slotted_tab(canvas: Pen, box: Box) -> None:
     """A tab with a head, and the facet with its slot."""
-    slot = np.array([[51.2, 8.5], [52.4, 8.5], [49.8, 23.5], [48.6, 23.5]])
-    _tabs(canvas, box, (_HEADED, slot), "V", (40.4, "a7", 58.0))
+    names = (("a7V", 40.4), ("a7", 58.0), ("P1", 17.0), ("P2", 68.0))
+    fold = _HEADED[[0, 5]], "V"
+    _joint(canvas, box, (_LEFT, _HEADED, _RIGHT, _SLOT), (fold,), names)
 
 
 def double_tab(canvas: Pen, box: Box) -> None:
     """A tab, and the tab of the other patch to which it is glued."""
-    # The mirror image about the slanting line half way between the two facets.
-    along = np.array([-4.0, 24.0]) / math.hypot(4, 24)
-    far = _TAB - np.array([42.5, 4.0])
-    image = 2 * np.outer(far @ along, along) - far + np.array([42.5, 4.0])
-    _tabs(canvas, box, (_TAB, image + np.array([6.0, 0.0])), "M", (38.6, "a7M", 51.0))
+    right = _RIGHT + np.array([13.0, 0.0])
+    # Turned by half a turn about the middle between the two facets, a trapezoid is its own mirror.
+    image = np.array([94.0, 32.0]) - _TAB
+    names = (("a7M", 38.6), ("a7M", 55.4), ("P1", 17.0), ("P2", 80.0))
+    folds = ((_LEFT[1:3], "M"), (right[[0, 3]], "M"))
+    _joint(canvas, box, (_LEFT, _TAB, right, image), folds, names)
 
 
-def _tabs(
-    canvas: Pen, box: Box, shapes: Sequence[Floats], fold: str, labels: tuple[float, str, float]
+def _joint(
+    canvas: Pen,
+    box: Box,
+    shapes: Sequence[Floats],
+    folds: Sequence[tuple[Floats, str]],
+    names: Sequence[tuple[str, float]],
 ) -> None:
-    """Two facets with ``shapes`` between them; the first is a tab with this ``fold``. ``labels``
-    are the place of its label, and the label beyond it with its place.
+    """A facet, its tab, its mate, and what the mate has; with ``folds`` and their letters, and
+    ``names`` with their places from left to right.
     """
-    at_tab, beyond, at_beyond = labels
-    parts = [_LEFT, _RIGHT, *shapes]
-    seen, scale = fitted(np.concatenate(parts), box)
-    low = seen.min(axis=0) - scale * np.concatenate(parts).min(axis=0)
+    every = np.concatenate(shapes)
+    seen, scale = fitted(every, box)
+    low = seen[0] - scale * every[0]
     canvas.setStrokeColor(INK)
     canvas.setLineWidth(0.25 * mm)
     canvas.setLineJoin(1)
-    fills = (tint(1, 0.6), tint(2, 0.6), tint(1, 0.3), tint(2, 0.3))
-    for fill, corners in zip(fills, parts, strict=False):
+    fills = (tint(1, 0.6), tint(1, 0.3), tint(2, 0.6), tint(2, 0.3))
+    for fill, corners in zip(fills, shapes, strict=False):
         canvas.setFillColor(fill)
         polygon(canvas, low + scale * corners, stroke=True)
-    colour = CREASE_COLOURS[fold]
-    _crease(canvas, low + scale * _LEFT[1:3], colour, fold)
-    for words, at in ((f"a7{fold}", at_tab), (beyond, at_beyond), ("P1", 17.0), ("P2", 66.0)):
+    for ends, letter in folds:
+        _crease(canvas, low + scale * ends, CREASE_COLOURS[letter], letter)
+    for words, at in names:
         x, y = (low + scale * np.array([at, 14.8])).tolist()
         look = QUIET if words.startswith("P") else INK
         text(canvas, x, y, words, 9, bold=look == INK, colour=look, align="middle")
