@@ -182,3 +182,13 @@ def pleated_hypar(rings: int = 8, angle: float = 90.0) -> CreasePattern:
             if k > 1:  # the innermost square is a facet that bends
                 lines.append((inner, at, "VM"[k % 2], angle))
     return drawn(lines)
+
+
+def roll(count: int = 8, angle: float = 100.0, shrinking: float = 1.0) -> CreasePattern:
+    """A strip that rolls up into itself, each facet ``shrinking`` times as long as the last."""
+    places = [0.0]
+    for k in range(count):
+        places.append(places[-1] + shrinking**k)
+    lines = border((0.0, 0.0), (places[-1], 0.0), (places[-1], 1.0), (0.0, 1.0))
+    lines += [((x, 0.0), (x, 1.0), "V", angle) for x in places[1:-1]]
+    return drawn(lines)

@@ -243,6 +243,7 @@ def _verdict(verdict: RampVerdict) -> dict[str, Any]:
         "seed_signs": verdict.seed_signs,
         "angle_error_deg": math.degrees(verdict.angle_error),
         "snaps": verdict.snaps,
+        "contact": verdict.touching,
     }
 
 

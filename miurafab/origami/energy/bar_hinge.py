@@ -61,7 +61,7 @@ class BarHingeModel:
     pattern's edges ``creases_edges`` (C,) that have a facet on both sides and are not assigned F.
     Creases of different ``mechanisms`` (C,) fold independently of each other, since no stiffness
     and no chain of interior vertices joins them.
-    ``unit_joule`` is None without a material.
+    ``unit_joule`` is None without a material. ``triangles`` (T, 3) are the parts of the facets.
     """
 
     points: Floats
@@ -76,6 +76,7 @@ class BarHingeModel:
     mechanisms: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     unit_mm: float = 1.0
     unit_joule: float | None = None
+    triangles: Ints = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
 
     def strains(self, points: Floats) -> Floats:
         """(B,) c = (|d|^2 - L^2) / (2 L) of each bar at ``points`` (V, 3)."""
@@ -242,6 +243,7 @@ def flat_model(
         creases_edges=inner[creased],
         mechanisms=np.zeros(int(creased.sum()), dtype=np.int64),
         unit_mm=unit,
+        triangles=triangles,
     )
 
 

@@ -15,7 +15,7 @@ with mu after Levenberg and Marquardt. So it only ever lowers the energy.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -24,15 +24,28 @@ from scipy import sparse
 
 from miurafab.geometry.arrays import Floats
 from miurafab.geometry.sparse import Factor, SymmetricSolver, factor_symmetric
-from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, stretch_blocks
+from miurafab.origami.energy.equilibrium import (
+    NO_TOUCH,
+    Balance,
+    EquilibriumState,
+    Touch,
+    stretch_blocks,
+)
 from miurafab.origami.energy.hinges import hinge_angles, hinge_gradients
+from miurafab.origami.energy.touching import (
+    NO_PAIRS,
+    TouchPairs,
+    near_pairs,
+    touch,
+    touch_energy,
+)
 
 LIMIT = np.pi - 0.01
 """Beyond this fold angle a facet meets its neighbour."""
 LIMIT_STIFFNESS = 1.0
 """Of the spring beyond the limit, for the length of its hinge: that of a facet."""
 LARGEST_TURN = 1.0
-"""Radians by which one step of a descent may turn a hinge."""
+"""Radians by which one step of a descent, or of a path, may turn a hinge."""
 LARGEST_MOVE = 0.3
 """Mean edges by which one step of a descent may move a vertex."""
 FIRST_MU, LEAST_MU, GREATEST_MU = 1e-3, 1e-12, 1e6
@@ -45,10 +58,12 @@ class Ramped(Balance):
     """A model whose hinges rest at the part ``target`` of their rest angles.
 
     ``last`` (H,) are the fold angles of the last accepted state, from which angles are counted on.
-    It is the one array that changes, by :meth:`accept`.
+    It is the one array that changes, by :meth:`accept`. ``pairs`` are the vertices and triangles
+    that touch.
     """
 
     last: Floats = field(default_factory=lambda: np.empty(0))
+    pairs: TouchPairs = NO_PAIRS
 
     def __post_init__(self) -> None:
         if not len(self.last):
@@ -61,6 +76,20 @@ class Ramped(Balance):
     def accept(self, points: Floats) -> None:
         """Count angles on from ``points`` (V, 3)."""
         self.last[:] = self.angles(points)
+
+    def touching_at(self, points: Floats) -> Ramped:
+        """The same model with the pairs that are near each other at ``points`` (V, 3).
+
+        It shares ``last``. Where nothing touches, now or before, it is this model itself.
+        """
+        pairs = near_pairs(points, self.model.triangles, self.pairs)
+        if not len(pairs.side) and not len(self.pairs.side):
+            return self
+        return replace(self, pairs=pairs)
+
+    def touch(self, points: Floats, *, definite: bool = False) -> Touch:
+        """The springs of the pairs that touch."""
+        return touch(points, self.pairs, definite=definite) if len(self.pairs.side) else NO_TOUCH
 
     def state(self, points: Floats) -> EquilibriumState:
         """The state at ``points`` (V, 3) whose bars pull by their strain; all have a compliance."""
@@ -88,7 +117,8 @@ class Ramped(Balance):
         bend = model.stiffness * (angle - target * model.rest) ** 2 + self._stop * over**2
         soft = model.compliance > 0
         strain = model.strains(points)[soft]
-        return 0.5 * float(bend.sum() + (strain**2 / model.compliance[soft]).sum())
+        stretch = (strain**2 / model.compliance[soft]).sum()
+        return 0.5 * float(bend.sum() + stretch) + touch_energy(points, self.pairs)
 
     def gauss_newton(self, points: Floats, target: float) -> tuple[Floats, sparse.csc_array]:
         """The gradient of the energy at ``points`` (V, 3), and K without mu."""
@@ -98,17 +128,17 @@ class Ramped(Balance):
         bars = self.bar_vectors(points) / model.lengths[:, None]
         forces = model.strains(points) / model.compliance
         pull = forces[:, None] * bars
-        touch = self.touch(points)
+        push = self.touch(points, definite=True)
         bend = moment[:, None, None] * turn
         pulls = np.stack([-pull, pull], axis=1)
-        gradient = self.assembly.gather([bend, pulls, np.zeros((0, 3)), touch.forces])
+        gradient = self.assembly.gather([bend, pulls, np.zeros((0, 3)), push.forces])
         outer = turn[:, :, None, :, None] * turn[:, None, :, None, :]
         block = bars[:, :, None] * bars[:, None, :] / model.compliance[:, None, None]
         block += (np.maximum(forces, 0.0) / model.lengths)[:, None, None] * np.eye(3)
         bent = slope[:, None, None, None, None] * outer
         stretched = stretch_blocks(block)
         none = np.zeros((1, 0, 0, 3, 3))
-        return gradient, self.assembly.matrix([bent, stretched, none, touch.stiffness])
+        return gradient, self.assembly.matrix([bent, stretched, none, push.stiffness])
 
     def _counted_on(self, angle: Floats) -> Floats:
         """``angle`` (H,) in (-pi, pi], with the whole turns nearest to the last state."""
@@ -131,12 +161,20 @@ class Descent(NamedTuple):
     force: float
 
 
-def descend(ramped: Ramped, points: Floats, target: float, force: float, rounds: int) -> Descent:
+def descend(
+    ramped: Ramped,
+    points: Floats,
+    target: float,
+    force: float,
+    rounds: int,
+    leash: float = np.inf,
+) -> Descent:
     """Lower the energy from ``points`` (V, 3) until no force is above ``force``.
 
-    It takes at most ``rounds`` steps. All bars need a compliance. ``ramped`` accepts each step.
+    It takes at most ``rounds`` steps, and none that leads farther than ``leash`` from the start.
+    All bars need a compliance. ``ramped`` accepts each step.
     """
-    energy, mu = ramped.energy(points, target), FIRST_MU
+    start, energy, mu = points, ramped.energy(points, target), FIRST_MU
     gradient, matrix = ramped.gauss_newton(points, target)
     for _ in range(rounds):
         if np.abs(gradient).max(initial=0.0) <= force or mu > GREATEST_MU:
@@ -146,6 +184,7 @@ def descend(ramped: Ramped, points: Floats, target: float, force: float, rounds:
         trial = points + step
         turned = np.abs(ramped.angles(trial) - ramped.last).max(initial=0.0)
         short = turned <= LARGEST_TURN and np.abs(step).max() <= LARGEST_MOVE
+        short = short and np.abs(trial - start).max() <= leash
         lower = ramped.energy(trial, target) if short else np.inf
         if lower < energy:
             points, energy, mu = trial, lower, max(mu * SHARPER, LEAST_MU)

@@ -28,8 +28,9 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, flat_model
 from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate
 from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, Factored, solve
-from miurafab.origami.energy.ramp import Ramped, descend
+from miurafab.origami.energy.ramp import LARGEST_TURN, Descent, Ramped, descend
 from miurafab.origami.energy.seed import linear_seed
+from miurafab.origami.energy.touching import REACH
 
 Progress = Callable[[float, str], None]
 
@@ -39,12 +40,12 @@ ENOUGH = 1e-6
 """The force, in k_f, at which a descent hands over to Newton's iteration."""
 ROUNDS = 200
 """The most steps of a descent."""
+MOST_PIECES, PIECE_ROUNDS = 40, 30
+"""The most pieces of a descent with facets that touch, and the most steps of each."""
 FIRST_PARTS = (1.0, 0.25, 1.0 / 16.0)
 """The first balance, in steps between two frames: nearer to flat if it is not found."""
 FIRST, LONGER, SHORTEST = 1.0 / 8.0, 1.6, 1.0 / 64.0
 """Of the step between two frames: the first step, the growth after one that holds, the least."""
-LARGEST_TURN = 1.0
-"""Radians by which a hinge may turn in one step of the path."""
 SHAKEN = 1e-3
 """Mean edges by which vertices are moved at random before a descent out of a snap."""
 MAX_SNAPS = 20
@@ -113,16 +114,19 @@ def ramp_parts(pattern: CreasePattern, steps: int) -> Floats:
 def fold_from_flat(
     pattern: CreasePattern,
     parts: Floats,
+    *,
+    touching: bool = False,
     seed: int = 0,
     on_progress: Progress | None = None,
 ) -> RampPath:
     """The path of ``pattern``, of one piece, from flat through ``parts`` (n + 1,) of its ramp.
 
-    ``seed`` is that of the shaking out of a snap. Raises what
-    :func:`~miurafab.origami.energy.bar_hinge.flat_model` raises. Failure is a result.
+    With ``touching`` facets do not pass through each other. ``seed`` is that of the shaking out of
+    a snap. Raises what :func:`~miurafab.origami.energy.bar_hinge.flat_model` raises. Failure is a
+    result.
     """
     model = flat_model(pattern)
-    walk = _Walk(model, np.random.default_rng(seed))
+    walk = _Walk(model, touching, np.random.default_rng(seed))
     start = linear_seed(model)
     frames: list[RampFrame] = []
     found = any(walk.leave_flat(start.heights, float(parts[1]) * first) for first in FIRST_PARTS)
@@ -142,7 +146,7 @@ def fold_from_flat(
 class _Walk:
     """The walk along the ramp: where it is, the last states, and the length of the next step."""
 
-    def __init__(self, model: BarHingeModel, random: np.random.Generator) -> None:
+    def __init__(self, model: BarHingeModel, touching: bool, random: np.random.Generator) -> None:
         self.ramped = Ramped(model)
         firmer = np.where(model.rest == 0, FIRMER, 1.0) * model.stiffness
         hard = replace(model, compliance=np.zeros_like(model.compliance), stiffness=firmer)
@@ -151,6 +155,7 @@ class _Walk:
         self._factored: Factored | None = None
         self.step = FIRST
         self.snaps = 0
+        self._touching = touching
         self._random = random
 
     def leave_flat(self, heights: Floats, part: float) -> bool:
@@ -162,15 +167,29 @@ class _Walk:
 
     def land(self, points: Floats, part: float) -> bool:
         """Find a balance at ``part`` by descent from ``points``."""
-        ended = descend(self.ramped, points, part, ENOUGH, ROUNDS)
+        ended = self._descend(points, part)
         found = solve(self.ramped, self.ramped.state(ended.points), part)
         turned = np.abs(self.ramped.angles(found.state.points) - self.ramped.last)
         if not found.converged or turned.max(initial=0.0) > LARGEST_TURN:
             return False
-        self.ramped.accept(found.state.points)
         self.known, self._factored = [Known(part, found.state)], found.factored
+        self._accept(found.state.points)
         self.step = FIRST
         return True
+
+    def _descend(self, points: Floats, part: float) -> Descent:
+        """Where a descent from ``points`` ends. With facets that touch it goes in short pieces, and
+        looks after each which facets are near each other.
+        """
+        if not self._touching:
+            return descend(self.ramped, points, part, ENOUGH, ROUNDS)
+        ended = Descent(points, np.inf)
+        for _ in range(MOST_PIECES):
+            ended = descend(self.ramped, ended.points, part, ENOUGH, PIECE_ROUNDS, REACH / 2)
+            if ended.force <= ENOUGH:
+                break
+            self._accept(ended.points)
+        return ended
 
     def reach(self, goal: float, nominal: float) -> bool:
         """Follow the path up to ``goal``, in steps of ``nominal`` at most; False if it is lost."""
@@ -179,9 +198,8 @@ class _Walk:
             part = min(goal, here + nominal * self.step)
             found = solve(self.ramped, extrapolate(self.known, part), part, self._factored)
             self._factored = found.factored
-            turned = np.abs(self.ramped.angles(found.state.points) - self.ramped.last)
-            if found.converged and turned.max(initial=0.0) <= LARGEST_TURN:
-                self.ramped.accept(found.state.points)
+            if found.converged and self._is_short(found.state.points):
+                self._accept(found.state.points)
                 self.known = [*self.known[1 - HISTORY :], Known(part, found.state)]
                 self.step = min(1.0, self.step * LONGER)
             elif self.step > SHORTEST:
@@ -201,6 +219,24 @@ class _Walk:
             if turned <= NEAR and not hard.unstable:
                 return hard
         return _frame(soft, here, False)
+
+    def _is_short(self, points: Floats) -> bool:
+        """Whether the way to ``points`` is short enough for one step.
+
+        Two facets that may touch come nearer by less than the reach, so that neither is overlooked.
+        """
+        turned = np.abs(self.ramped.angles(points) - self.ramped.last)
+        moved = np.abs(points - self.known[-1].state.points).max() if self._touching else 0.0
+        return bool(turned.max(initial=0.0) <= LARGEST_TURN and moved <= REACH / 2)
+
+    def _accept(self, points: Floats) -> None:
+        """Count angles on from ``points``, and look which facets are near each other there."""
+        self.ramped.accept(points)
+        if self._touching:
+            now = self.ramped.touching_at(points)
+            if now is not self.ramped:
+                self.ramped, self._factored = now, None
+                self.stiff = replace(self.stiff, pairs=now.pairs)
 
     def leave_saddle(self) -> bool:
         """Go down from an unstable state at the same part of the ramp."""

@@ -3,7 +3,8 @@
 1. *Closed form*: tangents of half fold angles keep their ratios. It is the motion if every loop
    closes, as in sheets that are flat-foldable with vertices of degree four.
 2. *From the folded form*, if the file holds one: one crease is driven, facets bend.
-3. *From flat*, by mountains and valleys alone: all creases together. This is for any pattern.
+3. *From flat*, by mountains and valleys alone: all creases together. This is for any pattern. If
+   facets pass through each other on the way, it is gone again with facets that touch.
 
 That the closed form does not close says nothing about other motions. So of the ways 2 and 3 it is
 certified whether all facets can stay flat (:mod:`miurafab.origami.folding.certificate`).
@@ -18,6 +19,7 @@ import numpy as np
 
 from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.certificate import RigidCertificate, certified
 from miurafab.origami.folding.kinematics import (
@@ -68,7 +70,9 @@ def find_motion(
     if bent is not None:
         motion, certificate = certified(bent)
         return FoundMotion(motion, mismatch, None, certificate)
-    motion, verdict = ramp_motion(pattern, steps, on_progress)
+    motion, verdict = ramp_motion(pattern, steps, on_progress=on_progress)
+    if verdict.wrong_signs <= MOST_WRONG and contacts(motion):
+        motion, verdict = ramp_motion(pattern, steps, touching=True, on_progress=on_progress)
     if verdict.wrong_signs > MOST_WRONG:
         raise _sequence(verdict)
     motion, certificate = certified(motion)

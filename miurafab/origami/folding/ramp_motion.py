@@ -34,7 +34,8 @@ class RampVerdict:
     ``unstable`` (T,) is the number of directions in which each frame is no minimum of the energy,
     ``strain`` (T,) the largest relative change of a side, ``angle_error`` the mean distance from
     the fold angles asked for in the last frame, radians, and ``snaps`` the number of jumps. If
-    ``complete`` is False the way was lost before its end.
+    ``complete`` is False the way was lost before its end. ``touching`` tells whether springs kept
+    facets from passing through each other.
     """
 
     wrong_edges: Ints
@@ -45,14 +46,19 @@ class RampVerdict:
     angle_error: float
     snaps: int
     complete: bool
+    touching: bool
 
 
 def ramp_motion(
     pattern: CreasePattern,
     steps: int = 20,
+    *,
+    touching: bool = False,
     on_progress: Callable[[float, str], None] | None = None,
 ) -> tuple[FoldingMotion, RampVerdict]:
     """The motion of ``pattern`` from flat, all creases together, and its verdict.
+
+    With ``touching`` springs keep facets from passing through each other.
 
     ``states`` are the parts of the fold angles of the pattern that creases strive for. Creases of
     half a turn go to nine tenths of it. If the solver loses the path, the motion ends there. Raises
@@ -70,7 +76,7 @@ def ramp_motion(
     paths = []
     for number, piece in enumerate(folding):
         progress = part_of(on_progress, number, len(folding))
-        paths.append(fold_from_flat(piece.pattern, parts, on_progress=progress))
+        paths.append(fold_from_flat(piece.pattern, parts, touching=touching, on_progress=progress))
     count = min(len(path.frames) for path in paths)
     if not count:
         raise _stuck(paths)
@@ -82,7 +88,7 @@ def ramp_motion(
     states = parts[: count + 1]
     frames = laid_on_each_other(pattern, states, frames)
     motion = FoldingMotion(pattern, states, frames, angles, mismatch=None, method=FROM_FLAT)
-    return motion, _verdict(folding, paths, count)
+    return motion, _verdict(folding, paths, count, touching)
 
 
 def _enter(frames: Floats, angles: Floats, piece: Piece, path: RampPath) -> None:
@@ -96,7 +102,9 @@ def _enter(frames: Floats, angles: Floats, piece: Piece, path: RampPath) -> None
         angles[number, edges] = turned + 2 * np.pi * np.round((before - turned) / (2 * np.pi))
 
 
-def _verdict(folding: list[Piece], paths: list[RampPath], count: int) -> RampVerdict:
+def _verdict(
+    folding: list[Piece], paths: list[RampPath], count: int, touching: bool
+) -> RampVerdict:
     wrong = [_wrong_edges(*pair) for pair in zip(folding, paths, strict=True)]
     folds = sum(len(path.sprung) for path in paths)
     errors = [path.angle_error * len(path.sprung) for path in paths]
@@ -115,6 +123,7 @@ def _verdict(folding: list[Piece], paths: list[RampPath], count: int) -> RampVer
         strain=strain,
         angle_error=sum(errors) / folds,
         snaps=sum(path.snaps for path in paths),
+        touching=touching,
         complete=all(path.converged for path in paths),
     )
 
