@@ -55,6 +55,7 @@ RULES = {
     "max-distance": Rule("refusal", "sheet and target farther apart than `max_distance`"),
     "facet-shape": Rule("refusal", "facets that break a limit on angles or proportions"),
     "flat-foldable": Rule("refusal", "a sheet less flat-foldable than asked"),
+    "barrier": Rule("refusal", "a sheet that cannot have the barrier asked for"),
     "smaller-part": Rule("warning", "a sheet on a smaller part of the mesh's rectangle"),
     "whole-facets": Rule("note", "whole facets at the border, since a cut leaves short edges"),
     "far-from-target": Rule("warning", "a sheet that lies over 1 % of its size from the target"),

@@ -74,8 +74,14 @@ def fit(
         def at(size: FitRequest) -> FitResult:
             return _FitSearch(size, None, ends_at=ENOUGH).result()
 
-        return coarsest(request, at, on_progress)
-    return _FitSearch(request, on_progress).result()
+        result = coarsest(request, at, on_progress)
+    else:
+        result = _FitSearch(request, on_progress).result()
+    if request.barrier is None:
+        return result
+    from miurafab.origami.energy.tuning import tuned
+
+    return tuned(request, result, on_progress)
 
 
 class _FitSearch:

@@ -99,6 +99,13 @@ class FitOptions(Shown):
         default_text="off",
         page="more",
     )
+    barrier: float | None = option(
+        number(0, 1e3, above=True),
+        "The energy barrier that holds the folded form, in k_f L, within 1 %: the residuals of the "
+        "fitted sheet are scaled until it is that.",
+        group="Limits",
+        default_text="as it comes",
+    )
     min_edge_mm: float | None = option(
         length(above=True), "The shortest edge allowed.", group="Limits", page="first"
     )
@@ -229,6 +236,19 @@ class FitOptions(Shown):
                     f"is {self.pieces}, and {len(self.cut_columns)} `cut_columns` make "
                     f"{len(self.cut_columns) + 1} pieces; give only one of the two",
                 )
+        if self.barrier is not None and self.flat_foldable is not None:
+            raise OptionError(
+                "barrier",
+                "decides the residuals, and so does `flat_foldable`; give only one of the two",
+            )
+        if self.barrier is not None and (self.pieces or 1) > 1:
+            raise OptionError("barrier", "is for one piece; ask for one of `pieces`")
+        shapes = (self.min_angle, self.max_angle, self.max_aspect)
+        if self.barrier is not None and any(limit is not None for limit in shapes):
+            raise OptionError(
+                "barrier",
+                "does not go with `min_angle`, `max_angle` and `max_aspect`; leave them out",
+            )
         low, high = self.angles
         if not low < math.pi / 2 < high:
             raise OptionError(

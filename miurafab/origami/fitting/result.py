@@ -76,6 +76,8 @@ class FitResult(Shown):
         Whether the sheet was brought closer after it was found.
     active_bounds : mapping
         How many inequalities of each kind hold the sheet back.
+    barrier : float, optional
+        The barrier of ``pattern`` in k_f L, where one was asked for.
     findings : tuple of Finding
         What a person should know of the target.
     """
@@ -91,6 +93,7 @@ class FitResult(Shown):
     score: Score | None = None
     polished: bool = False
     active_bounds: Mapping[str, int] = field(default_factory=dict)
+    barrier: float | None = None
     findings: tuple[Finding, ...] = ()
 
     @property
@@ -141,6 +144,7 @@ class FitResult(Shown):
             "score": None if self.score is None else self.score.report(),
             "polished": self.polished,
             "active_bounds": dict(self.active_bounds),
+            "barrier": self.barrier,
             "findings": findings_json(self.findings),
             "attempts": [
                 {
