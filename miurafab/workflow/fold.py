@@ -25,6 +25,7 @@ from miurafab.options.verbs import verb
 from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
 from miurafab.origami.folding.certificate import RigidCertificate
 from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.folding.facet_energy import facet_energies
 from miurafab.origami.folding.judge_motion import motion_findings
 from miurafab.origami.folding.kinematics import (
     CLOSED_FORM,
@@ -142,7 +143,12 @@ class Folding(Shown):
             write_gif(file, motion, _strain(motion) if by_strain else None, on_progress, shifts)
         else:
             slider = Slider(
-                _names(motion), target_frame(motion), _strain(motion), by_strain, shifts
+                _names(motion),
+                target_frame(motion),
+                _strain(motion),
+                by_strain,
+                shifts,
+                facet_energies(motion),
             )
             write_page(file, title=title, pattern=pattern, motion=motion.frames, slider=slider)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from browser import CHROMIUM, Browser
 from PIL import Image
 from problems import fitted, regular
 
+from miurafab.origami.folding.facet_energy import facet_energies
 from miurafab.workflow.fold import fold
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no browser to open the page in")
@@ -41,6 +43,12 @@ def covered(page: Browser) -> int:
     return int((np.abs(picture - picture[4, 4]).sum(axis=2) > 12).sum())
 
 
+def told_size(page: Browser) -> float:
+    """The diagonal of the box whose sides the page tells, mm."""
+    told = str(page.run('document.getElementById("fold-size").value'))
+    return math.hypot(*(float(side) for side in told.removesuffix(" mm").split(" × ")))
+
+
 def move(page: Browser, frame: int) -> str:
     page.run(MOVE.format(frame=frame))
     return str(page.run('document.getElementById("motion-frame").value'))
@@ -63,11 +71,13 @@ def test_the_slider_moves_the_sheet(tmp_path: Path, cells: int, most_bytes: int)
         at_first = page.run('document.getElementById("motion-frame").value')
         assert at_first.endswith("the folded form")
         assert move(page, 0) == "1 of 41, flat"
-        flat = covered(page)
+        flat, boxes = covered(page), [told_size(page)]
         assert move(page, 20).startswith("21 of 41, s = ")
         halfway = covered(page)
+        boxes.append(told_size(page))
         assert move(page, 40) == "41 of 41, folded flat"
         closed = covered(page)
+        boxes.append(told_size(page))
         assert page.run('document.getElementById("layers-bar").hidden') is False
         page.run('document.getElementById("apart").value = 100')
         move(page, 40)
@@ -75,8 +85,46 @@ def test_the_slider_moves_the_sheet(tmp_path: Path, cells: int, most_bytes: int)
         move(page, 39)
         assert page.run('document.getElementById("layers-bar").hidden') is True
         assert page.requests == [path.as_uri()]
-    assert flat > 1.2 * halfway > 1.44 * closed > 1000
+    # the view comes nearer as the sheet becomes smaller, and the size of its box is told
+    assert min(flat, halfway) > 100_000
+    assert closed > 25_000
     assert apart > 1.1 * closed
+    assert boxes == sorted(boxes, reverse=True)
+
+
+def test_the_page_plays_beside_the_flat_pattern_and_its_energy(tmp_path: Path) -> None:
+    pattern = fitted("hypar", 6, 6).pattern
+    assert pattern is not None
+    path = tmp_path / "motion.html"
+    folding = fold(pattern, 8)
+    folding.save(path, title="hypar")
+    energies = facet_energies(folding.motion)
+    assert energies is not None
+    with Browser(tmp_path / "profile") as page:
+        page.open(path)
+        note = page.run('document.getElementById("energy-note").textContent')
+        assert float(note.split("at most ")[1].split(" ")[0]) == float(f"{energies.max():.2g}")
+        # one line for each kind of edge, of as many pieces as there are edges
+        drawn = page.run(
+            '[...document.querySelectorAll("#flat-pattern path")]'
+            '.map((path) => path.getAttribute("d").split("M").length - 1)'
+        )
+        assert sum(drawn) == len(pattern.edges_vertices)
+        move(page, 0)
+        start = page.run('document.querySelector("#energy path:last-child").getAttribute("d")')
+        page.run('document.getElementById("fold-play").click()')
+        assert page.run('document.getElementById("fold-play").textContent') == "Pause"
+        seen_at = page.run(
+            "new Promise((done) => { const wait = () => {"
+            'const at = Number(document.getElementById("motion").value);'
+            "if (at >= 2) done(at); else requestAnimationFrame(wait); }; wait(); })"
+        )
+        assert seen_at >= 2
+        page.run('document.getElementById("fold-play").click()')
+        assert page.run('document.getElementById("fold-play").textContent') == "Play"
+        later = page.run('document.querySelector("#energy path:last-child").getAttribute("d")')
+        assert later != start
+        assert page.requests == [path.as_uri()]
 
 
 def test_facets_are_coloured_by_strain_when_asked(tmp_path: Path) -> None:
@@ -107,3 +155,5 @@ def test_a_rigid_sheet_shows_no_strain(tmp_path: Path) -> None:
         page.open(path)
         assert page.run('document.getElementById("strain-most").textContent') == "no strain"
         assert page.run('document.getElementById("by-strain").checked') is False
+        note = page.run('document.getElementById("energy-note").textContent')
+        assert note == "The facets stay flat: bending them takes no energy."

@@ -35,6 +35,7 @@ _SCRIPTS = ("viewer.js", "sheets.js", "fold.js", "page.js")
 _SEAM = "S"
 """What the page calls a border that is glued to another."""
 _STEPS = 65535
+_NO_ENERGY = 1e-12
 _BEGINS_STROKE = np.uint8(128)
 """Added to the layer of the first move of each stroke."""
 
@@ -44,7 +45,8 @@ class Slider:
     """The slider of a motion of T frames: a name for each frame in ``names`` (T, or none), the
     first frame ``start``, and the ``strain`` (T, F) of the facets, which colours can show; they do
     from the start if ``show_strain``. ``shifts`` (F, 3), mm, are those of the layers of the last
-    frame when they stand apart.
+    frame when they stand apart. ``energies`` (T,) of the facets, in k_f times the mean edge, have a
+    curve beside the view.
     """
 
     names: tuple[str, ...] = ()
@@ -52,6 +54,7 @@ class Slider:
     strain: Floats | None = None
     show_strain: bool = False
     shifts: Floats | None = None
+    energies: Floats | None = None
 
 
 def write_page(
@@ -191,6 +194,7 @@ def _fold(pattern: CreasePattern, motion: Floats | None, slider: Slider) -> dict
         "start": slider.start,
         "strain": _strain(slider, owners),
         "layers": _layers(pattern, slider, owners),
+        "energy": _energy(slider),
     }
 
 
@@ -205,6 +209,14 @@ def _strain(slider: Slider, owners: Ints) -> dict[str, Any] | None:
         "values": _base64(np.rint(slider.strain / (most or 1.0) * 255), np.uint8),
         "owners": _base64(owners, np.uint32),
     }
+
+
+def _energy(slider: Slider) -> dict[str, Any] | None:
+    """The energies, with the greatest; None where they are no more than rounding."""
+    if slider.energies is None or not slider.energies.max() > _NO_ENERGY:
+        return None
+    values = [float(f"{value:.4g}") for value in slider.energies.tolist()]
+    return {"values": values, "most": max(values), "unit": "k_f × mean edge"}
 
 
 def _layers(pattern: CreasePattern, slider: Slider, owners: Ints) -> dict[str, Any] | None:

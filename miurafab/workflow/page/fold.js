@@ -51,6 +51,8 @@ const CREASES = {
 };
 const THICKEST = 2.2;
 const RAMP = ["#4575b4", "#abd9e9", "#ffffbf", "#fdae61", "#d73027"];
+const ONE_WAY = 4500; // ms of a motion that plays, from one end to the other
+const REST = 700;
 const FIELD = Math.tan((16 * Math.PI) / 180);
 
 /** The screen's axes in space: right, up, and out of it towards the eye. Z is up in space. */
@@ -69,6 +71,14 @@ function gather(points, order) {
     found[3 * at + 2] = points[from + 2];
   }
   return found;
+}
+
+/** An element of a drawing, with attributes, and with styles that may name the page's colours. */
+function drawn(tag, attributes, styles) {
+  const made = document.createElementNS(byId("flat-pattern").namespaceURI, tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  Object.assign(made.style, styles);
+  return made;
 }
 
 class FoldView {
@@ -113,7 +123,11 @@ class FoldView {
       this.choose((this.at + step + this.forms.length) % this.forms.length);
       byId("forms").children[this.at].focus();
     });
-    byId("motion").addEventListener("input", (event) => this.show(Number(event.target.value)));
+    byId("motion").addEventListener("input", (event) => {
+      this.play(false);
+      this.show(Number(event.target.value));
+    });
+    byId("fold-play").addEventListener("click", () => this.play(!this.playing));
     byId("apart").addEventListener("input", () => this.show(Number(byId("motion").value)));
     byId("by-strain").addEventListener("change", () => this.stage.draw());
     byId("by-strain").checked = Boolean(fold.strain && fold.strain.shown);
@@ -122,9 +136,11 @@ class FoldView {
       turn: (dx, dy) => this.turn(dx, dy),
       shift: (dx, dy) => this.shift(dx, dy),
       zoom: (factor) => this.zoom(factor),
-      keys: { 0: () => this.fit() },
+      keys: { 0: () => this.fit(), " ": () => this.play(!this.playing) },
     });
     byId("fold").hidden = false;
+    this.playing = false;
+    if (this.forms.some((form) => form.frames > 1)) this.aside();
     this.choose(Math.min(fold.first, this.forms.length - 1));
   }
 
@@ -159,10 +175,9 @@ class FoldView {
     return Float32Array.from(packed, (value, at) => (value / 65535 - 0.5) * span[at % 3]);
   }
 
-  home({ box: [, , , sx, sy, sz], flat }) {
-    const radius = Math.hypot(sx, sy, sz) / 2 || 1;
+  home({ flat }) {
     return {
-      radius, yaw: flat ? 0 : -0.6, pitch: flat ? Math.PI / 2 : 0.62, x: 0, y: 0, near: 1,
+      yaw: flat ? 0 : -0.6, pitch: flat ? Math.PI / 2 : 0.62, x: 0, y: 0, near: 1,
     };
   }
 
@@ -184,6 +199,7 @@ class FoldView {
   }
 
   choose(at) {
+    this.play(false);
     this.at = at;
     this.form = this.forms[at];
     for (const [place, button] of [...byId("forms").children].entries()) {
@@ -192,6 +208,7 @@ class FoldView {
     }
     const moves = this.form.frames > 1;
     byId("motion-bar").hidden = !moves;
+    byId("fold-side").hidden = !moves;
     byId("strain-key").hidden = !moves || !this.strains;
     if (moves && Number(byId("motion").max) !== this.form.frames - 1) {
       byId("motion").max = this.form.frames - 1;
@@ -212,14 +229,88 @@ class FoldView {
     byId("fold-size").value = `${(this.form.flat ? size.slice(0, 2) : size).join(" × ")} mm`;
   }
 
-  /** Put one frame of the form on the stage. */
-  show(frame) {
-    const { gl } = this.stage;
+  /** There and back again, with a rest at either end, until it is stopped. */
+  play(wanted) {
+    if (wanted === this.playing) return;
+    this.playing = wanted;
+    byId("fold-play").textContent = wanted ? "Pause" : "Play";
+    byId("fold-play").setAttribute("aria-pressed", wanted);
+    if (!wanted) return;
+    const last = this.form.frames - 1;
+    const at = Number(byId("motion").value);
+    let begin = performance.now() - (at < last ? at / last : 0) * ONE_WAY - REST;
+    const tick = (moment) => {
+      if (!this.playing) return;
+      const round = Math.max(moment - begin, 0) % (2 * (ONE_WAY + REST));
+      const back = round > ONE_WAY + REST;
+      const part = Math.min(Math.max(((back ? round - ONE_WAY - REST : round) - REST) / ONE_WAY, 0), 1);
+      this.show((back ? 1 - part : part) * last);
+      requestAnimationFrame(tick);
+    };
+    requestAnimationFrame(tick);
+  }
+
+  /** The coordinates at `frame`, between two frames blended. */
+  points(frame) {
     const count = this.form.coordinates.length / this.form.frames;
-    const points = this.form.coordinates.subarray(frame * count, (frame + 1) * count);
+    const of = (number) => this.form.coordinates.subarray(number * count, (number + 1) * count);
+    const low = Math.floor(frame);
+    const part = frame - low;
+    if (part === 0) return of(low);
+    const [before, after] = [of(low), of(low + 1)];
+    return before.map((value, at) => value + part * (after[at] - value));
+  }
+
+  /** Beside the view: the flat pattern, and the energy along the motion with a mark at the frame. */
+  aside() {
+    const flat = this.forms.find((form) => form.flat);
+    const [, , , width, height] = flat.box;
+    const margin = 0.03 * Math.max(width, height);
+    const svg = byId("flat-pattern");
+    svg.setAttribute("viewBox", [-margin, -margin, width + 2 * margin, height + 2 * margin].map((mm) => mm.toFixed(2)).join(" "));
+    const lines = this.fold.assignments.map(() => "");
+    const place = (vertex) => (
+      `${(flat.coordinates[3 * vertex] + width / 2).toFixed(2)} ${(height / 2 - flat.coordinates[3 * vertex + 1]).toFixed(2)}`
+    );
+    decode(this.fold.kinds, Uint8Array).forEach((kind, edge) => {
+      lines[kind] += `M${place(this.edges[2 * edge])}L${place(this.edges[2 * edge + 1])}`;
+    });
+    lines.forEach((line, kind) => {
+      const { colour, width: wide } = CREASES[this.fold.assignments[kind]];
+      const stroke = colour.startsWith("--") ? `var(${colour})` : colour;
+      svg.append(drawn("path", { d: line, "stroke-width": 1.3 * wide, "vector-effect": "non-scaling-stroke" }, { stroke, fill: "none" }));
+    });
+    const { energy } = this.fold;
+    byId("energy-note").textContent = energy
+      ? `Bending energy of the facets, at most ${Number(energy.most.toPrecision(2))} ${energy.unit}`
+      : "The facets stay flat: bending them takes no energy.";
+    const chart = byId("energy");
+    chart.setAttribute("viewBox", "0 0 100 60");
+    chart.setAttribute("preserveAspectRatio", "none");
+    this.height = (at) => 56 - 50 * (energy ? energy.values[at] / energy.most : 0);
+    const last = this.forms.at(-1).frames - 1;
+    this.across = (at) => 3 + (94 * at) / last;
+    const path = Array.from({ length: last + 1 }, (_, at) => `${this.across(at).toFixed(2)} ${this.height(at).toFixed(2)}`);
+    chart.append(drawn("path", { d: `M${path.join("L")}`, "stroke-width": 1.8, "vector-effect": "non-scaling-stroke" }, { stroke: "var(--accent)", fill: "none" }));
+    this.mark = drawn("path", { "stroke-width": 1.2, "vector-effect": "non-scaling-stroke" }, { stroke: "var(--ink)" });
+    chart.append(this.mark);
+  }
+
+  /** Put one frame of the form on the stage; while it plays, also what lies between two frames. */
+  show(at) {
+    const { gl } = this.stage;
+    const points = this.points(at);
+    const frame = Math.round(at);
+    if (this.playing) byId("motion").value = frame;
+    if (this.mark && this.form.frames > 1) this.mark.setAttribute("d", `M${this.across(at).toFixed(2)} 2V58`);
+    this.shownPoints = points;
+    this.radius = 0;
+    for (let at = 0; at < points.length; at += 3) {
+      this.radius = Math.max(this.radius, Math.hypot(points[at], points[at + 1], points[at + 2]));
+    }
     this.measure(points);
     const corners = gather(points, this.triangles);
-    this.stacked = Boolean(this.layers) && this.form.frames > 1 && frame === this.form.frames - 1;
+    this.stacked = Boolean(this.layers) && this.form.frames > 1 && at === this.form.frames - 1;
     byId("layers-bar").hidden = !this.stacked;
     if (this.stacked) {
       const { closed, owners, sideOwners, ends, lines } = this.layers;
@@ -296,12 +387,13 @@ class FoldView {
 
   /** The view (world to eye) and the camera (world to clip space), column by column. */
   matrices() {
-    const { x, y, radius } = this.form.camera;
+    const { x, y } = this.form.camera;
+    const radius = this.radius * (this.stacked ? 2 : 1.05);
     const { right, up, out } = axes(this.form.camera);
     const z = -this.distance;
     const view = [0, 1, 2].flatMap((axis) => [right[axis], up[axis], out[axis], 0]).concat([x, y, z, 1]);
-    const far = this.distance + 2 * radius;
-    const near = Math.max(this.distance - 2 * radius, far / 400);
+    const far = this.distance + radius;
+    const near = Math.max(this.distance - radius, far / 400);
     const scale = [this.stage.height / this.stage.width / FIELD, 1 / FIELD];
     const [c, d] = [-(far + near) / (far - near), (-2 * far * near) / (far - near)];
     const camera = [];
@@ -314,7 +406,9 @@ class FoldView {
 
   paint(gl) {
     const seen = `${this.at} ${this.stage.width} ${this.stage.height}`;
-    if (seen !== this.seen) [this.seen, this.full] = [seen, this.reach(this.form.coordinates)];
+    if (seen !== this.seen) [this.seen, this.most] = [seen, this.reach(this.form.coordinates)];
+    // as near as the frame allows, but so that a sheet that closes is still seen to become smaller
+    this.full = this.form.frames > 1 ? Math.max(this.reach(this.shownPoints), 0.6 * this.most) : this.most;
     const { view, camera } = this.matrices();
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
