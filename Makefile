@@ -9,7 +9,7 @@ TOOLS := .venv/tools
 COMPILE = $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --upgrade
 AUDIT = $(TOOLS)/bin/pip-audit --strict --disable-pip --require-hashes
 
-.PHONY: demo test test-large lint lock audit sbom clean
+.PHONY: demo test test-large lint gallery lock audit sbom clean
 
 demo: .venv/installed
 	$(BIN)/miurafab cut patterns/hypar.toml --port virtual
@@ -27,6 +27,11 @@ lint: .venv/installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# Fits, lays out and draws all that docs/gallery.md shows.
+gallery: .venv/installed-dev
+	$(BIN)/python benchmarks/gallery.py
+	$(BIN)/python benchmarks/gallery.py --front
 
 # The versions and hashes of all libraries are in locks/; `make lock` writes them anew.
 .venv/installed: pyproject.toml locks/run.txt

@@ -16,6 +16,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+import miurafab
+
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = (sys.executable, "-m", "build", "--wheel", "--sdist", "--no-isolation")
 KINDS = ("firmware_profiles", "materials", "patterns")
@@ -260,3 +262,8 @@ def _imports(module):
 
 def _plain(name):
     return name.lower().replace("_", "-")
+
+
+def test_the_citation_names_this_version():
+    lines = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
+    assert f"version: {miurafab.__version__}" in lines
