@@ -38,9 +38,12 @@ from miurafab.studio.machine_words import (
     NO_SESSION,
     NOT_ARMED,
     ONE_SESSION,
+    OWN_PORT,
     PRACTICE,
     alarm_of,
+    held_words,
     plain,
+    port_words,
     spelled,
     state_words,
 )
@@ -86,10 +89,12 @@ class Desk:
         """The ports to choose from: those of this computer, the person's own, and the practice
         machine; who holds one, and why it cannot be used.
         """
-        found = {each.device: each.trouble or each.description for each in serial_ports()}
+        found = {
+            each.device: each.trouble or port_words(each.description) for each in serial_ports()
+        }
         own = own_defaults().port
         if own is not None and own != VIRTUAL:
-            found.setdefault(own, "the port of 'miurafab use'")
+            found.setdefault(own, OWN_PORT)
         listed = [
             {"name": name, "text": text, "held": _holder(name)} for name, text in found.items()
         ]
@@ -293,4 +298,4 @@ class Desk:
 
 def _holder(port: str) -> str:
     owner = owner_of(port)
-    return "" if owner is None else f"held by {owner}"
+    return "" if owner is None else held_words(owner)

@@ -10,7 +10,7 @@ import hashlib
 import shutil
 from pathlib import Path
 
-from miurafab.files import state_folder, write_bytes
+from miurafab.files import new_folder, state_folder, write_bytes
 from miurafab.workflow.manifest import MANIFEST
 
 _KEPT = 20
@@ -18,15 +18,17 @@ _KEPT = 20
 
 
 def keep_job(job: Path) -> Path:
-    """A copy of the job directory ``job`` that stays; the earlier copy of an equal one."""
+    """A copy of the job directory ``job`` that stays; the earlier copy of an equal one.
+
+    Raises :class:`~miurafab.errors.InputError` where it cannot be written.
+    """
     digest = hashlib.sha256((job / MANIFEST).read_bytes()).hexdigest()[:10]
-    home = state_folder() / "studio"
+    home = new_folder(state_folder() / "studio", "The folder of jobs that are cut")
     kept = home / f"{job.name}-{digest}"
     if not kept.is_dir():
-        home.mkdir(parents=True, exist_ok=True)
         coming = home / f".{kept.name}.new"
         shutil.rmtree(coming, ignore_errors=True)
-        coming.mkdir()
+        new_folder(coming, "The copy of the job")
         for file in sorted(job.iterdir()):
             write_bytes(coming / file.name, file.read_bytes())
         coming.rename(kept)

@@ -14,6 +14,7 @@ from miurafab.errors import spell_options
 from miurafab.grbl.events import Alarm
 from miurafab.grbl.streamer import alarm_words
 from miurafab.machine.known_controller import MachineState
+from miurafab.machine.owner import Owner
 from miurafab.workflow.dry_run import clock_text
 
 ENDED = "The session ended by itself."
@@ -34,6 +35,7 @@ PRACTICE = "practice machine, nothing burns"
 LAPSED = "The arming has lapsed; arm the sheet again."
 CONNECTING = "Connecting"
 SET_HERE = ", set here"
+OWN_PORT = "the port of 'miurafab use'"
 
 
 @dataclass(frozen=True)
@@ -216,3 +218,13 @@ def settings_verdict(differ: int, *, told: bool) -> str:
     if not told:
         return "not told yet"
     return f"{differ} not as the profile says" if differ else "as the profile says"
+
+
+def port_words(description: str) -> str:
+    """What the system says of a port; pyserial writes ``n/a`` where it says nothing."""
+    return "serial port" if description in ("", "n/a") else description
+
+
+def held_words(owner: Owner) -> str:
+    """Who has a port."""
+    return f"held by {owner}"

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,10 +16,12 @@ from rigs import LINE, MACHINE, ROWS, AtMachine, Pumped, until
 from small_jobs import write_job
 from studios import request, sentence
 
+from miurafab.errors import InputError
 from miurafab.machine.owner import Owner, owner_of
 from miurafab.machine.watchdog import SILENCE_S
 from miurafab.studio.core import Studio
 from miurafab.studio.desk import Desk
+from miurafab.studio.kept_jobs import keep_job
 from miurafab.studio.machine_orders import ACTIONS, KEYS, ROUTES
 from miurafab.studio.machine_words import alarm_of, plain, state_words
 
@@ -355,6 +358,22 @@ def test_words_for_each_state():
         state_words("Hold:0", **(said | {"waits": "waiting at x.nc, line 4 (M0)"})).look == "held"
     )
     assert plain("Give `home`, or `at`.") == "Give 'Home', or 'Set origin here'."
+
+
+def test_the_job_of_a_layout_is_kept_where_its_journal_stays(tmp_path):
+    job = write_job(tmp_path / "hypar-job", 1)
+    kept = keep_job(job)
+    assert kept.parent == tmp_path / "state" / "miurafab" / "studio"
+    (kept / "sheet-01.journal").write_text("begun")
+    names = {path.name: path.read_bytes() for path in job.iterdir()}
+    assert {path.name for path in kept.iterdir()} == {*names, "sheet-01.journal"}
+    assert all((kept / name).read_bytes() == content for name, content in names.items())
+    assert keep_job(job) == kept
+    assert (kept / "sheet-01.journal").read_text() == "begun"
+    shutil.rmtree(kept.parent)
+    kept.parent.write_text("a file")
+    with pytest.raises(InputError, match="which is a file; give a folder"):
+        keep_job(job)
 
 
 def test_a_port_that_somebody_holds_says_so(tmp_path, monkeypatch):

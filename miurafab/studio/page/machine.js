@@ -8,6 +8,7 @@ const OFTEN_MS = 200;
 const SELDOM_MS = 1500;
 const LATE_MS = 1500;
 const PRESS_MS = 100;
+const ABORT_MS = 700;
 
 let control = "";
 let taken = -1; // how often control had been taken when this page took it
@@ -40,11 +41,14 @@ async function order(route, body = {}) {
 
 export async function abort() {
   if (!now.open) return;
+  const unheard = () => fault(byId("abort-late").textContent);
+  const slow = setTimeout(unheard, ABORT_MS);
   try {
     show(await ask("machine/abort", {}), false);
-  } catch (error) {
-    fault(error.message);
+  } catch {
+    unheard();
   }
+  clearTimeout(slow);
 }
 
 const set = (id, text) => {
@@ -56,7 +60,7 @@ const toggle = (id, there) => { byId(id).hidden = !there; };
 function show(state, asked = true) {
   now = state;
   answered = performance.now();
-  byId("desk").classList.remove("old");
+  document.body.classList.remove("late");
   toggle("watch", state.open);
   toggle("desk-empty", !state.open);
   toggle("connect-form", !state.open);
@@ -217,7 +221,7 @@ async function follow() {
 }
 
 function late() {
-  if (now.open) byId("desk").classList.add("old");
+  if (now.open) document.body.classList.add("late");
 }
 
 /** A press of the pad: once, and again while it is held. */
