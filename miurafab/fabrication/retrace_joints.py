@@ -81,7 +81,7 @@ def _slot_faults(
     for patch in layout.model.patches:
         for each in patch.slots:
             row = rows.get(each.tab, -1)
-            if row in told or row < 0 or slots is None:
+            if slots is None or row in told or row < 0 or each.label != labels[row]:
                 yield f"The slot for tab {each.label} in {patch.label} is for no tab of its own."
             corners = turned(each.polygon_mm, -patch.rotation_deg) + patch.origin_mm
             told[row] = patch.id, each.edge, each.mate_patch, corners

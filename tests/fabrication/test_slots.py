@@ -218,6 +218,7 @@ def test_a_written_slot_is_proven_by_its_tab(written):
         (lambda slot: slot["polygon_mm"].reverse(), "is not the one that its tab goes through"),
         (lambda slot: slot.update(edge=0), "has no slot at the edge that it is joined to"),
         (lambda slot: slot.update(tab=999), "is for no tab of its own"),
+        (lambda slot: slot.update(label="x9"), "is for no tab of its own"),
     ):
         kept = json.dumps(patch["slots"][0])
         change(patch["slots"][0])
