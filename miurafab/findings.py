@@ -175,6 +175,7 @@ RULES = {
     "beam": _check("a beam that is on already"),
     "s-range": _check("an S range (`$30`, `$31`) that is not the profile's"),
     "settings": _check("another `$` setting that is not the profile's"),
+    "position": _check("a controller that restarted by itself, so that its position may be lost"),
     "restarted": Rule("note", "a board that the opening of its port reset, and what that undid"),
     "modes": Rule(
         "warning", "modes or startup blocks of the controller that a job does not expect"

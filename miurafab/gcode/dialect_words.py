@@ -18,33 +18,47 @@ GRBLHAL, FLUIDNC = "grblhal", "fluidnc"
 _NAMES = {GRBLHAL: "grblHAL", FLUIDNC: "FluidNC"}
 _BOTH = (GRBLHAL, FLUIDNC)
 
-_EFFECTS: dict[tuple[str, ...], tuple[str, tuple[str, ...]]] = {
-    ("M66",): ("waits for an input", _BOTH),
-    ("M67", "M68"): ("sets an analog output, and a beam may hang on it", _BOTH),
-    ("M6", "M61"): ("changes the tool", _BOTH),
-    ("M56",): ("changes what a hold does", _BOTH),
-    ("M48", "M49", "M50", "M51", "M53"): ("changes what the overrides do", (GRBLHAL,)),
-    ("M60",): ("waits for a change of the work", (GRBLHAL,)),
-    ("M70", "M71", "M72", "M73"): ("stores or restores the modes", (GRBLHAL,)),
-    ("M98", "M99"): ("calls a program or returns from it", (GRBLHAL,)),
-    ("M7.1", "M8.1"): ("switches a coolant off", (FLUIDNC,)),
-    ("G5", "G5.1"): ("draws a spline", (GRBLHAL,)),
-    ("G33", "G33.1", "G76", "G95", "G96"): ("moves by the turns of a spindle", (GRBLHAL,)),
+_OUT, _MOVES, _LINES = "leave it out", "write its moves as G0 and G1", "write its lines out"
+_EFFECTS: dict[tuple[str, ...], tuple[str, tuple[str, ...], str]] = {
+    ("M66",): ("waits for an input", _BOTH, _OUT),
+    ("M67", "M68"): (
+        "sets an analog output, and a beam may hang on it",
+        _BOTH,
+        "set the power by S, and outputs by M62 to M65",
+    ),
+    ("M6", "M61"): ("changes the tool", _BOTH, _OUT),
+    ("M56",): ("changes what a hold does", _BOTH, _OUT),
+    ("M48", "M49", "M50", "M51", "M53"): ("changes what the overrides do", (GRBLHAL,), _OUT),
+    ("M60",): ("waits for a change of the work", (GRBLHAL,), "wait by M0"),
+    ("M70", "M71", "M72", "M73"): ("stores or restores the modes", (GRBLHAL,), "set them by words"),
+    ("M98", "M99"): ("calls a program or returns from it", (GRBLHAL,), _LINES),
+    ("M7.1", "M8.1"): ("switches a coolant off", (FLUIDNC,), "switch it off by M9"),
+    ("G5", "G5.1"): ("draws a spline", (GRBLHAL,), "draw the curve by G1, G2 or G3"),
+    ("G33", "G33.1", "G76", "G95", "G96"): (
+        "moves by the turns of a spindle",
+        (GRBLHAL,),
+        "move by G1 in G94",
+    ),
     ("G73", "G81", "G82", "G83", "G84", "G85", "G86", "G89"): (
         "makes the moves of a drilling cycle",
         (GRBLHAL,),
+        _MOVES,
     ),
-    ("G43", "G43.2"): ("takes the length of a tool from a table", (GRBLHAL,)),
-    ("G50", "G51"): ("scales the coordinates", (GRBLHAL,)),
-    ("G59.1", "G59.2", "G59.3"): ("chooses a work offset that is kept in the controller", _BOTH),
-    ("G64",): ("rounds the corners of the path", (GRBLHAL,)),
-    ("G65", "G66", "G66.1", "G67"): ("calls a macro", (GRBLHAL,)),
-    ("G92.2", "G92.3"): ("drops or restores the shift of G92", (GRBLHAL,)),
+    ("G43", "G43.2"): ("takes the length of a tool from a table", (GRBLHAL,), _OUT),
+    ("G50", "G51"): ("scales the coordinates", (GRBLHAL,), "write them scaled"),
+    ("G59.1", "G59.2", "G59.3"): (
+        "chooses a work offset that is kept in the controller",
+        _BOTH,
+        "choose one by G54 to G59",
+    ),
+    ("G64",): ("rounds the corners of the path", (GRBLHAL,), _OUT),
+    ("G65", "G66", "G66.1", "G67"): ("calls a macro", (GRBLHAL,), _LINES),
+    ("G92.2", "G92.3"): ("drops or restores the shift of G92", (GRBLHAL,), "set it by G92"),
 }
 _OF_WORD = {word: effect for words, effect in _EFFECTS.items() for word in words}
 _EVALUATED = ("is evaluated by the controller alone", _BOTH)
 _TOKEN = re.compile(
-    r"([GM])\+?0*(\d+)(?:\.(\d*?)0*)?(?![\d.])|#(?:<[^>]*>|\d*)|\[|O(?:\d+|<[^>]*>|)"
+    r"([GM])\+?0*(\d+)(?:\.(\d*?)0*)?(?![\d.])|#(?:<[^>]*>|\d*)|\[|O(?:\d+|<[^>]*>)"
 )
 
 OUTPUT = re.compile(r"M\+?0*6([2-5])(?:\.0*)?(?![\d.])")
@@ -90,33 +104,41 @@ def require_told(code: str, dialect: str) -> None:
     """
     if dialect not in _NAMES:
         return
-    for word, what, dialects in _special(code):
+    for word, what, dialects, instead in _special(code):
         if dialect in dialects:
             raise UntoldEffect(
                 f"on {_NAMES[dialect]} {word} {what}; the effect on path, beam and time cannot be "
-                "told here, so let the controller itself read the file (`check_mode`), or leave "
-                "the word out"
+                f"told here, so {instead}, or let the controller itself read it (`check_mode`)"
             )
     if OUTPUT.search(code):
         raise UntoldEffect("M62 to M65 take one P word and stand beside no other P, G4 or G10")
 
 
 def known_elsewhere(code: str, dialect: str) -> str:
-    """The dialects that know a word of ``code`` which ``dialect`` does not, as a clause."""
-    for _, _, dialects in _special(code):
+    """The dialects that know a word of ``code`` which ``dialect`` does not, and what to write for
+    this one, as a clause.
+    """
+    for word, _, dialects, instead in _special(code):
         others = [_NAMES[each] for each in dialects if each != dialect]
         if others and dialect not in dialects:
-            return f"; {' and '.join(others)} know{'s' * (len(others) == 1)} it"
-    if dialect not in _NAMES and OUTPUT.search(code):
-        return "; grblHAL and FluidNC know it"
+            return (
+                f"; {' and '.join(others)} know{'s' * (len(others) == 1)} {word}; here, {instead}"
+            )
+    output = OUTPUT.search(code)
+    if dialect not in _NAMES and output:
+        return f"; grblHAL and FluidNC know {output[0]}; here, {_OUT}"
     return ""
 
 
-def _special(code: str) -> list[tuple[str, str, tuple[str, ...]]]:
-    found: list[tuple[str, str, tuple[str, ...]]] = []
+def _special(code: str) -> list[tuple[str, str, tuple[str, ...], str]]:
+    """The words of ``code`` that only some dialects know: the word, what it does, who knows it, and
+    what does the same in words that can be judged.
+    """
+    found: list[tuple[str, str, tuple[str, ...], str]] = []
     for match in _TOKEN.finditer(code):
         if match[1] is None:
-            found.append((f"'{match[0]}'", *_EVALUATED))
+            instead = _LINES if match[0].startswith("O") else "write the number itself"
+            found.append((f"'{match[0]}'", *_EVALUATED, instead))
         else:
             word = f"{match[1]}{match[2]}" + (f".{match[3]}" if match[3] else "")
             if word in _OF_WORD:

@@ -29,7 +29,10 @@ def grbl_words(code: str) -> str:
         raise ValueError(f"{code!r} begins with no command, and Marlin repeats none by itself")
     name, rest = match[1] + match[2], code[match.end() :]
     if name not in COMMANDS:
-        raise ValueError(f"{name} is not a command that a job for Marlin may hold")
+        known = ", ".join(sorted(COMMANDS, key=lambda word: (word[0], int(word[1:]))))
+        raise ValueError(
+            f"{name} is not a command that a job for Marlin may hold; those are {known}"
+        )
     if "G" in rest or "M" in rest:
         raise ValueError(f"{code!r} holds two commands, and Marlin reads one a line")
     if name in ("M3", "M4", "M5"):

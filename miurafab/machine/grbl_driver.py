@@ -80,8 +80,10 @@ class GrblDriver(StreamDriver):
             self.at_risk = True
             session.home()
             self.at_risk = False
+        status = session.wait_status()
+        lost = session.restarted_itself and plan.at is None
         forced = raise_findings(
-            check_status(session.wait_status(), restarted=restarted),
+            check_status(status, restarted=restarted, lost=lost),
             plan.options.force,
             ControllerError,
         )

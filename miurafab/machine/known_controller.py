@@ -124,6 +124,7 @@ class KnownController:
         if not self._opened:
             self._session.greet(patience, reset=reset)
             self._starts = self._session.starts
+            self._session.restarted_itself = False
             self._opened = True
             self._learn_overrides()
         self.refresh()
@@ -243,6 +244,7 @@ class KnownController:
     def set_position(self, x: float, y: float) -> None:
         """State where the head stands in work coordinates (G92), in known modes."""
         self._session.command(f"G92X{x:.3f}Y{y:.3f}")
+        self._session.restarted_itself = False
         self._unknown.add(OFFSETS)
 
     def job_offset(self) -> tuple[float, ...] | None:

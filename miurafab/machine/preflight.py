@@ -54,8 +54,12 @@ def require_known(force: frozenset[str]) -> None:
         raise InputError(f"'{code}' is a {rule.severity} and stops nothing; leave it out.")
 
 
-def check_status(status: StatusReport, *, restarted: bool = False) -> Iterator[Finding]:
-    """The checks ``idle`` and ``beam``; ``restarted``: the opening of the port reset the board."""
+def check_status(
+    status: StatusReport, *, restarted: bool = False, lost: bool = False
+) -> Iterator[Finding]:
+    """The checks ``idle``, ``beam`` and ``position``; ``restarted``: the opening of the port reset
+    the board; ``lost``: it restarted by itself later, and nobody has said where it stands.
+    """
     if status.state == "Alarm" and restarted:
         yield Finding(
             "idle",
@@ -73,6 +77,12 @@ def check_status(status: StatusReport, *, restarted: bool = False) -> Iterator[F
             "beam",
             "The controller reports the beam on before the job has begun; switch the laser off at "
             "the machine and reset the controller.",
+        )
+    if lost:
+        yield Finding(
+            "position",
+            "The controller restarted by itself since the last job, and may have lost its place "
+            "and its origin; `home` it, or say where the head stands (`at`).",
         )
 
 

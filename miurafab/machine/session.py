@@ -44,7 +44,8 @@ class Session:
     conversation. ``on_data`` is called with the bytes as they arrive. ``restarted``: the opening of
     the port reset the board. ``banner`` is what it greeted with, or what its ``$I`` says.
     ``patience`` is the longest time between two calls of ``check``, in seconds.
-    ``starts`` grows with each reset that was sent or greeted. ``overrides`` are as written until
+    ``starts`` grows with each reset that was sent or greeted; ``restarted_itself`` is set at one
+    that nobody sent, until the position is known again. ``overrides`` are as written until
     they are told.
     """
 
@@ -65,6 +66,8 @@ class Session:
         self.mm_per_unit = 1.0
         self.heard = 0.0
         self.starts = 0
+        self.restarted_itself = False
+        self._resetting = False
         self.on_data: Callable[[bytes], None] = lambda data: None
         self.patience = math.inf
         self._transport = transport
@@ -145,6 +148,8 @@ class Session:
             elif isinstance(event, Banner):
                 self.banner = event
                 self.starts += 1
+                self.restarted_itself = self.restarted_itself or not self._resetting
+                self._resetting = False
                 self.overrides = AS_WRITTEN
                 self.overrides_told = True
                 self._asked_at = None
@@ -257,6 +262,7 @@ class Session:
     def home(self) -> None:
         """Run the homing cycle and wait for its end; raises as :meth:`command` does."""
         self.command("$H", HOMING_S)
+        self.restarted_itself = False
         self.wait_status()
 
     def _require_ready(self, text: str) -> None:
@@ -330,6 +336,7 @@ class Session:
         data = self.connection.send_realtime(FEED_HOLD) if hold_first else b""
         data += self.connection.send_realtime(SOFT_RESET)
         self._transport.write_now(data)
+        self._resetting = True
         self.starts += 1
         self.forget_query()
         if self.transcript is not None:

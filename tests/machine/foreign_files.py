@@ -214,7 +214,9 @@ FILES: dict[str, Burnt | Refused] = {
     "scientific numbers": Refused(LINE.format("G1 X1.2E1 F600"), r"line 5: .*error"),
     "a letter alone": Refused(LINE.format("G1 X F600"), r"line 5: X has no readable number"),
     "marlin fan": Refused("M106 S255\n" + LINE.format("M107"), r"line 1: M106 is not a word"),
-    "tool change": Refused("T2 M6\n", r"line 1: M6 is not a word .*; grblHAL and FluidNC know it"),
+    "tool change": Refused(
+        "T2 M6\n", r"line 1: M6 is not a word .*; grblHAL and FluidNC know M6; here, leave it out"
+    ),
     "arc that misses its end": Refused(LINE.format("G2 X20 I6 J5 F600"), r"line 5: .*error:33"),
     "marlin checksum": Refused("N1 G1 X5 F600*12\n", r"line 1: "),
     "a fourth axis": Refused(LINE.format("G1 A5 F600"), r"line 5: A5 is not a word"),
@@ -224,8 +226,12 @@ FILES: dict[str, Burnt | Refused] = {
     "a second program": Refused(
         "O1\n" + LINE.format("") + "O2\nG1 X30 F600\n", r"line 9: O2 is not a word"
     ),
-    "a program called": Refused("o100 call [5]\n", r"line 1: O100 .*; grblHAL and FluidNC know it"),
-    "G64 on GRBL": Refused("G64\n", r"line 1: G64 is not .*; grblHAL knows it"),
+    "a program called": Refused(
+        "o100 call [5]\n", r"line 1: O100 .*; grblHAL and FluidNC know 'O100'; here, write"
+    ),
+    "G64 on GRBL": Refused(
+        "G64\n", r"line 1: G64 is not .*; grblHAL knows G64; here, leave it out"
+    ),
     "grblHAL, parameters": Refused(
         "#1=5\n" + LINE.format("G1 X#1 F600"), r"line 1: on grblHAL '#1' is evaluated", HAL
     ),

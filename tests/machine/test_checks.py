@@ -38,8 +38,9 @@ CONTROLLERS = {
 }
 
 
-# Of job directories and files of other machines: tests/workflow, tests/profiles/test_beams.py
-HERE = [check for check in CHECKS if check not in ("edited", "other-beam")]
+# Of job directories, files of other machines, and a second job of one session: tests/workflow,
+# tests/profiles/test_beams.py, tests/machine/test_session.py
+HERE = [check for check in CHECKS if check not in ("edited", "other-beam", "position")]
 
 
 def test_every_check_is_tried_here() -> None:

@@ -7,17 +7,20 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 from session_walk import HOMING, JOB, MACHINE, Cable, Walk
 
-from miurafab.errors import ControllerError, InputError, JobStopped, PersonNeeded
+from miurafab.errors import ControllerError, InputError, JobStopped, MachineError, PersonNeeded
 from miurafab.machine.jog_pad import JogPad
 from miurafab.machine.keys import JOG_CANCEL
 from miurafab.machine.known_controller import PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.owner import Owner, claim, holder_of, owner_of, this_owner
 from miurafab.machine.signals import StopSignals
+from miurafab.simulate.beam import standing_seconds
+from miurafab.simulate.faults import parse_faults
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 
@@ -138,6 +141,51 @@ def test_a_session_that_is_left_with_the_beam_on_goes_dark() -> None:
     assert here.close()
     assert wire.sent.endswith(b"\x18")
     assert not wire.device.beam_on
+
+
+@pytest.mark.parametrize("when", ["waits", "second sheet"])
+@pytest.mark.parametrize(
+    "fault", ["reset", "power", "alarm", "disconnect", "hang", "drop-reply=all"]
+)
+def test_a_fault_between_two_sheets_or_in_the_second_ends_dark(fault: str, when: str) -> None:
+    """What ``test_one_session`` does with real processes and a pty, in the controller's time."""
+    whole, wire = session()
+    whole.cut(JOB)
+    first = wire.device.now
+    whole.load()
+    whole.cut(JOB)
+    second = wire.device.now - first
+    assert whole.close()
+    at = first + 2.0 if when == "waits" else first + 5.0 + 0.5 * second
+    device = VirtualGrbl(
+        virtual_settings(MACHINE), baud=115_200, faults=parse_faults([f"{fault}@{at:.2f}s"])
+    )
+    wire = Wire(device)
+    here = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    here.cut(JOB)
+    burnt = len(device.beam_log)
+
+    def wait_and_cut() -> None:
+        end = device.now + 5.0
+        while device.now < end:
+            here.watch(0.1)
+        here.load()
+        here.cut(JOB)
+
+    lost = when == "waits" and fault in ("reset", "power")
+    with pytest.raises(MachineError, match="restarted by itself since" if lost else "."):
+        wait_and_cut()
+    if lost:  # a person says where the head stands, or that the place does not matter
+        forced = replace(JOB, options=replace(JOB.options, force=frozenset({"position"})))
+        if fault == "power":
+            here.set_origin()
+        assert here.cut(JOB if fault == "power" else forced).lines == 15
+        burnt = len(device.beam_log)
+    here.close()
+    device.advance(30.0)
+    assert not device.beam_on
+    assert standing_seconds(device.beam_log) == 0.0
+    assert (len(device.beam_log) == burnt) == (when == "waits")
 
 
 def test_a_sheet_that_is_burnt_takes_no_second_job() -> None:
