@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import argparse
 import math
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+from page_tables import Rows, markdown, write_tables
 
-from miurafab.files import write_text
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import Paper, sheet_model
 from miurafab.origami.energy.continuation import follow
@@ -47,7 +46,6 @@ POINTS = {
         LAST - MIDDLE * CORNER - MIDDLE,
     ),
 }
-Rows = list[tuple[str, ...]]
 
 
 @cache
@@ -242,25 +240,12 @@ TABLES: dict[str, Callable[[], str]] = {
 }
 
 
-def markdown(head: tuple[str, ...], rows: Rows) -> str:
-    """A table of a page."""
-    lines = [head, tuple("---" for _ in head), *rows]
-    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("page", nargs="?", type=Path, help="The page to write the tables into.")
     options = parser.parse_args()
     tables = {name: make() for name, make in TABLES.items()}
-    if options.page is None:
-        print("\n".join(tables.values()))
-        return
-    text = options.page.read_text(encoding="utf-8")
-    for name, table in tables.items():
-        place = re.compile(rf"(<!-- force_table: {name} -->\n).*?(?=<!-- end -->)", re.DOTALL)
-        text = place.sub(lambda match, table=table: f"{match[1]}\n{table}\n", text)
-    write_text(options.page, text)
+    write_tables(options.page, "force_table", tables)
 
 
 if __name__ == "__main__":

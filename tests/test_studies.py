@@ -1,6 +1,6 @@
 """The tables of the studies in docs, computed again in part by the commands that write them."""
 
-import importlib.util
+import importlib
 import re
 from pathlib import Path
 
@@ -12,10 +12,7 @@ _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 def study(name):
     """A module of benchmarks/."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "benchmarks" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return importlib.import_module(name)
 
 
 def rows_of(page, command, name):
@@ -32,6 +29,12 @@ def same(written, computed, rel):
     numbers = ([float(n) for n in _NUMBER.findall(cell)] for cell in (written, computed))
     ours, theirs = numbers
     assert ours == pytest.approx(theirs, rel=rel)
+
+
+@pytest.fixture(autouse=True)
+def _neighbours(monkeypatch):
+    """The studies import each other by name, as commands do."""
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
 
 
 def test_the_force_table_is_what_its_command_computes(monkeypatch):
@@ -55,3 +58,36 @@ def test_the_verdict_of_the_force_table_is_that_of_its_rows(monkeypatch):
     text = (ROOT / "docs" / "forces.md").read_text(encoding="utf-8")
     for sentence in force_table.summary():
         assert f"- {sentence}\n" in text
+
+
+def study_rows(name):
+    return rows_of("energy-study.md", "energy_study", name)
+
+
+def test_the_study_of_energy_is_what_its_command_computes():
+    """The coarsest pair at the height itself, a sheet of each kind, and two of the hypars."""
+    energy_study = study("energy_study")
+    written = study_rows("halving")[0]
+    computed = energy_study.halving_rows(8, (0.0,))
+    for column in (0, 1, 2, 6, 7):
+        same(written[column], computed[column], 0.1)
+    points = {(row[0], row[1]): row for row in study_rows("curves")}
+    for point in (energy_study.stiffer_movement(energy_study.WEIGHTS[0]), energy_study.even(None)):
+        row = energy_study.curve_row(point)
+        for cell, other in zip(points[row[:2]], row, strict=True):
+            same(cell, other, 0.1)
+    worst = float(study_rows("hypar")[0][0])
+    assert energy_study.levels("hypar", energy_study.FACETS)[0] == pytest.approx(worst, rel=0.01)
+    pattern = energy_study.scaled("hypar", energy_study.FACETS, 1e-3)
+    (row,) = (row for row in study_rows("hypar") if row[0] == "1.00e-03")
+    assert energy_study.energy_curve(pattern, 24).barrier == pytest.approx(float(row[2]), rel=0.02)
+
+
+def test_the_sentences_of_the_study_are_those_of_its_tables():
+    energy_study = study("energy_study")
+    text = (ROOT / "docs" / "energy-study.md").read_text(encoding="utf-8")
+    rows, points = study_rows("halving"), study_rows("curves")
+    assert energy_study.summary(rows, points) in text
+    medians = [float(row[3].split()[0]) for row in rows]
+    assert [row[0] for row in rows] == [f"{n} x {n}" for n in energy_study.GRIDS]
+    assert max(medians) < 1
