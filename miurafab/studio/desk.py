@@ -30,6 +30,7 @@ from miurafab.studio.desk_view import (
     sheet_drawing,
     state_table,
 )
+from miurafab.studio.guard import same_key
 from miurafab.studio.held_session import HeldSession
 from miurafab.studio.machine_words import (
     LAPSED,
@@ -155,7 +156,7 @@ class Desk:
     def require_control(self, key: str) -> None:
         """Raise :class:`~miurafab.errors.InputError` for a page that only watches."""
         self._require_session()
-        if self._control is None or not secrets.compare_digest(key, self._control):
+        if self._control is None or not same_key(key, self._control):
             raise InputError(NO_CONTROL)
 
     def _require_session(self) -> HeldSession:
@@ -206,7 +207,7 @@ class Desk:
     def start(self, code: str) -> None:
         """The second step, with the code of the first."""
         armed, self._armed = self._armed, None
-        if armed is None or not secrets.compare_digest(code, armed[0]):
+        if armed is None or not same_key(code, armed[0]):
             raise InputError(NOT_ARMED)
         if time.monotonic() > armed[1]:
             raise InputError(LAPSED)

@@ -104,7 +104,8 @@ def _work(route: str, order: dict[str, Any]) -> Callable[[Operator], None]:
         return lambda operator: operator.press(key)
     if route == "jog":
         ways = [order.get("x"), order.get("y")]
-        if order.get("step") not in STEPS or any(way not in (-1, 0, 1) for way in ways):
+        known = order.get("step") in STEPS and all(way in (-1, 0, 1) for way in ways)
+        if not known or not any(ways):
             raise InputError("The page asked for a jog that the pad does not have; reload it.")
         dx, dy = (float(way or 0) * float(order["step"]) for way in ways)
         return lambda operator: operator.nudge(dx, dy)

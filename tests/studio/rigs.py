@@ -77,7 +77,7 @@ class AtMachine(Asked):
         self.ok("job")
 
     def ask(self, route, **order):
-        return self.post(f"machine/{route}", {"control": self.control, **order})
+        return self.post(f"machine/{route}", {"control": self.control} | order)
 
     def ok(self, route, **order):
         answered = self.ask(route, **order)

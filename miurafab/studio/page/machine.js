@@ -40,8 +40,7 @@ async function order(route, body = {}) {
 }
 
 export async function abort() {
-  if (!now.open) return;
-  const unheard = () => fault(byId("abort-late").textContent);
+  const unheard = () => { if (now.open) fault(byId("abort-late").textContent); };
   const slow = setTimeout(unheard, ABORT_MS);
   try {
     show(await ask("machine/abort", {}), false);
