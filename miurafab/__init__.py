@@ -91,7 +91,6 @@ if TYPE_CHECKING:
     from miurafab.workflow.listings import list_surfaces as list_surfaces
     from miurafab.workflow.own_machine import add_machine as add_machine
     from miurafab.workflow.own_material import add_material as add_material
-    from miurafab.workflow.panels import save_panels as save_panels
     from miurafab.workflow.panels import thick_panels as thick_panels
     from miurafab.workflow.patterns import check as check
     from miurafab.workflow.preview import Preview as Preview

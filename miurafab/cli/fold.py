@@ -60,8 +60,9 @@ def fold(
     nearly flat to the folded form of the file, or from flat by mountains and valleys alone. The
     answer says which, and whether the facets could all stay flat.
     """
+    from miurafab.origami.formats.panels import PANEL_ENDINGS
     from miurafab.workflow.fold import ENDINGS, FoldOptions
-    from miurafab.workflow.panels import PANEL_ENDINGS, thickness_report
+    from miurafab.workflow.panels import thickness_report
 
     asked = read_options(FoldOptions, given)
     if out is not None:
@@ -83,7 +84,7 @@ def fold(
                 pattern, asked.thickness_mm, method=asked.method, on_progress=progress
             )
         if thick is not None and panels is not None:
-            miurafab.save_panels(thick, panels, title=file.stem)
+            thick.save(panels, title=file.stem)
     answer: dict[str, Any] = folding.report()
     answer |= {"file": None if out is None else str(out), "csv": None if csv is None else str(csv)}
     answer["thickness"] = None if thick is None else thickness_report(thick)

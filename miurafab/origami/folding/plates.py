@@ -21,6 +21,7 @@ import numpy as np
 
 from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError
+from miurafab.files import AnyPath
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.bennett import BennettHeights, bennett_heights, thick_placement
@@ -212,6 +213,26 @@ class ThickPlates(Shown):
     def folds(self) -> bool:
         """Whether each patch reaches its folded form without a collision."""
         return all(patch.clear_state >= 1.0 for patch in self.patches)
+
+    def save(self, path: AnyPath, *, title: str = "") -> None:
+        """Write the panels: outlines to cut, or solids.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            A ``.dxf`` or ``.svg`` file with outlines, an ``.stl`` file with the panels flat, or a
+            ``.glb`` file in which they move.
+        title : str
+            The title inside an SVG file. The default is the name of the target.
+
+        Raises
+        ------
+        InputError
+            For another ending, for a folder that does not exist, and for facets that are too small.
+        """
+        from miurafab.origami.formats.panels import write_panels
+
+        write_panels(self, path, title)
 
     def _summary(self) -> str:
         count = len(self.patches)

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from miurafab.display import Shown
 from miurafab.errors import InputError
+from miurafab.files import AnyPath
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import filled, next_corners, previous_corners, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
@@ -137,6 +138,26 @@ class ThickPanels(Shown):
         keys = np.column_stack([np.repeat(solids.triangle_facet, 3), solids.triangles.reshape(-1)])
         _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         return points[first], number.reshape(-1, 3), keys[first, 0]
+
+    def save(self, path: AnyPath, *, title: str = "") -> None:
+        """Write the panels: outlines to cut, or solids.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            A ``.dxf`` or ``.svg`` file with outlines, an ``.stl`` file with the panels flat, or a
+            ``.glb`` file in which they move.
+        title : str
+            The title inside an SVG file. The default is the name of the target.
+
+        Raises
+        ------
+        InputError
+            For another ending, for a folder that does not exist, and for facets that are too small.
+        """
+        from miurafab.origami.formats.panels import write_panels
+
+        write_panels(self, path, title)
 
     @property
     def _angles(self) -> Floats:

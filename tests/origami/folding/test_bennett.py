@@ -22,7 +22,6 @@ from miurafab.origami.folding.bennett import bennett_heights, nearest_heights, t
 from miurafab.origami.folding.kinematics import fold_angles_at, place
 from miurafab.origami.folding.plates import ThickPlates, thick_plates
 from miurafab.origami.folding.thick_panels import LEAST_USEFUL, thick_panels
-from miurafab.workflow.panels import save_panels
 
 STATES = np.geomspace(0.1, 10.0, 10)
 
@@ -140,7 +139,7 @@ def test_what_has_no_shifted_hinges_is_refused() -> None:
 
 def test_plates_are_written_as_outlines_and_brackets(tmp_path: Path) -> None:
     (patch,) = plywood().patches
-    save_panels(plywood(), tmp_path / "plates.dxf")
+    plywood().save(tmp_path / "plates.dxf")
     space = ezdxf.readfile(tmp_path / "plates.dxf").modelspace()
     by_layer: dict[str, list[np.ndarray]] = {}
     for line in space.query("POLYLINE"):
@@ -166,7 +165,7 @@ def test_plates_are_written_as_outlines_and_brackets(tmp_path: Path) -> None:
 def test_plates_are_written_as_solids_that_move(tmp_path: Path) -> None:
     (patch,) = plywood().patches
     parts = 16 + len(patch.brackets)
-    save_panels(plywood(), tmp_path / "plates.stl")
+    plywood().save(tmp_path / "plates.stl")
     mesh = trimesh.load(tmp_path / "plates.stl")
     assert mesh.is_watertight
     bracket_mm3 = sum(
@@ -175,7 +174,7 @@ def test_plates_are_written_as_solids_that_move(tmp_path: Path) -> None:
     expected = 4.0 * signed_areas(patch.outlines).sum() + bracket_mm3
     assert mesh.volume == pytest.approx(expected, rel=1e-4)
     assert len(mesh.split()) == parts
-    save_panels(plywood(), tmp_path / "plates.glb")
+    plywood().save(tmp_path / "plates.glb")
     content = (tmp_path / "plates.glb").read_bytes()
     document = json.loads(content[20 : 20 + int.from_bytes(content[12:16], "little")])
     assert len(document["meshes"][0]["primitives"][0]["targets"]) == 24
@@ -184,7 +183,7 @@ def test_plates_are_written_as_solids_that_move(tmp_path: Path) -> None:
 
 def test_tapered_panels_are_written_as_plies_with_the_hinge_between(tmp_path: Path) -> None:
     panels = thick_panels(regular(), 2.0)
-    save_panels(panels, tmp_path / "panels.dxf")
+    panels.save(tmp_path / "panels.dxf")
     space = ezdxf.readfile(tmp_path / "panels.dxf").modelspace()
     found: dict[str, list[np.ndarray]] = {}
     for line in space.query("POLYLINE"):
@@ -204,7 +203,7 @@ def test_tapered_panels_are_written_as_plies_with_the_hinge_between(tmp_path: Pa
     top, bottom = found["TopPly"][facet], panels.plies[1, facet]
     assert np.abs((top - start) @ normal).min() == pytest.approx(panels.offset_mm[edge], rel=1e-5)
     assert np.abs((bottom - start) @ normal).min() < 1e-9
-    save_panels(panels, tmp_path / "panels.stl")
+    panels.save(tmp_path / "panels.stl")
     points, triangles, _ = panels.solids()  # panels touch along hinges, so each is taken alone
     assert trimesh.Trimesh(points, triangles, process=False).is_watertight
     mesh = trimesh.load(tmp_path / "panels.stl")
@@ -216,7 +215,7 @@ def test_tapered_panels_are_written_as_plies_with_the_hinge_between(tmp_path: Pa
     )
     assert mesh.volume == pytest.approx(volume, rel=1e-5)
     for ending in (".svg", ".glb"):
-        save_panels(panels, tmp_path / f"panels{ending}")
+        panels.save(tmp_path / f"panels{ending}")
         assert (tmp_path / f"panels{ending}").stat().st_size > 1000
 
 
