@@ -193,7 +193,8 @@ class _Run:
     def _event(self, kind: int, seconds: float, power: float) -> None:
         self._synchronize()
         if kind == DWELL:
-            self._begin(self.now)
+            if self.first is None:
+                self.first = self.now
             self.now = self.processor.run(self.now, cpu.dwell_steps(seconds) * cpu.DWELL_STEP)
             self.last_end = self.now
         if power == power:
@@ -218,7 +219,7 @@ class _Run:
         if self.stepper.stopped:
             self.stepper.stopped = False
             self.cycling = False
-        elif self.cycling:
+        elif self.cycling and len(self.stepper.queue) < QUEUE:
             self._prepare()
 
     def _prepare(self) -> None:
@@ -231,33 +232,34 @@ class _Run:
             queue.append(segment)
 
     def _wait(self, until: int) -> None:
-        change = self.stepper.next_change()
+        change = self.stepper.change
         if change is not None and change <= until:
-            self.now = max(self.now, change)
+            if change > self.now:
+                self.now = change
             self.stepper.run_to(self.now)
-        elif until < _FOREVER:
-            self.now = max(self.now, until)
+        elif self.now < until < _FOREVER:
+            self.now = until
 
     def _work(self, cycles: int) -> None:
         """Do ``cycles`` of work, and the pending work of planner and generator."""
-        cycles += self.planner.cycles + self.generator.cycles
-        self.planner.cycles = self.generator.cycles = 0
+        planner, generator = self.planner, self.generator
+        cycles += planner.cycles + generator.cycles
+        planner.cycles = generator.cycles = 0
         if cycles and self.slow:
             self.now = self.processor.run(self.now, cycles)
 
-    def _begin(self, now: int) -> None:
+    def _segment(self, now: int, segment: Segment) -> None:
         if self.first is None:
             self.first = now
-
-    def _segment(self, now: int, segment: Segment) -> None:
-        self._begin(now)
         tag = segment.move.tag
         if tag != self.moving:
             self.moving = tag
             self.began[tag] = now
         self.ended[tag] = self.last_end = now + segment.cycles
         self.follows = segment.follows
-        self._beam(now, segment.power > 0)
+        burning = segment.power > 0
+        if burning != self.burning:
+            self._beam(now, burning)
 
     def _settled(self, now: int) -> None:
         """At rest the beam of M4 goes off; the constant power of M3 stays on."""

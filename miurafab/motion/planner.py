@@ -46,21 +46,21 @@ _LEAST_ACCELERATION = 3.6e-3
 class Move:
     """One planned straight move.
 
-    ``origin`` and signed ``steps`` per axis in motor steps, ``events`` the largest step count;
-    ``length`` is the part not prepared yet; ``rate`` the programmed speed and ``rapid_rate`` the
-    fastest in its direction; ``speed_word`` is its S and ``spindle`` 0, 3 or 4; ``steady`` moves
-    ignore the feed override; ``tag`` belongs to the caller.
+    ``origin`` and signed ``steps`` per axis in motor steps, ``events`` the largest step count,
+    ``axes`` how many axes move; ``length`` is the part not prepared yet; ``rate`` the programmed
+    speed and ``rapid_rate`` the fastest in its direction; ``speed_word`` is its S and ``spindle``
+    0, 3 or 4; ``steady`` moves ignore the feed override; ``tag`` belongs to the caller.
     """
 
     __slots__ = (
-        "acceleration", "entry_sqr", "events", "junction_sqr", "length", "limit_sqr", "origin",
-        "rapid", "rapid_rate", "rate", "speed_word", "spindle", "steady", "steps", "tag",
+        "acceleration", "axes", "entry_sqr", "events", "junction_sqr", "length", "limit_sqr",
+        "origin", "rapid", "rapid_rate", "rate", "speed_word", "spindle", "steady", "steps", "tag",
     )  # fmt: skip
 
     def __init__(self) -> None:
         self.origin: tuple[int, ...] = (0, 0, 0)
         self.steps: tuple[int, ...] = (0, 0, 0)
-        self.events = self.spindle = self.tag = 0
+        self.events = self.axes = self.spindle = self.tag = 0
         self.length = self.acceleration = self.rate = self.rapid_rate = self.speed_word = 0.0
         self.entry_sqr = self.limit_sqr = self.junction_sqr = 0.0
         self.rapid = self.steady = False
@@ -136,7 +136,8 @@ class Planner:
         z1 = to_steps(target[2], kz) if kz else z0
         end = (x1, y1, z1)
         steps = (x1 - x0, y1 - y0, z1 - z0)
-        self.cycles += cpu.PLAN_LINE + cpu.PLAN_AXIS * (3 - steps.count(0))
+        axes = 3 - steps.count(0)
+        self.cycles += cpu.PLAN_LINE + cpu.PLAN_AXIS * axes
         events = max(map(abs, steps))
         if events == 0:
             return None
@@ -147,7 +148,7 @@ class Planner:
         inverse = 1.0 / length
         direction = (x * inverse, y * inverse, z * inverse)
         move = Move()
-        move.origin, move.steps, move.events = start, steps, events
+        move.origin, move.steps, move.events, move.axes = start, steps, events, axes
         move.length = length
         move.acceleration = max(along(self._acceleration, direction), _LEAST_ACCELERATION)
         move.rapid_rate = along(self._max_rate, direction)
@@ -278,4 +279,8 @@ def to_steps(value: float, steps_per_mm: float) -> int:
 
 def along(limits: Sequence[float], direction: Sequence[float]) -> float:
     """The largest value along ``direction`` that keeps each axis within its limit."""
-    return min(limit / abs(part) for limit, part in zip(limits, direction, strict=True) if part)
+    most = math.inf
+    for limit, part in zip(limits, direction, strict=True):
+        if part and (own := limit / abs(part)) < most:
+            most = own
+    return most

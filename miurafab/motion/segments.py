@@ -24,6 +24,7 @@ SEGMENT_TIME = single(1.0 / 6000.0)
 """Minutes."""
 QUEUE = 5
 """The longest segment queue, including the running segment: 6 slots, one of them free."""
+_MINUTE = 60 * cpu.CLOCK
 _LEAST_STEPS = 1.25
 _SLOWEST_PERIOD = 0xFFFF
 _SMOOTHING = (2000, 4000, 8000)
@@ -50,7 +51,7 @@ class Segment:
 
     def __init__(self, move: Move, done: int, power: int, follows: bool) -> None:
         self.move = move
-        self.tick = cpu.STEP_TICK + cpu.STEP_AXIS * (len(move.steps) - move.steps.count(0))
+        self.tick = cpu.STEP_TICK + cpu.STEP_AXIS * move.axes
         self.done = done
         self.power = power
         self.follows = follows
@@ -125,7 +126,8 @@ class SegmentGenerator:
         if move is None:
             return None
         segment = Segment(move, self._done, 0, self._follows)
-        length, duration, rounds = self._hold(move) or self._travel(move)
+        long = self._hold(move) if self.whole_holds and self._ramp == HOLD else None
+        length, duration, rounds = long or self._travel(move)
         if self._follows or self.refresh_power:
             self._set_power(move)
         segment.power = self._power
@@ -235,8 +237,6 @@ class SegmentGenerator:
 
         Its end is left to segments of the usual length: a line that comes may change its plan.
         """
-        if not self.whole_holds or self._ramp != HOLD:
-            return None
         span = (move.length - self.fall_start) / self.top - _HOLD_REST
         if span < _LONG_HOLD:
             return None
@@ -323,7 +323,7 @@ class SegmentGenerator:
             return False
         duration += self._late
         per_step = duration / ((self._steps_left - left) or 1.0)
-        cycles = math.ceil(60 * cpu.CLOCK * per_step)
+        cycles = math.ceil(_MINUTE * per_step)
         level = bisect_right(_SMOOTHING, cycles)
         segment.ticks = steps << level
         segment.period = min(cycles >> level, _SLOWEST_PERIOD)

@@ -25,7 +25,8 @@ class Stepper:
     ``queue`` holds them, the running segment first; it began at the cycle ``began``. After the last
     segment the stepper is ``settling`` until that cycle, then ``stopped`` until a caller clears the
     flag. ``on_segment`` is called at the begin of each segment, ``on_end`` at the end of the last,
-    ``on_settled`` at the end of settling; each with its cycle.
+    ``on_settled`` at the end of settling; each with its cycle. ``change`` is the cycle at which the
+    running segment, or the settling, ends.
     """
 
     def __init__(self) -> None:
@@ -43,7 +44,7 @@ class Stepper:
         self.stopped = False
         self.began = 0
         self.share = 1.0
-        self._change: int | None = None
+        self.change: int | None = None
 
     @property
     def room(self) -> bool:
@@ -56,33 +57,31 @@ class Stepper:
             self.running, self.settling = True, None
             self._begin(now)
 
-    def next_change(self) -> int | None:
-        """The cycle at which the running segment, or the settling, ends."""
-        return self._change
-
     def run_to(self, now: int) -> None:
         """Run the segments and the settling that end by ``now``."""
         while self.running:
-            assert self._change is not None
-            if self._change > now:
+            change = self.change
+            assert change is not None
+            if change > now:
                 return
             del self.queue[0]
-            self._begin(self._change)
+            self._begin(change)
         if self.settling is not None and self.settling <= now:
             settled, self.settling = self.settling, None
-            self.share, self._change = 1.0, None
+            self.share, self.change = 1.0, None
             self.stopped = True
             self.on_settled(settled)
 
     def _begin(self, now: int) -> None:
         if self.queue:
             segment = self.queue[0]
-            self.began, self._change = now, now + segment.cycles
-            self.share = max(1.0 - segment.tick / max(segment.period, 1), _LEAST_SHARE)
+            self.began, self.change = now, now + segment.cycles
+            share = 1.0 - segment.tick / (segment.period or 1)
+            self.share = share if share > _LEAST_SHARE else _LEAST_SHARE
             self.on_segment(now, segment)
         else:
             self.running = False
-            self.settling = self._change = now + self.idle_lock
+            self.settling = self.change = now + self.idle_lock
             self.share = 0.0
             self.on_end(now)
 
@@ -125,12 +124,12 @@ class Processor:
         share = stepper.share
         if share:  # usually the stepper does not change meanwhile
             done_at = now + math.ceil(cycles / share)
-            change = stepper.next_change()
+            change = stepper.change
             if change is None or done_at < change:
                 return done_at
         self.start(now, cycles)
         while True:
-            done, change = self.finish(), stepper.next_change()
+            done, change = self.finish(), stepper.change
             if done is not None and (change is None or done < change):
                 return done
             if change is not None:

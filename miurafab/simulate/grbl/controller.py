@@ -121,7 +121,7 @@ class VirtualGrbl:
         machine = self._machine
         uart = machine.uart
         events = (
-            machine.stepper.next_change(),
+            machine.stepper.change,
             uart.next_arrival(),
             uart.next_departure(machine.now),
             self._due(),
@@ -314,7 +314,7 @@ class VirtualGrbl:
                 line = uart.next_line()
                 if line is not None:
                     target = min(target, max(line, machine.now))
-            change, arrival, due = stepper.next_change(), uart.next_arrival(), self._due()
+            change, arrival, due = stepper.change, uart.next_arrival(), self._due()
             now = target + 1
             for event in (change, arrival, due):
                 if event is not None and event < now:
