@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ from miurafab.workflow.manifest import read_manifest
 from miurafab.workflow.sheets import sheets
 
 
+@cache
 def irregular_tube(columns=6):
     """A closed tube over a star of ten unequal corners, no two lines of which are alike."""
     rng = np.random.default_rng(5)
@@ -88,17 +90,24 @@ def torus(columns=8, rows=6):
 
 
 RINGS = {
-    "ring": (revolved("6x16", "220mm"), 0),
-    "tube": (tube(), 0),
-    "irregular tube": (irregular_tube(), 0),
-    "tube along its columns": (across(irregular_tube()), 1),
-    "ring of a thousand": (revolved("10x100", "600mm"), 0),
+    "ring": (lambda: revolved("6x16", "220mm"), 0),
+    "tube": (tube, 0),
+    "irregular tube": (irregular_tube, 0),
+    "tube along its columns": (lambda: across(irregular_tube()), 1),
+    "ring of a thousand": (lambda: revolved("10x100", "600mm"), 0),
 }
+
+
+@cache
+def ring_of(name):
+    """The pattern of that name, and the axis along which it closes."""
+    make, axis = RINGS[name]
+    return make(), axis
 
 
 @pytest.fixture(scope="module", params=RINGS)
 def ring(request):
-    return RINGS[request.param]
+    return ring_of(request.param)
 
 
 def lines_of(pattern, axis):
@@ -170,7 +179,7 @@ def test_opened_twice_it_is_opened_once_at_the_sum(ring):
 
 def test_a_ring_opened_a_period_farther_is_laid_out_alike():
     """All periods of a revolved ring are the same, so the flat pattern is, too."""
-    pattern, _ = RINGS["ring"]
+    pattern, _ = ring_of("ring")
     for line in range(2, count_of(pattern, 0), 2):
         there = open_ring(pattern, 0, line)
         np.testing.assert_allclose(there.vertices_coords, pattern.vertices_coords, atol=1e-9)
@@ -269,7 +278,7 @@ def test_a_pattern_that_closes_both_ways_is_opened_both_ways():
 
 def mismatched():
     """A tube whose last row has the right lengths and turns the other way in the flat pattern."""
-    pattern, _ = RINGS["irregular tube"]
+    pattern = irregular_tube()
     columns, rows = pattern.grid
     flat = pattern.vertices_coords.reshape(rows, columns, 2).copy()
     start, end = complex(*flat[-1, 0]), complex(*flat[-1, -1])
@@ -280,34 +289,35 @@ def mismatched():
 
 
 @pytest.mark.parametrize(
-    ("pattern", "axis", "line", "why"),
+    ("make", "axis", "line", "why"),
     [
         pytest.param(
-            replace(without_grid(tube()), folded_coords=tube().folded_coords),
+            lambda: replace(without_grid(tube()), folded_coords=tube().folded_coords),
             0, 3, "the facets of this pattern do not form a grid.", id="no grid",
         ),
         pytest.param(
-            replace(tube(), faces_vertices=tube().faces_vertices[1:]),
+            lambda: replace(tube(), faces_vertices=tube().faces_vertices[1:]),
             0, 3, "the facets of this pattern do not form a grid.", id="a facet is missing",
         ),
         pytest.param(
-            replace(tube(), folded_coords=None), 0, 3,
+            lambda: replace(tube(), folded_coords=None), 0, 3,
             "where it closes is seen in the folded form, which is missing.", id="flat alone",
         ),
         pytest.param(
-            revolved("6x16", "220mm", close="open"), 0, 3,
+            lambda: revolved("6x16", "220mm", close="open"), 0, 3,
             "its first and last row do not come together in the folded form.", id="no ring",
         ),
         pytest.param(
-            tube(), 1, 3,
+            tube, 1, 3,
             "its first and last column do not come together in the folded form; it closes along "
             "its rows.", id="the other way",
         ),
-        pytest.param(tube(), 0, 12, "with 12 rows it may be 1 to 11.", id="beyond"),
-        pytest.param(tube(), 0, 0, "with 12 rows it may be 1 to 11.", id="where it is open"),
+        pytest.param(tube, 0, 12, "with 12 rows it may be 1 to 11.", id="beyond"),
+        pytest.param(tube, 0, 0, "with 12 rows it may be 1 to 11.", id="where it is open"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_opened_is_refused_in_a_sentence(pattern, axis, line, why):
+def test_what_cannot_be_opened_is_refused_in_a_sentence(make, axis, line, why):
+    pattern = make()
     name = ("row", "column")[axis]
     with pytest.raises(LayoutError) as refusal:
         open_ring(pattern, axis, line)
@@ -332,7 +342,7 @@ def test_ends_that_are_not_congruent_are_refused_by_how_far_they_are_apart():
 @pytest.mark.parametrize("side", ["lower", "alternate"])
 @pytest.mark.parametrize("name", ["ring", "tube", "irregular tube", "tube along its columns"])
 def test_every_crease_of_an_opened_ring_is_made_once_and_every_tab_glued(name, size, side):
-    pattern, axis = RINGS[name]
+    pattern, axis = ring_of(name)
     machine, material = bed(*size), card()
     line = 3
     options = LayoutOptions(
