@@ -134,7 +134,7 @@ def by_this(start: Start) -> tuple[Floats, int, float]:
     x, feet, taken = start.x, objective.feet, 0
     for penalty, steps in (*EASING, *LEGS):
         steps = MORE if (penalty, steps) == LEGS[-1] and len(x) < FEW else steps
-        sheet = fairest(objective, unknowns, constraints, x, feet, steps=steps, penalty=penalty)
+        sheet = fairest(objective, unknowns, x, feet, steps=steps, penalty=penalty)
         x, feet, taken = sheet.x, sheet.feet, taken + sheet.steps
     return project(constraints, x, cap=STEP_CAP * unknowns.length).x, taken, 0.0
 

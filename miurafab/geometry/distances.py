@@ -24,7 +24,9 @@ def closest_on_triangle(points: Floats, triangles: Floats) -> Floats:
 
     The foot in the triangle's plane where it lies inside, else the nearest foot on a side.
     """
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    # Coordinates in rows: sums over them are then sums of whole rows, twice as fast.
+    points, triangles = np.ascontiguousarray(points.T), triangles.transpose(1, 2, 0).copy()
+    a, b, c = triangles
     ab, ac, ap = b - a, c - a, points - a
     d11, d12, d22 = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac)
     p1, p2 = _dot(ap, ab), _dot(ap, ac)
@@ -32,19 +34,21 @@ def closest_on_triangle(points: Floats, triangles: Floats) -> Floats:
     with np.errstate(invalid="ignore", divide="ignore"):
         s, t = (d22 * p1 - d12 * p2) / det, (d11 * p2 - d12 * p1) / det
         inside = (det > 0) & (s >= 0) & (t >= 0) & (s + t <= 1)
-    best = a + np.where(inside, s, 0.0)[:, None] * ab + np.where(inside, t, 0.0)[:, None] * ac
-    least = np.where(inside, _dot(best - points, best - points), np.inf)
+    best = a + np.where(inside, s, 0.0) * ab + np.where(inside, t, 0.0) * ac
+    gap = best - points
+    least = np.where(inside, _dot(gap, gap), np.inf)
     for start, end in ((a, b), (b, c), (c, a)):
         side = end - start
         length = _dot(side, side)
         with np.errstate(invalid="ignore", divide="ignore"):
             at = np.where(length > 0, np.clip(_dot(points - start, side) / length, 0, 1), 0.0)
-        foot = start + at[:, None] * side
-        gap = _dot(foot - points, foot - points)
-        nearer = ~inside & (gap < least)
-        best = np.where(nearer[:, None], foot, best)
-        least = np.where(nearer, gap, least)
-    return best
+        foot = start + at * side
+        gap = foot - points
+        far = _dot(gap, gap)
+        nearer = ~inside & (far < least)
+        best = np.where(nearer, foot, best)
+        least = np.where(nearer, far, least)
+    return np.ascontiguousarray(best.T)
 
 
 def closest_on_mesh(points: Floats, triangles: Floats) -> Floats:
@@ -120,4 +124,5 @@ def _keep_nearest(
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("nk,nk->n", a, b))
+    """(n,) the products of the columns of ``a`` and ``b`` (3, n)."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])

@@ -160,12 +160,15 @@ def _steps(domain: Domain) -> tuple[Floats, Floats]:
 
 def tangents(surface: TargetSurface, uv: Floats) -> tuple[Floats, Floats]:
     """dS/du and dS/dv at ``uv`` (..., 2), each (..., 3), by central differences of order four."""
-    both = []
-    for axis, step in enumerate(_steps(surface.domain)):
-        near = surface.point(uv + step) - surface.point(uv - step)
-        far = surface.point(uv + 2 * step) - surface.point(uv - 2 * step)
-        both.append((8 * near - far) / (12 * step[axis]))
-    return both[0], both[1]
+    du, dv = steps = _steps(surface.domain)
+    offsets = np.array([k * step for step in steps for k in (1, -1, 2, -2)])
+    # One call: a surface takes as long for one point as for a hundred.
+    points = surface.point(uv + offsets.reshape(8, *(1,) * (uv.ndim - 1), 2))
+    along, across = (
+        (8 * (p[0] - p[1]) - (p[2] - p[3])) / (12 * step)
+        for p, step in ((points[:4], du[0]), (points[4:], dv[1]))
+    )
+    return along, across
 
 
 def curvature_along_u(surface: TargetSurface, uv: Floats) -> Floats:

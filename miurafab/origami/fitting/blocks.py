@@ -17,6 +17,8 @@ from miurafab.geometry.angles import sectors
 from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.quads import QuadCharts
 
+_AXES = np.arange(3, dtype=np.int32)
+
 Block = tuple[Floats, Ints, Floats]
 """Values (n,), the vertices that each depends on (n, k), and its gradient (n, k, 3)."""
 
@@ -117,9 +119,9 @@ def stacked(blocks: list[Block], size: int) -> tuple[Floats, sparse.csr_array]:
     """The values (n,) of all ``blocks`` and their Jacobian (n, ``size``)."""
     columns, widths = [], []
     for _, vertices, _ in blocks:
-        columns.append((vertices[:, :, None] * 3 + np.arange(3)).reshape(-1))
+        columns.append((vertices.astype(np.int32)[:, :, None] * 3 + _AXES).reshape(-1))
         widths.append(np.full(len(vertices), 3 * vertices.shape[1]))
-    starts = np.concatenate([[0], np.cumsum(np.concatenate(widths))])
+    starts = np.concatenate([[0], np.cumsum(np.concatenate(widths))]).astype(np.int32)
     data = np.concatenate([gradient.reshape(-1) for _, _, gradient in blocks])
     values = np.concatenate([value for value, _, _ in blocks])
     matrix = sparse.csr_array((data, np.concatenate(columns), starts), shape=(len(values), size))

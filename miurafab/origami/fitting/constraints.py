@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from miurafab.geometry.angles import sector_angles, sectors
@@ -30,6 +31,9 @@ def flat_foldability(points: Floats, grid: QuadGrid) -> Floats:
     """(I,) Kawasaki residual a0 + a2 - pi at each interior vertex, radians."""
     angles = sector_angles(points, grid.interior_vertices, grid.interior_neighbours)
     return angles[:, 0] + angles[:, 2] - np.pi
+
+
+Index = NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +49,8 @@ class OrigamiConstraints:
     flat_foldable: bool = False
 
     @cached_property
-    def _pattern(self) -> tuple[Ints, Ints]:
-        """Column indices and row starts of J (CSR)."""
+    def _pattern(self) -> tuple[Index, Index]:
+        """Column indices and row starts of J (CSR), as SciPy keeps them."""
         faces = self.grid.faces_vertices
         spokes = np.concatenate(
             [self.grid.interior_vertices[:, None], self.grid.interior_neighbours], axis=1
@@ -54,7 +58,8 @@ class OrigamiConstraints:
         stencils = [faces, spokes, *([spokes] if self.flat_foldable else [])]
         columns = [(s[:, :, None] * 3 + np.arange(3)).reshape(-1) for s in stencils]
         sizes = np.concatenate([np.full(len(s), 3 * s.shape[1]) for s in stencils])
-        return np.concatenate(columns), np.concatenate([[0], np.cumsum(sizes)])
+        starts = np.concatenate([[0], np.cumsum(sizes)])
+        return np.concatenate(columns).astype(np.int32), starts.astype(np.int32)
 
     @property
     def count(self) -> int:
@@ -78,9 +83,24 @@ class OrigamiConstraints:
         )
         return np.concatenate(values), matrix
 
-    def _planarity(self, points: Floats) -> tuple[Floats, Floats]:
+    def values(self, x: Floats) -> Floats:
+        """c (m,) alone, to the same bits, in a third of the time."""
+        points = x.reshape(-1, 3)
+        a, b, c = self._from_first_corner(points)
+        flat = np.einsum("fk,fk->f", a, vector_product(b, c)) / self.length**3
+        grid = self.grid
+        angles = sector_angles(points, grid.interior_vertices, grid.interior_neighbours)
+        values = [flat, angles.sum(axis=1) - 2 * np.pi]
+        if self.flat_foldable:
+            values.append(angles[:, 0] + angles[:, 2] - np.pi)
+        return np.concatenate(values)
+
+    def _from_first_corner(self, points: Floats) -> tuple[Floats, Floats, Floats]:
         p = points[self.grid.faces_vertices]
-        a, b, c = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]
+        return p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]
+
+    def _planarity(self, points: Floats) -> tuple[Floats, Floats]:
+        a, b, c = self._from_first_corner(points)
         bc, ca, ab = vector_product(b, c), vector_product(c, a), vector_product(a, b)
         residual = np.einsum("fk,fk->f", a, bc) / self.length**3
         gradient = np.stack([-(bc + ca + ab), bc, ca, ab], axis=1) / self.length**3

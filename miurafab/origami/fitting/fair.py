@@ -27,7 +27,7 @@ from miurafab.geometry.arrays import Floats
 from miurafab.geometry.sparse import SymmetricSolver
 from miurafab.origami.fitting.objective import FairObjective
 from miurafab.origami.fitting.reduction import Unknowns
-from miurafab.origami.fitting.solver import Constraints, longest_move
+from miurafab.origami.fitting.solver import longest_move
 
 PENALTY = 1e5
 """rho."""
@@ -77,21 +77,23 @@ class _State:
 def fairest(
     objective: FairObjective,
     unknowns: Unknowns,
-    constraints: Constraints,
     x: Floats,
     feet: Floats,
     *,
+    flat_foldable: bool = False,
     steps: int = STEPS,
     penalty: float = PENALTY,
     solver: SymmetricSolver | None = None,
     on_step: Callable[[int, float], None] | None = None,
 ) -> FairSheet:
-    """Minimise ``objective`` from ``x`` (n,), near which ``constraints`` hold, with the nearest
-    points near the parameters ``feet`` (K, 2).
+    """Minimise ``objective`` from ``x`` (n,), near which the constraints of ``unknowns`` hold, with
+    the nearest points near the parameters ``feet`` (K, 2).
 
-    A ``solver`` keeps the order of elimination from one call to the next. ``on_step`` gets the
+    With ``flat_foldable`` Kawasaki's condition is among the constraints. A ``solver`` keeps the order of elimination from one call to the next. ``on_step`` gets the
     number and the objective of each step.
     """
+
+    constraints, off = unknowns.constraints(flat_foldable), unknowns.residuals(flat_foldable)
 
     def at(x: Floats, feet: Floats) -> _State:
         residuals, jacobian, feet = objective(unknowns.vertices(x), feet)
@@ -103,7 +105,7 @@ def fairest(
     state = at(x, feet)
     taken = resting = 0
     while taken < steps:
-        following = _step(state, constraints, at, solver, damping, CAP * unknowns.length)
+        following = _step(state, off, at, solver, damping, CAP * unknowns.length)
         if following is None:
             if damping >= most:
                 break
@@ -123,13 +125,16 @@ def fairest(
 
 def _step(
     state: _State,
-    constraints: Constraints,
+    off: Callable[[Floats], Floats],
     at: Callable[[Floats, Floats], _State],
     solver: SymmetricSolver,
     damping: float,
     cap: float,
 ) -> _State | None:
-    """The state after one step, or None where the step does not lower the merit."""
+    """The state after one step, or None where the step does not lower the merit.
+
+    ``off`` gives the values of the constraints alone.
+    """
     jacobian, gradient = state.jacobian, state.gradient
     onto = gradient.T.tocsr()
     normal = (jacobian.T.tocsr() @ jacobian + state.rho * (onto @ gradient)).tocsc()
@@ -144,7 +149,7 @@ def _step(
     step *= min(1.0, cap / longest) if longest > 0 else 1.0
     reached = state.x + step
     for _ in range(CORRECTIONS):
-        back = -factor.solve(state.rho * (onto @ constraints(reached)[0]))
+        back = -factor.solve(state.rho * (onto @ off(reached)))
         if not longest_move(back) <= min(longest, cap):
             break
         reached = reached + back

@@ -75,7 +75,6 @@ def polished(
         max_aspect=None,
         flat_foldable=0.0 if request.exactly_flat_foldable else None,
     )
-    constraints = unknowns.constraints(request.exactly_flat_foldable)
     tick, solver = _ticking(on_step), SymmetricSolver()
     x, iterations, scale = start.x, 0, _scale_of(request, start)
     excess = np.inf
@@ -92,9 +91,9 @@ def polished(
             sheet = fairest(
                 objective,
                 unknowns,
-                constraints,
                 x,
                 feet,
+                flat_foldable=request.exactly_flat_foldable,
                 steps=steps,
                 penalty=penalty,
                 solver=solver,

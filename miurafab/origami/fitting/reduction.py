@@ -131,10 +131,25 @@ class Unknowns:
     def constraints(self, flat_foldable: bool) -> Constraints:
         """The conditions of an origami as a function of x."""
         on_charts = OrigamiConstraints(self.charts, self.length, flat_foldable)
+        return self.of_unknowns(on_charts, self._chosen(flat_foldable))
+
+    def residuals(self, flat_foldable: bool) -> Callable[[Floats], Floats]:
+        """The values of :meth:`constraints` without their Jacobian."""
+        on_charts = OrigamiConstraints(self.charts, self.length, flat_foldable)
+        chosen = self._chosen(flat_foldable)
+
+        def values(x: Floats) -> Floats:
+            all_values = on_charts.values(self.vertices(x).ravel())
+            return all_values if chosen is None else all_values[chosen]
+
+        return values
+
+    def _chosen(self, flat_foldable: bool) -> Ints | None:
+        """The conditions that are stated; None: all."""
         if self.stated is None or self.interior is None:
-            return self.of_unknowns(on_charts)
+            return None
         inner = [self.interior] * (2 if flat_foldable else 1)
-        return self.of_unknowns(on_charts, np.flatnonzero(np.concatenate([self.stated, *inner])))
+        return np.flatnonzero(np.concatenate([self.stated, *inner]))
 
     def of_unknowns(self, on_charts: Constraints, chosen: Ints | None = None) -> Constraints:
         """Conditions on ``charts``, or the ``chosen`` ones of them, as a function of x."""
