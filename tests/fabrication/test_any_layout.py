@@ -339,7 +339,7 @@ def check(pattern, size, material, options):
     return layout
 
 
-@settings(derandomize=True, max_examples=40, deadline=None, phases=[Phase.generate])
+@settings(derandomize=True, max_examples=25, deadline=None, phases=[Phase.generate])
 @given(patterns(), BEDS, materials(), all_options())
 def test_anything_asked_for_is_laid_out_soundly_or_refused_clearly(
     pattern, size, material, options

@@ -12,17 +12,17 @@ from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.sheets import lay_out
 
 CASES = {
-    "miura": miura(24, 20),
+    "miura": miura(20, 16),
     "fan": flat_patterns.fan(24, 20, radius=150.0),
     "fan without grid": without_grid(flat_patterns.fan(24, 20, radius=150.0)),
-    "triangles": triangles(3, 14, 450.0),
+    "triangles": triangles(3, 11, 360.0),
 }
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_what_is_assembled_stays_a_disk(name):
     pattern = CASES[name]
-    size = (200.0, 160.0) if name == "triangles" else (120.0, 100.0)
+    size = (150.0, 120.0) if name == "triangles" else (120.0, 100.0)
     layout = lay_out(pattern, bed(*size), card())
     steps = assembly_order(layout, pattern)
     assert len(steps) == len(layout.patches) > 6
@@ -33,8 +33,8 @@ def test_what_is_assembled_stays_a_disk(name):
 
 
 def test_a_ring_is_closed_by_its_last_patches_alone():
-    pattern = triangles(4, 20, 700.0, hole=True)
-    layout = lay_out(pattern, bed(300.0, 250.0), card())
+    pattern = triangles(4, 14, 490.0, hole=True)
+    layout = lay_out(pattern, bed(210.0, 175.0), card())
     steps = assembly_order(layout, pattern)
     faces = np.empty(0, dtype=np.int64)
     whole = []

@@ -22,8 +22,8 @@ from miurafab.profiles import OPERATIONS
 from miurafab.profiles.material import CREASE_KINDS, MODES, Crease
 
 ENGRAVE, SCORE, PERFORATE, CUT = range(4)
-MACHINE = bed(300.0, 200.0)
-PATTERNS = {"miura": miura(30, 26), "acute": zigzag(24, 12, a=20.0)}
+MACHINE = bed(180.0, 130.0)
+PATTERNS = {"miura": miura(20, 16), "acute": zigzag(12, 8, a=20.0)}
 KERF = 0.15
 
 
@@ -297,7 +297,7 @@ def test_weak_tabs_are_told_by_label():
     material = dataclasses.replace(
         material, tabs=dataclasses.replace(material.tabs, min_area_mm2=70.0)
     )
-    layout = lay_out(PATTERNS["miura"], MACHINE, material)
+    layout = lay_out(miura(30, 26), bed(300.0, 200.0), material)
     weak = [
         tab.label
         for patch in layout.patches
@@ -333,9 +333,9 @@ def sound(pattern, layout, limit):
 @pytest.mark.parametrize("gridded", [True, pytest.param(False, marks=pytest.mark.large)])
 def test_tabs_stand_on_the_side_asked_for_and_patches_still_fit(side, full_facet, gridded):
     pattern = PATTERNS["miura"] if gridded else flat_patterns.without_grid(PATTERNS["miura"])
-    options = LayoutOptions(tab_side=side, full_facet=full_facet, max_patch_mm=(180.0, 120.0))
+    options = LayoutOptions(tab_side=side, full_facet=full_facet, max_patch_mm=(130.0, 90.0))
     layout = lay_out(pattern, MACHINE, card(), options=options)
-    sound(pattern, layout, (180.0, 120.0))
+    sound(pattern, layout, (130.0, 90.0))
     lower = [tab.mate_patch > patch.id for patch in layout.patches for tab in patch.tabs]
     share = np.mean(lower)
     assert {"lower": share > 0.95, "upper": share < 0.05, "alternate": 0.4 < share < 0.7}[side]

@@ -37,12 +37,12 @@ from miurafab.profiles.material import Crease
 MACHINE, MATERIAL = load_machine("grbl-laser-400"), load_material("card-250")
 
 
-LETTERS = regular(53, 37).edges_assignment
+LETTERS = regular(33, 23).edges_assignment
 
 
 @pytest.fixture(scope="module")
 def layout():
-    return lay_out(regular(53, 37), MACHINE, MATERIAL)
+    return lay_out(regular(33, 23), MACHINE, MATERIAL)
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -82,7 +82,7 @@ def test_hpgl(layout):
 def test_tiles_joined_by_their_crosses_are_the_sheet(layout, page):
     """Every page is laid onto the sheet by the crosses that it shares with those laid before."""
     toolpath = layout.toolpaths[0]
-    letters = edge_letters(layout, regular(53, 37))
+    letters = edge_letters(layout, regular(33, 23))
     guide = tiled_pdf((toolpath,), letters, "test", Tiling(page=page))
     reader = pypdf.PdfReader(io.BytesIO(guide))
     first, *tiles = reader.pages
@@ -219,7 +219,7 @@ def test_drawings_say_that_they_are_in_mm(layout, name):
 
 
 def test_a_page_that_cannot_be_is_refused(layout):
-    letters = edge_letters(layout, regular(53, 37))
+    letters = edge_letters(layout, regular(33, 23))
     with pytest.raises(InputError, match="'a9'"):
         tiled_pdf(layout.toolpaths, letters, "test", Tiling(page="a9"))
     for measure in ("20x300mm", "200x", "200x300x400"):
@@ -251,7 +251,7 @@ def labels_of(layout):
 
 
 def test_the_guide_names_every_patch_and_tab(layout):
-    pattern = regular(53, 37)
+    pattern = regular(33, 23)
     pages = pages_of(assembly_guide(layout, pattern, MACHINE, MATERIAL, "Test").pdf)
     overview = pages[0]
     for patch in layout.patches:
@@ -369,7 +369,7 @@ def test_patches_side_by_side_have_colours_that_differ(number):
 
 
 def test_each_patch_is_glued_onto_what_is_assembled(layout):
-    steps = assembly_order(layout, regular(53, 37))
+    steps = assembly_order(layout, regular(33, 23))
     assert sorted(step.patch for step in steps) == list(range(len(layout.patches)))
     done = set()
     for step in steps:

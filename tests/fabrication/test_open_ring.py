@@ -94,7 +94,7 @@ RINGS = {
     "tube": (tube, 0),
     "irregular tube": (irregular_tube, 0),
     "tube along its columns": (lambda: across(irregular_tube()), 1),
-    "ring of a thousand": (lambda: revolved("10x100", "600mm"), 0),
+    "ring of fifty rows": (lambda: revolved("8x50", "600mm"), 0),
 }
 
 

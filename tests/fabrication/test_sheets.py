@@ -20,14 +20,14 @@ from miurafab.fabrication.sheets import Layout, lay_out
 from miurafab.profiles import OPERATIONS
 
 CUT, PERFORATE = OPERATIONS.index("cut"), OPERATIONS.index("perforate")
-MACHINE = bed(300.0, 200.0)
+MACHINE = bed(220.0, 160.0)
 CASES = {
     "one patch": miura(10, 8),
-    "miura": miura(30, 26),
-    "acute": zigzag(24, 30),
-    "fan": flat_patterns.fan(36, 30, radius=250.0),
-    "no grid": without_grid(flat_patterns.fan(30, 20, radius=250.0)),
-    "ring": triangles(4, 14, 600.0, hole=True),
+    "miura": miura(20, 16),
+    "acute": zigzag(16, 20),
+    "fan": flat_patterns.fan(24, 18, radius=250.0),
+    "no grid": without_grid(flat_patterns.fan(20, 14, radius=250.0)),
+    "ring": triangles(4, 11, 460.0, hole=True),
 }
 
 
@@ -301,7 +301,7 @@ def test_random_patterns_beds_and_materials_give_a_sound_layout_or_a_clear_refus
 
 
 def test_offcuts_are_used_up_before_whole_sheets():
-    pattern = miura(24, 16, 14.0, 14.0)
+    pattern = miura(18, 14, 14.0, 14.0)
     small = (120.0, 90.0)
     options = LayoutOptions(offcuts_mm=((240.0, 180.0), (12.0, 11.0)), max_patch_mm=small)
     layout = lay_out(pattern, bed(260.0, 200.0), card(), options=options)

@@ -42,7 +42,7 @@ def strokes_of(path: str) -> list[np.ndarray]:
 @pytest.fixture(scope="module", params=["miura", "acute", "fan"])
 def drawn(request):
     """A toolpath and the assignments of the edges of its pattern."""
-    make = {"miura": miura(12, 12), "acute": zigzag(24, 30), "fan": fan(30, 20, radius=250.0)}
+    make = {"miura": miura(12, 12), "acute": zigzag(12, 14), "fan": fan(20, 14, radius=250.0)}
     pattern = make[request.param]
     layout = lay_out(pattern, bed(300.0, 200.0), card())
     return layout.toolpaths[0], edge_letters(layout, pattern)

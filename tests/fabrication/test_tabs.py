@@ -21,13 +21,13 @@ from miurafab.fabrication.tabs import MIN_AREA_MM2, MIN_BASE_MM, inset_of
 from miurafab.origami.crease_pattern import CreasePattern
 
 CASES = {
-    "mild": (miura(30, 26), card()),
-    "acute": (zigzag(24, 30, sector=0.55), card()),
-    "very acute": (zigzag(24, 20, a=25.0, sector=0.35), card()),
-    "fan": (flat_patterns.fan(36, 30, radius=250.0), card(tab=12.0)),
-    "triangles": (triangles(3, 20, 700.0), card()),
-    "ring": (triangles(4, 20, 700.0, hole=True), card(tab=20.0)),
-    "no inset": (miura(30, 26), card(inset=0.0)),
+    "mild": (miura(24, 20), card()),
+    "acute": (zigzag(18, 20, sector=0.55), card()),
+    "very acute": (zigzag(16, 14, a=25.0, sector=0.35), card()),
+    "fan": (flat_patterns.fan(26, 22, radius=250.0), card(tab=12.0)),
+    "triangles": (triangles(3, 15, 520.0), card()),
+    "ring": (triangles(4, 15, 520.0, hole=True), card(tab=20.0)),
+    "no inset": (miura(24, 20), card(inset=0.0)),
     "single facets": (miura(4, 4, a=60.0, b=60.0), card(tab=30.0)),
 }
 
@@ -153,7 +153,7 @@ def test_a_facet_with_two_seam_edges_is_split_on_its_bisector():
 
 
 def test_glue_area_of_a_mild_pattern_is_at_least_5_mm2_a_mm_of_seam():
-    for pattern in (miura(30, 26), flat_patterns.fan(36, 30, radius=250.0)):
+    for pattern in (miura(30, 26), flat_patterns.fan(26, 22, radius=250.0)):
         outlined = outline_patches(pattern, 190.0, 140.0, card())
         ends = pattern.vertices_coords[pattern.edges_vertices[outlined.tabs.edge]]
         seam = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()

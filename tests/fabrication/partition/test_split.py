@@ -22,14 +22,14 @@ from miurafab.fabrication.tab_choice import choose_tabs
 from miurafab.origami.crease_pattern import CreasePattern
 
 CASES = {
-    "miura": miura(30, 26),
-    "zigzag": zigzag(24, 30),
-    "fan": flat_patterns.fan(36, 30, radius=250.0),
+    "miura": miura(24, 20),
+    "zigzag": zigzag(18, 20),
+    "fan": flat_patterns.fan(26, 22, radius=250.0),
     "one row": miura(80, 1),
     "one column": miura(1, 80),
-    "fan without grid": without_grid(flat_patterns.fan(36, 30, radius=250.0)),
-    "triangles": triangles(3, 20, 700.0),
-    "ring": triangles(4, 20, 700.0, hole=True),
+    "fan without grid": without_grid(flat_patterns.fan(26, 22, radius=250.0)),
+    "triangles": triangles(3, 15, 520.0),
+    "ring": triangles(4, 15, 520.0, hole=True),
 }
 
 
@@ -286,8 +286,8 @@ def test_asked_for_seams_stay_when_a_split_is_made_better(tab_side):
 @pytest.mark.parametrize(
     ("pattern", "most"),
     [
-        pytest.param(miura(80, 80), 1.25, id="miura"),
-        pytest.param(flat_patterns.fan(120, 120, radius=1000.0), 1.3, id="fan"),
+        pytest.param(miura(60, 60), 1.25, id="miura"),
+        pytest.param(flat_patterns.fan(80, 80, radius=1000.0), 1.3, id="fan"),
     ],
 )
 def test_the_number_of_patches_is_near_the_area_bound(pattern, most):

@@ -21,12 +21,12 @@ from miurafab.fabrication.toolpath import Toolpath
 from miurafab.profiles import OPERATIONS
 
 CASES = {
-    "miura": miura(30, 26),
-    "acute": zigzag(24, 30),
-    "fan": flat_patterns.fan(36, 30, radius=250.0),
-    "triangles": triangles(3, 14, 500.0),
+    "miura": miura(20, 16),
+    "acute": zigzag(16, 20),
+    "fan": flat_patterns.fan(24, 18, radius=250.0),
+    "triangles": triangles(3, 11, 390.0),
 }
-MACHINE = bed(300.0, 200.0)
+MACHINE = bed(220.0, 160.0)
 
 
 @pytest.fixture(scope="module", params=CASES)
