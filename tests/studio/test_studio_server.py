@@ -121,7 +121,7 @@ def test_the_page_writes_what_the_commands_that_it_shows_write(start, tmp_path):
     program = start()
     page = Page(program.address)
     assert b"<h1>miurafab" in page.get("")
-    options = {"facets": "6x6", "size": "420mm", "min_edge": "4mm"}
+    options = {"facets": "6x6", "size": "300mm", "min_edge": "4mm"}
     page.post("fit", {"target": MINIATURE, "options": options})
     pattern = page.finished()["pattern"]
     assert pattern["status"] == "converged"
