@@ -6,6 +6,7 @@ import contextlib
 import io
 import os
 import re
+import runpy
 import shlex
 import signal
 import subprocess
@@ -33,7 +34,7 @@ TARGETS = re.compile(r"^make (\w[\w-]*)")
 def run_line(line, folder, expected=0):
     """Run one line of a ``sh`` block in ``folder``; what it printed, errors and progress first."""
     if long := LONG.match(line):
-        return _process([sys.executable, ROOT / long[1], "--help"], folder)
+        return _help_of(ROOT / long[1])
     if target := TARGETS.match(line):
         return _process(["make", "--dry-run", "--directory", ROOT, target[1]], folder)
     words = shlex.split(line, comments=True)
@@ -71,6 +72,22 @@ def _command(arguments, folder, expected):
             code = exited.code or 0
     assert code == expected, f"exit code {code}\n{shown.getvalue()}{told.getvalue()}"
     return told.getvalue() + shown.getvalue()
+
+
+def _help_of(script):
+    """What a benchmark says to ``--help``, within this process."""
+    shown = io.StringIO()
+    with (
+        contextlib.redirect_stdout(shown),
+        mock.patch.object(sys, "argv", [str(script), "--help"]),
+        mock.patch.object(sys, "path", [str(script.parent), *sys.path]),
+    ):
+        try:
+            runpy.run_path(str(script), run_name="__main__")
+        except SystemExit as exited:
+            assert not exited.code, shown.getvalue()
+    assert shown.getvalue().startswith("usage: ")
+    return shown.getvalue()
 
 
 def _process(words, folder):
