@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 from unittest import mock
 
+import pytest
 from pages import ROOT
 
 from miurafab.__main__ import main
@@ -81,11 +82,10 @@ def _help_of(script):
         contextlib.redirect_stdout(shown),
         mock.patch.object(sys, "argv", [str(script), "--help"]),
         mock.patch.object(sys, "path", [str(script.parent), *sys.path]),
+        pytest.raises(SystemExit) as exited,
     ):
-        try:
-            runpy.run_path(str(script), run_name="__main__")
-        except SystemExit as exited:
-            assert not exited.code, shown.getvalue()
+        runpy.run_path(str(script), run_name="__main__")
+    assert not exited.value.code
     assert shown.getvalue().startswith("usage: ")
     return shown.getvalue()
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from miurafab.geometry.angles import sector_angles, sectors
-from miurafab.geometry.arrays import Floats, Ints, vector_product
+from miurafab.geometry.arrays import Floats, vector_product
 from miurafab.geometry.quads import QuadCharts, QuadGrid
 
 

@@ -89,8 +89,9 @@ def fairest(
     """Minimise ``objective`` from ``x`` (n,), near which the constraints of ``unknowns`` hold, with
     the nearest points near the parameters ``feet`` (K, 2).
 
-    With ``flat_foldable`` Kawasaki's condition is among the constraints. A ``solver`` keeps the order of elimination from one call to the next. ``on_step`` gets the
-    number and the objective of each step.
+    With ``flat_foldable`` Kawasaki's condition is among the constraints. A ``solver`` keeps the
+    order of elimination from one call to the next. ``on_step`` gets the number and the objective of
+    each step.
     """
 
     constraints, off = unknowns.constraints(flat_foldable), unknowns.residuals(flat_foldable)
