@@ -24,7 +24,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.request import FitRequest
-from miurafab.origami.fitting.result import FitResult
+from miurafab.origami.fitting.result import INTERRUPTED, FitResult
 from miurafab.origami.fitting.scaling import scaled_residuals, worst_residual
 from miurafab.origami.verify import DEGENERATE, EXACT, Measurements, measure, with_distances
 
@@ -51,7 +51,8 @@ def tuned(
     request: FitRequest, result: FitResult, on_progress: Callable[[float, str], None] | None = None
 ) -> FitResult:
     """``result`` brought to the barrier of ``request``, in k_f L; or ``infeasible``, with the
-    nearest sheet and how far the barrier goes.
+    nearest sheet and how far the barrier goes. Ctrl-C ends the search: the result is the nearest
+    sheet up to then, ``interrupted``.
 
     Raises :class:`~miurafab.errors.OptionError` for a sheet that is not one full grid.
     """
@@ -78,7 +79,13 @@ def tuned(
             on_progress(1 - 0.8 ** len(found), f"residuals times {factor:.3g}: {said}")
         return sheet
 
-    _search(asked, at)
+    interrupted = False
+    try:
+        _search(asked, at)
+    except KeyboardInterrupt:
+        interrupted = True
+        if not found:
+            raise
     if not found:
         return _missed(result, "The way to flat of the fitted sheet was lost.")
     best = min(found, key=lambda sheet: _miss(sheet, asked))
@@ -93,6 +100,9 @@ def tuned(
     )
     if _miss(best, asked) <= CLOSE:
         return answer
+    if interrupted:
+        findings = (*result.findings, INTERRUPTED)
+        return replace(answer, status="interrupted", advice=INTERRUPTED.sentence, findings=findings)
     low = min(found, key=lambda sheet: sheet.barrier)
     high = max(found, key=lambda sheet: sheet.barrier)
     return _missed(

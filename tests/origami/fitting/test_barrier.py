@@ -52,6 +52,17 @@ def test_a_sheet_that_folds_rigidly_has_no_barrier_to_change():
     assert "folds rigidly" in result.advice
 
 
+def test_an_interruption_gives_the_nearest_sheet_up_to_then():
+    def stop(part, note):
+        if note.startswith("residuals times") and not note.startswith("residuals times 1:"):
+            raise KeyboardInterrupt
+
+    result = fit("hypar", facets=(4, 4), barrier=1.0, on_progress=stop)
+    assert (result.status, result.is_valid) == ("interrupted", True)
+    assert result.barrier == pytest.approx(energy_curve(result.pattern, 24).barrier)
+    assert "interrupted" in result.advice
+
+
 @pytest.mark.parametrize(
     ("options", "part"),
     [
