@@ -43,7 +43,7 @@ from miurafab.workflow.fold_gif import target_frame, write_gif
 from miurafab.workflow.layers import layer_facts, layer_findings
 from miurafab.workflow.page import Slider, write_page
 from miurafab.workflow.panels import METHODS
-from miurafab.workflow.patterns import PatternLike, consistent_pattern
+from miurafab.workflow.patterns import PatternLike, movable_pattern
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -293,10 +293,10 @@ def fold(
     <Folding rigid, 11 frames of 16 facets, no contacts>
     """
     steps = read_options(FoldOptions, {"steps": steps}).steps
-    pattern = consistent_pattern(pattern)
+    pattern = movable_pattern(pattern)
     found = find_motion(pattern, steps, on_progress)
     closed = found.motion.is_rigid and found.motion.method == CLOSED_FORM
-    order = layer_order(pattern) if closed else None
+    order = layer_order(found.motion.pattern) if closed else None
     return Folding(found, contacts(found.motion, on_progress), order)
 
 

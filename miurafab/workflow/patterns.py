@@ -22,6 +22,7 @@ ROUNDED = 1e-4
 """Flat and folded form in a file of five digits differ by as much, as a part of an edge."""
 
 _SHAPES = frozenset({"degenerate-edge", "bow-tie", "overlap", "self-intersection"})
+_WISHES = frozenset({"flat-folding", "closure"})
 _RESIDUALS = frozenset({"planarity", "developability", "isometry"})
 
 PatternLike = CreasePattern | FitResult | AnyPath
@@ -73,10 +74,27 @@ def consistent_pattern(pattern: object) -> CreasePattern:
     return found
 
 
-def require_consistent(pattern: CreasePattern, name: str) -> None:
-    """Raise :class:`~miurafab.errors.PatternError` if ``pattern`` contradicts itself."""
+def movable_pattern(pattern: object) -> CreasePattern:
+    """The pattern that ``pattern`` is or names, if its mountains and valleys can be tried.
+
+    Without a folded form the fold angles are a wish, which a motion need not reach; so they may
+    leave vertices open. Raises what :func:`consistent_pattern` raises otherwise.
+    """
+    found = as_pattern(pattern)
+    allowed = _WISHES if found.folded_coords is None else frozenset()
+    require_consistent(found, _called(pattern), allowed)
+    return found
+
+
+def require_consistent(
+    pattern: CreasePattern, name: str, allowed: frozenset[str] = frozenset()
+) -> None:
+    """Raise :class:`~miurafab.errors.PatternError` if ``pattern`` contradicts itself.
+
+    Findings whose codes are ``allowed`` do not count.
+    """
     evidence = gather(pattern)
-    shown = set(_SHAPES)
+    shown = _SHAPES | allowed
     if evidence.residuals is not None and evidence.residuals.worst <= ROUNDED:
         shown |= _RESIDUALS
     _refuse([each for each in refusals(judge(pattern, evidence)) if each.code not in shown], name)

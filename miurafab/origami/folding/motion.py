@@ -19,6 +19,7 @@ import numpy as np
 
 from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.cut_open import cut_open
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.certificate import RigidCertificate, certified
@@ -55,9 +56,11 @@ def find_motion(
 ) -> FoundMotion:
     """The motion of ``pattern`` in ``steps`` steps.
 
-    Raises :class:`~miurafab.errors.PatternError` for a pattern whose facets are not joined, in
-    which nothing folds, or whose folds do not go together.
+    Cuts are opened first, and the parts that they leave are pieces. Raises
+    :class:`~miurafab.errors.PatternError` for a pattern in which nothing folds, or whose folds do
+    not go together.
     """
+    pattern = cut_open(pattern)
     first_facets(pattern, place(pattern, np.zeros((1, len(pattern.edges_vertices)))).depth)
     mismatch = None
     if _has_closed_form(pattern):

@@ -38,6 +38,7 @@ from miurafab.geometry.polygons import (
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.folding.layers import LayerOrder
+from miurafab.origami.formats.any_plane import laid_in_plane
 from miurafab.origami.formats.fold_frames import written_frames
 from miurafab.origami.formats.planar_graph import enclosed_facets, oriented
 from miurafab.origami.formats.target_frame import (
@@ -165,7 +166,7 @@ def parse_fold(document: Any) -> CreasePattern:
     if not isinstance(document, dict):
         raise PatternError("A FOLD file holds one JSON object.")
     frames = _frames(document)
-    key = _flat_frame(frames)
+    place, key = _flat_frame(frames)
     factor = _unit(key, 1.0)
     flat = np.ascontiguousarray(_coordinates(key, "vertices_coords")[:, :2] * factor)
     edges = _indices(key, "edges_vertices", 2)
@@ -174,7 +175,7 @@ def parse_fold(document: Any) -> CreasePattern:
     faces = _face_indices(key) if given else enclosed_facets(flat, edges, assignment)
     if faces.max() >= len(flat):  # before something is made as large as that number
         raise PatternError("'faces_vertices' refers to a vertex that does not exist.")
-    others = [frame for frame in frames if frame is not key]
+    others = frames[:place] + frames[place + 1 :]
     pattern = CreasePattern(
         vertices_coords=flat,
         edges_vertices=edges,
@@ -220,13 +221,20 @@ def _classes(frame: Mapping[str, Any]) -> list[Any]:
     return classes if isinstance(classes, list) else []
 
 
-def _flat_frame(frames: list[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """The frame of class creasePattern, or else the first frame that is flat."""
-    declared = [frame for frame in frames if "creasePattern" in _classes(frame)]
-    for frame in declared or [f for f in frames if "foldedForm" not in _classes(f)] or frames:
+def _flat_frame(frames: list[Mapping[str, Any]]) -> tuple[int, Mapping[str, Any]]:
+    """The place of the frame of class creasePattern, or else of the first frame that is flat, and
+    the frame with its plane turned into that of x and y.
+    """
+    places = range(len(frames))
+    declared = [n for n in places if "creasePattern" in _classes(frames[n])]
+    for n in declared or [n for n in places if "foldedForm" not in _classes(frames[n])] or places:
+        frame = frames[n]
         points = _coordinates(frame, "vertices_coords")
         if points.shape[1] == 2 or np.ptp(points[:, 2]) <= 1e-9 * np.ptp(points[:, :2]):
-            return frame
+            return n, frame
+        laid = laid_in_plane(points, frame.get("faces_vertices"))
+        if laid is not None:
+            return n, {**frame, "vertices_coords": laid.tolist()}
     raise PatternError("No frame of the file holds a flat crease pattern in 'vertices_coords'.")
 
 

@@ -1,0 +1,81 @@
+"""A pattern with cuts, opened along them: each side of a cut has vertices and edges of its own.
+
+Two corners of facets are one vertex if facets around it join them across edges that are not cut.
+Facets and edges keep their numbers. One fan of facets keeps the vertex, and the left side of a cut
+keeps the edge; what is new comes behind.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from miurafab.geometry.arrays import Ints
+from miurafab.geometry.polygons import connected_parts, next_corners
+from miurafab.origami.crease_pattern import CreasePattern
+
+
+def cut_open(pattern: CreasePattern) -> CreasePattern:
+    """``pattern`` with its inner cuts as borders; the pattern itself if it has none.
+
+    Edges of letter B or C with a facet on both sides are cuts.
+    """
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    cut = inner & np.isin(pattern.edges_assignment, ("B", "C"))
+    if not cut.any():
+        return pattern
+    faces, width = pattern.faces_vertices, pattern.faces_vertices.shape[1]
+    face, slot = np.nonzero(faces >= 0)
+    start, end = face * width + slot, face * width + next_corners(faces)[face, slot]
+    edge = pattern.faces_edges[face, slot]
+    side = (pattern.edges_vertices[edge, 0] != faces[face, slot]).astype(np.int64)
+    # (E, 2, 2) the corners at the tail and the head of each edge, in the facet on either side
+    corners = np.full((len(inner), 2, 2), -1, dtype=np.int64)
+    corners[edge, side, side] = start
+    corners[edge, side, 1 - side] = end
+    joined = corners[inner & ~cut]
+    vertex = _fans(pattern, joined[:, 0].ravel(), joined[:, 1].ravel())
+    own = np.where(corners[:, :1, 0] >= 0, corners[:, 0], corners[:, 1])
+    edges = np.where(own >= 0, vertex[own], pattern.edges_vertices)
+    other = vertex[corners[cut, 1]]
+    source = np.arange(max(int(vertex.max()) + 1, len(pattern.vertices_coords)))
+    source[vertex[start]] = faces[face, slot]
+    opened = np.where(faces >= 0, vertex.reshape(faces.shape), -1)
+    parts, piece = connected_parts(opened)
+    letter = np.where(cut, "B", pattern.edges_assignment)
+    angle = np.where(cut, 0.0, pattern.edges_fold_angle)
+    folded = pattern.folded_coords
+    return replace(
+        pattern,
+        vertices_coords=pattern.vertices_coords[source],
+        edges_vertices=np.concatenate([edges, other]),
+        edges_assignment=np.concatenate([letter, np.full(len(other), "B")]),
+        edges_fold_angle=np.concatenate([angle, np.zeros(len(other))]),
+        faces_vertices=opened,
+        folded_coords=None if folded is None else folded[source],
+        grid=None,
+        pieces=piece if parts > 1 else None,
+    )
+
+
+def _fans(pattern: CreasePattern, one: Ints, other: Ints) -> Ints:
+    """(F k,) the vertex of each corner of a facet, where the corners ``one`` and ``other`` (n,) are
+    the same vertex.
+    """
+    faces = pattern.faces_vertices.ravel()
+    graph = coo_array((np.ones(len(one)), (one, other)), shape=(len(faces), len(faces)))
+    _, fan = connected_components(graph, directed=False)
+    real = np.flatnonzero(faces >= 0)
+    _, first, which = np.unique(fan[real], return_index=True, return_inverse=True)
+    origin = faces[real][first]
+    _, kept = np.unique(origin, return_index=True)
+    again = np.ones(len(origin), dtype=bool)
+    again[kept] = False
+    number = origin.copy()
+    number[again] = len(pattern.vertices_coords) + np.arange(int(again.sum()))
+    vertex = np.full(len(faces), -1, dtype=np.int64)
+    vertex[real] = number[which.reshape(-1)]
+    return vertex
