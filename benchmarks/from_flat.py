@@ -48,13 +48,19 @@ def row(name: str) -> str:
     motion, certificate = certified(motion)
     met = contacts(motion)
     ended = time.process_time()
-    rigid = "yes" if motion.is_rigid else f"no, at {certificate.state:.0%}"
-    return (
-        f"| {name} | {len(pattern.faces_vertices)} | {walked - started:.1f} + {ended - walked:.1f} "
-        f"| {facet_strain(pattern, motion.frames).max():.0e} | {rigid} | {certificate.residual:.0e} "
-        f"| {verdict.wrong_signs:.1%} | {'yes' if not verdict.unstable.any() else 'no'} "
-        f"| {math.degrees(verdict.angle_error):.1f} | {max((len(m.facets) for m in met), default=0)} |"
+    cells = (
+        name,
+        len(pattern.faces_vertices),
+        f"{walked - started:.1f} + {ended - walked:.1f}",
+        f"{facet_strain(pattern, motion.frames).max():.0e}",
+        "yes" if motion.is_rigid else f"no, at {certificate.state:.0%}",
+        f"{certificate.residual:.0e}",
+        f"{verdict.wrong_signs:.1%}",
+        "no" if verdict.unstable.any() else "yes",
+        f"{math.degrees(verdict.angle_error):.1f}",
+        max((len(each.facets) for each in met), default=0),
     )
+    return "| " + " | ".join(map(str, cells)) + " |"
 
 
 def main(names: list[str]) -> None:

@@ -82,10 +82,11 @@ def bird_base() -> CreasePattern:
     return drawn(lines)
 
 
-def square_twist() -> CreasePattern:
+def square_twist(lean: float = -15.0, far: float = 1.6) -> CreasePattern:
     """A square that turns, with four pleats; its facets have to bend on the way."""
-    half, far = math.sqrt(0.5), 3.0
-    square = [(0.0, -half), (half, 0.0), (0.0, half), (-half, 0.0)]
+    half = math.sqrt(0.5)
+    turns = [math.radians(90.0 * k + lean) for k in (-1, 0, 1, 2)]
+    square = [(half * math.cos(turn), half * math.sin(turn)) for turn in turns]
     lines = border((-far, -far), (far, -far), (far, far), (-far, far))
     ways = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
     for k, way in enumerate(ways):
@@ -171,7 +172,7 @@ def resch(columns: int = 5, rows: int = 5, part: float = 1.0) -> CreasePattern:
 
 
 def pleated_hypar(rings: int = 8, angle: float = 90.0) -> CreasePattern:
-    """Squares in each other, alternately mountain and valley."""
+    """Squares in each other, alternately mountain and valley, with facets that bend freely."""
     lines: list[Line] = []
     for k in range(rings, 0, -1):
         corners = [(-k, -k), (k, -k), (k, k), (-k, k)]
@@ -181,6 +182,8 @@ def pleated_hypar(rings: int = 8, angle: float = 90.0) -> CreasePattern:
             inner = (at[0] * (k - 1) / k, at[1] * (k - 1) / k)
             if k > 1:  # the innermost square is a facet that bends
                 lines.append((inner, at, "VM"[k % 2], angle))
+                next_inner = (other[0] * (k - 1) / k, other[1] * (k - 1) / k)
+                lines.append((next_inner, at, "U", 0.0))
     return drawn(lines)
 
 

@@ -23,7 +23,7 @@ def cut_open(pattern: CreasePattern) -> CreasePattern:
 
     Edges of letter B or C with a facet on both sides are cuts.
     """
-    inner = (pattern.edges_faces >= 0).all(axis=1)
+    inner = np.asarray((pattern.edges_faces >= 0).all(axis=1))
     cut = inner & np.isin(pattern.edges_assignment, ("B", "C"))
     if not cut.any():
         return pattern
@@ -33,7 +33,7 @@ def cut_open(pattern: CreasePattern) -> CreasePattern:
     edge = pattern.faces_edges[face, slot]
     side = (pattern.edges_vertices[edge, 0] != faces[face, slot]).astype(np.int64)
     # (E, 2, 2) the corners at the tail and the head of each edge, in the facet on either side
-    corners = np.full((len(inner), 2, 2), -1, dtype=np.int64)
+    corners = np.full((len(pattern.edges_vertices), 2, 2), -1, dtype=np.int64)
     corners[edge, side, side] = start
     corners[edge, side, 1 - side] = end
     joined = corners[inner & ~cut]

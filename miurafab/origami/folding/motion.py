@@ -2,7 +2,8 @@
 
 1. *Closed form*: tangents of half fold angles keep their ratios. It is the motion if every loop
    closes, as in sheets that are flat-foldable with vertices of degree four.
-2. *From the folded form*, if the file holds one: one crease is driven, facets bend.
+2. *From the folded form*, if the file holds one: one crease is driven, facets bend. A way that is
+   lost before it is nearly flat is taken only if the third fails.
 3. *From flat*, by mountains and valleys alone: all creases together. This is for any pattern. If
    facets pass through each other on the way, it is gone again with facets that touch.
 
@@ -34,6 +35,9 @@ from miurafab.origami.folding.kinematics import (
 from miurafab.origami.folding.ramp_motion import MOST_WRONG, RampVerdict, ramp_motion
 
 Progress = Callable[[float, str], None]
+
+LEAST_FRAMES = 2
+"""A way of fewer frames shows no motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +74,20 @@ def find_motion(
         if motion.is_rigid:
             return FoundMotion(motion, mismatch)
     bent = _bent(pattern, steps, on_progress)
-    if bent is not None:
+    if bent is not None and len(bent.frames) == steps + 1:
         motion, certificate = certified(bent)
         return FoundMotion(motion, mismatch, None, certificate)
+    try:
+        return _from_flat(pattern, steps, mismatch, on_progress)
+    except PatternError:
+        if bent is None or len(bent.frames) < LEAST_FRAMES:
+            raise
+        return FoundMotion(bent, mismatch)  # the part of the way next to the folded form
+
+
+def _from_flat(
+    pattern: CreasePattern, steps: int, mismatch: float | None, on_progress: Progress | None
+) -> FoundMotion:
     motion, verdict = ramp_motion(pattern, steps, on_progress=on_progress)
     if verdict.wrong_signs <= MOST_WRONG and contacts(motion):
         motion, verdict = ramp_motion(pattern, steps, touching=True, on_progress=on_progress)
