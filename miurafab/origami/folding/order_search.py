@@ -91,10 +91,10 @@ def search_layer_orders(
     >>> len(search.orders), search.complete
     (1, True)
     """
-    solvers = _solvers()
     letters = pattern.edges_assignment
     turn = np.select([letters == "M", np.isin(letters, ("V", "U"))], [-np.pi, np.pi], 0.0)
     folded = folded_flat(pattern, turn, width, width)
+    solvers = _solvers()
     rules = _Rules(folded)
     found: list[LayerOrder] = []
     none = np.empty((0, 2), dtype=np.int64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import json
 from dataclasses import replace
 from functools import cache
@@ -13,13 +14,15 @@ import numpy as np
 import pytest
 import trimesh
 from problems import fitted, regular
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
 
 from miurafab.errors import InputError, PatternError
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding import plates as plates_module
 from miurafab.origami.folding.bennett import bennett_heights, nearest_heights, thick_loop_gap
-from miurafab.origami.folding.kinematics import fold_angles_at, place
+from miurafab.origami.folding.kinematics import fold_angles_at, place, states_between
 from miurafab.origami.folding.plates import ThickPlates, thick_plates
 from miurafab.origami.folding.thick_panels import LEAST_USEFUL, thick_panels
 
@@ -88,6 +91,36 @@ def test_one_patch_in_plywood_moves_without_collision_from_flat_to_flat() -> Non
     corners = solids.corners[first]
     moved = placed[first] - placed[first][0]
     assert np.abs(moved - (corners - corners[0]) @ thin[5].T).max() < 1e-10
+
+
+def deepest(one: np.ndarray, other: np.ndarray) -> float:
+    """The radius of the largest ball in both of two convex solids (n, 3), by linear programming;
+    negative where they are apart.
+    """
+    hulls = [ConvexHull(points).equations for points in (one, other)]
+    planes = np.concatenate(hulls)
+    ball = np.column_stack([planes[:, :3], np.ones(len(planes))])
+    found = linprog([0, 0, 0, -1], ball, -planes[:, 3], bounds=[(None, None)] * 4)
+    return float(found.x[3])
+
+
+@pytest.mark.large
+def test_convex_solids_have_no_ball_in_common_at_finer_states() -> None:
+    (patch,) = plywood().patches
+    solids = patch.solids()
+    graph = trimesh.Trimesh(solids.corners, solids.triangles, process=False)
+    parts = trimesh.graph.connected_components(graph.edges, nodes=np.arange(len(graph.vertices)))
+    owner = [int(solids.facet[part[0]]) for part in parts]
+    checked = 0
+    for placed in patch.placed(solids, states_between(patch.pattern, 60)):
+        boxes = [(placed[part].min(axis=0), placed[part].max(axis=0)) for part in parts]
+        for a, b in itertools.combinations(range(len(parts)), 2):
+            apart = (boxes[a][0] > boxes[b][1]) | (boxes[b][0] > boxes[a][1])
+            if owner[a] == owner[b] or apart.any():
+                continue
+            checked += 1
+            assert deepest(placed[parts[a]], placed[parts[b]]) < 0.01
+    assert checked > 1000
 
 
 @pytest.mark.parametrize("fault", ["higher plates", "axes in the middle", "thicker plates"])
