@@ -4,12 +4,16 @@ blamed. ``benchmarks/corruptions.py`` does the same with 200 files of ten kinds.
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from corruptions import KINDS, corrupted, rewritten, verdict
 from piece_problems import gores, trimmed
 from problems import regular
+
+import miurafab as mf
+from miurafab.findings import refusals
 
 WHOLE = {
     "grid": regular,
@@ -32,3 +36,13 @@ def test_changes_of_every_kind_are_found_and_whole_files_are_not_blamed(name, tm
         if change is not None:
             refused, _ = verdict(change[0], tmp_path / "changed.fold")
             assert refused, change[1]
+
+
+def test_a_drawing_that_can_be_folded_flat_is_not_blamed_for_the_frame_that_says_so(tmp_path):
+    """Its file has a frame folded flat, which is not the folded form that its angles tell."""
+    pattern = replace(regular(), folded_coords=None)
+    pattern.save(tmp_path / "drawn.fold")
+    frames = json.loads((tmp_path / "drawn.fold").read_text())["file_frames"]
+    assert [frame["frame_title"] for frame in frames] == ["folded flat"]
+    assert mf.load(tmp_path / "drawn.fold").folded_coords is None
+    assert not refusals(mf.check(tmp_path / "drawn.fold").findings)

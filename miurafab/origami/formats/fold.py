@@ -318,10 +318,10 @@ def _folded(
     frames: list[Mapping[str, Any]], vertices: int, factor: float, origin: Floats
 ) -> Floats | None:
     """The folded form (V, 3), mm, from the first of ``frames`` of class foldedForm, relative to
-    ``origin``.
+    ``origin``. A frame that says of itself that it is folded flat is another state of the sheet.
     """
     for frame in frames:
-        if "foldedForm" in _classes(frame):
+        if "foldedForm" in _classes(frame) and not _is_folded_flat(frame):
             points = _coordinates(frame, "vertices_coords")
             factor = _unit(frame, factor)
             if origin.any() and points.shape[1] == 3 and np.isfinite(points).all():
@@ -336,6 +336,12 @@ def _folded(
                 )
             return points
     return None
+
+
+def _is_folded_flat(frame: Mapping[str, Any]) -> bool:
+    """Whether it orders its facets and all its folds are 0 or 180 degrees."""
+    angles = frame.get("edges_foldAngle") if "faceOrders" in frame else None
+    return isinstance(angles, list) and {abs(a) for a in angles if a is not None} <= {0, 180}
 
 
 def _grid(document: Mapping[str, Any], vertices: int) -> tuple[int, int] | None:
