@@ -216,7 +216,7 @@ def layer_order(pattern: CreasePattern) -> LayerOrder:
     Raises
     ------
     PatternError
-        For a pattern that does not fold rigidly to that end.
+        For a pattern that the closed form does not bring to that end. It may still fold otherwise.
 
     Examples
     --------
@@ -231,8 +231,8 @@ def layer_order(pattern: CreasePattern) -> LayerOrder:
     missed = loop_mismatch(pattern, place(pattern, angles[:-1]))
     if not missed.max() <= RIGID:
         raise PatternError(
-            "The sheet does not fold rigidly to the flat-folded state: on the way its facets miss "
-            f"each other by up to {missed.max():.2g} mean edges."
+            "The closed form of folding does not hold for the sheet: by it, its facets miss each "
+            f"other by up to {missed.max():.2g} mean edges on the way to the flat-folded state."
         )
     folded = folded_flat(pattern, angles[-1])
     heights, gap = _heights(folded, half)

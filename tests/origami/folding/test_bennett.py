@@ -164,7 +164,7 @@ def test_the_guide_tells_what_is_made(name: str) -> None:
 def test_what_has_no_shifted_hinges_is_refused() -> None:
     developable = fitted("hypar", 4, 4).pattern
     assert developable is not None
-    with pytest.raises(PatternError, match="does not fold"):
+    with pytest.raises(PatternError, match="closed form of folding does not hold"):
         thick_plates(developable, 4.0)
     with pytest.raises(InputError, match="greater than zero"):
         thick_plates(regular(), 0.0)
