@@ -39,7 +39,7 @@ from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.folding.layers import LayerOrder
 from miurafab.origami.formats.any_plane import laid_in_plane
-from miurafab.origami.formats.fold_frames import frames_in_state, written_frames
+from miurafab.origami.formats.fold_frames import written_frames
 from miurafab.origami.formats.planar_graph import enclosed_facets, oriented
 from miurafab.origami.formats.target_frame import (
     exact_frames,
@@ -182,7 +182,7 @@ def parse_fold(document: Any) -> CreasePattern:
         edges_assignment=assignment,
         edges_fold_angle=_fold_angles(key, assignment),
         faces_vertices=faces,
-        folded_coords=_folded(frames_in_state(key, others), len(flat), factor, _origin(document)),
+        folded_coords=_folded(others, len(flat), factor, _origin(document)),
         grid=_grid(document, len(flat)),
         pieces=_pieces(document, faces),
         seams=_numbers(document, "miurafab:seams", 2),

@@ -6,7 +6,6 @@ Each inherits the flat pattern, its key frame, and has its own coordinates.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -64,22 +63,3 @@ def _folded(points: Floats) -> dict[str, Any]:
         "frame_unit": "mm",
         "vertices_coords": points.tolist(),
     }
-
-
-def frames_in_state(
-    key: Mapping[str, Any], frames: list[Mapping[str, Any]]
-) -> list[Mapping[str, Any]]:
-    """Those of ``frames`` that have no other fold angles than the frame ``key``: others, such as
-    one that is folded flat, are further states of its motion.
-    """
-    given = key.get("edges_foldAngle")
-    return [frame for frame in frames if not _differ(given, frame.get("edges_foldAngle"))]
-
-
-def _differ(given: object, own: object) -> bool:
-    """Whether two lists of fold angles differ by over a degree at some edge."""
-    if not isinstance(given, list) or not isinstance(own, list):
-        return False
-    pairs = zip(given, own, strict=False)
-    numbers = (pair for pair in pairs if all(isinstance(a, int | float) for a in pair))
-    return any(abs(a - b) > 1 for a, b in numbers)

@@ -247,15 +247,3 @@ def test_any_value_in_any_place_is_read_or_refused_in_a_sentence() -> None:
         except PatternError as fault:
             refused.append(str(fault))
     assert all(sentence.endswith(".") for sentence in refused)
-
-
-def test_a_frame_of_another_state_is_not_the_folded_form(tmp_path):
-    """A pattern that is only known flat has a frame folded flat; its own fold angles are others."""
-    flat = replace(regular(5, 5), folded_coords=None)
-    flat.save(tmp_path / "flat.fold")
-    written = json.loads((tmp_path / "flat.fold").read_text(encoding="utf-8"))
-    assert [frame["frame_title"] for frame in written["file_frames"]] == ["folded flat"]
-    assert parse_fold(written).folded_coords is None
-    motion = rigid_motion(regular(5, 5), [0.0, 0.5, 1.0, np.inf])
-    again = parse_fold(json.loads(fold_text(flat, motion=motion)))
-    assert again.folded_coords == pytest.approx(motion.frames[2], abs=1e-9)
