@@ -390,8 +390,8 @@ def test_the_job_holds_the_pattern_that_its_layout_names(tmp_path):
 def test_a_design_says_where_its_ring_is_opened(tmp_path):
     file = tmp_path / "waist.toml"
     file.write_text(
-        'facets = "4x8"\npieces = 1\nsize = "140mm"\nclose = "seam"\n'
-        '[target]\nsurface = "hyperboloid"\n'
+        'facets = "4x8"\nsize = "140mm"\nclose = "seam"\n'
+        '[target]\nsurface = "cylinder"\n'
         "[layout]\nopen_row = 3\n"
     )
     prepared = prepare(str(file), out=tmp_path / "job")

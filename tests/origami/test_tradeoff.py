@@ -135,7 +135,7 @@ def test_the_command(run, tmp_path, hypar):
     assert [curve["weight"] for curve in answer["costs"]] == [0.5]
     assert answer["file"] == str(out)
     assert out.exists()
-    shown = run(*arguments, "--quiet")
+    shown = run(*arguments, "--quiet", "--polish", "off")
     assert "A/A0 tends to" in shown.stdout
 
 
