@@ -96,6 +96,7 @@ RULES = {
     "no-creases": Rule("note", "a format that holds a shape and no creases"),
     "no-folded-form": Rule("note", "a format that does not hold the folded form"),
     "no-fold-angles": Rule("note", "a format that tells mountains from valleys and no fold angles"),
+    "free-creases": Rule("note", "a format that does not tell free creases from flat ones"),
     "no-seams": Rule("note", "a format that does not hold which edges meet along seams"),
     "assumed-folded-flat": Rule("note", "a file without fold angles, taken as folded flat"),
     # A pattern, folded (miurafab.origami.folding.judge_motion, miurafab.workflow.layers)

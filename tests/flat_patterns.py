@@ -171,7 +171,7 @@ def resch(columns: int = 5, rows: int = 5, part: float = 1.0) -> CreasePattern:
     return drawn(lines)
 
 
-def pleated_hypar(rings: int = 8, angle: float = 90.0) -> CreasePattern:
+def pleated_hypar(rings: int = 8, angle: float = 60.0) -> CreasePattern:
     """Squares in each other, alternately mountain and valley, with facets that bend freely."""
     lines: list[Line] = []
     for k in range(rings, 0, -1):
@@ -180,10 +180,12 @@ def pleated_hypar(rings: int = 8, angle: float = 90.0) -> CreasePattern:
         for at, other in zip(corners, corners[1:] + corners[:1], strict=True):
             lines.append((at, other, "B" if k == rings else letter, angle))
             inner = (at[0] * (k - 1) / k, at[1] * (k - 1) / k)
-            if k > 1:  # the innermost square is a facet that bends
+            if k > 1:
                 lines.append((inner, at, "VM"[k % 2], angle))
                 next_inner = (other[0] * (k - 1) / k, other[1] * (k - 1) / k)
-                lines.append((next_inner, at, "U", 0.0))
+                across = (next_inner, at) if k % 2 else (inner, other)
+                lines.append((*across, "U", 0.0))
+    lines.append(((-1.0, -1.0), (1.0, 1.0), "U", 0.0))
     return drawn(lines)
 
 

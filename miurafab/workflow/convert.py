@@ -129,6 +129,10 @@ def convert(
         if ending in WITHOUT_ANGLES:
             says = "tells mountains from valleys and no fold angles"
             findings.append(_loss("no-fold-angles", target, says))
+            free = int(np.isin(pattern.edges_assignment, ("U", "J")).sum())
+            if free:
+                says = f"does not tell free creases (U, J) from flat ones (F): {free} become F"
+                findings.append(_loss("free-creases", target, says))
     return Conversion(source, target, pattern, tuple(findings))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import flat_patterns
 import numpy as np
 import pytest
 import trimesh
@@ -11,6 +12,7 @@ from piece_problems import gores, trimmed, two_pieces, two_trimmed_pieces
 from problems import fitted, regular, saddle_mesh
 
 from miurafab.errors import InputError, PatternError
+from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.fit import fit
 from miurafab.origami.folding.kinematics import rigid_motion, states_between
 from miurafab.origami.formats.files import WRITTEN, load
@@ -162,3 +164,19 @@ def test_a_curved_sheet_of_another_program_folds_like_ours(tmp_path: Path) -> No
     read = load(tmp_path / "a.dxf")
     motion = rigid_motion(read, states_between(read, 6))
     assert motion.is_rigid
+
+
+def test_free_creases_that_a_format_cannot_hold_are_told(tmp_path: Path) -> None:
+    pattern = flat_patterns.pleated_hypar(3)
+    free = int((pattern.edges_assignment == "U").sum())
+    done = convert(_saved(pattern, tmp_path / "a.fold"), tmp_path / "a.cp")
+    told = {finding.code: finding.sentence for finding in done.findings}
+    assert f"{free} become F" in told["free-creases"]
+    assert (done.pattern.edges_assignment == "U").sum() == free
+    kept = convert(tmp_path / "a.fold", tmp_path / "b.svg").findings
+    assert "free-creases" not in {finding.code for finding in kept}
+
+
+def _saved(pattern: CreasePattern, path: Path) -> Path:
+    pattern.save(path)
+    return path

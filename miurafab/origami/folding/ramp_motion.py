@@ -137,9 +137,16 @@ def _wrong_edges(piece: Piece, path: RampPath) -> Ints:
 
 
 def _stuck(paths: list[RampPath]) -> PatternError:
+    """The error for a pattern that does not leave the plane."""
     follow = np.concatenate([path.follow for path in paths])
+    if follow.all():
+        return PatternError(
+            "The pattern could not be brought out of the plane, though every fold can start to the "
+            "side that its letter tells. Very thin facets can be the cause: convert the file with "
+            "a larger `tolerance`, which joins lines that nearly meet."
+        )
     return PatternError(
-        f"The pattern could not be brought out of the plane: {1 - follow.mean():.0%} of its folds "
+        f"The pattern could not be brought out of the plane: {1 - follow.mean():.1%} of its folds "
         "cannot start to the side that their letter tells. Either letters are wrong, or it folds "
         "in a sequence, crease after crease, which one motion of all creases cannot show."
     )

@@ -112,6 +112,22 @@ def test_a_square_twist_bends_and_says_where() -> None:
     assert "bent-facets" in {finding.code for finding in motion_findings(found, ())}
 
 
+def test_a_pleated_hypar_leaves_the_plane_by_stretching_a_little() -> None:
+    """No paper folds it exactly (Demaine et al., 2011); alternating triangles come near."""
+    found = find_motion(flat_patterns.pleated_hypar(), 8)
+    assert found.verdict is not None
+    assert found.verdict.complete
+    assert not len(found.verdict.wrong_edges)
+    assert not found.verdict.unstable.any()
+    assert 1e-3 < found.verdict.strain.max() < 1e-2
+    assert not found.motion.is_rigid
+    last = found.motion.frames[-1]
+    size = np.linalg.norm(np.ptp(last, axis=0))
+    assert np.linalg.svd(last - last.mean(axis=0))[1][2] > 0.05 * size  # a saddle in space
+    codes = {finding.code for finding in motion_findings(found, ())}
+    assert {"bent-facets", "stretched"} <= codes
+
+
 def inverted(pattern: CreasePattern, edge: int) -> CreasePattern:
     letter, angle = pattern.edges_assignment.copy(), pattern.edges_fold_angle.copy()
     letter[edge] = "M" if letter[edge] == "V" else "V"
