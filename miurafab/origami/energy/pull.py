@@ -27,6 +27,8 @@ from miurafab.origami.energy.yielding import YieldingDriven
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+RELEASED = 1e-6
+"""A force below this part of the largest is none."""
 CORNERS = "corners"
 """The first and the last vertex of a grid."""
 
@@ -108,7 +110,7 @@ class PullCurve(EnergyResult):
             "strain": self.strain,
             "force_n": float(self.forces[out[0]]),
             "largest_force_n": float(np.abs(self.forces).max()),
-            "set_mm": float(self.extensions[back[0]]),
+            "set_mm": self._set(back[0]),
             "second_cycle_change_n": changes[0] if changes else None,
             "third_cycle_change_n": changes[1] if len(changes) > 1 else None,
             "yielded": float((self.slips != 0).mean()),
@@ -122,7 +124,7 @@ class PullCurve(EnergyResult):
                     "cycle": c,
                     "force_n": float(self.forces[top]),
                     "strain": float(self.extensions[top] / self.distances[0]),
-                    "set_mm": float(self.extensions[end]),
+                    "set_mm": self._set(end),
                     "work_j": float(self.works[end]),
                     "stored_j": float(self.stored[end]),
                     "dissipated_j": float(self.dissipated[end]),
@@ -135,6 +137,12 @@ class PullCurve(EnergyResult):
                 "force_n": self.forces.tolist(),
             },
         }
+
+    def _set(self, end: int) -> float | None:
+        """How much longer it stays, mm; None where the way was lost before it was let go."""
+        top = float(np.abs(self.forces).max())
+        released = self.loading[end] == 0 and abs(self.forces[end]) <= RELEASED * top
+        return float(self.extensions[end]) if released else None
 
     @property
     def _all(self) -> range:
@@ -191,6 +199,11 @@ def pull(
     :func:`~miurafab.origami.energy.bar_hinge.sheet_model` does and for ``corners`` of a pattern
     without a grid, and :class:`~miurafab.errors.InputError` for vertices that cannot be pulled.
     """
+    if pattern.pieces_count > 1:
+        raise PatternError(
+            f"The pattern has {pattern.pieces_count} pieces, and only one can be pulled; save the "
+            "piece as a pattern of its own."
+        )
     model = sheet_model(pattern, paper=paper, uncut=uncut)
     pair = _pair(pattern, ends)
     bending = len(model.hinges) - (len(model.creases) if paper.crease_length_mm else 0)

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from piece_problems import two_pieces
 from problems import regular
 
 from miurafab.errors import InputError, PatternError
@@ -150,3 +151,6 @@ def test_what_cannot_be_pulled_is_said():
     assert "smaller `strain`" in lost.verdict()
     reached = lost.report()["cycles"][0]["strain"]
     assert 0 < reached < 3
+    assert lost.report()["set_mm"] is None
+    with pytest.raises(PatternError, match="2 pieces, and only one"):
+        pull(two_pieces(5, 5, 2), PAPER)
