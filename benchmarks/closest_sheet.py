@@ -109,7 +109,7 @@ def closest(request: FitRequest, weight: float = WEIGHT) -> Closest:
     feet = Nominal.of(start.surface, unknowns.charts, *start.cells).parameters
     solver, value, gain, steps = SymmetricSolver(), math.inf, 1.0, 0
     while gain > AT_REST and steps < STEPS:
-        leg = fairest(objective, unknowns, constraints, x, feet, steps=LEG, solver=solver)
+        leg = fairest(objective, unknowns, x, feet, steps=LEG, solver=solver)
         x, feet, gain, value = leg.x, leg.feet, 1 - leg.value / value, leg.value
         steps += LEG
     bounds = limits(replace(request, flat_foldable=limit), unknowns, 1.0)
