@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -28,13 +29,24 @@ material = "paper-100"
 """
 
 
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """An empty folder for what the first test makes."""
+    return tmp_path_factory.mktemp("kept")
+
+
 @pytest.fixture
-def job(run, tmp_path):
-    """A small pattern and its job directory."""
-    assert run("fit", "hypar", "--facets", "6x5", "--size", "70mm", "-o", "s.fold").returncode == 0
-    done = run("sheets", "s.fold", "-o", "job", "--material", "paper-100", "--json")
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["totals"]["patches"] == 1
+def job(run, tmp_path, kept):
+    """A small pattern and its job directory, made once and copied for each test."""
+    if not any(kept.iterdir()):
+        fitted = run("fit", "hypar", "--facets", "6x5", "--size", "70mm", "-o", "s.fold")
+        assert fitted.returncode == 0
+        done = run("sheets", "s.fold", "-o", "job", "--material", "paper-100", "--json")
+        assert done.returncode == 0, done.stderr
+        assert json.loads(done.stdout)["totals"]["patches"] == 1
+        for name in ("s.fold", "job"):
+            (tmp_path / name).rename(kept / name)
+    shutil.copytree(kept, tmp_path, dirs_exist_ok=True)
     return tmp_path / "job"
 
 
