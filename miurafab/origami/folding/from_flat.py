@@ -26,7 +26,7 @@ from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.sparse import negative_pivots
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, flat_model
-from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate
+from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate, follow
 from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, Factored, solve
 from miurafab.origami.energy.ramp import LARGEST_TURN, Descent, Ramped, descend
 from miurafab.origami.energy.seed import linear_seed
@@ -140,6 +140,8 @@ def fold_from_flat(
         frames.append(frame)
         if on_progress is not None:
             on_progress((number + 1) / (len(parts) - 1), f"step {number + 1} of {len(parts) - 1}")
+    if found and not touching:
+        frames = walk.stiffened_back(frames)
     return RampPath(model, tuple(frames), start.follow, walk.snaps, bool(found))
 
 
@@ -219,6 +221,33 @@ class _Walk:
             if turned <= NEAR and not hard.unstable:
                 return hard
         return _frame(soft, here, False)
+
+    def stiffened_back(self, frames: list[RampFrame]) -> list[RampFrame]:
+        """``frames``, all with stiff bars if the stiff path leads back to the first of them.
+
+        Near flat a soft sheet may lie far from every stiff shape. The path with stiff bars is
+        followed back there from the first of the frames from which all are stiff.
+        """
+        stiff = [frame.stiff for frame in frames]
+        first = len(stiff) - stiff[::-1].index(False) if False in stiff else 0
+        if not 0 < first < len(frames):
+            return frames
+        self.stiff.last[:] = frames[first].angles
+        rest = EquilibriumState(
+            frames[first].points @ self.stiff.axes, np.zeros(len(self.stiff.model.bars)), 0.0
+        )
+        goals = np.array([frame.part for frame in frames[first::-1]])
+        back = follow(self.stiff, rest, goals)
+        if len(back) < len(goals):
+            return frames
+        hard = []
+        for part, state in zip(goals.tolist(), back, strict=True):
+            if np.abs(self.stiff.angles(state.points) - self.stiff.last).max() > LARGEST_TURN:
+                return frames
+            hard.append(_frame(self.stiff, Known(part, state), True))
+            self.stiff.accept(state.points)
+        unstable = any(frame.unstable for frame in hard)
+        return frames if unstable else [*hard[:0:-1], *frames[first:]]
 
     def _is_short(self, points: Floats) -> bool:
         """Whether the way to ``points`` is short enough for one step.

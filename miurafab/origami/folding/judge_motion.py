@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from miurafab.findings import Finding
 from miurafab.origami.folding.angles_csv import Contact
 from miurafab.origami.folding.certificate import MOVED, RigidCertificate
@@ -28,7 +30,7 @@ def motion_findings(found: FoundMotion, contacts: Sequence[Contact]) -> tuple[Fi
 def _findings(found: FoundMotion, contacts: Sequence[Contact]) -> Iterator[Finding]:
     motion, verdict = found.motion, found.verdict
     if found.certificate is not None and not found.certificate.rigid:
-        yield _bends(found.certificate, motion.method == FROM_FLAT)
+        yield _bends(found.certificate, motion.method == FROM_FLAT, _stretch_at(found))
     if verdict is not None:
         yield from _of_ramp(verdict, float(motion.states[-1]))
     if contacts:
@@ -36,7 +38,15 @@ def _findings(found: FoundMotion, contacts: Sequence[Contact]) -> Iterator[Findi
         yield Finding("contacts", f"On the way facets pass through each other in {frames}.")
 
 
-def _bends(certificate: RigidCertificate, from_flat: bool) -> Finding:
+def _stretch_at(found: FoundMotion) -> float:
+    """By how much a side stretches in the frame that is not rigid."""
+    if found.verdict is None or found.certificate is None:
+        return 0.0
+    frame = int(np.argmin(np.abs(found.motion.states - found.certificate.state)))
+    return float(found.verdict.strain[frame])
+
+
+def _bends(certificate: RigidCertificate, from_flat: bool, stretch: float) -> Finding:
     where = f"at {certificate.state:.0%} of its fold angles" if from_flat else "half-way"
     if certificate.moved > MOVED:
         turn = math.degrees(certificate.moved)
