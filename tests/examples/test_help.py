@@ -37,7 +37,6 @@ def prepared(tmp_path_factory):
     return folder
 
 
-@pytest.mark.xdist_group("help")
 @pytest.mark.parametrize("example", sorted(set(examples())))
 def test_the_example_runs(prepared, tmp_path, example):
     folder = shutil.copytree(prepared, tmp_path / "files")

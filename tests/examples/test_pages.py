@@ -95,13 +95,7 @@ def pages(tmp_path_factory):
     return {page: Page(page, tmp_path_factory.mktemp(page.stem)) for page in PAGES}
 
 
-@pytest.mark.parametrize(
-    "block",
-    [
-        pytest.param(b, marks=pytest.mark.xdist_group(f"page {b.page.stem}"), id=str(b))
-        for b in BLOCKS
-    ],
-)
+@pytest.mark.parametrize("block", BLOCKS, ids=str)
 def test_the_block_runs(pages, block):
     pages[block.page].run(block)
 
