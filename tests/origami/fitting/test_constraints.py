@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import CELL
 
+from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.fitting.constraints import OrigamiConstraints
+from miurafab.origami.fitting.reduction import Unknowns
 from miurafab.origami.miura import MiuraCell, regular_miura
 from miurafab.origami.tessellation import Tessellation
 
@@ -32,6 +34,16 @@ def test_the_jacobian_is_that_of_central_differences(flat_foldable: bool, number
         (constraints(x + h * e)[0] - constraints(x - h * e)[0]) / (2 * h) for e in np.eye(len(x))
     ]
     assert np.abs(jacobian - np.stack(columns, axis=1)).max() < 1e-8
+
+
+@pytest.mark.parametrize("flat_foldable", [False, True])
+def test_the_values_alone_are_the_same_to_the_bit(flat_foldable: bool) -> None:
+    sheet = Unknowns.all_of(QuadCharts.of_cells(np.ones((3, 4), dtype=bool)), 10.0)
+    ring = Unknowns.ring(np.zeros(6, dtype=np.int64), 8, 10.0, turn=0.4)
+    for unknowns, size in ((sheet, 3 * 20), (ring, 3 * 14)):
+        x = np.random.default_rng(size).normal(scale=10.0, size=size)
+        values = unknowns.constraints(flat_foldable)(x)[0]
+        assert np.array_equal(unknowns.residuals(flat_foldable)(x), values)
 
 
 @given(alpha=st.floats(0.3, 1.5), theta=st.floats(0.05, 1.5), across=st.floats(0.1, 50.0))
