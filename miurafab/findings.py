@@ -92,6 +92,9 @@ RULES = {
     "much-paper": Rule("warning", "a sheet of more than four times the area of the target"),
     "coverage": Rule("warning", "a sheet that covers less than 95 % of the target"),
     "overhang": Rule("note", "a sheet of which more than 1 % is beyond the target"),
+    "frame": Rule(
+        "refusal", "a further frame of a file that is no state of the sheet, or orders it wrongly"
+    ),
     # A pattern, converted (miurafab.workflow.convert)
     "no-creases": Rule("note", "a format that holds a shape and no creases"),
     "no-folded-form": Rule("note", "a format that does not hold the folded form"),

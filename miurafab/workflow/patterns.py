@@ -6,14 +6,18 @@ import os
 import reprlib
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from miurafab.errors import InputError, PatternError
-from miurafab.files import AnyPath, Reading
+from miurafab.files import AnyPath, Reading, as_path
 from miurafab.findings import Finding, refusals
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.formats.files import load
+from miurafab.origami.formats.fold import read_further_frames
+from miurafab.origami.formats.fold_states import FurtherFrame
+from miurafab.origami.judge_frames import judge_frames
 from miurafab.origami.judge_pattern import gather, judge
 from miurafab.origami.verify import Audit, audit
 from miurafab.surfaces.description import described_surface
@@ -145,4 +149,16 @@ def check(pattern: PatternLike) -> Audit:
     checked = audit(found, surface)
     if not found.target:
         missing = (Finding("no-target", "The pattern names no target, so distances are left out."),)
-    return replace(checked, findings=missing + checked.findings)
+    frames = _further_frames(pattern)
+    states = tuple(judge_frames(found, frames))
+    proved = checked.proved
+    if frames and not states:
+        proved += (f"Each of the {len(frames)} further frames is a state of the sheet.",)
+    return replace(checked, findings=missing + checked.findings + states, proved=proved)
+
+
+def _further_frames(pattern: PatternLike) -> tuple[FurtherFrame, ...]:
+    """The frames of the file that ``pattern`` names beside the flat pattern and its folded form."""
+    if not isinstance(pattern, str | os.PathLike) or Path(pattern).suffix.lower() != ".fold":
+        return ()
+    return read_further_frames(as_path(pattern, "The pattern"))

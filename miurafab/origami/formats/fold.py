@@ -38,24 +38,35 @@ from miurafab.geometry.polygons import (
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.folding.layers import LayerOrder
-from miurafab.origami.formats.any_plane import laid_in_plane
 from miurafab.origami.formats.fold_frames import written_frames
+from miurafab.origami.formats.fold_keys import (
+    frames_in,
+    indices_at,
+    list_at,
+    numbers_at,
+    points_at,
+    unit_mm,
+)
+from miurafab.origami.formats.fold_states import (
+    FurtherFrame,
+    flat_frame,
+    folded_form,
+    further_frames,
+    origin_of,
+)
 from miurafab.origami.formats.planar_graph import enclosed_facets, oriented
 from miurafab.origami.formats.target_frame import (
     exact_frames,
     in_own_frame,
-    relative,
     scale_in,
     target_in,
     target_kept,
     target_seal,
 )
 from miurafab.origami.unfold import with_angles_of_the_folded_form
-from miurafab.surfaces.frame import origin_in
 from miurafab.version import __version__
 
 ASSUMED = "assumed"
-_UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "um": 1e-3}
 
 
 def fold_text(
@@ -161,15 +172,26 @@ def read_fold(path: Path) -> CreasePattern:
     return replace(pattern, target={**pattern.target, "mesh": whole})
 
 
+def read_further_frames(path: Path) -> tuple[FurtherFrame, ...]:
+    """The frames of class foldedForm in the FOLD file ``path`` beside its folded form.
+
+    Raises :class:`~miurafab.errors.PatternError` as :func:`read_fold` does.
+    """
+    text = read_text(path, PatternError, "a FOLD file")
+    with Reading(path, "a FOLD file", PatternError):
+        document = parse_json(text)
+        return further_frames(exact_frames(document, text) if type(document) is dict else document)
+
+
 def parse_fold(document: Any) -> CreasePattern:
     """The pattern in a parsed FOLD document. Raises ``PatternError`` naming the key at fault."""
     if not isinstance(document, dict):
         raise PatternError("A FOLD file holds one JSON object.")
-    frames = _frames(document)
-    place, key = _flat_frame(frames)
-    factor = _unit(key, 1.0)
-    flat = np.ascontiguousarray(_coordinates(key, "vertices_coords")[:, :2] * factor)
-    edges = _indices(key, "edges_vertices", 2)
+    frames = frames_in(document)
+    place, key = flat_frame(frames)
+    factor = unit_mm(key, 1.0)
+    flat = np.ascontiguousarray(points_at(key, "vertices_coords")[:, :2] * factor)
+    edges = indices_at(key, "edges_vertices", 2)
     assignment = _assignments(key, len(edges))
     given = "faces_vertices" in key
     faces = _face_indices(key) if given else enclosed_facets(flat, edges, assignment)
@@ -182,11 +204,11 @@ def parse_fold(document: Any) -> CreasePattern:
         edges_assignment=assignment,
         edges_fold_angle=_fold_angles(key, assignment),
         faces_vertices=faces,
-        folded_coords=_folded(others, len(flat), factor, _origin(document)),
+        folded_coords=folded_form(others, len(flat), factor, origin_of(document)),
         grid=_grid(document, len(flat)),
         pieces=_pieces(document, faces),
-        seams=_numbers(document, "miurafab:seams", 2),
-        cells=_numbers(document, "miurafab:cells", 2),
+        seams=numbers_at(document, "miurafab:seams", 2),
+        cells=numbers_at(document, "miurafab:cells", 2),
         scale=scale_in(document),
         target=target_in(document),
         target_kept=target_kept(document),
@@ -199,88 +221,14 @@ def parse_fold(document: Any) -> CreasePattern:
     return pattern
 
 
-def _frames(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The key frame and ``file_frames``, each with its inherited keys."""
-    listed = document.get("file_frames", [])
-    if not isinstance(listed, list) or not all(isinstance(frame, dict) for frame in listed):
-        raise PatternError("'file_frames' is not a list of objects.")
-    frames: list[Mapping[str, Any]] = [document]
-    for number, frame in enumerate(listed, start=1):
-        parent = frame.get("frame_parent", 0)
-        if not frame.get("frame_inherit"):
-            frames.append(frame)
-        elif type(parent) is int and 0 <= parent < number:
-            frames.append({**frames[parent], **frame})
-        else:
-            raise PatternError(f"Frame {number} inherits {parent!r}, which is no frame before it.")
-    return frames
-
-
-def _classes(frame: Mapping[str, Any]) -> list[Any]:
-    classes = frame.get("frame_classes")
-    return classes if isinstance(classes, list) else []
-
-
-def _flat_frame(frames: list[Mapping[str, Any]]) -> tuple[int, Mapping[str, Any]]:
-    """The place of the frame of class creasePattern, or else of the first frame that is flat, and
-    the frame with its plane turned into that of x and y.
-    """
-    places = range(len(frames))
-    declared = [n for n in places if "creasePattern" in _classes(frames[n])]
-    for n in declared or [n for n in places if "foldedForm" not in _classes(frames[n])] or places:
-        frame = frames[n]
-        points = _coordinates(frame, "vertices_coords")
-        if points.shape[1] == 2 or np.ptp(points[:, 2]) <= 1e-9 * np.ptp(points[:, :2]):
-            return n, frame
-        laid = laid_in_plane(points, frame.get("faces_vertices"))
-        if laid is not None:
-            return n, {**frame, "vertices_coords": laid.tolist()}
-    raise PatternError("No frame of the file holds a flat crease pattern in 'vertices_coords'.")
-
-
-def _unit(frame: Mapping[str, Any], default: float) -> float:
-    """The frame's unit in millimetres; ``default`` if it has none, or one that is no length."""
-    unit = frame.get("frame_unit")
-    return _UNITS_MM.get(unit, default) if isinstance(unit, str) else default
-
-
-def _array(document: Mapping[str, Any], key: str) -> list[Any]:
-    value = document.get(key)
-    if not isinstance(value, list) or not value:
-        raise PatternError(f"'{key}' is missing or empty.")
-    return value
-
-
-def _coordinates(document: Mapping[str, Any], key: str) -> Floats:
-    try:
-        points = np.array(_array(document, key), dtype=np.float64)
-    except (ValueError, TypeError):
-        raise PatternError(f"'{key}' is not a list of points of equal dimension.") from None
-    if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise PatternError(f"'{key}' is not a list of 2D or 3D points.")
-    return points
-
-
-def _indices(document: Mapping[str, Any], key: str, width: int) -> Ints:
-    try:
-        indices = np.array(_array(document, key))
-    except ValueError:
-        raise PatternError(f"'{key}' is not a list of {width} vertices each.") from None
-    if indices.ndim != 2 or indices.shape[1] != width or indices.dtype.kind not in "iu":
-        raise PatternError(f"'{key}' is not a list of {width} whole numbers each.")
-    if indices.min() < 0:
-        raise PatternError(f"'{key}' holds a negative vertex.")
-    return indices.astype(np.int64)
-
-
 def _face_indices(document: Mapping[str, Any]) -> Ints:
-    faces = _array(document, "faces_vertices")
+    faces = list_at(document, "faces_vertices")
     sizes = {len(face) if isinstance(face, list) else 0 for face in faces}
     if min(sizes) < 3:
         raise PatternError("'faces_vertices' holds a facet of fewer than three corners.")
     width = max(sizes)
     if len(sizes) == 1:
-        return _indices(document, "faces_vertices", width)
+        return indices_at(document, "faces_vertices", width)
     numbers = all(type(v) is int and v >= 0 for face in faces for v in face)
     if not numbers:
         raise PatternError("'faces_vertices' holds something that is not a vertex number.")
@@ -314,36 +262,6 @@ def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> F
     return np.radians(np.where(np.isnan(angles), flat_folded, angles))
 
 
-def _folded(
-    frames: list[Mapping[str, Any]], vertices: int, factor: float, origin: Floats
-) -> Floats | None:
-    """The folded form (V, 3), mm, from the first of ``frames`` of class foldedForm, relative to
-    ``origin``. A frame that says of itself that it is folded flat is another state of the sheet.
-    """
-    for frame in frames:
-        if "foldedForm" in _classes(frame) and not _is_folded_flat(frame):
-            points = _coordinates(frame, "vertices_coords")
-            factor = _unit(frame, factor)
-            if origin.any() and points.shape[1] == 3 and np.isfinite(points).all():
-                points = relative(frame["vertices_coords"], factor, origin)
-            else:
-                points = points * factor
-            if points.shape[1] == 2:
-                points = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
-            if len(points) != vertices:
-                raise PatternError(
-                    f"The folded form has {len(points)} vertices and the pattern {vertices}."
-                )
-            return points
-    return None
-
-
-def _is_folded_flat(frame: Mapping[str, Any]) -> bool:
-    """Whether it orders its facets and all its folds are 0 or 180 degrees."""
-    angles = frame.get("edges_foldAngle") if "faceOrders" in frame else None
-    return isinstance(angles, list) and {abs(a) for a in angles if a is not None} <= {0, 180}
-
-
 def _grid(document: Mapping[str, Any], vertices: int) -> tuple[int, int] | None:
     grid = document.get("miurafab:grid")
     if grid is None:
@@ -360,29 +278,8 @@ def _grid(document: Mapping[str, Any], vertices: int) -> tuple[int, int] | None:
 
 def _pieces(document: Mapping[str, Any], faces: Ints) -> Ints | None:
     """The file's pieces, or else the parts of the pattern that do not touch; None for one."""
-    given = _numbers(document, "miurafab:pieces", None)
+    given = numbers_at(document, "miurafab:pieces", None)
     if given is not None:
         return given
     count, part = connected_parts(faces)
     return part if count > 1 else None
-
-
-def _numbers(document: Mapping[str, Any], key: str, width: int | None) -> Ints | None:
-    """The whole numbers (n,), or (n, ``width``), under ``key``; None where the key is missing."""
-    given = document.get(key)
-    if given is None:
-        return None
-    try:
-        numbers = np.array(given)
-    except ValueError:
-        numbers = np.empty(0)
-    shaped = numbers.ndim == 1 if width is None else numbers.shape[1:] == (width,)
-    if not shaped or numbers.dtype.kind != "i":
-        what = "whole numbers" if width is None else f"{width} whole numbers each"
-        raise PatternError(f"'{key}' is not a list of {what}.")
-    return numbers.astype(np.int64)
-
-
-def _origin(document: Mapping[str, Any]) -> Floats:
-    """(3,) where the folded form of the pattern starts in the frame of the file, mm."""
-    return np.asarray(scale_in(document) * origin_in(target_in(document)))

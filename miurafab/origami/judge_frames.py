@@ -1,0 +1,96 @@
+"""Whether the further frames of a file are states of its sheet.
+
+Each edge must be as long as in the flat pattern. A frame that orders its facets must be the sheet
+folded flat, each piece in its place up to a rigid motion, and each pair of facets that overlap must
+have the order that the closed form (:mod:`~miurafab.origami.folding.layers`) gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from miurafab.findings import Finding
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import connected_parts, edge_lengths
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.layers import LayerOrder, known_layer_order
+from miurafab.origami.formats.fold_states import FurtherFrame
+
+STRETCH = 1e-6
+"""The largest difference in length or place, in mean edges, that the digits of a file explain."""
+
+
+def judge_frames(pattern: CreasePattern, frames: Sequence[FurtherFrame]) -> Iterator[Finding]:
+    """The faults of ``frames``, and what cannot be judged of them."""
+    flat = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
+    for frame in frames:
+        lengths = edge_lengths(frame.points, pattern.edges_vertices)
+        apart = np.abs(lengths - flat) / flat.mean()
+        stretched = np.flatnonzero(~(apart <= STRETCH))
+        off = float(apart.max())
+        if len(stretched):
+            yield Finding(
+                "stretched" if frame.orders is None else "frame",
+                f"Frame {frame.number} is no state of the sheet: {len(stretched)} of its edges are "
+                f"up to {off:.1e} mean edges longer or shorter than in the flat pattern; write the "
+                "file anew, or take the frame out.",
+                tuple(stretched.tolist()),
+            )
+        elif frame.orders is not None:
+            yield from _judge_layers(pattern, frame, frame.orders)
+
+
+def _judge_layers(pattern: CreasePattern, frame: FurtherFrame, orders: Ints) -> Iterator[Finding]:
+    order = known_layer_order(pattern)
+    if order is None:
+        yield Finding(
+            "not-proven",
+            f"Frame {frame.number} orders its facets; the sheet has no order in closed form, so "
+            "that this one is not judged.",
+        )
+        return
+    off = _apart(pattern, frame.points, order)
+    if not off <= STRETCH:
+        yield Finding(
+            "frame",
+            f"Frame {frame.number} orders its facets and is not the sheet folded flat: vertices "
+            f"are up to {off:.2g} mean edges off; write the file anew, or take the frame out.",
+        )
+    wrong = _signs(orders) ^ _signs(order.face_orders())
+    if wrong:
+        pairs = {pair[:2] for pair in wrong}
+        one, other = min(pairs)
+        yield Finding(
+            "frame",
+            f"Frame {frame.number} has another order of layers than the sheet for {len(pairs)} "
+            f"pairs of facets, the first being {one} and {other}; write the file anew, or take "
+            "the frame out.",
+            tuple(sorted({facet for pair in pairs for facet in pair})),
+        )
+
+
+def _signs(orders: Ints) -> set[tuple[int, int, int]]:
+    """The triples of ``orders`` that say something."""
+    return {(f, g, s) for f, g, s in orders.tolist() if s}
+
+
+def _apart(pattern: CreasePattern, points: Floats, order: LayerOrder) -> float:
+    """How far ``points`` (V, 3) are from the sheet folded flat, in mean edges, each piece moved to
+    it as a rigid body (W. Kabsch, Acta Crystallographica A 32 (1976)).
+    """
+    there = np.column_stack([order.folded.vertices, np.zeros(len(points))])
+    mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
+    _, part = connected_parts(pattern.faces_vertices)
+    piece = np.full(len(points), -1, dtype=np.int64)
+    real = pattern.faces_vertices >= 0
+    piece[pattern.faces_vertices[real]] = np.broadcast_to(part[:, None], real.shape)[real]
+    worst = 0.0
+    for number in range(int(part.max()) + 1):
+        mine = points[piece == number] - points[piece == number].mean(axis=0)
+        theirs = there[piece == number] - there[piece == number].mean(axis=0)
+        left, _, right = np.linalg.svd(mine.T @ theirs)
+        left[:, 2] *= np.sign(np.linalg.det(left @ right))  # a turn, and no reflection
+        worst = max(worst, float(np.linalg.norm(mine @ left @ right - theirs, axis=1).max()) / mean)
+    return worst

@@ -1,0 +1,97 @@
+"""The further frames of a file are judged: places, lengths, and the order of layers."""
+
+import json
+
+import numpy as np
+import pytest
+
+import miurafab as mf
+
+
+@pytest.fixture(scope="module")
+def document(tmp_path_factory):
+    """An exactly flat-foldable sheet, whose last frame is folded flat."""
+    path = tmp_path_factory.mktemp("exact") / "exact.fold"
+    mf.fit("hypar", facets=(4, 4), flat_foldable="exact").pattern.save(path)
+    return json.loads(path.read_text())
+
+
+def judged(document, tmp_path):
+    path = tmp_path / "given.fold"
+    path.write_text(json.dumps(document))
+    return mf.check(path)
+
+
+def copied(document):
+    """A copy of ``document``, and its frame that is folded flat."""
+    found = json.loads(json.dumps(document))
+    frame = found["file_frames"][-1]
+    assert frame["frame_title"] == "folded flat"
+    return found, frame
+
+
+def test_the_frame_folded_flat_is_proved_wherever_it_lies(document, tmp_path):
+    found, frame = copied(document)
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn[:, 0] *= np.sign(np.linalg.det(turn))
+    points = np.pad(np.array(frame["vertices_coords"]), ((0, 0), (0, 1)))[:, :3]
+    for moved in (points, points @ turn + 5.0):
+        frame["vertices_coords"] = moved.tolist()
+        check = judged(found, tmp_path)
+        assert check.valid, check.findings
+        assert "Each of the 1 further frames is a state of the sheet." in check.proved
+
+
+def test_facets_that_run_clockwise_have_their_orders_the_other_way(document, tmp_path):
+    found, frame = copied(document)
+    found["faces_vertices"][3].reverse()
+    frame["faceOrders"] = [[f, g, -s if g == 3 else s] for f, g, s in frame["faceOrders"]]
+    assert judged(found, tmp_path).valid
+
+
+def _moved(frame):
+    frame["vertices_coords"][7][0] += 0.01
+
+
+def _turned(frame):
+    f, g, s = frame["faceOrders"][5]
+    frame["faceOrders"][5] = [f, g, -s]
+
+
+def _left_out(frame):
+    del frame["faceOrders"][5]
+
+
+def _strange(frame):
+    frame["faceOrders"].append([0, 0, 1])
+
+
+@pytest.mark.parametrize("change", [_moved, _turned, _left_out, _strange])
+def test_a_frame_that_was_changed_is_refused(document, tmp_path, change):
+    found, frame = copied(document)
+    change(frame)
+    check = judged(found, tmp_path)
+    assert [finding.code for finding in check.findings if finding.severity == "refusal"] == [
+        "frame"
+    ]
+    assert not any("further frames" in sentence for sentence in check.proved)
+
+
+@pytest.mark.parametrize("triple", [[0, 99, 1], [0, 1], ["a", 0, 1], [-1, 0, 1]])
+def test_an_order_that_is_none_is_one_sentence(document, tmp_path, triple):
+    found, frame = copied(document)
+    frame["faceOrders"].append(triple)
+    with pytest.raises(mf.MiurafabError, match="faceOrders"):
+        judged(found, tmp_path)
+
+
+def test_a_frame_of_a_motion_that_stretches_is_told(document, tmp_path):
+    found, _ = copied(document)
+    folded = dict(found["file_frames"][0])
+    folded["vertices_coords"] = (1.01 * np.array(folded["vertices_coords"])).tolist()
+    found["file_frames"].append(folded)
+    check = judged(found, tmp_path)
+    assert check.valid
+    assert [finding.where for finding in check.findings if finding.code == "stretched"] == [
+        tuple(range(len(found["edges_vertices"])))
+    ]
