@@ -73,7 +73,7 @@ class MachineSession:
         self._setup = setup
         self._orders = session_keys(setup.dialect)
         self._pad = JogPad()
-        self._at_risk = self._in_job = False
+        self._at_risk = self._in_job = self._stops = False
         self._poll_at = 0.0
         self._told: StatusReport | None = None  # the report of the last state that was told
         self.on_state: Callable[[MachineState], None] = lambda state: None
@@ -110,7 +110,7 @@ class MachineSession:
         Never raises because of the machine.
         """
         self._signals.hold()
-        dark = True
+        dark = self._stops = True
         if self._at_risk:
             self._at_risk = False
             dark = self.conversation.stop()
@@ -158,7 +158,7 @@ class MachineSession:
         if self.conversation.status is not self._told:
             self._told = self.conversation.status
             self.on_state(self.state)
-        if self._in_job or self.conversation.connection.writing_eeprom:
+        if self._in_job or self._stops or self.conversation.connection.writing_eeprom:
             return
         for key in self._keys.pressed():
             order = self._orders.get(key)
@@ -214,12 +214,9 @@ class MachineSession:
     def _run_jog(self, line: str) -> None:
         session = self.conversation
         session.command(line)
-        while True:
-            status = session.wait_status()
-            if status.state == "Idle":
-                return
-            if status.state != "Jog":
-                raise ControllerError(f"The jog ended in state {status.state}.")
+        while (state := session.wait_status().state) != "Idle":
+            if state != "Jog":
+                raise ControllerError(f"The jog ended in state {state}.")
             session.pause(_POLL_S)
 
     def nudge(self, dx: float, dy: float) -> None:
@@ -312,14 +309,18 @@ class MachineSession:
 
     def abort(self, *, at_once: bool = False) -> bool:
         """Stop whatever runs by a reset, after a dark motion has come to rest, unless ``at_once``;
-        whether the controller then reports that the beam is off.
+        whether the controller then reports that the beam is off. Keys do not end it half done.
         """
         self._pad.forget()
-        session, self._at_risk = self.conversation, False
+        session, self._at_risk, self._stops = self.conversation, True, True
         status = session.status
         jogs = status is not None and status.state == "Jog" and not status.beam_on
-        dark = session.hold_and_stop() if jogs and not at_once else session.stop()
+        try:
+            dark = session.hold_and_stop() if jogs and not at_once else session.stop()
+        finally:
+            self._stops = False
         self._at_risk = not dark
+        self._keys.pressed()  # what was pressed meanwhile is done
         return dark
 
     def _or_stop(self, action: Callable[[], object]) -> None:
@@ -344,8 +345,7 @@ class MachineSession:
         session = self.conversation
         if session.connection.in_flight:
             return False
-        report = session.wait_status()
-        self._note(report)
+        self._note(session.wait_status())
         return not self._at_risk
 
     # Jobs

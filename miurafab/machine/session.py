@@ -304,13 +304,12 @@ class Session:
             for _ in range(_RESETS):
                 self._reset_now(hold_first)
                 if restarts(self, RESET_S):
-                    break
-            else:
-                return False
-            report = self.fresh_status(ANSWER_S)
+                    report = self.fresh_status(ANSWER_S)
+                    if report is None or not report.beam_on:  # it rests: it may have missed that
+                        return report is not None and report.beam_off
         except PortError:
-            return False
-        return report is not None and report.beam_off
+            pass
+        return False
 
     def hold_and_stop(self) -> bool:
         """Let the motion come to rest before the reset, so that the position is not lost.

@@ -30,10 +30,14 @@ class Wire(Cable):
     def __init__(self, device: VirtualGrbl) -> None:
         super().__init__(device)
         self.sent = b""
+        self.lose_resets = 0
 
     def write(self, data: bytes) -> None:
         self.sent += data.replace(b"?", b"")
-        super().write(data)
+        if data == b"\x18" and self.lose_resets:
+            self.lose_resets -= 1
+        else:
+            super().write(data)
 
     def write_now(self, data: bytes) -> None:
         self.reset_at = self.now()
@@ -132,6 +136,40 @@ def test_ctrl_x_resets_within_10_ms_whatever_is_waited_for(action: str) -> None:
     assert wire.sent.endswith(b"\x18")
     assert b"!" not in wire.sent
     assert 0 <= wire.reset_at - begun - 0.333 <= 0.011
+
+
+class Hammered(Pressed):
+    """... and pressed again at each look from then on."""
+
+    def pressed(self) -> str:
+        return "\x18" * (self._wire.now() >= self._at)
+
+
+def test_a_reset_that_a_resting_controller_missed_is_sent_again() -> None:
+    here, wire = session(s32=0)
+    here.say("M3 S500")
+    wire.lose_resets = 2
+    assert here.abort(at_once=True)
+    assert wire.sent.count(b"\x18") == 3
+    assert not wire.device.beam_on
+
+
+def test_a_second_press_does_not_end_a_stop_that_the_controller_has_not_heard() -> None:
+    """The first reset is lost; the repetition must come, however often somebody presses."""
+    wire = Wire(VirtualGrbl(virtual_settings(MACHINE) | {32: 0}, baud=115_200))
+    keys = Hammered(wire)
+    here = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
+    here.say("M3 S500")
+    assert here.watch(0.2).beam_on
+    wire.lose_resets = 1
+    keys.press(wire.now())
+    here.watch(0.1)
+    assert wire.lose_resets == 0
+    assert wire.sent.count(b"\x18") == 2
+    assert not wire.device.beam_on
+    assert here.state.beam_off
+    keys.press(math.inf)
+    assert here.close()
 
 
 def test_a_session_that_is_left_with_the_beam_on_goes_dark() -> None:
