@@ -13,10 +13,12 @@ import numpy as np
 
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.polygons import connected_parts, edge_lengths
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.layers import LayerOrder, known_layer_order
+from miurafab.origami.folding.laying import laid_on
 from miurafab.origami.formats.fold_states import FurtherFrame
+from miurafab.origami.piece import pieces_of
 
 STRETCH = 1e-6
 """The largest difference in length or place, in mean edges, that the digits of a file explain."""
@@ -78,19 +80,12 @@ def _signs(orders: Ints) -> set[tuple[int, int, int]]:
 
 def _apart(pattern: CreasePattern, points: Floats, order: LayerOrder) -> float:
     """How far ``points`` (V, 3) are from the sheet folded flat, in mean edges, each piece moved to
-    it as a rigid body (W. Kabsch, Acta Crystallographica A 32 (1976)).
+    it as a rigid body.
     """
     there = np.column_stack([order.folded.vertices, np.zeros(len(points))])
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
-    _, part = connected_parts(pattern.faces_vertices)
-    piece = np.full(len(points), -1, dtype=np.int64)
-    real = pattern.faces_vertices >= 0
-    piece[pattern.faces_vertices[real]] = np.broadcast_to(part[:, None], real.shape)[real]
-    worst = 0.0
-    for number in range(int(part.max()) + 1):
-        mine = points[piece == number] - points[piece == number].mean(axis=0)
-        theirs = there[piece == number] - there[piece == number].mean(axis=0)
-        left, _, right = np.linalg.svd(mine.T @ theirs)
-        left[:, 2] *= np.sign(np.linalg.det(left @ right))  # a turn, and no reflection
-        worst = max(worst, float(np.linalg.norm(mine @ left @ right - theirs, axis=1).max()) / mean)
-    return worst
+    off = [
+        np.linalg.norm(laid_on(points[own], there[own]) - there[own], axis=1).max()
+        for own in (piece.vertices for piece in pieces_of(pattern))
+    ]
+    return float(max(off)) / mean

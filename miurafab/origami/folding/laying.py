@@ -15,6 +15,9 @@ from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.piece import pieces_of, shelved
 
+PLANAR = 1e-9
+"""A shape that is thinner, as part of its size, lies in a plane."""
+
 
 def laid_on_each_other(pattern: CreasePattern, states: Floats, frames: Floats) -> Floats:
     """``frames`` (T, V, 3) of ``pattern`` at ``states`` (T,), moved rigidly, piece by piece."""
@@ -53,9 +56,15 @@ def _laid(states: Floats, frames: Floats, known: Floats, goal: float) -> Floats:
 def laid_on(points: Floats, onto: Floats) -> Floats:
     """``points`` (V, 3) moved rigidly to lie on ``onto`` (V, 3) with the least squared distance.
 
-    (W. Kabsch, Acta Cryst. A 32 (1976) 922.)
+    Two shapes in the plane of x and y stay in it: a sheet folded to a strip would leave the turn
+    about the strip open. (W. Kabsch, Acta Cryst. A 32 (1976) 922.)
     """
     centre, goal = points.mean(axis=0), onto.mean(axis=0)
-    u, _, vt = np.linalg.svd((points - centre).T @ (onto - goal))
-    mirror = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    return np.asarray((points - centre) @ ((u * mirror) @ vt) + goal)
+    size = float(np.ptp(onto, axis=0).max())
+    planar = max(np.abs(points[:, 2]).max(), np.abs(onto[:, 2]).max()) <= PLANAR * size
+    n = 2 if planar else 3
+    u, _, vt = np.linalg.svd((points - centre)[:, :n].T @ (onto - goal)[:, :n])
+    u[:, -1] *= np.sign(np.linalg.det(u @ vt))
+    turn = np.eye(3)
+    turn[:n, :n] = u @ vt
+    return np.asarray((points - centre) @ turn + goal)

@@ -17,6 +17,7 @@ from flat_folds import flaps, grid, strip
 from problems import fitted, regular
 
 from miurafab.errors import InputError, PatternError
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding import order_search
 from miurafab.origami.folding.kinematics import fold_angles_at, place
@@ -219,3 +220,12 @@ def test_search_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(order_search.importlib, "import_module", missing)
     with pytest.raises(InputError, match=r"python-sat.*miurafab\[layers\]"):
         search_layer_orders(strip("V"))
+
+
+def test_a_sheet_that_folds_to_a_strip_is_drawn_in_its_plane():
+    """A Miura-ori of one width lies along a line, about which a turn is left open."""
+    pattern = replace(regular(), folded_coords=None)
+    order = known_layer_order(pattern)
+    flat = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
+    lengths = edge_lengths(order.folded.vertices, pattern.edges_vertices)
+    assert np.abs(lengths - flat).max() <= 1e-12 * flat.max()
