@@ -2,7 +2,7 @@
 
     python benchmarks/from_flat.py [NAME ...]
 
-Without names all patterns of tests/flat_patterns.py but the largest are folded; ``miura-60`` has
+Without names all patterns of tests/named_patterns.py but the largest are folded; ``miura-60`` has
 3,600 facets.
 """
 
@@ -16,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-import flat_patterns
+import named_patterns
 
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.certificate import certified
@@ -25,17 +25,17 @@ from miurafab.origami.folding.ramp_motion import ramp_motion
 
 STEPS = 20
 PATTERNS = {
-    "miura-10": partial(flat_patterns.miura, 10),
-    "miura-20": partial(flat_patterns.miura, 20),
-    "waterbomb-base": flat_patterns.waterbomb_base,
-    "bird-base": flat_patterns.bird_base,
-    "square-twist": flat_patterns.square_twist,
-    "yoshimura": partial(flat_patterns.yoshimura, 8, 8, 60.0),
-    "kresling": flat_patterns.kresling,
-    "waterbombs": flat_patterns.waterbombs,
-    "resch": flat_patterns.resch,
-    "pleated-hypar": flat_patterns.pleated_hypar,
-    "miura-60": partial(flat_patterns.miura, 60),
+    "miura-10": partial(named_patterns.miura, 10),
+    "miura-20": partial(named_patterns.miura, 20),
+    "waterbomb-base": named_patterns.waterbomb_base,
+    "bird-base": named_patterns.bird_base,
+    "square-twist": named_patterns.square_twist,
+    "yoshimura": partial(named_patterns.yoshimura, 8, 8, 60.0),
+    "kresling": named_patterns.kresling,
+    "waterbombs": named_patterns.waterbombs,
+    "resch": named_patterns.resch,
+    "pleated-hypar": named_patterns.pleated_hypar,
+    "miura-60": partial(named_patterns.miura, 60),
 }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import flat_patterns
+import named_patterns
 import numpy as np
 import pytest
 
@@ -13,11 +13,11 @@ from miurafab.origami.folding.motion import find_motion
 
 def slit():
     """Three by two squares: a slit along the middle of the lower row's top, and two flaps."""
-    lines = flat_patterns.border((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (0.0, 2.0))
+    lines = named_patterns.border((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (0.0, 2.0))
     lines += [((1.0, 1.0), (2.0, 1.0), "C", 0.0), ((0.0, 1.0), (1.0, 1.0), "V", 60.0)]
     lines += [((2.0, 1.0), (3.0, 1.0), "V", 60.0)]
     lines += [((x, 0.0), (x, 2.0), "F", 0.0) for x in (1.0, 2.0)]
-    return flat_patterns.drawn(lines)
+    return named_patterns.drawn(lines)
 
 
 def test_the_two_sides_of_a_cut_part() -> None:
@@ -28,9 +28,9 @@ def test_the_two_sides_of_a_cut_part() -> None:
     # both ends of the slit lie inside the sheet, so facets around them still join them
     assert len(opened.vertices_coords) == len(pattern.vertices_coords)
     assert len(opened.edges_vertices) == edges + 1
-    through = flat_patterns.drawn(
+    through = named_patterns.drawn(
         [
-            *flat_patterns.border((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)),
+            *named_patterns.border((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)),
             ((1.0, 0.0), (1.0, 1.0), "C", 0.0),
         ]
     )
@@ -42,16 +42,16 @@ def test_the_two_sides_of_a_cut_part() -> None:
     assert lengths[: len(through.edges_vertices)] == pytest.approx(
         edge_lengths(through.vertices_coords, through.edges_vertices)
     )
-    assert cut_open(flat_patterns.waterbomb_base()).edges_vertices.shape == (12, 2)
+    assert cut_open(named_patterns.waterbomb_base()).edges_vertices.shape == (12, 2)
 
 
 def test_a_flap_folds_along_its_cut() -> None:
     """A flap in a square, cut on three sides, turns by itself and leaves the square flat."""
-    lines = flat_patterns.border((0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0))
+    lines = named_patterns.border((0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0))
     lines += [((1.0, 1.0), (2.0, 1.0), "V", 90.0), ((2.0, 1.0), (2.0, 2.0), "C", 0.0)]
     lines += [((2.0, 2.0), (1.0, 2.0), "C", 0.0), ((1.0, 2.0), (1.0, 1.0), "C", 0.0)]
     lines += [((0.0, 1.0), (1.0, 1.0), "F", 0.0), ((2.0, 1.0), (3.0, 1.0), "F", 0.0)]
-    motion = find_motion(flat_patterns.drawn(lines), 4).motion
+    motion = find_motion(named_patterns.drawn(lines), 4).motion
     assert motion.is_rigid
     valley = motion.pattern.edges_assignment == "V"
     last = np.degrees(motion.fold_angles[-1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import flat_patterns
+import named_patterns
 import numpy as np
 import pytest
 import trimesh
@@ -167,7 +167,7 @@ def test_a_curved_sheet_of_another_program_folds_like_ours(tmp_path: Path) -> No
 
 
 def test_free_creases_that_a_format_cannot_hold_are_told(tmp_path: Path) -> None:
-    pattern = flat_patterns.pleated_hypar(3)
+    pattern = named_patterns.pleated_hypar(3)
     free = int((pattern.edges_assignment == "U").sum())
     done = convert(_saved(pattern, tmp_path / "a.fold"), tmp_path / "a.cp")
     told = {finding.code: finding.sentence for finding in done.findings}

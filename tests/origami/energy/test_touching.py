@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import flat_patterns
+import named_patterns
 import numpy as np
 import pytest
 
@@ -62,7 +62,7 @@ def test_a_side_is_remembered_and_a_far_vertex_has_none() -> None:
 
 @pytest.mark.parametrize(("count", "angle", "shrinking"), [(8, 100.0, 1.0), (10, 95.0, 0.93)])
 def test_a_roll_comes_to_lie_on_itself(count: int, angle: float, shrinking: float) -> None:
-    pattern = flat_patterns.roll(count, angle, shrinking)
+    pattern = named_patterns.roll(count, angle, shrinking)
     assert contacts(ramp_motion(pattern, 10)[0])
     motion, verdict = ramp_motion(pattern, 10, touching=True)
     assert verdict.complete
@@ -70,12 +70,12 @@ def test_a_roll_comes_to_lie_on_itself(count: int, angle: float, shrinking: floa
 
 
 def test_contact_is_taken_up_where_it_is_needed() -> None:
-    pattern = flat_patterns.yoshimura(4, 2, 150.0)
+    pattern = named_patterns.yoshimura(4, 2, 150.0)
     without = max(len(contact.facets) for contact in contacts(ramp_motion(pattern, 6)[0]))
     found = find_motion(pattern, 6)
     assert found.verdict is not None
     assert found.verdict.touching
     assert max((len(each.facets) for each in contacts(found.motion)), default=0) < without
-    spared = find_motion(flat_patterns.waterbomb_base(), 5).verdict
+    spared = find_motion(named_patterns.waterbomb_base(), 5).verdict
     assert spared is not None
     assert not spared.touching

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import flat_patterns
+import named_patterns
 import numpy as np
 import pytest
 
@@ -23,12 +23,12 @@ from miurafab.origami.folding.motion import find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
 
 RIGID = {
-    "waterbomb base": flat_patterns.waterbomb_base,
-    "bird base": flat_patterns.bird_base,
-    "Yoshimura": lambda: flat_patterns.yoshimura(4, 4),
-    "Kresling": lambda: flat_patterns.kresling(4, 3),
-    "waterbombs": lambda: flat_patterns.waterbombs(3, 2),
-    "Resch": lambda: flat_patterns.resch(3, 2),
+    "waterbomb base": named_patterns.waterbomb_base,
+    "bird base": named_patterns.bird_base,
+    "Yoshimura": lambda: named_patterns.yoshimura(4, 4),
+    "Kresling": lambda: named_patterns.kresling(4, 3),
+    "waterbombs": lambda: named_patterns.waterbombs(3, 2),
+    "Resch": lambda: named_patterns.resch(3, 2),
 }
 
 
@@ -58,7 +58,7 @@ def test_a_known_pattern_folds_with_flat_facets(name: str) -> None:
 
 def test_a_waterbomb_base_folds_as_spherical_trigonometry_says() -> None:
     """With q = sin(rho_M / 2), cos rho_V = 2 (1 - q^2) / (1 + q^2) - 1: M -60, V 78.46 degrees."""
-    pattern = flat_patterns.waterbomb_base()
+    pattern = named_patterns.waterbomb_base()
     motion = find_motion(pattern, 12).motion
     mountains = motion.fold_angles[1:, pattern.edges_assignment == "M"]
     valleys = motion.fold_angles[1:, pattern.edges_assignment == "V"]
@@ -72,7 +72,7 @@ def test_a_waterbomb_base_folds_as_spherical_trigonometry_says() -> None:
 
 def test_a_miura_ori_comes_to_its_closed_form_without_using_it() -> None:
     """tan(rho_straight / 2) = cos(alpha) tan(rho_zigzag / 2) at every vertex and in every frame."""
-    pattern = flat_patterns.miura(4)
+    pattern = named_patterns.miura(4)
     assert find_motion(pattern, 6).motion.method == CLOSED_FORM
     motion, verdict = ramp_motion(pattern, 6)
     motion, certificate = certified(motion)
@@ -90,10 +90,10 @@ def test_a_miura_ori_comes_to_its_closed_form_without_using_it() -> None:
 def test_a_vertex_that_is_not_flat_foldable_folds_rigidly_all_the_same() -> None:
     """One vertex of degree four always does; its closed form is not that of flat-foldable ones."""
     tips = [(math.cos(turn), math.sin(turn)) for turn in np.radians([0, 70, 150, 230])]
-    lines = flat_patterns.border(*tips)
+    lines = named_patterns.border(*tips)
     letters = ("V", "V", "M", "V")
     lines += [((0.0, 0.0), tip, letter, 60.0) for tip, letter in zip(tips, letters, strict=True)]
-    found = find_motion(flat_patterns.drawn(lines), 8)
+    found = find_motion(named_patterns.drawn(lines), 8)
     assert found.mismatch is not None
     assert found.mismatch > 1e-3
     assert found.motion.is_rigid
@@ -102,7 +102,7 @@ def test_a_vertex_that_is_not_flat_foldable_folds_rigidly_all_the_same() -> None
 
 
 def test_a_square_twist_bends_and_says_where() -> None:
-    found = find_motion(flat_patterns.square_twist(), 10)
+    found = find_motion(named_patterns.square_twist(), 10)
     assert not found.motion.is_rigid
     assert found.certificate is not None
     assert not found.certificate.rigid
@@ -114,7 +114,7 @@ def test_a_square_twist_bends_and_says_where() -> None:
 
 def test_a_pleated_hypar_leaves_the_plane_by_stretching_a_little() -> None:
     """No paper folds it exactly (Demaine et al., 2011); alternating triangles come near."""
-    found = find_motion(flat_patterns.pleated_hypar(), 8)
+    found = find_motion(named_patterns.pleated_hypar(), 8)
     assert found.verdict is not None
     assert found.verdict.complete
     assert not len(found.verdict.wrong_edges)
@@ -136,7 +136,7 @@ def inverted(pattern: CreasePattern, edge: int) -> CreasePattern:
 
 
 def test_a_wrong_letter_shows_as_the_sheet_leaves_the_plane() -> None:
-    pattern = flat_patterns.miura(4)
+    pattern = named_patterns.miura(4)
     assert linear_seed(flat_model(pattern)).follow.all()
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
     edge = int(inner[len(inner) // 2 - 3])
@@ -149,7 +149,7 @@ def test_a_wrong_letter_shows_as_the_sheet_leaves_the_plane() -> None:
 
 def test_a_frame_is_a_minimum_by_finite_differences() -> None:
     """Every direction that keeps all lengths raises the energy of the bird base."""
-    pattern = flat_patterns.bird_base()
+    pattern = named_patterns.bird_base()
     path = fold_from_flat(pattern, ramp_parts(pattern, 6))
     frame, model = path.frames[3], path.model
     assert frame.stiff
@@ -199,7 +199,7 @@ def test_pieces_fold_each_by_itself() -> None:
     for shift in (0.0, 5.0):
         for one, other, letter, angle in two_squares():
             lines.append(((one[0] + shift, one[1]), (other[0] + shift, other[1]), letter, angle))
-    pattern = flat_patterns.drawn(lines)
+    pattern = named_patterns.drawn(lines)
     motion, verdict = ramp_motion(pattern, 5)
     assert pattern.pieces_count == 2
     folds = np.isin(pattern.edges_assignment, ("M", "V"))
@@ -209,15 +209,17 @@ def test_pieces_fold_each_by_itself() -> None:
     assert verdict.wrong_signs == 0
 
 
-def two_squares() -> list[flat_patterns.Line]:
-    sides = flat_patterns.border((0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (0, 1))
+def two_squares() -> list[named_patterns.Line]:
+    sides = named_patterns.border(
+        (0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (0, 1)
+    )
     return [*sides, ((1.0, 0.0), (1.0, 1.0), "V", 180.0)]
 
 
 @pytest.mark.large
 @pytest.mark.parametrize("facets", [20, 30])
 def test_large_miuras_fold_from_flat(facets: int) -> None:
-    motion, verdict = ramp_motion(flat_patterns.miura(facets), 20)
+    motion, verdict = ramp_motion(named_patterns.miura(facets), 20)
     motion, certificate = certified(motion)
     assert certificate.rigid
     assert certificate.residual <= 1e-12

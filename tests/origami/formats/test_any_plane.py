@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import flat_patterns
+import named_patterns
 import numpy as np
 import pytest
 
@@ -15,7 +15,7 @@ SEEDS = range(4)
 
 
 def document(points: np.ndarray, faces: list[list[int]]) -> dict:
-    pattern = flat_patterns.waterbomb_base()
+    pattern = named_patterns.waterbomb_base()
     return {
         "file_spec": 1.1,
         "frame_classes": ["creasePattern"],
@@ -28,7 +28,7 @@ def document(points: np.ndarray, faces: list[list[int]]) -> dict:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_pattern_in_any_plane_keeps_its_lengths_and_its_upper_side(seed: int) -> None:
-    pattern = flat_patterns.waterbomb_base()
+    pattern = named_patterns.waterbomb_base()
     turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     flat = pattern.vertices_coords
@@ -45,14 +45,14 @@ def test_a_pattern_in_any_plane_keeps_its_lengths_and_its_upper_side(seed: int) 
 
 def test_a_pattern_in_the_plane_of_x_and_z_keeps_its_axes() -> None:
     """Facets that run counter-clockwise seen against y: x stays x, and z becomes y."""
-    flat = flat_patterns.waterbomb_base().vertices_coords
+    flat = named_patterns.waterbomb_base().vertices_coords
     points = np.column_stack([flat[:, 0], np.zeros(len(flat)), flat[:, 1]])
-    faces = flat_patterns.waterbomb_base().faces_vertices.tolist()
+    faces = named_patterns.waterbomb_base().faces_vertices.tolist()
     assert laid_in_plane(points, faces) == pytest.approx(flat)
 
 
 def test_what_is_in_no_plane_is_no_flat_pattern() -> None:
-    pattern = flat_patterns.waterbomb_base()
+    pattern = named_patterns.waterbomb_base()
     bent = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
     bent[0, 2] = 1.0
     assert laid_in_plane(bent) is None
