@@ -160,7 +160,7 @@ class SessionProcess:
         self._tell(framed(pickle.dumps(order, protocol=5)))
 
     def _tell(self, data: bytes) -> None:
-        with contextlib.suppress(OSError):  # one that has died says so in poll
+        with contextlib.suppress(OSError, ValueError):  # one that has died says so in poll
             self._down.write(data)
             self._down.flush()
 

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from miurafab.errors import InputError
 from miurafab.machine.known_controller import MachineState, require_talk
@@ -58,6 +58,17 @@ _ARMED_S = 60.0
 _MOST_LINES = 400
 
 
+class ArmedSheet(NamedTuple):
+    """The first step of a start: its ``code``, ``until`` when it holds (monotonic clock), the
+    ``facts`` that a person read, and the number of ``resets`` up to then.
+    """
+
+    code: str
+    until: float
+    facts: list[list[str]]
+    resets: int
+
+
 class Desk:
     """The session and who controls it. Every method may be called in any thread.
 
@@ -73,7 +84,7 @@ class Desk:
         self._session: HeldSession | None = None
         self._control: str | None = None
         self._taken = 0
-        self._armed: tuple[str, float, list[list[str]]] | None = None
+        self._armed: ArmedSheet | None = None
         self._lines: deque[tuple[int, str]] = deque(maxlen=_MOST_LINES)
         self._count = 0
         self._alarm: int | None = None
@@ -188,30 +199,42 @@ class Desk:
         if prepared.machine != session.machine:
             prepared = prepare(job, machine=session.machine)
         prepared = replace(prepared, name=name)
-        self.do(lambda operator: operator.put_on(prepared))
-        with self._lock:
-            self._prepared = prepared
-            self._jobs += 1
+
+        def work(operator: Operator) -> None:
+            operator.put_on(prepared)
+            with self._lock:
+                self._prepared = prepared
+                self._jobs += 1
+
+        self.do(work)
 
     def arm(self) -> None:
-        """The first step of a start."""
+        """The first step of a start; raises :class:`~miurafab.errors.InputError` where somebody
+        else has taken over meanwhile.
+        """
         self._armed = None
 
         def work(operator: Operator) -> list[list[str]]:
             operator.arm()
             return burn_table(operator)
 
-        table = self._require_session().ask(work)
-        self._armed = secrets.token_urlsafe(12), time.monotonic() + _ARMED_S, table
+        taken, session = self._taken, self._require_session()
+        resets = session.process.resets
+        facts = session.ask(work, resets)
+        with self._lock:
+            if taken != self._taken:
+                raise InputError(NO_CONTROL)
+            until = time.monotonic() + _ARMED_S
+            self._armed = ArmedSheet(secrets.token_urlsafe(12), until, facts, resets)
 
     def start(self, code: str) -> None:
         """The second step, with the code of the first."""
         armed, self._armed = self._armed, None
-        if armed is None or not same_key(code, armed[0]):
+        if armed is None or not same_key(code, armed.code):
             raise InputError(NOT_ARMED)
-        if time.monotonic() > armed[1]:
+        if time.monotonic() > armed.until:
             raise InputError(LAPSED)
-        self._require_session().ask(lambda operator: operator.start())
+        self._require_session().ask(lambda operator: operator.start(), armed.resets)
 
     # What is seen
 
@@ -238,8 +261,8 @@ class Desk:
             seen = self._seen
         if session is None:
             return shown | {"ports": self.ports()}
-        if armed is not None and time.monotonic() <= armed[1]:
-            shown["armed"] = {"code": armed[0], "facts": armed[2]}
+        if armed is not None and time.monotonic() <= armed.until:
+            shown["armed"] = {"code": armed.code, "facts": armed.facts}
         silent = time.monotonic() - session.process.heard
         busy = seen.get("busy", "open")
         words = state_words(
@@ -287,8 +310,9 @@ class Desk:
             self._seen = seen
 
     def _differences(self, session: HeldSession, state: MachineState) -> dict[str, Any]:
-        if self._settings[0] is not state.settings:
-            self._settings = state.settings, settings_table(session.machine, state.settings)
+        told = session.machine, state.settings  # each state brings a copy
+        if self._settings[0] != told:
+            self._settings = told, settings_table(*told)
         return self._settings[1]
 
     def _say(self, text: str) -> None:

@@ -39,8 +39,9 @@ _RESET_KEY = RESET.decode("ascii")
 class DeskProcess(SessionProcess):
     """The process, with a reset that any thread may ask for.
 
-    ``asked`` is the number of resets when the order under way was asked for. ``heard`` is when a
-    message came last, on the monotonic clock.
+    ``resets`` counts them, and what else makes void that which was asked for before. ``asked`` is
+    that number when the order under way was asked for. ``heard`` is when a message came last, on
+    the monotonic clock.
     """
 
     def __init__(self, machine: MachineProfile, port: str, speed: float | None) -> None:
@@ -61,6 +62,11 @@ class DeskProcess(SessionProcess):
         with self._gate:
             self.resets += 1
             self.press(_RESET_KEY)
+
+    def void(self) -> None:
+        """Begin nothing more of what was asked for up to now."""
+        with self._gate:
+            self.resets += 1
 
     def poll(self) -> Message | None:
         """As the base."""
@@ -102,18 +108,21 @@ class HeldSession:
         self._thread = threading.Thread(target=self._attend, name="miurafab desk", daemon=True)
         self._thread.start()
 
-    def ask(self, work: Callable[[Operator], T]) -> T:
+    def ask(self, work: Callable[[Operator], T], resets: int | None = None) -> T:
         """Have ``work`` done by the thread and return what it returns, or raise what it raises.
 
-        Raises :class:`~miurafab.errors.MachineError` if the session has ended.
+        ``resets`` is the number of them at which it was wanted; any since then makes it void.
+        Raises :class:`~miurafab.errors.MachineError` if the session has ended, and for no answer:
+        then it is not done later, when nobody expects it.
         """
         future: Future[T] = Future()
-        self._asked.put((self.process.resets, work, future))
+        self._asked.put((self.process.resets if resets is None else resets, work, future))
         if not self._thread.is_alive():
             self._refuse_rest()
         try:
             return future.result(_ANSWER_S)
         except TimeoutError:
+            self.process.void()
             raise MachineError(NO_ANSWER) from None
 
     def abort(self) -> None:
@@ -127,20 +136,22 @@ class HeldSession:
         self._thread.join()
 
     def _attend(self) -> None:
-        how = FAILED
+        how = why = FAILED
         operator: Operator | None = None
         try:
             operator = Operator(self.process, None, DEFAULT_OPTIONS)
             self._follow(operator)
-            how = self._why_over(operator)
+            why = self._why_over(operator)
         finally:
-            if operator is None:
-                self.process.end()
-            else:
-                how = operator.close() or how
-            self._leaves.set()
-            self._refuse_rest()
-            self._on_end(how)
+            try:
+                if operator is None:
+                    self.process.end()
+                else:
+                    how = operator.close() or why
+            finally:
+                self._leaves.set()
+                self._refuse_rest()
+                self._on_end(how)
 
     def _follow(self, operator: Operator) -> None:
         look_at = 0.0
@@ -174,6 +185,9 @@ class HeldSession:
             self.process.asked = asked
             self.trouble = ""
             try:
+                if asked != self.process.resets:
+                    operator.armed = False
+                    raise JobStopped(VOID)
                 future.set_result(work(operator))
             except MiurafabError as error:
                 future.set_exception(error)
@@ -193,8 +207,9 @@ class HeldSession:
 
     def _wake(self, operator: Operator, seconds: float) -> None:
         """A job that the computer slept through has stood still unwatched: it is not gone on
-        with.
+        with, and none that was armed before is started.
         """
+        operator.armed = False
         operator.said.append(slept(seconds, stopped=operator.busy == "cut"))
         if operator.busy == "cut":
             self.process.reset()

@@ -111,7 +111,7 @@ def _work(route: str, order: dict[str, Any]) -> Callable[[Operator], None]:
         return lambda operator: operator.nudge(dx, dy)
     if route == "sheet":
         number = order.get("number")
-        if not isinstance(number, int):
+        if type(number) is not int:
             raise InputError("The page asked for a sheet without a number; reload it.")
         return lambda operator: operator.choose(number)
     if route == "say":

@@ -1,6 +1,7 @@
 """The tab Machine in a browser: arm, burn, hold, go on, abort from anywhere, and take over."""
 
 import threading
+import time
 
 import pytest
 import studio_picture
@@ -137,3 +138,36 @@ def test_a_sheet_is_burnt_held_and_aborted_from_every_screen(studio, tmp_path):
         page.click("leave")
         page.until("!document.getElementById('connect-form').hidden")
         assert all(asked.startswith((address, "data:", "blob:")) for asked in page.requests)
+
+
+def test_the_pad_rests_when_it_is_released_while_disabled_and_one_loop_asks(studio, tmp_path):
+    right = "document.querySelector('#pad .right')"
+    with AtDesk(tmp_path / "profile") as page:
+        page.open(studio.guard.address)
+        page.until("document.documentElement.dataset.ready === 'yes'")
+        page.click("connect")
+        page.title("Ready")
+        page.until(f"!{right}.disabled")
+        jogs = "performance.getEntriesByType('resource').filter((e) => /jog$/.test(e.name)).length"
+        page.run(f"{right}.dispatchEvent(new PointerEvent('pointerdown', {{button: 0}}))")
+        page.until(f"{jogs} >= 2")
+        studio.desk.take_over()  # another page
+        page.until(f"{right}.disabled")
+        time.sleep(0.3)  # it is released, of which a disabled button need not tell
+        page.click("take")
+        page.until(f"!{right}.disabled")
+        time.sleep(0.3)
+        before = page.run(jogs)
+        time.sleep(0.5)
+        assert page.run(jogs) == before
+
+        page.run(
+            "for (let k = 0; k < 20; k += 1) document.dispatchEvent(new Event('visibilitychange'))"
+        )
+        asked = (
+            "performance.getEntriesByType('resource').filter((e) => /after=/.test(e.name)).length"
+        )
+        time.sleep(0.5)
+        page.run("performance.clearResourceTimings()")
+        time.sleep(1.0)
+        assert 1 <= page.run(asked) <= 6

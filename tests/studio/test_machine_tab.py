@@ -289,6 +289,7 @@ NOT_OFFERED = (
     ("leave", {"control": "ключ"}),
     ("sheet", {"number": "2"}),
     ("sheet", {"number": 2}),
+    ("sheet", {"number": True}),
     ("say", {"text": "$X\n$H"}),
     ("start", {}),
     ("arm", {"force": "bounds"}),

@@ -19,6 +19,7 @@ let step = 10;
 let now = { open: false };
 let answered = performance.now();
 let asking = null;
+let turns = 0;
 let fault = () => {};
 
 const controls = () => Boolean(control) && taken === now.taken;
@@ -209,9 +210,13 @@ export function offerJob(job, own) {
 
 async function follow() {
   clearTimeout(asking);
+  const turn = ++turns; // of two that wait for an answer the later one goes on
   try {
-    show(await ask(`machine?after=${heard}`));
+    const state = await ask(`machine?after=${heard}`);
+    if (turn !== turns) return;
+    show(state);
   } catch (error) {
+    if (turn !== turns) return;
     late();
     if (now.open) fault(error.message);
   }
@@ -223,21 +228,24 @@ function late() {
   if (now.open) document.body.classList.add("late");
 }
 
-/** A press of the pad: once, and again while it is held. */
+/** A press of the pad: once, and again while it is held. A button that is disabled meanwhile tells
+ * of no release, so that ends it, too. */
 function pressPad(button) {
   let under = false;
+  const over = new AbortController();
+  const end = () => { clearInterval(again); over.abort(); };
   const press = async () => {
+    if (button.disabled) end();
     if (under || button.disabled) return;
     under = true;
     await order("jog", { x: Number(button.dataset.x), y: Number(button.dataset.y), step });
     under = false;
   };
   const again = setInterval(press, PRESS_MS);
-  const end = () => clearInterval(again);
-  for (const event of ["pointerup", "pointercancel", "pointerleave", "blur"]) {
-    button.addEventListener(event, end, { once: true });
+  for (const event of ["pointerup", "pointercancel", "blur"]) {
+    window.addEventListener(event, end, { signal: over.signal });
   }
-  window.addEventListener("blur", end, { once: true });
+  button.addEventListener("pointerleave", end, { signal: over.signal });
   press();
 }
 
