@@ -280,4 +280,6 @@ def _points(values: list[list[float]]) -> Floats:
     points = np.array(values, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
         raise ValueError("a list of points is not a list of pairs of numbers")
+    if np.abs(points).max(initial=0.0) > LARGEST_MM:
+        raise ValueError(f"a list of points holds a coordinate over {LARGEST_MM:g} mm")
     return points

@@ -165,6 +165,10 @@ def _tabs(patches: tuple[Patch, ...], pattern: CreasePattern, face_patch: Ints) 
             edges[row, side], faces[row, side] = edge, own[0]
         inner = tab.edge == tab.mate_edge and tab.join != "double"
         fold[row] = pattern.edges_assignment[tab.edge] if inner else _LETTERS.get(tab.fold, "F")
+        if sizes[row] < 3 or not np.ptp(tab.polygon_mm[:2], axis=0).any():
+            raise LayoutError(
+                f"Tab {tab.label} has no base: it needs three corners, two at its edge."
+            )
         points[row, : sizes[row]] = turned(tab.polygon_mm, -patch.rotation_deg) + patch.origin_mm
     seams = Seams(edges, faces, fold)
     return TabRegions(seams, points, _glued(pattern, seams, points), sizes)

@@ -229,6 +229,14 @@ def test_a_written_slot_is_proven_by_its_tab(written):
     (written / "layout.json").write_text(text)
 
 
+def test_a_job_of_one_patch_has_no_slots_and_is_whole(tmp_path):
+    for name, options in (("bare", {}), ("based", {"border_tabs": "all"})):
+        mf.sheets(regular(), join="slots", **options).write(tmp_path / name)
+        found = mf.check_job(tmp_path / name)
+        assert found.valid, found.findings
+        assert "slot" not in found.traced
+
+
 def test_a_slot_that_is_not_cut_is_named(written):
     program = written / "sheet-01.nc"
     text = program.read_text()

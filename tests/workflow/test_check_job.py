@@ -12,7 +12,7 @@ import shapely
 from piece_problems import gores, trimmed, two_trimmed_pieces
 
 import miurafab as mf
-from miurafab.errors import InputError
+from miurafab.errors import InputError, LayoutError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.options import read_options, written_options
 from miurafab.profiles import load_material
@@ -169,6 +169,22 @@ def test_a_layout_that_is_not_of_the_pattern_is_named(job):
     assert with_(shifted) == ["The outline of P1 does not surround its facets and tabs."]
     assert "edge 9999" in with_(lambda layout: layout["patches"][0]["tabs"][0].update(edge=9999))[0]
     assert "each facet" in with_(lambda layout: layout["patches"][0]["faces"].pop())[0]
+    for points in (
+        lambda tab: tab[:1] * len(tab),
+        lambda tab: tab[:1] + tab[:1] + tab[2:],
+        lambda tab: tab[:2],
+    ):
+
+        def changed(layout, points=points):
+            tab = layout["patches"][0]["tabs"][0]
+            tab["polygon_mm"] = points(tab["polygon_mm"])
+
+        assert "has no base" in with_(changed)[0]
+    far = json.loads(before)
+    far["patches"][0]["tabs"][0]["polygon_mm"][0][0] = 1e308
+    edited(job, "layout.json", lambda _: json.dumps(far))
+    with pytest.raises(LayoutError, match="a coordinate over"):
+        mf.check_job(job)
     (bare,) = with_(lambda layout: layout["patches"][0]["tabs"].clear())[:1]
     assert "outline of P1" in bare or "no tab" in bare
 

@@ -50,7 +50,7 @@ class OutlinedPatch:
 class OutlinedPatches:
     """All ``patches`` of a pattern: ``face_patch`` (F,) the patch of each facet, ``tabs`` all tabs,
     ``untabbed`` (u,) the edges where no side can bear the tab that is wanted. ``join`` is what
-    holds the seams, ``slots`` the slots that tabs go through.
+    holds the seams, ``slots`` the slots that tabs go through, None where there are none.
     """
 
     patches: list[OutlinedPatch]
@@ -62,7 +62,8 @@ class OutlinedPatches:
 
     def joined(self, pattern: CreasePattern, material: Material, join: str) -> OutlinedPatches:
         """The same, held as ``join`` says."""
-        slots = slots_of(pattern, self.tabs, material) if join == "slots" else None
+        slotted = join == "slots" and bool((self.tabs.mate_face >= 0).any())
+        slots = slots_of(pattern, self.tabs, material) if slotted else None
         return replace(self, join=join, slots=slots)
 
     @property
