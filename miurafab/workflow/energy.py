@@ -42,7 +42,7 @@ class EnergyOptions:
         number(0), "Stiffness of the creases over that of the facets.", default=0.0
     )
     pull: str | tuple[int, int] | None = option(
-        Either(Choice((CORNERS,)), Pair(Whole(), "V1,V2")),
+        Either(Choice((CORNERS,)), Pair(Whole(), "V1,V2", "0,120")),
         "Pull two vertices apart, two opposite corners of the grid or those given, and tell the "
         "force in newtons.",
         default_text="none",

@@ -156,6 +156,7 @@ def test_a_material_without_stiff_creases_cannot_be_pulled(hypar):
     [
         (["--strain", "0.2"], "--strain is for a sheet that is pulled"),
         (["--pull", "0,1"], "two corners of one facet"),
+        (["--pull", "0"], "such as 0,120"),
         (["--pull", "0,99"], "0 to 80"),
         (["--pull", "corners", "--crease", "20"], "leave it out with --pull"),
         (["--pull", "corners", "--crease-ratio", "1"], "--crease-ratio does not go with --pull"),

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from miurafab.errors import InputError, PatternError
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, Paper, sheet_model
 from miurafab.origami.energy.continuation import Known, Progress, Walk, without_load
@@ -68,7 +68,7 @@ class PullCurve(EnergyResult):
     distances: Floats
     forces: Floats
     cycles: Ints
-    loading: Ints
+    loading: Bools
     works: Floats
     stored: Floats
     dissipated: Floats
@@ -84,7 +84,7 @@ class PullCurve(EnergyResult):
         """The extensions and forces on the way out, a pair for each cycle."""
         ways = []
         for cycle in range(1, int(self.cycles[-1]) + 1):
-            on = (self.cycles == cycle) & (self.loading == 1)
+            on = (self.cycles == cycle) & self.loading
             ways.append((self.extensions[on], self.forces[on]))
         return ways
 
@@ -100,7 +100,7 @@ class PullCurve(EnergyResult):
     def report(self) -> dict[str, Any]:
         """The curve's numbers, ready for JSON."""
         paper, changes = self.paper, self.changes()
-        out = [int(np.flatnonzero((self.cycles == c) & (self.loading == 1))[-1]) for c in self._all]
+        out = [int(np.flatnonzero((self.cycles == c) & self.loading)[-1]) for c in self._all]
         back = [int(np.flatnonzero(self.cycles == c)[-1]) for c in self._all]
         stiff = math.isinf(paper.yield_angle)
         return {
@@ -139,9 +139,11 @@ class PullCurve(EnergyResult):
         }
 
     def _set(self, end: int) -> float | None:
-        """How much longer it stays, mm; None where the way was lost before it was let go."""
+        """How much longer it stays, mm; None where the way was lost before it was let go, and where
+        the sheet does not come back by itself.
+        """
         top = float(np.abs(self.forces).max())
-        released = self.loading[end] == 0 and abs(self.forces[end]) <= RELEASED * top
+        released = not self.loading[end] and abs(self.forces[end]) <= RELEASED * top
         return float(self.extensions[end]) if released else None
 
     @property
@@ -157,9 +159,18 @@ class PullCurve(EnergyResult):
                 "shape or is stretched out; ask for a smaller `strain`, or take more `steps`."
             )
         answer = self.report()
-        said = f"{answer['force_n']:.3g} N pull it to a strain of {self.strain:g}"
+        force, left = answer["force_n"], answer["set_mm"]
+        pulled = self.strain > 0
+        if (force > 0) != pulled:
+            return (
+                f"At a strain of {self.strain:g} it goes farther by itself, and {abs(force):.3g} N "
+                "hold it back."
+            )
+        said = (
+            f"{abs(force):.3g} N {'pull' if pulled else 'push'} it to a strain of {self.strain:g}"
+        )
         if answer["yielded"]:
-            said += f"; let go, it stays {answer['set_mm']:.2g} mm longer"
+            said += f"; let go, it stays {abs(left):.3g} mm {'longer' if left > 0 else 'shorter'}"
         return said + "."
 
     def _table(self) -> str:
@@ -251,7 +262,7 @@ class _Pulled:
         cycles: int,
         on_progress: Progress | None,
     ) -> None:
-        self.driven, self.on_progress = driven, on_progress
+        self.driven, self.strain, self.on_progress = driven, strain, on_progress
         self.first = driven.value(driven.model.points)
         self.drives = self.first * (1 + strain * np.linspace(0, 1, steps + 1))
         self.outward = math.copysign(1.0, strain)
@@ -322,12 +333,12 @@ def _curve(
     joule = model.unit_joule
     return PullCurve(
         ends=ends,
-        strain=(pulled.drives[-1] - pulled.first) / pulled.first,
+        strain=pulled.strain,
         paper=paper,
         distances=drive * model.unit_mm,
         forces=load * joule / (model.unit_mm * 1e-3),
         cycles=cycle.astype(np.int64),
-        loading=loading.astype(np.int64),
+        loading=loading.astype(bool),
         works=work * joule,
         stored=stored * joule,
         dissipated=lost * joule,

@@ -88,7 +88,7 @@ def test_a_stiff_miura_ori_pulls_as_its_rigid_motion_does(unit):
     turned = motion.fold_angles[:, inner] - motion.fold_angles[0, inner]
     energy = 0.5 * (k * turned**2).sum(axis=1)
     force = np.gradient(energy, apart * 1e-3)
-    out = curve.loading == 1
+    out = curve.loading
     expected = np.interp(curve.distances[out], apart, force)
     assert curve.forces[out] == pytest.approx(expected, abs=2e-3 * expected.max())
 
@@ -138,6 +138,30 @@ def test_the_force_grows_with_the_cube_of_a_sheet_scaled_alike():
     other = pull(hypar().scaled(2.0), twice, cycles=1, steps=8)
     assert other.forces == pytest.approx(4 * one.forces, rel=1e-6, abs=1e-9)
     assert other.stored == pytest.approx(8 * one.stored, rel=1e-6, abs=1e-12)
+
+
+def test_the_verdict_tells_pull_from_push():
+    pushed = pull(hypar(), PAPER, strain=-0.1, steps=6, cycles=1)
+    force = pushed.report()["force_n"]
+    assert force < 0
+    assert pushed.report()["strain"] == -0.1
+    assert pushed.verdict().startswith(f"{-force:.3g} N push it to a strain of -0.1")
+    pulled = pull(hypar(), PAPER, strain=0.25, steps=6, cycles=1)
+    assert f"it stays {pulled.report()['set_mm']:.3g} mm longer" in pulled.verdict()
+
+
+def test_a_sheet_that_is_pulled_over_its_barrier_is_held_back():
+    """Its creases are so soft that the bistable sheet goes on to flat by itself."""
+    surface = make_surface("hypar", {"height": 1.0})[0]
+    pattern = fit(FitRequest(surface=surface, facets=(8, 8), size_mm=200.0)).pattern
+    soft = Paper(0.3, 2.5e9, crease_length_mm=1e6, yield_angle=0.3, hardening=0.1)
+    curve = pull(pattern, soft, strain=0.5, steps=20, cycles=1)
+    report = curve.report()
+    assert curve.converged
+    assert report["yielded"] > 0
+    assert report["force_n"] < 0
+    assert report["set_mm"] is None
+    assert "goes farther by itself" in curve.verdict()
 
 
 def test_what_cannot_be_pulled_is_said():
