@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from miurafab.errors import OptionError
+from miurafab.errors import OptionError, PatternError
 from miurafab.findings import Finding
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
@@ -183,7 +183,10 @@ def _tried(request: FitRequest, fitted: CreasePattern, factor: float) -> Tried |
     short = measured.min_edge_mm < (request.min_edge_mm or DEGENERATE * mean)
     if short or near.factor > 1:
         return None
-    curve = energy_curve(pattern, STEPS)
+    try:
+        curve = energy_curve(pattern, STEPS)
+    except PatternError:  # no balance is found at its folded form
+        return None
     return Tried(factor, pattern, measured, curve.barrier) if curve.converged else None
 
 

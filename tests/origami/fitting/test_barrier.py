@@ -46,6 +46,14 @@ def test_a_barrier_out_of_reach_is_told_with_what_there_is():
     assert 1e-3 < result.barrier < 10.0
 
 
+def test_sheets_without_balance_end_the_search_with_what_there_is():
+    """On the way up to 0.01 a sheet is tried whose folded form is in no balance."""
+    result = fit("hypar:height=1", facets=(8, 8), barrier=1e-2)
+    assert result.status == "infeasible"
+    assert 1e-3 < result.barrier < 1e-2
+    assert "beyond them no sheet without faults" in result.advice
+
+
 def test_a_sheet_that_folds_rigidly_has_no_barrier_to_change():
     result = asked(1e-3, "plane")
     assert result.status == "infeasible"
