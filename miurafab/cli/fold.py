@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import miurafab
 from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option, takes
-from miurafab.errors import DONE, NO, InputError
+from miurafab.errors import DONE, NO, InputError, OptionError
 from miurafab.files import new_file
 from miurafab.options import File, read_options
 
@@ -71,6 +71,8 @@ def fold(
         new_file(panels, "The drawing of the panels", PANEL_ENDINGS)
         if asked.thickness_mm is None:
             raise InputError(f"{panels} needs a `thickness` of the panels, such as 3mm.")
+    if "method" in given and asked.thickness_mm is None:
+        raise OptionError("method", "is for panels; add a `thickness` such as 3mm")
     pattern = miurafab.load(file)
     with console.progress("folding") as progress:
         folding = miurafab.fold(pattern, asked.steps, on_progress=progress)
@@ -83,13 +85,17 @@ def fold(
             thick = miurafab.thick_panels(
                 pattern, asked.thickness_mm, method=asked.method, on_progress=progress
             )
-        if thick is not None and panels is not None:
-            thick.save(panels, title=file.stem)
+        made = None if thick is None else thickness_report(thick)
+        written = None if made is None or made.get("facets_too_small") else panels
+        if thick is not None and written is not None:
+            thick.save(written, title=file.stem)
     answer: dict[str, Any] = folding.report()
-    answer |= {"file": None if out is None else str(out), "csv": None if csv is None else str(csv)}
-    answer["thickness"] = None if thick is None else thickness_report(thick)
+    for name, path in (("file", out), ("csv", csv), ("panels", written)):
+        answer[name] = None if path is None else str(path)
+    answer["thickness"] = made
     console.answer(answer, lambda: _show(console, folding, answer))
-    made = answer["thickness"]
+    if panels is not None and written is None:
+        console.note(f"{panels} is not written, since facets are too small for such panels.")
     return DONE if made is None or made.get("usable", made["folds"]) else NO
 
 

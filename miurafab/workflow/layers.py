@@ -86,7 +86,7 @@ class Layers(Shown):
         """The JSON answer of ``layers``; ``orders`` and ``complete`` are null without a search."""
         found = self.order
         return {
-            "method": "closed form" if found is self.closed else "search",
+            "method": "search" if found is None or found is not self.closed else "closed form",
             "exists": self.exists,
             "orders": None if self.search is None else len(self.search.orders),
             "complete": None if self.search is None else self.search.complete,

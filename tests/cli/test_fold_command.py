@@ -79,6 +79,13 @@ def test_panels_are_written_and_little_use_is_told(run, rigid, tmp_path):
     nearly = run("fold", rigid, "--steps", "4", "--thickness", f"{0.98 * limit}mm")
     assert nearly.returncode == 1
     assert "too little to use" in nearly.stdout
+    gone = tmp_path / "none.dxf"
+    none = run("fold", rigid, "--steps", "4", "--thickness", "2in", "--panels", gone)
+    assert none.returncode == 1
+    assert "none.dxf is not written" in none.stderr
+    assert not gone.exists()
+    assert json.loads(done.stdout)["panels"] == str(out)
+    assert "add a --thickness" in sentence(run("fold", rigid, "--method", "bennett"), 2)
     plates = run("fold", rigid, "--steps", "4", "--thickness", "1mm", "--method", "bennett")
     assert plates.returncode == 0
     assert "clear up to deg" in plates.stdout

@@ -97,6 +97,9 @@ def test_fold_angles_alone_lead_a_sheet_from_flat_to_its_folded_form() -> None:
     assert told["wrong_signs"] == 0
     assert not told["certificate"]["rigid"]
     assert [finding["code"] for finding in told["findings"]] == ["bent-facets", "no-layer-order"]
+    deciding = told["certificate"]
+    off = f"off by up to {100 * deciding['residual']:.2g} %"
+    assert off in told["findings"][0]["sentence"]
     last = laid_on(folding.motion.frames[-1], pattern.folded_coords)
     size = float(np.linalg.norm(np.ptp(pattern.folded_coords, axis=0)))
     assert np.abs(last - pattern.folded_coords).max() < 1e-6 * size

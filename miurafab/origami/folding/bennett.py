@@ -116,7 +116,8 @@ def bennett_heights(pattern: CreasePattern) -> BennettHeights:
     equal = hstack([closing, csr_array((rows, facets + 1))]).tocsr()
     bounds = np.tile([-np.inf, np.inf], (size, 1))
     bounds[: len(edges)] = [-1.0, 1.0]
-    bounds[-1, 0] = 0.0
+    # as thick as the range of the axes; more only where all creases are valleys, or mountains
+    bounds[-1] = [0.0, 2.0]
     cost = np.zeros(size)
     cost[-1] = -1.0
     inequal, limits = np.zeros(apart.shape[0]), np.zeros(rows)
@@ -229,8 +230,8 @@ def _turns(pattern: CreasePattern) -> _Turns:
     after = np.roll(before, -1, axis=1)
     placement = place(pattern, fold_angles_at(pattern, np.array(_STATES)))
     normals = placement.turn[..., 2][:, facet]  # (T, I, 4, 3)
-    stacked = normals.transpose(1, 0, 3, 2).reshape(len(vertices), -1, 4)
-    shares = np.linalg.svd(stacked)[2][:, 3] if len(vertices) else np.zeros((0, 4))
+    stacked = normals.transpose(1, 0, 3, 2).reshape(len(vertices), 3 * len(_STATES), 4)
+    shares = np.linalg.svd(stacked)[2][:, 3]
     return _Turns(vertices, before, after, shares)
 
 

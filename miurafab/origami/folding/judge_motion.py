@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from miurafab.findings import Finding
 from miurafab.origami.folding.angles_csv import Contact
 from miurafab.origami.folding.certificate import MOVED, RigidCertificate
@@ -30,7 +28,7 @@ def motion_findings(found: FoundMotion, contacts: Sequence[Contact]) -> tuple[Fi
 def _findings(found: FoundMotion, contacts: Sequence[Contact]) -> Iterator[Finding]:
     motion, verdict = found.motion, found.verdict
     if found.certificate is not None and not found.certificate.rigid:
-        yield _bends(found.certificate, motion.method == FROM_FLAT, _stretch_at(found))
+        yield _bends(found.certificate, motion.method == FROM_FLAT)
     if verdict is not None:
         yield from _of_ramp(verdict, float(motion.states[-1]))
     if contacts:
@@ -38,21 +36,18 @@ def _findings(found: FoundMotion, contacts: Sequence[Contact]) -> Iterator[Findi
         yield Finding("contacts", f"On the way facets pass through each other in {frames}.")
 
 
-def _stretch_at(found: FoundMotion) -> float:
-    """By how much a side stretches in the frame that is not rigid."""
-    if found.verdict is None or found.certificate is None:
-        return 0.0
-    frame = int(np.argmin(np.abs(found.motion.states - found.certificate.state)))
-    return float(found.verdict.strain[frame])
-
-
-def _bends(certificate: RigidCertificate, from_flat: bool, stretch: float) -> Finding:
-    where = f"at {certificate.state:.0%} of its fold angles" if from_flat else "half-way"
+def _bends(certificate: RigidCertificate, from_flat: bool) -> Finding:
+    state = certificate.state
+    where = f"at {state:.0%} of its fold angles" if from_flat else f"at s = {state:.2g}"
     if certificate.moved > MOVED:
         turn = math.degrees(certificate.moved)
         why = f"the nearest shape with flat facets has a crease turned by {turn:.2g} degrees more"
     else:
-        why = f"the nearest shape with flat facets misses by {certificate.residual:.2g}"
+        left = certificate.residual
+        why = (
+            f"no shape with flat facets is near: sides stay off by up to {100 * left:.2g} %, or "
+            f"facets bent by up to {math.degrees(left):.2g} degrees"
+        )
     rounding = ""
     if certificate.residual <= DRAWN and certificate.moved <= MOVED:
         rounding = "; so little may be the rounding of the drawing"

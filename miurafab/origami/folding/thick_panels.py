@@ -112,7 +112,8 @@ class ThickPanels(Shown):
     def useful(self) -> Floats:
         """(F,) the part of each facet that is left on its smaller side; 0 where it is too small."""
         whole = signed_areas(self.pattern.vertices_coords[filled(self.pattern.faces_vertices)])
-        left = np.stack([signed_areas(ply) for ply in self.plies]).min(axis=0)
+        with np.errstate(invalid="ignore"):  # a side at a crease of 180 degrees goes to infinity
+            left = np.stack([signed_areas(ply) for ply in self.plies]).min(axis=0)
         return np.where(self.limit_mm > self.thickness_mm, left / whole, 0.0)
 
     @property

@@ -13,6 +13,7 @@ import ezdxf
 import numpy as np
 import pytest
 import trimesh
+from flat_folds import strip
 from problems import fitted, regular
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
@@ -159,6 +160,16 @@ def test_the_guide_tells_what_is_made(name: str) -> None:
     most = max(patch.range_mm for patch in made.patches) / 2.0
     assert row.endswith(f"| {patches} | {most:.1f} t | 180° |")
     assert all(patch.clear_deg == 180.0 for patch in made.patches)
+
+
+def test_one_crease_folds_about_the_face_of_its_plates() -> None:
+    made = thick_plates(strip("V"), 4.0)
+    (patch,) = made.patches
+    assert made.folds
+    assert patch.clear_deg == pytest.approx(180.0)
+    assert patch.brackets == ()
+    crease = patch.edges_inner
+    assert patch.bottom_mm + 4.0 == pytest.approx(patch.axis_mm[crease].repeat(2))
 
 
 def test_what_has_no_shifted_hinges_is_refused() -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flat_folds import flaps, grid, strip
+from flat_folds import flaps, grid, pattern_of, strip
 from problems import fitted, regular
 
 from miurafab.errors import InputError, PatternError
@@ -29,6 +29,7 @@ from miurafab.origami.folding.layers import (
 )
 from miurafab.origami.folding.order_search import broken_rules, search_layer_orders
 from miurafab.origami.formats.fold import read_fold
+from miurafab.workflow.layers import layers
 
 SHEETS = ("plane", "hypar", "paraboloid", "cylinder")
 
@@ -154,6 +155,15 @@ def test_a_roll_of_equal_stamps_passes_through_itself_and_has_no_order() -> None
     assert order.levels is None
     rolled = search_layer_orders(strip("VVV", widths=(1.0, 1.2, 1.0, 1.2)), 10)
     assert (rolled.complete, rolled.orders) == (True, ())
+
+
+def test_what_has_no_order_after_a_search_is_not_called_closed_form() -> None:
+    """A square with a square hole, folded on its diagonals, closes as no frame can."""
+    points = [[0, 0], [3, 0], [3, 3], [0, 3], [1, 1], [2, 1], [2, 2], [1, 2]]
+    faces = [[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
+    found = layers(pattern_of(points, faces, {(k, k + 4): "MV"[k % 2] for k in range(4)}))
+    assert (found.closed, found.exists) == (None, False)
+    assert found.report()["method"] == "search"
 
 
 def test_a_roll_that_grows_closes_without_crossing_if_its_inner_creases_lead() -> None:

@@ -85,6 +85,7 @@ def test_what_is_folded_flat_has_no_thickness() -> None:
     assert panels.offset_mm[0] == math.inf
     assert panels.too_small.tolist() == [0, 1]
     assert panels.least_scale == math.inf
+    assert panels.useful.tolist() == [0.0, 0.0]
 
 
 def test_what_cannot_be_made_of_panels_is_refused() -> None:
