@@ -173,3 +173,10 @@ def test_protocol_tests_wait_for_no_clock() -> None:
     tests = [path for room in PROTOCOL_ROOMS for path in (ROOT / "tests" / room).rglob("*.py")]
     assert len(tests) > 20
     assert [name(path) for path in tests if imported(path) & {"time", "asyncio", "threading"}] == []
+
+
+def test_modules_that_tests_share_have_names_of_their_own():
+    """All folders of tests are on one path: of two modules of a name one would hide the other."""
+    files = [*(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]
+    names = sorted(path.stem for path in files if path.stem != "conftest")
+    assert names == sorted(set(names))

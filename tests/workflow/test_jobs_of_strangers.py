@@ -3,6 +3,7 @@ written, and what was there before is whole."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from pathlib import Path
@@ -18,7 +19,8 @@ from miurafab.machine.journal import Journal, read_journal
 from miurafab.workflow.job_files import job_files, settle_job
 from miurafab.workflow.manifest import LAYOUT
 
-CORPUS = Path(__file__).parent.parent / "corpus" / "job"
+ROOT = Path(__file__).parents[2]
+CORPUS = ROOT / "tests" / "corpus" / "job"
 NAMES = sorted(path.name for path in CORPUS.iterdir())
 READ = {
     "check": miurafab.check_job,
@@ -36,6 +38,12 @@ def job(tmp_path):
     folder.mkdir()
     for name in NAMES:
         (folder / name).write_bytes((CORPUS / name).read_bytes())
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["profiles"] = {  # a job of an earlier profile or material is to be made again
+        name: hashlib.sha256((ROOT / name).read_bytes()).hexdigest()
+        for name in manifest["profiles"]
+    }
+    (folder / "manifest.json").write_text(json.dumps(manifest))
     return folder
 
 
