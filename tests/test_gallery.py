@@ -8,11 +8,11 @@ from PIL import Image
 
 
 def test_a_row_and_its_picture_are_made_again():
-    entry = next(entry for entry in gallery.ENTRIES if entry.name == "hypar")
+    entry = next(entry for entry in gallery.ENTRIES if entry.name == "plane")
     row, picture = gallery.made(entry)
     assert row in gallery.PAGE.read_text(encoding="utf-8").splitlines()
     made = np.array(Image.open(io.BytesIO(picture)).convert("RGB"), dtype=float)
-    there = np.array(Image.open(gallery.PICTURES / "hypar.png").convert("RGB"), dtype=float)
+    there = np.array(Image.open(gallery.PICTURES / "plane.png").convert("RGB"), dtype=float)
     assert made.shape == there.shape
     assert np.abs(made - there).mean() < 0.5
 
