@@ -180,12 +180,16 @@ def _show_thickness(console: Console, thick: dict[str, Any]) -> None:
             f"of the smallest panel {thick['least_useful_area']:.0%} is left on one side, too "
             "little to use"
         )
-    for facet in thick["facets_too_small"][:8]:
-        limit = facet["greatest_thickness_mm"]
-        console.line(f"facet {facet['facet']} is too small: it can be {limit:.3g} mm thick")
+    _show_too_small(console, thick)
     for collision in thick["collisions"][:8]:
         a, b = collision["facets"]
         console.line(f"at s = {collision['state']:.3g} panels {a} and {b} collide")
+
+
+def _show_too_small(console: Console, thick: dict[str, Any]) -> None:
+    for facet in thick["facets_too_small"][:8]:
+        limit = facet["greatest_thickness_mm"]
+        console.line(f"facet {facet['facet']} is too small: it can be {limit:.3g} mm thick")
 
 
 def _show_plates(console: Console, thick: dict[str, Any]) -> None:
@@ -200,6 +204,7 @@ def _show_plates(console: Console, thick: dict[str, Any]) -> None:
         },
         title=f"plates {thick['thickness_mm']:g} mm thick on shifted hinges",
     )
+    _show_too_small(console, thick)
     for number, patch in enumerate(patches):
         if patch["collision"] is not None:
             a, b = patch["collision"]

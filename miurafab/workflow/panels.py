@@ -83,6 +83,10 @@ def thickness_report(panels: ThickPanels | ThickPlates) -> dict[str, Any]:
             "method": "bennett",
             "thickness_mm": panels.thickness_mm,
             "folds": panels.folds,
+            "facets_too_small": [
+                {"facet": facet, "greatest_thickness_mm": limit}
+                for facet, limit in panels.too_small
+            ],
             "patches": [_patch_report(patch) for patch in panels.patches],
         }
     pattern = panels.pattern

@@ -23,6 +23,7 @@ from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError
 from miurafab.files import AnyPath
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import next_corners
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.bennett import BennettHeights, bennett_heights, thick_placement
 from miurafab.origami.folding.contact import self_intersections, triangulate
@@ -112,6 +113,24 @@ class PlatePatch:
         have are its first.
         """
         return _inset(self.pattern, CLEARANCE * self.thickness_mm)
+
+    @property
+    def limit_mm(self) -> Floats:
+        """(F,) the thickness at which each plate loses a side to its clearance, mm."""
+        faces = self.pattern.faces_vertices
+        row, after = np.arange(len(faces))[:, None], next_corners(faces)
+        corners = self.pattern.vertices_coords[faces]
+        whole, left = (each[row, after] - each for each in (corners, self.outlines))
+        length = np.linalg.norm(whole, axis=2)
+        real = (faces >= 0) & (length > 0)
+        kept = np.divide(
+            (whole * left).sum(axis=2), length**2, where=real, out=np.ones_like(length)
+        )
+        shrinks = real & (kept < 1)
+        lasts = np.divide(
+            self.thickness_mm, 1 - kept, where=shrinks, out=np.full_like(kept, np.inf)
+        )
+        return np.asarray(lasts.min(axis=1))
 
     @cached_property
     def brackets(self) -> tuple[Bracket, ...]:
@@ -211,8 +230,18 @@ class ThickPlates(Shown):
 
     @property
     def folds(self) -> bool:
-        """Whether each patch reaches its folded form without a collision."""
-        return all(patch.clear_state >= 1.0 for patch in self.patches)
+        """Whether each patch has all its plates and reaches its folded form without a collision."""
+        return not self.too_small and all(patch.clear_state >= 1.0 for patch in self.patches)
+
+    @property
+    def too_small(self) -> tuple[tuple[int, float], ...]:
+        """The facets of which no plate is left, and from which thickness on, mm."""
+        return tuple(
+            (int(facet), float(limit))
+            for patch in self.patches
+            for facet, limit in zip(patch.facets, patch.limit_mm, strict=True)
+            if limit <= self.thickness_mm
+        )
 
     def save(self, path: AnyPath, *, title: str = "") -> None:
         """Write the panels: outlines to cut, or solids.
@@ -232,6 +261,11 @@ class ThickPlates(Shown):
         """
         from miurafab.origami.formats.panels import write_panels
 
+        if self.too_small:
+            raise InputError(
+                f"Facet {self.too_small[0][0]} is too small for {self.thickness_mm:g} mm plates, "
+                "so it has no outline; enlarge the sheet or choose a smaller `thickness`."
+            )
         write_panels(self, path, title)
 
     def _summary(self) -> str:

@@ -172,6 +172,20 @@ def test_one_crease_folds_about_the_face_of_its_plates() -> None:
     assert patch.bottom_mm + 4.0 == pytest.approx(patch.axis_mm[crease].repeat(2))
 
 
+def test_plates_that_their_clearance_eats_up_are_refused(tmp_path: Path) -> None:
+    """A unit square loses both sides at a clearance of 1/2, which is a thickness of 10."""
+    thin = thick_plates(strip("V"), 9.9)
+    assert np.concatenate([patch.limit_mm for patch in thin.patches]) == pytest.approx(10.0)
+    assert thin.folds
+    thin.save(tmp_path / "thin.svg")
+    thick = thick_plates(strip("V"), 10.1)
+    assert [facet for facet, _ in thick.too_small] == [0, 1]
+    assert not thick.folds
+    with pytest.raises(InputError, match=r"too small for 10\.1 mm plates"):
+        thick.save(tmp_path / "thick.svg")
+    assert not (tmp_path / "thick.svg").exists()
+
+
 def test_what_has_no_shifted_hinges_is_refused() -> None:
     developable = fitted("hypar", 4, 4).pattern
     assert developable is not None
