@@ -170,6 +170,11 @@ class Desk:
         if self._control is None or not same_key(key, self._control):
             raise InputError(NO_CONTROL)
 
+    def _require_not_taken(self, taken: int) -> None:
+        """Raise ``InputError`` if control was taken since it had been so often."""
+        if taken != self._taken:
+            raise InputError(NO_CONTROL)
+
     def _require_session(self) -> HeldSession:
         if self._session is None:
             raise InputError(NO_SESSION)
@@ -192,21 +197,24 @@ class Desk:
     def put_on(self, job: Path, name: str) -> None:
         """Take the job of a directory or of a G-code file, to frame and to cut.
 
-        Raises :class:`~miurafab.errors.InputError` for one that cannot be read or cut.
+        Raises :class:`~miurafab.errors.InputError` for one that cannot be read or cut, and where
+        somebody else has taken over meanwhile.
         """
-        session = self._require_session()
+        taken, session = self._taken, self._require_session()
+        self._armed = None
         prepared = prepare(job)
         if prepared.machine != session.machine:
             prepared = prepare(job, machine=session.machine)
         prepared = replace(prepared, name=name)
 
         def work(operator: Operator) -> None:
-            operator.put_on(prepared)
             with self._lock:
+                self._require_not_taken(taken)
+                operator.put_on(prepared)
                 self._prepared = prepared
                 self._jobs += 1
 
-        self.do(work)
+        session.ask(work)  # not another, which was opened while a large job was read
 
     def arm(self) -> None:
         """The first step of a start; raises :class:`~miurafab.errors.InputError` where somebody
@@ -222,8 +230,7 @@ class Desk:
         resets = session.process.resets
         facts = session.ask(work, resets)
         with self._lock:
-            if taken != self._taken:
-                raise InputError(NO_CONTROL)
+            self._require_not_taken(taken)
             until = time.monotonic() + _ARMED_S
             self._armed = ArmedSheet(secrets.token_urlsafe(12), until, facts, resets)
 

@@ -37,6 +37,8 @@ ORDER_LIMIT = 2**16
 UPLOAD = "upload"
 BODIES, BODY_BYTES = 8, 2 * FILE_LIMIT
 """The most bodies, and the most bytes of them, that are held in memory at one time."""
+SHORT_BODY = 256
+"""Bodies of so many bytes are always taken: no upload may keep Abort out."""
 
 
 def new_key() -> str:
@@ -114,6 +116,7 @@ class BodyRoom:
         """Room for ``size`` bytes until the end of the block, or False where there is none now."""
         with self._lock:
             there = len(self._held) < BODIES and sum(self._held) + size <= BODY_BYTES
+            there = there or size <= SHORT_BODY
             if there:
                 self._held.append(size)
         try:

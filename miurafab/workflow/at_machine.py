@@ -181,8 +181,11 @@ class Operator:
         self._process.press(keys)
 
     def load(self) -> None:
-        """Somebody has put in fresh material."""
+        """Somebody has put in fresh material; raises ``InputError`` while an action is under way,
+        which would burn on it.
+        """
         self.armed = False
+        self._require_idle()
         self._process.order("load")
         self.said.append("Fresh material is in.")
 
@@ -232,8 +235,9 @@ class Operator:
         )
 
     def choose(self, number: int) -> None:
-        """Make ``number`` the next sheet, if there is such a one."""
+        """Make ``number`` the next sheet, if there is such a one and no action is under way."""
         self.armed = False
+        self._require_idle()
         if not 1 <= number <= len(self._job().jobs):
             raise InputError(f"{self._job().name} has no sheet {number}.")
         self.number = number

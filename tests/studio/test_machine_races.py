@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 
 import pytest
-from rigs import ROWS, AtMachine, Pumped, until
+from rigs import MACHINE, ROWS, AtMachine, Pumped, until
 from studios import sentence
 
 from miurafab.errors import JobStopped, MachineError
@@ -125,3 +125,37 @@ def test_the_settings_are_compared_once_and_not_at_each_look(at, monkeypatch):
     heard = session_of(at).process.heard
     until(lambda: session_of(at).process.heard > heard + 0.5)
     assert len(looks) <= 1
+
+
+def test_neither_sheet_nor_material_is_changed_under_a_sheet_that_burns(at):
+    """The mark of burnt material would be gone at its end, and a wrong sheet counted as done."""
+    at.start()
+    at.until(busy="cut")
+    assert "Wait for the end of 'cut'" in sentence(at.ask("do", action="fresh"))
+    assert "Wait for the end of 'cut'" in sentence(at.ask("sheet", number=1))
+
+
+def test_a_job_that_was_read_for_a_session_that_is_over_comes_to_no_other(at, monkeypatch):
+    read = desk.prepare
+
+    def meanwhile(*what, **how):
+        monkeypatch.setattr(desk, "prepare", read)
+        at.desk.leave()
+        at.desk.connect("virtual", MACHINE)
+        return read(*what, **how)
+
+    monkeypatch.setattr(desk, "prepare", meanwhile)
+    assert "The session has ended" in sentence(at.ask("job"))
+    assert at.seen()["job"] is None
+
+
+def test_a_job_that_was_read_under_another_s_control_is_not_put_on(at, monkeypatch):
+    read, before = desk.prepare, at.seen()["job"]
+
+    def meanwhile(*what, **how):
+        at.desk.take_over()
+        return read(*what, **how)
+
+    monkeypatch.setattr(desk, "prepare", meanwhile)
+    assert "press 'Take over'" in sentence(at.ask("job"))
+    assert at.seen()["job"] == before

@@ -102,11 +102,13 @@ def test_what_is_being_sent_has_a_bound_in_number_and_bytes():
     room = BodyRoom()
     with contextlib.ExitStack() as under_way:
         for _ in range(BODIES):
-            assert under_way.enter_context(room.kept(1))
-        with room.kept(1) as there:
-            assert not there
-    with room.kept(FILE_LIMIT) as one, room.kept(FILE_LIMIT) as two, room.kept(1) as three:
+            assert under_way.enter_context(room.kept(300))
+        with room.kept(300) as there, room.kept(len(b"{}")) as abort:
+            assert (there, abort) == (False, True)
+    with room.kept(FILE_LIMIT) as one, room.kept(FILE_LIMIT) as two, room.kept(300) as three:
         assert (one, two, three) == (True, True, False)
+        with room.kept(len(b"{}")) as abort:
+            assert abort
     with room.kept(BODY_BYTES) as there:  # all is free again
         assert there
 
