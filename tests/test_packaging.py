@@ -267,11 +267,3 @@ def _plain(name):
 def test_the_citation_names_this_version():
     lines = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
     assert f"version: {miurafab.__version__}" in lines
-
-
-def test_modules_of_tests_have_names_of_their_own():
-    """All their folders are on one path; of two modules of one name a test gets the first."""
-    folders = ("tests", "benchmarks")
-    names = [path.stem for folder in folders for path in (ROOT / folder).rglob("*.py")]
-    own = [name for name in names if name not in ("__init__", "conftest")]
-    assert sorted(set(own)) == sorted(own)
