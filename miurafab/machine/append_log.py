@@ -23,8 +23,8 @@ class DurableFile:
 
     The opening writes ``header`` and waits until it is on the disk, so that a directory that
     cannot be written and a disk that is full show before anything moves. A new file comes into
-    being with its whole header. Raises :class:`~miurafab.errors.InputError`, also for a link: a job
-    of a stranger must not name what is written.
+    being with its whole header. Raises :class:`~miurafab.errors.InputError`, also for a link
+    or a pipe: a job of a stranger must not name what is written.
     """
 
     def __init__(self, path: Path, noun: str, header: bytes, *, append: bool) -> None:
@@ -36,6 +36,8 @@ class DurableFile:
         self._closing = False
         if path.is_symlink():
             raise InputError(f"The {noun} {path} is a link; remove it.")
+        if path.is_fifo():  # whose opening would wait for ever
+            raise InputError(f"The {noun} {path} is a pipe; remove it.")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             new = not append or not path.exists()

@@ -10,6 +10,7 @@ import hashlib
 import shutil
 from pathlib import Path
 
+from miurafab.errors import InputError
 from miurafab.files import new_folder, state_folder, write_bytes
 from miurafab.workflow.manifest import MANIFEST
 
@@ -22,8 +23,15 @@ def keep_job(job: Path) -> Path:
 
     Raises :class:`~miurafab.errors.InputError` where it cannot be written.
     """
-    digest = hashlib.sha256((job / MANIFEST).read_bytes()).hexdigest()[:10]
     home = new_folder(state_folder() / "studio", "The folder of jobs that are cut")
+    try:
+        return _kept(job, home)
+    except OSError as fault:
+        raise InputError(f"The job cannot be kept in {home}: {fault.strerror}.") from None
+
+
+def _kept(job: Path, home: Path) -> Path:
+    digest = hashlib.sha256((job / MANIFEST).read_bytes()).hexdigest()[:10]
     kept = home / f"{job.name}-{digest}"
     if not kept.is_dir():
         coming = home / f".{kept.name}.new"

@@ -66,6 +66,16 @@ def test_a_journal_is_read_back(tmp_path: Path) -> None:
     assert (run.job, run.sha256, run.lines) == ("sheet-01.nc", job_digest(JOB), 2)
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_no_record_waits_for_a_reader_of_a_pipe(tmp_path: Path) -> None:
+    pipe = tmp_path / "sheet-01.journal"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # so that a fault here does not wait
+    with pytest.raises(InputError, match=r"The journal .*sheet-01.journal is a pipe; remove it"):
+        DurableFile(pipe, "journal", b"head", append=True)
+    os.close(reader)
+
+
 def test_records_come_four_times_a_second_at_most(tmp_path: Path) -> None:
     book = journal(tmp_path / "j")
     for n in range(1000):

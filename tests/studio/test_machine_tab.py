@@ -375,6 +375,10 @@ def test_the_job_of_a_layout_is_kept_where_its_journal_stays(tmp_path):
     assert all((kept / name).read_bytes() == content for name, content in names.items())
     assert keep_job(job) == kept
     assert (kept / "sheet-01.journal").read_text() == "begun"
+    shutil.rmtree(kept)
+    kept.write_text("a file")
+    with pytest.raises(InputError, match=r"The job cannot be kept in .*: Not a directory"):
+        keep_job(job)
     shutil.rmtree(kept.parent)
     kept.parent.write_text("a file")
     with pytest.raises(InputError, match="which is a file; give a folder"):
