@@ -78,7 +78,7 @@ class GrblDriver(StreamDriver):
         known.clear_overrides()
         if plan.options.home:
             self.at_risk = True
-            session.home()
+            session.home(self._take_keys)
             self.at_risk = False
         status = session.wait_status()
         lost = session.restarted_itself and plan.at is None

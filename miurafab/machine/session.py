@@ -259,9 +259,22 @@ class Session:
             f"The controller at {self.name} did not answer '{text}' within {timeout:g} s."
         )
 
-    def home(self) -> None:
-        """Run the homing cycle and wait for its end; raises as :meth:`command` does."""
-        self.command("$H", HOMING_S)
+    def home(self, heed: Callable[[], None] = lambda: None) -> None:
+        """Run the homing cycle and wait for its end; raises as :meth:`command` does.
+
+        ``heed`` is called before every read meanwhile, as ``check`` is, and may raise.
+        """
+        check = self._check
+
+        def both() -> None:
+            check()
+            heed()
+
+        self._check = both
+        try:
+            self.command("$H", HOMING_S)
+        finally:
+            self._check = check
         self.restarted_itself = False
         self.wait_status()
 

@@ -138,6 +138,21 @@ def test_ctrl_x_resets_within_10_ms_whatever_is_waited_for(action: str) -> None:
     assert 0 <= wire.reset_at - begun - 0.333 <= 0.011
 
 
+def test_ctrl_x_ends_the_homing_before_a_job_at_once() -> None:
+    wire = Wire(VirtualGrbl(virtual_settings(MACHINE) | HOMING, baud=115_200))
+    keys = Pressed(wire)
+    here = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
+    here.unlock()
+    here.jog(x=-100, y=-100, feed_mm_min=6000)
+    begun = wire.now()
+    keys.press(begun + 0.5)
+    with pytest.raises(JobStopped, match="stopped at the keyboard"):
+        here.cut(replace(JOB, options=replace(JOB.options, home=True)))
+    assert b"$H\n\x18" in wire.sent
+    assert 0 <= wire.reset_at - begun - 0.5 <= 0.011
+    assert here.state.state in ("Alarm", "Idle")
+
+
 class Hammered(Pressed):
     """... and pressed again at each look from then on."""
 
