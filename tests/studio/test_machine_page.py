@@ -1,12 +1,16 @@
 """The tab Machine in a browser: arm, burn, hold, go on, abort from anywhere, and take over."""
 
+import os
+import signal
 import threading
 import time
 
 import pytest
 import studio_picture
+from benches import children
 from browser import CHROMIUM
 from rigs import ROWS
+from test_machine_tab import Itself, command
 from test_studio_page import Seen
 
 import miurafab
@@ -171,3 +175,19 @@ def test_the_pad_rests_when_it_is_released_while_disabled_and_one_loop_asks(stud
         page.run("performance.clearResourceTimings()")
         time.sleep(1.0)
         assert 1 <= page.run(asked) <= 6
+
+
+def test_a_session_that_ends_by_itself_says_so_on_every_tab(studio, tmp_path):
+    with AtDesk(tmp_path / "profile") as page:
+        page.open(studio.guard.address)
+        page.until("document.documentElement.dataset.ready === 'yes'")
+        page.click("connect")
+        page.title("Ready")
+        page.click("shape-tab")
+        (holder,) = [pid for pid in children(Itself()) if b"session_process" in command(pid)]
+        os.kill(holder, signal.SIGKILL)
+        page.until("!document.getElementById('connect-form').hidden", 30)
+        assert "was killed by signal 9" in page.text("fault")
+        page.open(studio.guard.address)  # loaded anew, it still tells
+        page.until("document.documentElement.dataset.ready === 'yes'")
+        assert "was killed by signal 9" in page.text("desk-ended")

@@ -58,6 +58,7 @@ const set = (id, text) => {
 const toggle = (id, there) => { byId(id).hidden = !there; };
 
 function show(state, asked = true) {
+  const before = now.open;
   now = state;
   answered = performance.now();
   document.body.classList.remove("late");
@@ -68,6 +69,8 @@ function show(state, asked = true) {
   for (const part of document.querySelectorAll("#desk .live")) part.hidden = !state.open;
   if (asked) told(state);
   if (!state.open) {
+    set("desk-ended", state.ended);
+    if (before && state.ended) fault(state.ended); // on whatever tab
     control = "";
     drawn = "";
     showPorts(state.ports ?? []);
