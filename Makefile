@@ -17,10 +17,10 @@ demo: .venv/installed
 	@echo "How to glue it: jobs/hypar/assembly.pdf. Pictures of the sheets: $(BIN)/miurafab preview jobs/hypar"
 
 test: .venv/installed-dev
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 3
 
 test-large: .venv/installed-dev
-	$(BIN)/python -m pytest -n 2 -m large
+	$(BIN)/python -m pytest -n 3 -m large
 
 lint: .venv/installed-dev
 	$(BIN)/ruff check .
