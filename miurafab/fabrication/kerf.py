@@ -27,7 +27,7 @@ SHORTEST_MM = 0.05
 """No end of a mitre is shorter: programs merge points that are nearer (judged; issue 57 of boxes.py
 tells of one that does within 0.1 mm).
 """
-_TIP_MM = 0.1
+_TIP_MM = 0.2
 """A whole mitre is at most so much longer than a mitre that is cut off."""
 
 
@@ -57,7 +57,8 @@ def cut_lines(outlines: Sequence[Sequence[Floats]], kerf: float) -> list[list[Fl
             raise LayoutError("The outline of a patch surrounds no area in one part.")
         outer, *inner = shapely.get_rings(polygon)
         lines = [
-            _without_specks(shapely.get_coordinates(ring)[:-1], kerf) for ring in (outer, *inner)
+            _without_specks(shapely.get_coordinates(ring)[:-1], kerf, hole=place > 0)
+            for place, ring in enumerate((outer, *inner))
         ]
         if not shapely.is_ccw(outer):
             lines[0] = lines[0][::-1]
@@ -65,8 +66,10 @@ def cut_lines(outlines: Sequence[Sequence[Floats]], kerf: float) -> list[list[Fl
     return found
 
 
-def _without_specks(ring: Floats, kerf: float) -> Floats:
-    """The closed ``ring`` (n, 2), in which no cut-off mitre ends in less than :data:`SHORTEST_MM`.
+def _without_specks(ring: Floats, kerf: float, hole: bool) -> Floats:
+    """The closed ``ring`` (n, 2), in which no cut-off mitre ends in less than :data:`SHORTEST_MM`,
+    and no side is shorter beside a corner that points into the piece. Such a corner, as between two
+    tabs that nearly meet, is left out, so that the line goes round the piece a little farther away.
 
     With half the turn t at such an end, the mitre's tip lies kerf / (2 cos t) from the corner, and
     an end of width w lies (w / 2) tan t nearer. It goes back from the tip by w / (2 cos t) along
@@ -78,14 +81,20 @@ def _without_specks(ring: Floats, kerf: float) -> Floats:
     if not len(specks):
         return ring
     ahead = step / length[:, None]
+    inwards = -1.0 if shapely.LinearRing(ring).is_ccw != hole else 1.0
     points: list[Floats] = [corner[None] for corner in ring]
     for k in specks.tolist():
         following = (k + 1) % len(ring)
         into, out = ahead[k - 1], ahead[following]
         turn = math.atan2(into[0] * out[1] - into[1] * out[0], into @ out) % (2 * math.pi)
         half = min(turn, 2 * math.pi - turn) / 2
-        if not math.pi / 3 - 1e-6 < half < math.pi / 2:
-            continue  # no mitre
+        if not math.pi / 3 - 1e-6 < half < math.pi / 2:  # no mitre
+            for place in (k, following):
+                one, other = ahead[place - 1], ahead[place]
+                if inwards * (one[0] * other[1] - one[1] * other[0]) > 0:
+                    points[place] = np.empty((0, 2))
+                    break
+            continue
         to_tip = length[k] / (2 * math.cos(half))
         tip = ring[k] + to_tip * into
         back = SHORTEST_MM / (2 * math.cos(half))
