@@ -219,7 +219,7 @@ def test_a_second_command_on_the_same_port_is_refused(nc: Path, tmp_path: Path) 
     assert process.poll() is None
     process.send_signal(signal.SIGTERM)
     bench.finish(process)
-    assert process.returncode == 3
+    assert process.returncode == 130
     bench.assert_dark()
     end(bench)
 
