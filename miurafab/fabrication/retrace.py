@@ -121,6 +121,8 @@ def patches_on_sheets(
 def _outlined(layout: Layout, pattern: CreasePattern) -> tuple[OutlinedPatches, tuple[str, ...]]:
     """The patches of the first model in the plane of the pattern, and the labels of their tabs."""
     patches = layout.model.patches
+    if [patch.id for patch in patches] != list(range(len(patches))):
+        raise LayoutError("The patches of the layout are not numbered from 0 in their order.")
     facets = np.concatenate([patch.faces for patch in patches])
     count = len(pattern.faces_vertices)
     if not np.array_equal(np.sort(facets), np.arange(count)):

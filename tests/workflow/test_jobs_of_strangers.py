@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 
 import pytest
+from sealing import seal
 
 import miurafab
 from miurafab.errors import InputError
@@ -189,3 +190,14 @@ def test_a_journal_with_other_values_is_refused_in_a_sentence(tmp_path, wrong):
         file.write(json.dumps(wrong) + "\n")
     with pytest.raises(InputError, match=r"a\.journal is not a journal of this version"):
         read_journal(path)
+
+
+def test_a_patch_of_a_huge_number_is_refused_at_once(job):
+    """One of 2 ** 31 took minutes: a table was as long as the number."""
+    layout = json.loads((job / LAYOUT).read_text())
+    layout["patches"][0]["id"] = 2**31
+    (job / LAYOUT).write_text(json.dumps(layout))
+    seal(job)
+    found = miurafab.check_job(job)
+    assert not found.valid
+    assert any("not numbered from 0" in finding.sentence for finding in found.findings)
