@@ -156,10 +156,12 @@ def test_make_lock_makes_each_lock_file():
 def test_the_lock_file_of_npm_has_a_sum_for_each_package():
     folder = ROOT / "tests" / "interop"
     packages = json.loads((folder / "package-lock.json").read_text())["packages"]
-    wanted = json.loads((folder / "package.json").read_text())["dependencies"]
-    assert packages.pop("")["dependencies"] == wanted
-    for name, version in wanted.items():
-        assert packages[f"node_modules/{name}"]["version"] == version
+    wanted = json.loads((folder / "package.json").read_text())
+    root = packages.pop("")
+    for kind in ("dependencies", "devDependencies"):
+        assert root[kind] == wanted[kind]
+        for name, version in wanted[kind].items():
+            assert packages[f"node_modules/{name}"]["version"] == version
     assert all(each["integrity"].startswith("sha512-") for each in packages.values())
 
 
