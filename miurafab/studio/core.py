@@ -51,6 +51,7 @@ from miurafab.studio.machine_words import NO_JOB, plain
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
 from miurafab.studio.orders import read_fit, read_layout, read_source
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
+from miurafab.studio.texts import with_texts
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
 from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED
 from miurafab.workflow.at_machine import STEPS
@@ -59,7 +60,7 @@ from miurafab.workflow.design import can_close
 PAGE, MACHINE = "studio.html", "machine"
 PARTS = (
     *("icon.svg", "studio.css", "machine.css", "tools.js", "choices.js", "results.js"),
-    *("machine.js", "sheet.js", "studio.js"),
+    *("machine.js", "sheet.js", "studio.js", "texts.js"),
 )
 """The files of the page, beside the page itself."""
 
@@ -139,7 +140,9 @@ class Studio:
         if route in ("", *PARTS):
             name = route or PAGE
             content = self._page.joinpath(name).read_bytes()
-            return own_file(name, filled(content.decode()).encode() if name == PAGE else content)
+            if name == PAGE:
+                content = filled(with_texts(content.decode())).encode()
+            return own_file(name, content)
         if route == "catalogue":
             own = None if self._own_job is None else self._own_job.name
             return answer({**self._catalogue, "first": self._first, "own_job": own})

@@ -1,7 +1,10 @@
 // The forms: surfaces, machines and materials filled in from the catalogue, all read back as orders.
 // Values stay as they were written.
 
-import { byId, element } from "./tools.js";
+import { texts } from "./texts.js";
+import { byId, element, say } from "./tools.js";
+
+const { shape, words } = texts;
 
 let catalogue;
 let sourcesNow = [];
@@ -15,7 +18,7 @@ export function fillForms(given) {
   options(byId("machine"), given.machines, first?.machine ?? defaults.machine);
   options(byId("material"), given.materials, first?.material ?? defaults.material);
   byId("file").accept = given.file_suffixes.join(",");
-  byId("file-help").textContent = `${given.file_suffixes.join(" ")}, up to ${given.file_limit >> 20} MB; or drop it here`;
+  byId("file-help").textContent = say(shape.files, { suffixes: given.file_suffixes.join(" "), limit: given.file_limit >> 20 });
   byId("target").addEventListener("change", () => showTarget());
   showSources([]);
   if (first?.surface) showTarget(`surface:${first.surface}`, first.parameters);
@@ -34,10 +37,10 @@ export function showSources(sources, chosen) {
   const before = chosen ? `source:${chosen}` : select.value;
   const group = (label, entries) => (entries.length ? [element("optgroup", { label }, ...entries)] : []);
   select.replaceChildren(
-    ...group("Your files", sources.map(({ id, name, kind }) => (
-      element("option", { value: `source:${id}`, textContent: kind === "pattern" ? `${name} (pattern)` : name })
+    ...group(shape.your_files, sources.map(({ id, name, kind }) => (
+      element("option", { value: `source:${id}`, textContent: kind === "pattern" ? say(shape.pattern_file, { name }) : name })
     ))),
-    ...group("Built in", catalogue.surfaces.map(({ name }) => (
+    ...group(shape.built_in, catalogue.surfaces.map(({ name }) => (
       element("option", { value: `surface:${name}`, textContent: name })
     ))),
   );
@@ -59,9 +62,9 @@ function showTarget(value, parameters = {}) {
   const { surface, source } = chosenTarget();
   const pattern = source?.kind === "pattern";
   byId("summary").textContent = surface ? `${capital(surface.summary)}.` : {
-    mesh: "Your mesh. It keeps the size of its file unless you give one.",
-    design: "Your design file. What you give below wins over what it says.",
-    pattern: "A finished pattern: it is checked and shown as it stands.",
+    mesh: shape.of_mesh,
+    design: shape.of_design,
+    pattern: shape.of_pattern,
   }[source.kind];
   byId("parameters").replaceChildren(...(surface?.parameters ?? []).map((each) => {
     const id = `parameter-${each.key}`;
@@ -74,10 +77,10 @@ function showTarget(value, parameters = {}) {
   }));
   byId("close-row").hidden = Boolean(surface && !surface.turned) || source?.kind === "mesh";
   byId("sheet-options").hidden = pattern;
-  byId("fit").textContent = pattern ? "Open" : "Fit";
+  byId("fit").textContent = pattern ? shape.open : shape.fit;
   const { facets, size } = catalogue.defaults;
-  byId("facets").placeholder = source?.kind === "design" ? "as it says" : facets;
-  byId("size").placeholder = { design: "as it says", mesh: "as in its file" }[source?.kind] ?? size;
+  byId("facets").placeholder = source?.kind === "design" ? words.as_it_says : facets;
+  byId("size").placeholder = { design: words.as_it_says, mesh: words.as_in_file }[source?.kind] ?? size;
   // the size that was offered belongs to built-in surfaces; files have their own
   if (source && byId("size").value === size) byId("size").value = "";
   if (source?.kind === "design" && byId("facets").value === facets) byId("facets").value = "";
@@ -90,7 +93,7 @@ const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 /** Why a file cannot be taken, if it cannot; the server would hang up on a larger one. */
 export function tooLarge(file) {
   const limit = catalogue.file_limit;
-  return file.size > limit ? `${file.name} is larger than the ${limit >> 20} MB that are taken.` : "";
+  return file.size > limit ? say(shape.too_large, { file: file.name, limit: limit >> 20 }) : "";
 }
 
 /** The route and the order that the first form stands for. */

@@ -1,6 +1,9 @@
 // What came of it: the pattern in words, in space and flat; the sheets, their totals and warnings.
 
-import { byId, element, hasWebGl } from "./tools.js";
+import { texts } from "./texts.js";
+import { byId, element, hasWebGl, say } from "./tools.js";
+
+const { layout, shape, words } = texts;
 
 const terms = (lines) => lines.map(({ name, value, remark, mark }) => (
   element(
@@ -28,13 +31,13 @@ export function showPattern(pattern) {
   byId("verdict").classList.toggle("bad", pattern.status !== "converged");
   byId("headline").textContent = pattern.headline;
   byId("advice").textContent = pattern.advice;
-  const waiting = pattern.folding ? ["The folding is still being computed."] : [];
+  const waiting = pattern.folding ? [shape.folding_comes] : [];
   const findings = pattern.findings.map(({ sentence }) => sentence);
   byId("findings").replaceChildren(...items([...findings, ...waiting, ...(pattern.still ? [pattern.still] : [])]));
   byId("pattern-downloads").replaceChildren(
-    ...(files.fold ? [download("Pattern .fold", `${files.fold}?save`)] : []),
-    ...(files.picture ? [download("Drawing .svg", `${files.picture}?save`)] : []),
-    ...(pattern.has_design ? [download("Design .toml", "design.toml")] : []),
+    ...(files.fold ? [download(shape.save_pattern, `${files.fold}?save`)] : []),
+    ...(files.picture ? [download(shape.save_drawing, `${files.picture}?save`)] : []),
+    ...(pattern.has_design ? [download(shape.save_design, "design.toml")] : []),
   );
   byId("pattern-views").hidden = !files.fold;
   if (files.fold) {
@@ -55,19 +58,19 @@ byId("flat").addEventListener("load", ({ target }) => {
 
 export function showJob(job, pattern) {
   const ready = Boolean(pattern?.files.fold);
-  byId("layout-of").textContent = ready ? `For the pattern ${pattern.name}.` : "";
+  byId("layout-of").textContent = ready ? say(layout.for_pattern, { name: pattern.name }) : "";
   byId("lay-out").disabled = !ready;
   byId("layout-empty").hidden = job !== null;
   byId("layout-hint").textContent = ready
-    ? "Choose a machine and a material, and lay the pattern out." : "Fit or open a pattern first.";
+    ? layout.hint_ready : layout.hint_none;
   byId("job").hidden = job === null;
   if (job === null) return;
   const { files } = job;
   byId("totals").replaceChildren(...terms(job.lines));
   byId("job-downloads").replaceChildren(
-    download("Job .zip", `${files.zip}?save`),
-    download("Assembly guide .pdf", `${files.guide}?save`),
-    download("Pattern .fold", `${pattern.files.fold}?save`),
+    download(layout.save_job, `${files.zip}?save`),
+    download(layout.save_guide, `${files.guide}?save`),
+    download(shape.save_pattern, `${pattern.files.fold}?save`),
   );
   const warnings = [...job.doubts, ...job.findings.map(({ sentence }) => sentence)];
   byId("warnings").hidden = warnings.length === 0;
@@ -78,7 +81,7 @@ export function showJob(job, pattern) {
   else if (byId("pictures").childElementCount !== job.pictures.length || byId("pictures").dataset.job !== job.id) {
     byId("pictures").dataset.job = job.id;
     byId("pictures").replaceChildren(...job.pictures.map((src, at) => (
-      element("img", { src, loading: "lazy", alt: `Sheet ${at + 1}` })
+      element("img", { src, loading: "lazy", alt: say(words.sheet_number, { number: at + 1 }) })
     )));
   }
   byId("cut-command").textContent = job.cut;

@@ -3,10 +3,11 @@
 import { fillForms, fitOrder, layoutOrder, showSources, tooLarge } from "./choices.js";
 import { beginMachine, offerJob } from "./machine.js";
 import { showJob, showPattern } from "./results.js";
-import { ask, byId, copy } from "./tools.js";
+import { texts } from "./texts.js";
+import { ask, byId, copy, say } from "./tools.js";
 
 const TABS = ["shape", "layout", "desk"];
-const DOING = { fit: "Fitting", open: "Opening", sheets: "Laying out" };
+const DOING = { fit: texts.frame.fitting, open: texts.frame.opening, sheets: texts.frame.laying_out };
 let following = 0;
 let told = "";
 let ownJob = null;
@@ -19,7 +20,9 @@ function show(state) {
   const running = Boolean(task?.running);
   byId("task").hidden = !running;
   if (running) {
-    byId("task-note").textContent = task.note ? `${DOING[task.kind]}: ${task.note}` : `${DOING[task.kind]}…`;
+    byId("task-note").textContent = say(
+      task.note ? texts.frame.task : texts.frame.task_begins, { doing: DOING[task.kind], note: task.note },
+    );
     // nothing is known of how long it takes before the first step is done
     if (task.fraction > 0) byId("task-bar").value = task.fraction;
     else byId("task-bar").removeAttribute("value");

@@ -1,5 +1,7 @@
 // The smallest of tools: elements, requests to our own server, the clipboard.
 
+import { texts } from "./texts.js";
+
 export const byId = (id) => document.getElementById(id);
 
 export function element(tag, properties = {}, ...children) {
@@ -7,6 +9,9 @@ export function element(tag, properties = {}, ...children) {
   made.append(...children);
   return made;
 }
+
+/** `text` with the values of its {names}. */
+export const say = (text, values) => text.replace(/\{(\w+)\}/g, (_, name) => values[name]);
 
 const KEY = location.pathname.split("/")[1];
 
@@ -21,7 +26,7 @@ export async function ask(route, body, headers = {}) {
   try {
     answer = await fetch(route, how);
   } catch {
-    throw new Error("The studio does not answer; start it again with 'miurafab studio'.");
+    throw new Error(texts.frame.no_answer);
   }
   const said = await answer.json();
   if (!answer.ok) throw new Error(said.error);
@@ -32,8 +37,8 @@ export async function copy(button) {
   const code = byId(button.dataset.copy);
   try {
     await navigator.clipboard.writeText(code.textContent);
-    button.textContent = "Copied";
-    setTimeout(() => { button.textContent = "Copy"; }, 1500);
+    button.textContent = texts.words.copied;
+    setTimeout(() => { button.textContent = texts.words.copy; }, 1500);
   } catch {
     getSelection().selectAllChildren(code);
   }
