@@ -77,7 +77,11 @@ def _read(kind: Kind, token: Token) -> Any:
 
 TargetArgument = Annotated[
     str,
-    argument("TARGET", "A named surface (hypar:height=0.5), a design .toml, or a mesh file."),
+    argument(
+        "TARGET",
+        "A named surface (hypar:height=0.5), a formula (formula:z=x*y/2), a design .toml, a mesh "
+        "file, or an image of heights (dem.png:height=20).",
+    ),
 ]
 MachineOption = Annotated[
     str | None, option(Text("NAME"), "A machine profile: a shipped name or a TOML file.")

@@ -25,6 +25,7 @@ def surfaces(*, console: Console = Console()) -> int:
                 "name": entry.name,
                 "summary": entry.summary,
                 "profile": entry.profile_axes,
+                "formulas": dict(entry.formulas),
                 "parameters": {
                     key: {
                         "default": parameter.default,

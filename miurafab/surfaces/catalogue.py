@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from miurafab.errors import TargetError
 from miurafab.options import Quantity, angle, number
 from miurafab.surfaces import analytic, curves
+from miurafab.surfaces.formula import DEFAULT, computed, formula_surface
 from miurafab.surfaces.surface import TargetSurface
 
 
@@ -38,7 +39,8 @@ class SurfaceParameter:
 @dataclass(frozen=True)
 class NamedSurface:
     """One entry of the catalogue. ``profile_axes`` names the axes of the curve that a design file
-    may give it, or is None where the surface takes none.
+    may give it, or is None where the surface takes none. ``formulas`` are the names of the formulas
+    that it takes, each with its meaning.
     """
 
     name: str
@@ -46,6 +48,13 @@ class NamedSurface:
     parameters: Mapping[str, SurfaceParameter]
     make: Callable[..., TargetSurface]
     profile_axes: str | None = None
+    formulas: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The names of all that may be given."""
+        profile = () if self.profile_axes is None else ("profile",)
+        return (*self.formulas, *self.parameters, *profile)
 
 
 def _length(default: float, meaning: str, low: float = 1e-6) -> SurfaceParameter:
@@ -60,6 +69,11 @@ def _signed(default: float, meaning: str) -> SurfaceParameter:
     return SurfaceParameter(number(-1e6, 1e6), default, meaning)
 
 
+def _end(default: float, meaning: str) -> SurfaceParameter:
+    kind = Quantity(computed, "a number or a formula such as 2*pi", low=-1e6, high=1e6)
+    return SurfaceParameter(kind, default, meaning)
+
+
 _TURN = {"angle": _angle(120, "angle turned through", 360)}
 _SIDES = {"width": _length(2.0, "side along x"), "depth": _length(2.0, "side along y")}
 _VASE = ((0.55, 0.0), (0.8, 0.5), (0.72, 1.1), (0.5, 1.6), (0.58, 2.0))
@@ -72,6 +86,10 @@ def _arc_cylinder(radius: float, angle: float, length: float, profile: Any = Non
 
 def _log_spiral(start: float, growth: float, turns: float, length: float) -> TargetSurface:
     return analytic.cylinder_over(curves.log_spiral(start, growth, turns), length)
+
+
+def _formula(u0: float, u1: float, v0: float, v1: float, **formulas: str) -> TargetSurface:
+    return formula_surface((u0, u1, v0, v1), **formulas)
 
 
 def _turned(name: str, profile: curves.ProfileCurve, angle: float) -> TargetSurface:
@@ -243,6 +261,22 @@ _ENTRIES = (
         _revolution,
         "r, z",
     ),
+    NamedSurface(
+        "formula",
+        f"a formula: z of x and y, or x, y and z of u and v; by default z={DEFAULT}",
+        {
+            "u0": _end(-1.0, "start of u, or of x"),
+            "u1": _end(1.0, "end of u, or of x"),
+            "v0": _end(-1.0, "start of v, or of y"),
+            "v1": _end(1.0, "end of v, or of y"),
+        },
+        _formula,
+        formulas={
+            "z": "height over x and y, such as 0.4*(x^2-y^2); with x and y, of u and v",
+            "x": "of u and v, such as cos(u); empty for a height",
+            "y": "of u and v, such as sin(u); empty for a height",
+        },
+    ),
 )
 
 CATALOGUE: Mapping[str, NamedSurface] = {entry.name: entry for entry in _ENTRIES}
@@ -268,8 +302,11 @@ def make_surface(name: str, given: Mapping[str, Any]) -> tuple[TargetSurface, di
 
             written["profile"] = read_profile(Path(text)) if isinstance(text, str) else text
             continue
+        if key in entry.formulas:
+            written[key] = str(text)
+            continue
         if key not in entry.parameters:
-            known = ", ".join(entry.parameters)
+            known = ", ".join(entry.keys)
             raise TargetError(f"The surface '{name}' has no parameter '{key}'; it has {known}.")
         kind = entry.parameters[key].kind
         try:
@@ -277,6 +314,8 @@ def make_surface(name: str, given: Mapping[str, Any]) -> tuple[TargetSurface, di
             written[key] = round(kind.read(text) / kind.factor, 12)
         except ValueError as fault:
             raise TargetError(f"The parameter '{key}' of '{name}' {fault}.") from None
+    if entry.formulas and not entry.formulas.keys() & written.keys():
+        written["z"] = DEFAULT
     inside = {key: written[key] * p.kind.factor for key, p in entry.parameters.items()}
     surface = entry.make(**written | inside)
     if name == "helicoid" and written["inner"] >= written["radius"]:
@@ -288,9 +327,21 @@ def parse_target(text: str) -> tuple[str, dict[str, str]]:
     """``name:key=value,key=value`` as a name and its parameters. Raises ``TargetError``."""
     name, _, rest = text.partition(":")
     parameters = {}
-    for part in filter(None, rest.split(",")):
+    for part in filter(None, _parted(rest)):
         key, equals, value = part.partition("=")
         if not equals or not value.strip():
             raise TargetError(f"'{part}' in '{text}' is not of the form parameter=value.")
         parameters[key.strip()] = value.strip()
     return name.strip(), parameters
+
+
+def _parted(text: str) -> list[str]:
+    """``text`` parted at the commas that stand in no brackets."""
+    parts, depth = [""], 0
+    for letter in text:
+        depth += (letter == "(") - (letter == ")")
+        if letter == "," and depth <= 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return parts

@@ -61,12 +61,15 @@ class SampledSurface:
         The parameters of the target. It lies inside ``span``.
     origin : (3,) float64
         What the samples are relative to (:mod:`miurafab.surfaces.frame`).
+    findings : tuple of Finding
+        What a person should know of the samples.
     """
 
     points: Floats
     span: Domain
     domain: Domain
     origin: Floats = field(default_factory=lambda: np.zeros(3))
+    findings: tuple[Finding, ...] = ()
 
     def __repr__(self) -> str:
         rows, columns = self.points.shape[:2]

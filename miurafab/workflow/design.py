@@ -1,8 +1,8 @@
 """From a target, in any form, to the request of a fit.
 
 A target is text (a surface with parameters such as ``hypar:height=0.5``, a design ``.toml``, a mesh
-or an image file) or a value (a design, a mesh of trimesh, a function, an array). A design file says
-the same as the options of ``miurafab fit``; options override it.
+or an image) or a value (a design, a mesh of trimesh, a function, an array). A design file says the
+same as the options of ``miurafab fit``; options override it.
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ from miurafab.errors import OptionError, TargetError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.files import Reading
 from miurafab.findings import Finding
-from miurafab.options import Text, declared, length, number, read_options, read_value
+from miurafab.options import Text, declared, length, read_options, read_value
 from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitOptions, FitRequest
 from miurafab.profiles import Table, find_file, read_toml
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
 from miurafab.surfaces.body import BodyChoice
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface, parse_target
 from miurafab.surfaces.description import described_surface
+from miurafab.surfaces.frame import described
 from miurafab.surfaces.function import SampledSurface, from_function, from_points, rounded
-from miurafab.surfaces.height_field import IMAGE_SUFFIXES, from_heights, read_image
+from miurafab.surfaces.height_field import IMAGE_SUFFIXES, from_heights
 from miurafab.surfaces.mesh import MeshSurface, load_mesh, mesh_surface
 from miurafab.surfaces.mesh_files import (
     FROM_POINTS,
@@ -42,6 +43,8 @@ from miurafab.surfaces.mesh_files import (
 from miurafab.surfaces.preparation import MeshReading
 from miurafab.surfaces.surface import TargetSurface
 from miurafab.surfaces.tube import TubeSurface
+from miurafab.workflow.image_targets import PARAMETERS as OF_IMAGE
+from miurafab.workflow.image_targets import heights_in, image_named
 
 Values = Mapping[str, Any]
 
@@ -196,12 +199,10 @@ def _named(target: str, given: Values) -> Design:
     if mesh_suffix(path):
         asked, _ = _asked(given, (), f"the mesh {path.name}")
         return _from_mesh(path, asked, path.name.partition(".")[0])
-    if suffix in IMAGE_SUFFIXES:
-        asked, values = _asked(given, ("height", "spacing"), f"the image {path.name}")
-        height = values.get("height")
-        if height is not None:
-            height = read_value("height", number(), height)
-        return _on_heights(read_image(path, height), values, asked, path.stem)
+    image = image_named(target)
+    if image is not None:
+        asked, values = _asked(given, tuple(OF_IMAGE), f"the image {image[0].name}")
+        return _on_heights(*heights_in(image[0], image[1] | values), asked, image[0].stem)
     if suffix and os.sep in target and target.partition(":")[0] not in CATALOGUE:
         files = ", ".join((".toml", *MESH_SUFFIXES, *IMAGE_SUFFIXES))
         raise TargetError(f"'{target}' cannot be a target: known files are {files}.")
@@ -215,7 +216,7 @@ def _parameters(name: str) -> tuple[str, ...]:
     if entry is None:
         make_surface(name, {})  # says what is known
         return ()
-    return (*entry.parameters, *(() if entry.profile_axes is None else ("profile",)))
+    return entry.keys
 
 
 def _from_file(path: Path, given: Values) -> Design:
@@ -223,10 +224,15 @@ def _from_file(path: Path, given: Values) -> Design:
     title = table.value("title", Text(), path.stem)
     target = table.table("target")
     sheets, machine, material = read_layout_table(table.table("layout", {}), path.parent)
-    mesh = path.parent / target.value("mesh", Text()) if target.has("mesh") else None
-    name = "" if mesh is not None else target.value("surface", Text())
+    mesh, image = (
+        path.parent / target.value(kind, Text()) if target.has(kind) else None
+        for kind in ("mesh", "image")
+    )
+    of_file = mesh is not None or image is not None
+    name = "" if of_file else target.value("surface", Text())
     with Reading(path.name, "a design", TargetError):
-        known = () if mesh is not None else _parameters(name)
+        known = tuple(OF_IMAGE) if image is not None else ()
+        known = known if of_file else _parameters(name)
     chosen, changed = _split(given, known, f"the target of {path.name}")
     asked = read_options(
         FitOptions,
@@ -239,6 +245,9 @@ def _from_file(path: Path, given: Values) -> Design:
         if mesh is not None:
             design = _from_mesh(mesh, asked, title)
             target.finish()
+        elif image is not None:
+            heights = heights_in(image, {**target.rest(), **changed})
+            design = _on_heights(*heights, asked, title)
         else:
             values = target.rest()
             if isinstance(values.get("profile"), str):
@@ -312,11 +321,11 @@ def _on_array(target: Any, given: Values) -> Design:
             "columns), a grid of points (rows, columns, 3)."
         )
     asked, values = _asked(given, ("spacing",), "a height map")
-    return _on_heights(array, values, asked, "heights")
-
-
-def _on_heights(heights: Any, values: Values, asked: FitOptions, title: str) -> Design:
     spacing = read_value("spacing", length(above=True), values.get("spacing", 1.0))
+    return _on_heights(array, spacing, asked, "heights")
+
+
+def _on_heights(heights: Any, spacing: float, asked: FitOptions, title: str) -> Design:
     return _on_samples(*from_heights(heights, spacing), asked, title)
 
 
@@ -332,7 +341,12 @@ def _on_samples(
 def _on_surface(name: str, parameters: Values, asked: FitOptions, title: str) -> Design:
     _not_for(name, asked)
     surface, values = _closed(*make_surface(name, parameters), name, asked)
-    return Design(_request(surface, {"surface": name, "parameters": values}, asked), title)
+    target: dict[str, Any] = {"surface": name, "parameters": values}
+    findings: tuple[Finding, ...] = ()
+    if isinstance(surface, SampledSurface):
+        target |= described(surface.origin)
+        findings = surface.findings
+    return Design(_request(surface, target, asked), title, findings=findings)
 
 
 def _request(surface: TargetSurface, target: dict[str, Any], asked: FitOptions) -> FitRequest:

@@ -127,7 +127,7 @@ def test_command_lines():
 def test_the_design_file_asks_for_the_same(tmp_path):
     for surface, entry in CATALOGUE.items():
         angles = {key: "35deg" for key, value in entry.parameters.items() if value.kind.unit}
-        parameters = angles or {next(iter(entry.parameters)): "1.25"}
+        parameters = angles or {list(entry.parameters)[-1]: "1.25"}
         options = {"facets": "6x8", "size": "12in", "amplitude": "0.3", "flat_foldable": "5deg"}
         order = read_fit(
             body(target={"surface": surface, "parameters": parameters}, options=options)
