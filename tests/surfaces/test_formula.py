@@ -12,6 +12,7 @@ from PIL import Image
 
 import miurafab as mf
 from miurafab.errors import OptionError, TargetError
+from miurafab.origami.formats.fold import read_fold
 from miurafab.surfaces.catalogue import make_surface, parse_target
 from miurafab.surfaces.description import described_surface
 from miurafab.surfaces.formula import LONGEST, computed, read_formula
@@ -125,7 +126,7 @@ def test_the_file_keeps_the_formula_and_a_check_knows_it(tmp_path):
     assert result.status == "converged"
     file = tmp_path / "far.fold"
     result.pattern.save(file)
-    pattern = mf.CreasePattern.load(file)
+    pattern = read_fold(file)
     assert pattern.target["parameters"]["z"] == "0.3*x*y+1e6"
     assert pattern.origin[2] != 0
     assert described_surface(pattern.target)[0].origin[2] == 1e6
