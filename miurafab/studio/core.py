@@ -11,6 +11,8 @@ design.toml     GET    the design file of the pattern
 upload          POST   keeps a file (its name in ``X-File-Name``, percent-encoded)
 fit, open       POST   starts to make or read a pattern
 sheets          POST   starts to lay it out
+live, live/plan POST   asks for a coarse fit, or for the sheets that the pattern on the bench needs
+live/N          GET    the answer to the N-th of these
 cancel          POST   ends the task
 machine         GET    the session with a machine, and what was said since ``?after=N``
 machine/sheet/N GET    the strokes of sheet N of the job there
@@ -25,6 +27,7 @@ no other.
 from __future__ import annotations
 
 import threading
+from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -46,10 +49,11 @@ from miurafab.studio.desk import Desk
 from miurafab.studio.form import by_label, filled
 from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
 from miurafab.studio.kept_jobs import keep_job
+from miurafab.studio.live import Live
 from miurafab.studio.machine_orders import ROUTES, carry_out
 from miurafab.studio.machine_words import NO_JOB, plain
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
-from miurafab.studio.orders import read_fit, read_layout, read_source
+from miurafab.studio.orders import read_fit, read_glance, read_layout, read_plan, read_source
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.texts import with_texts
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
@@ -57,7 +61,7 @@ from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED
 from miurafab.workflow.at_machine import STEPS
 from miurafab.workflow.design import can_close
 
-PAGE, MACHINE = "studio.html", "machine"
+PAGE, MACHINE, LIVE = "studio.html", "machine", "live"
 PARTS = (
     *("icon.svg", "studio.css", "machine.css", "tools.js", "choices.js", "results.js"),
     *("machine.js", "sheet.js", "studio.js", "texts.js"),
@@ -77,11 +81,13 @@ class Studio:
         first: dict[str, Any] | None = None,
         *,
         desk: Desk | None = None,
+        live: Live | None = None,
         own_job: Path | None = None,
     ) -> None:
         self.bench = bench
         self.guard = guard
         self.desk = Desk() if desk is None else desk
+        self.live = Live() if live is None else live
         self._own_job = own_job
         self._lock = threading.Lock()
         self._first = first
@@ -95,6 +101,8 @@ class Studio:
             return refused
         route = self.guard.route(request.path)
         assert route is not None
+        if route == LIVE or route.startswith(f"{LIVE}/"):
+            return self._live(route.removeprefix(LIVE).removeprefix("/"), request)
         if route == MACHINE or route.startswith(f"{MACHINE}/"):
             return self._machine(route.removeprefix(MACHINE).removeprefix("/"), request)
         with self._lock:
@@ -105,6 +113,36 @@ class Studio:
                 return self._get(route, request.path.partition("?")[2])
             except MiurafabError as fault:
                 return refusal(400, by_label(fault.sentence))
+
+    def _live(self, route: str, request: HttpRequest) -> Response:
+        """What is answered while a hand drags; it waits a moment, and nothing waits for it."""
+        bench = self.bench
+        try:
+            if request.method == "POST":
+                with self._lock:
+                    bench.take_in()
+                    number = self.live.ask(self._question(route, request.body))
+            elif route.isascii() and route.isdigit():
+                number = int(route[:9])
+            else:
+                return refusal(404, "Nothing is at this address.")
+        except MiurafabError as fault:
+            return refusal(400, by_label(fault.sentence))
+        said = self.live.answer(number)
+        if "error" in said:
+            said = {"error": bench.plain(said["error"])}
+        return answer({"number": number, "said": said})
+
+    def _question(self, route: str, body: bytes) -> dict[str, Any]:
+        if route == "plan":
+            layout = read_plan(body)
+            file = str(self.bench.pattern_file())
+            return {"do": "plan", "file": file, "layout": layout and asdict(layout)}
+        asked, layout = read_glance(body)
+        target = self.bench.target_of(asked)
+        options = dict(asked.options)
+        beside = layout and asdict(layout)
+        return {"do": "coarse", "target": target, "options": options, "layout": beside}
 
     def _machine(self, route: str, request: HttpRequest) -> Response:
         """What belongs to the session with a machine; nothing here waits for the bench, but the

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from html import escape
 
 from miurafab.errors import spell_options
@@ -12,6 +12,8 @@ from miurafab.origami.fitting.request import FitOptions
 
 FIT = {name: field for name, field in declared(FitOptions).items() if field.page}
 LAYOUT = {name: field for name, field in declared(LayoutOptions).items() if field.page}
+
+LABELS = {name: field.label for name, field in (FIT | LAYOUT).items()}
 
 
 def filled(page: str) -> str:
@@ -25,10 +27,7 @@ def filled(page: str) -> str:
 
 def by_label(sentence: str) -> str:
     """``sentence`` with each option called as its field on the page is, if it has one."""
-    fields: Mapping[str, Declared] = FIT | LAYOUT
-    return spell_options(
-        sentence, lambda name: f"'{fields[name].label if name in fields else name}'"
-    )
+    return spell_options(sentence, lambda name: f"'{LABELS.get(name, name)}'")
 
 
 def _row(field: Declared) -> str:

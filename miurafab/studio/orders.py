@@ -8,10 +8,10 @@ field on the page (:mod:`~miurafab.studio.form`); none of them names a file.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from miurafab.errors import InputError, TargetError
+from miurafab.errors import InputError, MiurafabError, TargetError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.files import parse_json
 from miurafab.options import Declared, Flag, Whole, read_options
@@ -26,12 +26,23 @@ _LONGEST = 200
 
 @dataclass(frozen=True)
 class FitOrder:
-    """A fit to a named ``surface`` with its ``parameters``, or to the file of ``source``."""
+    """A fit to a named ``surface`` with its ``parameters``, or to the file of ``source``.
+
+    ``replaces`` is the number of the task whose place it takes, if that one still runs.
+    """
 
     surface: str | None
     parameters: Mapping[str, str]
     source: str | None
     options: Mapping[str, Value]
+    replaces: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """The order as the page wrote it."""
+        target: dict[str, Any] = {"source": self.source}
+        if self.source is None:
+            target = {"surface": self.surface, "parameters": dict(self.parameters)}
+        return {"target": target, "options": dict(self.options)}
 
     @property
     def target(self) -> str:
@@ -55,7 +66,31 @@ def read_fit(body: bytes) -> FitOrder:
 
     Raises :class:`~miurafab.errors.InputError` or ``TargetError``.
     """
-    order = read_order(body, ("target", "options"))
+    order = read_order(body, ("target", "options", "replaces"))
+    return replace(_fit_of(order), replaces=text_of("replaces", order.get("replaces", "")))
+
+
+def read_glance(body: bytes) -> tuple[FitOrder, LayoutOrder | None]:
+    """The fit that a coarse answer is asked for, and the layout that the form of the sheets stands
+    for, None where a field of it holds something wrong. Raises as :func:`read_fit`.
+    """
+    order = read_order(body, ("target", "options", "layout"))
+    return _fit_of(order), _layout_beside(order.get("layout"))
+
+
+def read_plan(body: bytes) -> LayoutOrder | None:
+    """The layout for which the pattern on the bench is planned; as in :func:`read_glance`."""
+    return _layout_beside(read_order(body, ("layout",)).get("layout"))
+
+
+def _layout_beside(value: Any) -> LayoutOrder | None:
+    try:
+        return _layout_of(_table(value, "The layout"))
+    except MiurafabError:  # the form of the sheets says so where it is used
+        return None
+
+
+def _fit_of(order: Mapping[str, Any]) -> FitOrder:
     target = _table(order.get("target"), "The target")
     options = _options(order.get("options", {}), FIT)
     if "source" in target:
@@ -83,7 +118,10 @@ def read_layout(body: bytes) -> LayoutOrder:
 
     Raises :class:`~miurafab.errors.InputError`.
     """
-    order = read_order(body, ("machine", "material", "options"))
+    return _layout_of(read_order(body, ("machine", "material", "options")))
+
+
+def _layout_of(order: Mapping[str, Any]) -> LayoutOrder:
     machine = listed("machine", order.get("machine"), known_names("firmware_profiles"))
     material = listed("material", order.get("material"), known_names("materials"))
     options = _options(order.get("options", {}), LAYOUT)

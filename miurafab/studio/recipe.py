@@ -20,6 +20,24 @@ def fit_command(target: str, options: Mapping[str, Value], name: str) -> str:
     return shlex.join(["miurafab", "fit", target, *_words(options), "-o", f"{name}.fold"])
 
 
+def subject(
+    name: str,
+    parameters: Mapping[str, str],
+    options: Mapping[str, Value],
+    labels: Mapping[str, str],
+) -> str:
+    """What a result is a result of: the target and its options, by their ``labels`` on the page.
+
+    >>> subject("vase", {"neck": "0.4"}, {"facets": "12x12"}, {"facets": "Facets"})
+    'vase, neck 0.4 · Facets 12x12'
+    """
+    words = [", ".join([name, *(f"{key} {value}" for key, value in parameters.items())])]
+    for key, value in options.items():
+        label = labels.get(key, key)
+        words.append(label if value is True else f"{label} {value}")
+    return " · ".join(words)
+
+
 def check_command(file: str) -> str:
     """``miurafab check`` for a pattern that was opened."""
     return shlex.join(["miurafab", "check", file])

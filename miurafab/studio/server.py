@@ -69,6 +69,7 @@ def serve(
         at_end.callback(server.server_close)
         guard = Guard(server.server_port, new_key())
         server.studio = Studio(bench, guard, first, own_job=own_job)
+        at_end.callback(server.studio.live.stop)
         at_end.callback(server.studio.desk.leave)  # before anything else: the machine is dark
         at_end.callback(signals.hold)
         if thing is not None and first is not None and first.get("open"):

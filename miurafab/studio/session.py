@@ -10,14 +10,14 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError
 from miurafab.files import write_bytes
 from miurafab.studio import recipe
-from miurafab.studio.form import by_label
+from miurafab.studio.form import LABELS, by_label
 from miurafab.studio.names import safe_stem, suffix_of
 from miurafab.studio.orders import FitOrder, LayoutOrder
 from miurafab.studio.report_text import headline, layout_lines, pattern_lines
@@ -65,11 +65,14 @@ class Task:
 @dataclass(frozen=True)
 class Asked:
     """The order for the pattern on the bench. ``target`` is as in a design file, None where a
-    design file cannot state it; ``file`` is the pattern's name in command lines.
+    design file cannot state it; ``file`` is the pattern's name in command lines. ``form`` is the
+    order as the page sent it, ``subject`` the same in words.
     """
 
     command: str
     file: str
+    form: Mapping[str, Any]
+    subject: str
     target: Mapping[str, str] | None = None
     options: Mapping[str, recipe.Value] = field(default_factory=dict)
     layout: LayoutOrder | None = None
@@ -115,39 +118,68 @@ class Bench:
         return self._keep(Source(self._number(), kind, path, str(path), ours=True))
 
     def fit(self, asked: FitOrder) -> None:
-        """Start a fit. Raises :class:`~miurafab.errors.InputError` while another task runs."""
+        """Start a fit. Raises :class:`~miurafab.errors.InputError` while another task runs, but
+        for the one that it replaces: that is ended.
+        """
+        target = self.target_of(asked)  # refused before anything is ended
+        if self.task is not None and self.task.id == asked.replaces:
+            self.cancel()
         self._check_idle()
         if asked.source is None:
             assert asked.surface is not None
-            target, shown, name = asked.target, asked.target, asked.surface
+            shown, name = asked.target, asked.surface
             described: Mapping[str, str] | None = {"surface": name, **asked.parameters}
+            words = name
         else:
-            source = self._source(asked.source, ("mesh", "design"))
-            target, shown, name = str(source.path), source.shown, source.name
+            source = self.sources[asked.source]
+            shown, name = source.shown, source.name
             described = {"mesh": source.shown} if source.kind == "mesh" else None
-        command = recipe.fit_command(shown, asked.options, name)
-        self._coming = Asked(command, f"{name}.fold", described, asked.options)
+            words = source.path.name
+        self._coming = Asked(
+            recipe.fit_command(shown, asked.options, name),
+            f"{name}.fold",
+            asked.as_dict(),
+            recipe.subject(words, asked.parameters, asked.options, LABELS),
+            described,
+            asked.options,
+        )
         self._begin("fit", name, target=target, options=asked.options)
+
+    def target_of(self, asked: FitOrder) -> str:
+        """The target of a fit as the verbs take it. Raises ``InputError`` for a file that is gone
+        or cannot be fitted.
+        """
+        if asked.source is None:
+            return asked.target
+        return str(self._source(asked.source, ("mesh", "design")).path)
+
+    def pattern_file(self) -> Path:
+        """The file of the pattern on the bench. Raises ``InputError`` if there is none."""
+        if self.pattern is None or "fold" not in self.pattern["files"]:
+            raise InputError("There is no pattern to lay out yet; fit or open one first.")
+        return self.files[self.pattern["id"], f"{self.pattern['name']}.fold"]
 
     def open(self, source_id: str) -> None:
         """Start to open a pattern. Raises as :meth:`fit`."""
         self._check_idle()
         source = self._source(source_id, ("pattern",))
-        self._coming = Asked(recipe.check_command(source.shown), source.shown)
+        form = {"source": source_id}
+        self._coming = Asked(
+            recipe.check_command(source.shown), source.shown, form, source.path.name
+        )
         self._begin("open", source.name, file=source.path, ours=source.ours)
 
     def lay_out(self, asked: LayoutOrder) -> None:
         """Start to lay out the pattern on the bench. Raises as :meth:`fit`."""
         self._check_idle()
-        if self.pattern is None or "fold" not in self.pattern["files"] or self._asked is None:
-            raise InputError("There is no pattern to lay out yet; fit or open one first.")
-        self._coming = Asked(
-            self._asked.command, self._asked.file, self._asked.target, self._asked.options, asked
-        )
+        file = self.pattern_file()
+        assert self.pattern is not None
+        assert self._asked is not None
+        self._coming = replace(self._asked, layout=asked)
         self._begin(
             "sheets",
             self.pattern["name"],
-            file=self.files[self.pattern["id"], f"{self.pattern['name']}.fold"],
+            file=file,
             machine=asked.machine,
             material=asked.material,
             options=asked.options,
@@ -173,7 +205,7 @@ class Bench:
             elif "part" in said:
                 self._take_part(task, said)
             else:
-                task.error = self._plain(said.get("error", ""))
+                task.error = self.plain(said.get("error", ""))
                 task.running.stop()
                 task.running = None
                 self._settle()
@@ -239,7 +271,7 @@ class Bench:
             "name": task.order.name,
             "status": report["status"],
             "headline": headline(report["status"], opened=opened),
-            "advice": self._plain(report["advice"]),
+            "advice": self.plain(report["advice"]),
             "seams": bool(report.get("seam_mm")),
             "lines": pattern_lines(report),
             "findings": self._findings(part),
@@ -248,6 +280,8 @@ class Bench:
             "still": "",
             "has_design": self._asked.target is not None,
             "command": self._asked.command,
+            "form": self._asked.form,
+            "subject": self._asked.subject,
         }
 
     def _new_job(self, task: Task, part: News) -> None:
@@ -280,11 +314,11 @@ class Bench:
 
     def _findings(self, part: News) -> list[dict[str, Any]]:
         return [
-            finding | {"sentence": self._plain(finding["sentence"])}
+            finding | {"sentence": self.plain(finding["sentence"])}
             for finding in part.get("findings", [])
         ]
 
-    def _plain(self, sentence: str) -> str:
+    def plain(self, sentence: str) -> str:
         """``sentence`` with files of the studio's folder named without a path, and options named
         by the labels of their fields.
         """

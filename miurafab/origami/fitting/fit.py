@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from miurafab.errors import OptionError
 from miurafab.findings import Finding
@@ -25,6 +26,7 @@ from miurafab.origami.fitting.result import INTERRUPTED, TIME_RAN_OUT, Attempt, 
 from miurafab.origami.fitting.score import ENOUGH, GOOD
 from miurafab.origami.fitting.search import coarsest
 from miurafab.origami.fitting.starts import STEEP, Start, direct, starts_elsewhere, starts_for
+from miurafab.origami.verify import Measurements
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
 from miurafab.surfaces.tube import TubeSurface
 
@@ -47,8 +49,10 @@ TOO_FAR = 1.2
 """A size whose first sheets miss a limit on the distance by this factor is too coarse."""
 FAR = 4.0
 """The plain search goes on while the deviation is over this many times that of a good sheet."""
+GLANCES = 6
+"""So many starts a coarse fit makes at most, if none is a clean sheet."""
 
-__all__ = ["Attempt", "FitRequest", "FitResult", "fit"]
+__all__ = ["Attempt", "FitRequest", "FitResult", "coarse", "fit"]
 
 
 class _TimeUp(Exception):
@@ -82,6 +86,33 @@ def fit(
     from miurafab.origami.energy.tuning import tuned
 
     return tuned(request, result, on_progress)
+
+
+def coarse(
+    request: FitRequest, on_progress: Callable[[float, str], None] | None = None
+) -> FitResult:
+    """The first clean sheet that the projection alone finds, as a picture of what a fit will give.
+
+    The sheet is exact, and its residuals, its clashes and the deviation of its middle are measured.
+    What takes longer than the sheet itself is left out: the fair objective, the cut along the
+    outline of a mesh (the sheet ends with whole facets), pieces that nobody asked for, the search
+    of a number of facets or of a barrier, and the distances between the whole sheet and the whole
+    target (``hausdorff_mm``, ``coverage``, ``area_ratio`` are None).
+
+    Parameters
+    ----------
+    request : FitRequest
+        What is asked of the fit; a size in mm, or none.
+    on_progress : callable, optional
+        As for :func:`fit`. An exception that it raises ends the fit.
+
+    Returns
+    -------
+    FitResult
+        ``stalled`` where no exact sheet was found in so many starts.
+    """
+    edge = "whole" if request.edge == "trim" else request.edge
+    return _Glance(replace(request, polish="off", edge=edge), on_progress).result()
 
 
 class _FitSearch:
@@ -231,6 +262,9 @@ class _FitSearch:
             # the number of attempts is not known beforehand; most sheets need one or two
             self.on_progress(1 - 0.8 ** len(self.made), start.describe())
 
+    def _measured(self, best: Candidate) -> Measurements:
+        return best.with_distances()
+
     def _check_time(self) -> None:
         limit = self.request.timeout
         if limit is not None and time.perf_counter() - self.started > limit:
@@ -269,7 +303,7 @@ class _FitSearch:
             status,
             " ".join(finding.sentence for finding in findings),
             best.pattern,
-            best.with_distances(),
+            self._measured(best),
             made,
             iterations,
             seconds,
@@ -279,6 +313,17 @@ class _FitSearch:
             best.active_bounds,
             findings=tuple(findings),
         )
+
+
+class _Glance(_FitSearch):
+    """The search of a coarse fit: few starts, and no distances."""
+
+    def _settled(self) -> bool:
+        best = self.best
+        return (best is not None and best.rank[0] == 0) or len(self.made) >= GLANCES
+
+    def _measured(self, best: Candidate) -> Measurements:
+        return best.measurements
 
 
 def _no_sheet(attempts: tuple[Attempt, ...], ended: Finding | None) -> Finding:

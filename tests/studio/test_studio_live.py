@@ -1,0 +1,247 @@
+"""What is answered while a hand drags: the newest question alone, quickly, and by a true sheet."""
+
+import os
+import time
+
+import numpy as np
+import pytest
+from rigs import until
+from studios import Asked, Done, saddle_obj, sentence
+
+import miurafab
+from miurafab.fabrication.sheets import lay_out
+from miurafab.origami.fitting.fit import coarse
+from miurafab.studio import glance
+from miurafab.studio.glance import MOST, Glances, _stock
+from miurafab.studio.live import Live
+from miurafab.workflow import design as designs
+
+LAYOUT = {"machine": "grbl-laser-400", "material": "card-250", "options": {}}
+
+
+class Told:
+    """A process that answers when the test says so."""
+
+    def __init__(self, on_line, on_end):
+        self.on_line, self.on_end, self.asked, self.stopped = on_line, on_end, [], False
+
+    def send(self, value):
+        self.asked.append(value)
+
+    def stop(self):
+        self.stopped = True
+
+
+@pytest.fixture
+def begun():
+    return []
+
+
+@pytest.fixture
+def live(begun):
+    def begin(on_line, on_end):
+        begun.append(Told(on_line, on_end))
+        return begun[-1]
+
+    return Live(begin)
+
+
+def test_only_the_newest_question_has_an_answer(live, begun):
+    first, second = live.ask({"do": "a"}), live.ask({"do": "b"})
+    (process,) = begun
+    assert [each["do"] for each in process.asked] == ["a", "b"]
+    process.on_line({"number": first, "answer": {"late": True}})
+    assert live.answer(first) == {"gone": True}
+    assert live.answer(second) == {"wait": True}
+    process.on_line({"number": second, "answer": {"it": 1}})
+    assert live.answer(second) == live.answer(second) == {"answer": {"it": 1}}
+
+
+def test_a_process_that_ends_is_an_error_and_the_next_question_starts_one(live, begun):
+    number = live.ask({})
+    begun[0].on_end("It ended.")
+    assert live.answer(number) == {"error": "It ended."}
+    number = live.ask({})
+    begun[0].on_end("It ended again.")  # the old one has no say any more
+    begun[1].on_line({"number": number, "answer": {}})
+    assert live.answer(number) == {"answer": {}}
+    live.stop()
+    assert begun[1].stopped
+
+
+def test_a_process_that_hangs_is_left_for_a_new_one(live, begun, monkeypatch):
+    live.ask({})
+    monkeypatch.setattr("miurafab.studio.live.PATIENCE_S", -1.0)
+    number = live.ask({"do": "again"})
+    assert begun[0].stopped
+    assert begun[1].asked == [{"number": number, "do": "again"}]
+
+
+def coarsely(target, layout=LAYOUT, **options):
+    asked = {"do": "coarse", "target": target, "options": options, "layout": layout}
+    return Glances().answer(asked, lambda fraction, note: None)
+
+
+def test_a_coarse_sheet_is_exact_and_told_without_the_slow_figures():
+    told = coarsely("hypar", facets="10x10", size="250mm")
+    lines = {line["name"]: line for line in told["lines"]}
+    assert lines["Flat facets"]["mark"] == lines["Folds from flat paper"]["mark"] == "good"
+    assert "With its folds" not in lines
+    assert max(told["box_mm"]) == 250.0
+    points = np.reshape(told["picture"]["points"], (-1, 3)) / 100
+    assert len(points) == 121
+    assert np.ptp(points, axis=0) == pytest.approx(told["box_mm"], abs=0.06)
+    # the distance of its middle is that of the whole measurement
+    request = miurafab.design("hypar", facets=(10, 10), size=250, polish="off").request
+    whole, quick = miurafab.fit("hypar", facets=(10, 10), size=250, polish="off"), coarse(request)
+    assert quick.measurements.hausdorff_mm is None
+    assert quick.deviation_mm == whole.deviation_mm
+    assert np.array_equal(quick.pattern.vertices_coords, whole.pattern.vertices_coords)
+
+
+def test_a_coarse_fit_of_10x10_takes_less_than_a_fifth_of_a_second():
+    taken = []
+    for size in (100, 150, 200):
+        begun = time.process_time()
+        coarsely("hypar", facets="10x10", size=f"{size}mm")
+        taken.append(time.process_time() - begun)
+    assert min(taken) < 0.2, taken  # 0.03 s
+
+
+def test_what_is_told_of_the_bed_is_what_a_fit_to_the_bed_finds():
+    largest = miurafab.fit("hypar", size="bed", facets=(8, 8), polish="off")
+    side = float(np.ptp(largest.pattern.folded_coords, axis=0).max())
+    told = coarsely("hypar", facets="8x8", size="100mm")["bed"]
+    assert (told["title"], told["mark"]) == ("One sheet, no glue", "good")
+    assert told["largest_mm"] == int(side)
+    told = coarsely("hypar", facets="8x8", size=f"{side + 5}mm")["bed"]
+    assert told["remark"] == f"at {int(side)} mm: one sheet, no glue"
+    assert told["mark"] == "more"
+    assert max(coarsely("hypar", facets="8x8", size="bed")["box_mm"]) == pytest.approx(
+        side, abs=0.1
+    )
+    sealed = coarsely("cylinder", facets="8x8", close="seam")["bed"]
+    assert "at most" in sealed["remark"]  # its border has tabs
+    assert coarsely("hypar", None, facets="8x8")["bed"] is None
+    assert "At least" in coarsely("hypar", facets="8x8", size="2m")["bed"]["title"]
+
+
+def test_of_many_facets_fewer_are_shown_in_the_same_proportion():
+    told = coarsely("plane", facets="80x20")
+    columns, rows = told["facets"]
+    assert told["fewer"]
+    assert 0.5 * MOST <= columns * rows <= MOST
+    assert columns / rows == pytest.approx(4, rel=0.1)
+    assert not coarsely("plane", facets="20x20")["fewer"]
+
+
+def test_a_mesh_is_read_once_for_all_its_sizes(tmp_path, monkeypatch):
+    file = tmp_path / "saddle.obj"
+    file.write_bytes(saddle_obj())
+    read = []
+    monkeypatch.setattr(designs, "load_mesh", lambda *a, _of=designs.load_mesh, **k: (
+        read.append(1), _of(*a, **k))[1])  # fmt: skip
+    glances = Glances()
+    sizes = []
+    for size in ("80mm", "120mm"):
+        asked = {"facets": "6x6", "size": size, "holes": "all"}
+        given = {"do": "coarse", "target": str(file), "options": asked, "layout": LAYOUT}
+        sizes.append(max(glances.answer(given, lambda fraction, note: None)["box_mm"]))
+    assert sizes == [80, 120]
+    assert len(read) == 1
+    given["options"] = {"facets": "6x6", "holes": "small"}
+    glances.answer(given, lambda fraction, note: None)
+    assert len(read) == 2
+
+
+def test_a_question_that_is_overtaken_is_left():
+    class Over(Exception):
+        pass
+
+    def over(fraction, note):
+        raise Over
+
+    asked = {"do": "coarse", "target": "hypar", "options": {"facets": "6x6"}, "layout": LAYOUT}
+    with pytest.raises(Over):
+        Glances().answer(asked, over)
+
+
+@pytest.fixture
+def studio(tmp_path):
+    asked = Asked(tmp_path, Done)
+    yield asked
+    asked.studio.live.stop()
+
+
+def told_by(studio, route, body):
+    """The answer to a question, once it is there."""
+    said = studio.post(route, body)
+    assert said.status == 200, said
+    number = said.json()["number"]
+    return until(lambda: _there(studio.get(f"live/{number}").json()["said"]), 60.0)
+
+
+def _there(said):
+    return None if "wait" in said else said
+
+
+def test_the_page_asks_and_the_process_stays(studio):
+    target = {"surface": "plane"}
+    for size in ("100mm", "120mm"):
+        form = {"target": target, "options": {"facets": "4x4", "size": size}, "layout": LAYOUT}
+        said = told_by(studio, "live", form)
+        assert max(said["answer"]["box_mm"]) == float(size[:-2])
+    process = studio.studio.live._process._process
+    assert os.getpriority(os.PRIO_PROCESS, process.pid) >= 10
+    assert studio.state()["pattern"] is None  # nothing of it lies on the bench
+    wrong = {"machine": "grbl-laser-400", "material": "card-250", "options": {"gap": "wide"}}
+    said = told_by(studio, "live", form | {"layout": wrong})
+    assert said["answer"]["bed"] is None
+    said = told_by(studio, "live", {"target": target, "options": {"min_edge": "9m"}})
+    assert "asked for" in said["answer"]["advice"]
+    assert studio.studio.live._process._process is process
+    assert "'Facets' is '8x'" in sentence(
+        studio.post("live", {"target": target, "options": {"facets": "8x"}})
+    )
+    assert "gone" in sentence(studio.post("live", {"target": {"source": "9"}}))
+    assert sentence(studio.get("live/x"), 404)
+
+    assert "no pattern" in sentence(studio.post("live/plan", {"layout": LAYOUT}))
+    studio.fit("plane", "4x4", size="420mm")
+    said = told_by(studio, "live/plan", {"layout": LAYOUT})["answer"]["bed"]
+    pattern = miurafab.fit("plane", facets="4x4", size="420mm").pattern
+    totals = lay_out(pattern, *_stock(LAYOUT)[:2]).totals
+    glue = f"{totals.seam_mm / 1000:.2f} m of glue"
+    assert said["title"] == f"{totals.sheets} sheets, {glue}"
+    assert f"{totals.patches} patches" in said["remark"]
+
+
+def test_a_result_says_what_it_is_a_result_of(studio):
+    studio.fit("plane", "4x4", size="120mm")
+    pattern = studio.state()["pattern"]
+    assert pattern["subject"] == "plane · Facets 4x4 · Size 120mm"
+    form = {"target": {"surface": "plane", "parameters": {}}}
+    assert pattern["form"] == form | {"options": {"facets": "4x4", "size": "120mm"}}
+
+
+def test_a_fit_takes_the_place_of_the_one_that_it_replaces_and_of_no_other(tmp_path):
+    asked = Asked(tmp_path)
+    asked.fit("hypar")
+    task = asked.state()["task"]["id"]
+    order = {"target": {"surface": "plane"}, "options": {}}
+    assert "already" in sentence(asked.post("fit", order | {"replaces": "77"}))
+    sentence(asked.post("fit", {"target": {"source": "9"}, "replaces": task}))
+    assert not asked.orders[0].stopped  # what is refused ends nothing
+    assert asked.post("fit", order | {"replaces": task}).status == 200
+    assert asked.orders[0].stopped
+    assert asked.state()["task"]["running"]
+    # news of the first comes too late
+    asked.orders[0].coming = [{"part": "pattern", "report": {}, "files": {}}]
+    assert asked.state()["pattern"] is None
+
+
+def test_the_drawing_has_each_facet_once():
+    pattern = miurafab.fit("plane", facets="4x4").pattern
+    drawn = glance.picture(pattern)
+    assert [len(face) for face in drawn["faces"]] == [4] * 16
+    assert sorted({at for face in drawn["faces"] for at in face}) == list(range(25))
