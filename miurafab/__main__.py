@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import NoReturn
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -25,11 +26,21 @@ def main() -> NoReturn:
 
 
 def _serve_studio(
-    thing: str | None, *, port: int, open_browser: bool, announce: Callable[[str], None]
+    thing: str | None,
+    *,
+    port: int,
+    open_browser: bool,
+    host: str | None,
+    password: str,
+    certificate: Path | None,
+    certificate_key: Path | None,
+    announce: Callable[[str, str], None],
 ) -> None:
-    from miurafab.studio.server import serve  # only now: no other command waits for it
+    from miurafab.studio.hosting import Hosting  # only now: no other command waits for them
+    from miurafab.studio.server import serve
 
-    serve(thing, port=port, open_browser=open_browser, announce=announce)
+    hosting = None if host is None else Hosting(host, password, certificate, certificate_key)
+    serve(thing, port=port, open_browser=open_browser, hosting=hosting, announce=announce)
 
 
 if __name__ == "__main__":

@@ -60,7 +60,7 @@ def test_the_same_source_gives_the_same_packages(installed, tmp_path):
 LOCKS = {
     "run": ("build.in", ()),
     "dev": ("build.in", ("dev",)),
-    "extras": (None, ("bench", "cluster", "layers", "step")),
+    "extras": (None, ("bench", "cluster", "host", "layers", "step")),
     "tools": ("tools.in", None),
 }
 """What `make lock` makes each file of: a list beside it, and extras of pyproject.toml."""

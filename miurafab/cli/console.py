@@ -58,9 +58,9 @@ class Console:
         else:
             self.facts(values)
 
-    def announce(self, address: str) -> None:
-        """Print, at once, the ``address`` that another program waits for."""
-        line = json_text({"address": address}) if self.wants_json else address
+    def announce(self, address: str, **more: str) -> None:
+        """Print, at once, the ``address`` that another program waits for, in JSON with ``more``."""
+        line = json_text({"address": address, **more}) if self.wants_json else address
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
 

@@ -1,7 +1,8 @@
 """Which requests are let in, judged by the first line and the headers before a body is read.
 
-The server listens on this computer only. Other pages in the browser and other people on the
-computer can reach it, too. Against them:
+The server listens on this computer only, or at one address of it for other computers
+(:mod:`~miurafab.studio.hosting`). Other pages in the browser and other people can reach it, too.
+Against them:
 
 - the ``Host`` must be this server's; otherwise another site has pointed its own name here (DNS
   rebinding);
@@ -25,7 +26,10 @@ from dataclasses import dataclass
 from miurafab.studio.messages import Response, refusal
 
 ADDRESS = "127.0.0.1"
-"""The only address on which the server listens."""
+"""The only address on which the server listens, unless it is told another."""
+
+_USUAL_PORTS = {"http": 80, "https": 443}
+"""Browsers leave these out of ``Host`` and ``Origin`` (RFC 9110, sections 4.2.1 and 4.2.2)."""
 
 TOKEN_HEADER = "x-studio-key"
 FILE_LIMIT = 64 * 2**20
@@ -48,26 +52,38 @@ def new_key() -> str:
 
 @dataclass(frozen=True)
 class Guard:
-    """Lets requests in to the server at ``port`` whose addresses begin with ``key``."""
+    """Lets requests in to the server at ``port`` whose addresses begin with ``key``.
+
+    ``names`` are those of the server, the one to show first; ``scheme`` is ``http`` or ``https``.
+    """
 
     port: int
     key: str
+    names: tuple[str, ...] = (ADDRESS, "localhost")
+    scheme: str = "http"
+
+    @property
+    def outside(self) -> str:
+        """The address of the server without the key."""
+        return f"{self.scheme}://{self._hosts[0]}/"
 
     @property
     def address(self) -> str:
         """What to open in a browser."""
-        return f"http://{ADDRESS}:{self.port}/{self.key}/"
+        return f"{self.outside}{self.key}/"
 
     @property
     def _hosts(self) -> tuple[str, ...]:
-        return tuple(f"{name}:{self.port}" for name in (ADDRESS, "localhost"))
+        usual = self.port == _USUAL_PORTS[self.scheme]
+        with_port = tuple(f"{name}:{self.port}" for name in self.names)
+        return (*self.names, *with_port) if usual else with_port
 
     def is_named(self, headers: Mapping[str, str]) -> bool:
         """Whether the request is for this server by a name of its own."""
         return headers.get("host", "").lower() in self._hosts
 
     def _is_ours(self, origin: str) -> bool:
-        return origin.lower() in {f"http://{host}" for host in self._hosts}
+        return origin.lower() in {f"{self.scheme}://{host}" for host in self._hosts}
 
     def route(self, path: str) -> str | None:
         """The part of ``path`` after the key, without its query; None if the key is wrong."""
@@ -76,6 +92,20 @@ class Guard:
 
     def refuse(self, method: str, path: str, headers: Mapping[str, str]) -> Response | None:
         """The refusal of the request, or None to let it in. Names of ``headers`` are lower case."""
+        refused = self.refuse_sender(method, headers)
+        if refused is not None:
+            return refused
+        route = self.route(path)
+        if route is None:
+            return refusal(404, "Open the address that 'miurafab studio' printed, with its key.")
+        if method != "POST":
+            return None
+        if not same_key(headers.get(TOKEN_HEADER, ""), self.key):
+            return refusal(403, "The request does not carry the studio's key; reload the page.")
+        return self.refuse_body(headers, FILE_LIMIT if route == UPLOAD else ORDER_LIMIT)
+
+    def refuse_sender(self, method: str, headers: Mapping[str, str]) -> Response | None:
+        """The refusal of a request for another server, of another page, or of another protocol."""
         if not self.is_named(headers):
             return refusal(421, f"This server answers to {self._hosts[0]} only.")
         if method not in ("GET", "HEAD", "POST"):
@@ -85,20 +115,16 @@ class Guard:
             return refusal(403, "The request does not come from the studio's own page.")
         if "upgrade" in headers:
             return refusal(400, "This server speaks plain HTTP alone, and opens no WebSocket.")
-        route = self.route(path)
-        if route is None:
-            return refusal(404, "Open the address that 'miurafab studio' printed, with its key.")
-        return self._refuse_post(route, headers) if method == "POST" else None
-
-    def _refuse_post(self, route: str, headers: Mapping[str, str]) -> Response | None:
-        if not self._is_ours(headers.get("origin", "")):
+        if method == "POST" and origin is None:
             return refusal(403, "The request does not come from the studio's own page.")
-        if not same_key(headers.get(TOKEN_HEADER, ""), self.key):
-            return refusal(403, "The request does not carry the studio's key; reload the page.")
+        return None
+
+    @staticmethod
+    def refuse_body(headers: Mapping[str, str], limit: int) -> Response | None:
+        """The refusal of a body that states no length, or one beyond ``limit`` bytes."""
         length = headers.get("content-length", "")
         if "transfer-encoding" in headers or not (length.isascii() and length.isdigit()):
             return refusal(411, "The request does not state its length.")
-        limit = FILE_LIMIT if route == UPLOAD else ORDER_LIMIT
         if len(length) > 18 or int(length) > limit:
             return refusal(413, f"The request is larger than the limit of {limit // 2**10:,} KiB.")
         return None

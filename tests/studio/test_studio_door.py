@@ -50,7 +50,8 @@ def test_the_browser_is_started_without_the_key(monkeypatch):
         opened.append(address)
         came.set()
 
-    def announce(address):
+    def announce(address, fingerprint):
+        assert fingerprint == ""
         told.append(address)
 
     class Enough(Exception):

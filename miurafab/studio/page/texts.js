@@ -38,6 +38,15 @@ export const texts = {
     "task": "{doing}: {note}",
     "task_begins": "{doing}…"
   },
+  "enter": {
+    "title": "Enter the studio",
+    "how": "The password is the one that was given where the studio was started. Before you type it, see that the certificate of this page has the fingerprint that stands in that terminal.",
+    "password": "Password",
+    "enter": "Enter",
+    "wrong": "That is not the password.",
+    "wait": "There were too many wrong passwords; try again in {seconds} s.",
+    "not_here": "The entrance takes no such request."
+  },
   "shape": {
     "surface": "Surface",
     "open_file": "Open a file…",
