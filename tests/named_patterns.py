@@ -97,6 +97,18 @@ def square_twist(lean: float = -15.0, far: float = 1.6) -> CreasePattern:
     return drawn(lines)
 
 
+def windmill() -> CreasePattern:
+    """The windmill base: its square in the middle keeps it from folding with flat facets."""
+    lines = border((-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0))
+    turns = [(1.0, 0.0, 0.0, 1.0), (0.0, -1.0, 1.0, 0.0), (-1.0, 0.0, 0.0, -1.0), (0, 1.0, -1.0, 0)]
+    for a, b, c, d in turns:
+        at, far, side, following = (
+            (a * x + b * y, c * x + d * y) for x, y in ((1, 1), (2, 2), (2, 0), (1, -1))
+        )
+        lines += [(at, far, "V", A), (at, following, "V", A), (at, side, "M", A)]
+    return drawn(lines)
+
+
 def yoshimura(columns: int = 8, rows: int = 8, angle: float = 72.0) -> CreasePattern:
     """Diamonds: valleys along the rows, mountains across."""
     lines: list[Line] = []

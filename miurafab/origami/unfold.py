@@ -25,6 +25,8 @@ from miurafab.origami.tessellation import Tessellation
 
 FLAT_ANGLE = 1e-9
 """Radians; an edge with a smaller fold angle is flat and not folded."""
+HALF_TURN = 1e-6
+"""Radians; closer to half a turn than this, rounding decides on the sign of a fold angle."""
 
 
 def unfold(
@@ -134,8 +136,9 @@ def turned_upright(flat: Floats, along: Ints) -> Floats:
 def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
     """``pattern`` with its fold angles measured in its folded form, for facets of any shape.
 
-    The sign makes a mountain or valley; borders, cuts and joins stay. The fold angle at a crease or
-    facet without extent is 0.
+    The sign makes a mountain or valley; borders, cuts and joins stay. Half a turn to either side is
+    the same form, so there a mountain stays one. The fold angle at a crease or facet without extent
+    is 0.
     """
     assert pattern.folded_coords is not None
     normals = facet_normals(pattern.folded_coords, pattern.faces_vertices)
@@ -145,6 +148,9 @@ def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
     with np.errstate(invalid="ignore", divide="ignore"):
         turned = fold_angles(pattern.folded_coords, pattern.edges_vertices[inner], left, right)
     angle[inner] = np.nan_to_num(turned)
+    half = np.abs(angle) > np.pi - HALF_TURN
+    told = half & np.isin(pattern.edges_assignment, ("M", "V"))
+    angle[told] = np.where(pattern.edges_assignment[told] == "M", -1, 1) * np.abs(angle[told])
     letter = np.where(angle > FLAT_ANGLE, "V", np.where(angle < -FLAT_ANGLE, "M", "F"))
     folds = inner & ~np.isin(pattern.edges_assignment, ("B", "C", "J"))
     kept = np.where(~inner & (pattern.edges_assignment != "C"), "B", pattern.edges_assignment)

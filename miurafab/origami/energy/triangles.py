@@ -1,8 +1,8 @@
 """Facets of any shape split into triangles on their short diagonals, about which they bend.
 
-A quad is split on its shorter diagonal; if it is not convex, on the diagonal from its reflex
-corner, which lies inside. A facet of more corners is split so that its worst triangle is as good
-as can be: the triangle of the least area for the square of its longest side.
+A quad is split on its shorter diagonal; if it is not convex, on the diagonal from its reflex or
+straight corner, which lies inside. A facet of more corners is split so that its worst triangle is
+as good as can be: the triangle of the least area for the square of its longest side.
 """
 
 from __future__ import annotations
@@ -11,6 +11,9 @@ import numpy as np
 
 from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.polygons import edge_lengths, facet_normals
+
+STRAIGHT = 1e-6
+"""A corner whose triangle is a smaller part of its quad lies on the line of its neighbours."""
 
 
 def split_facets(points: Floats, faces: Ints) -> tuple[Ints, Ints]:
@@ -45,7 +48,7 @@ def _turned(points: Floats, q: Ints) -> Ints:
         [vector_product(p[:, k] - p[:, k - 1], p[:, (k + 1) % 4] - p[:, k]) for k in range(4)],
         axis=1,
     )
-    reflex = np.einsum("qck,qk->qc", turn, normal) < 0
+    reflex = np.einsum("qck,qk->qc", turn, normal) < STRAIGHT * (normal**2).sum(axis=1)[:, None]
     first, second = edge_lengths(points, q[:, [0, 2]]), edge_lengths(points, q[:, [1, 3]])
     across = np.where(reflex.any(axis=1), reflex[:, 1] | reflex[:, 3], second < first)
     return np.where(across[:, None], np.roll(q, -1, axis=1), q)

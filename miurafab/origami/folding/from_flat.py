@@ -25,7 +25,7 @@ import numpy as np
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.sparse import negative_pivots
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.energy.bar_hinge import BarHingeModel, flat_model
+from miurafab.origami.energy.bar_hinge import SOFTNESS, BarHingeModel, flat_model
 from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate, follow
 from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, Factored, solve
 from miurafab.origami.energy.ramp import LARGEST_TURN, Descent, Ramped, descend
@@ -116,16 +116,18 @@ def fold_from_flat(
     parts: Floats,
     *,
     touching: bool = False,
+    softness: float = SOFTNESS,
     seed: int = 0,
     on_progress: Progress | None = None,
 ) -> RampPath:
     """The path of ``pattern``, of one piece, from flat through ``parts`` (n + 1,) of its ramp.
 
-    With ``touching`` facets do not pass through each other. ``seed`` is that of the shaking out of
-    a snap. Raises what :func:`~miurafab.origami.energy.bar_hinge.flat_model` raises. Failure is a
-    result.
+    With ``touching`` facets do not pass through each other. ``softness`` is the compliance of a bar
+    over its length (:func:`~miurafab.origami.energy.bar_hinge.flat_model`), and ``seed`` is that of
+    the shaking out of a snap. Raises what
+    :func:`~miurafab.origami.energy.bar_hinge.flat_model` raises. Failure is a result.
     """
-    model = flat_model(pattern)
+    model = flat_model(pattern, softness=softness)
     walk = _Walk(model, touching, np.random.default_rng(seed))
     start = linear_seed(model)
     frames: list[RampFrame] = []

@@ -10,14 +10,12 @@ from miurafab.origami.folding.angles_csv import Contact
 from miurafab.origami.folding.certificate import MOVED, RigidCertificate
 from miurafab.origami.folding.kinematics import FROM_FLAT
 from miurafab.origami.folding.motion import FoundMotion
-from miurafab.origami.folding.ramp_motion import RampVerdict
+from miurafab.origami.folding.ramp_motion import HELD_BACK, RampVerdict
 
 STRETCH = 1e-4
 """Paper tears at a few hundredths; below this nobody sees that a side stretches."""
 DRAWN = 1e-4
 """A residual up to this may come from the rounding of a drawing."""
-HELD_BACK = math.radians(30.0)
-"""A mean distance from the fold angles asked for that is worth a remark."""
 
 
 def motion_findings(found: FoundMotion, contacts: Sequence[Contact]) -> tuple[Finding, ...]:

@@ -14,16 +14,18 @@ certified whether all facets can stay flat (:mod:`miurafab.origami.folding.certi
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cut_open import cut_open
+from miurafab.origami.energy.bar_hinge import SOFTNESS
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.certificate import RigidCertificate, certified
+from miurafab.origami.folding.flat_edges import without_flat_edges
 from miurafab.origami.folding.kinematics import (
     FoldingMotion,
     first_facets,
@@ -36,6 +38,9 @@ from miurafab.origami.folding.ramp_motion import MOST_WRONG, RampVerdict, ramp_m
 
 Progress = Callable[[float, str], None]
 
+SOFTER = 10 * SOFTNESS
+"""For a sheet that is held back: sides as soft as those of other simulators, which stretch by some
+hundredths on the way."""
 LEAST_FRAMES = 2
 """A way of fewer frames shows no motion."""
 
@@ -60,12 +65,22 @@ def find_motion(
 ) -> FoundMotion:
     """The motion of ``pattern`` in ``steps`` steps.
 
-    Cuts are opened first, and the parts that they leave are pieces. Raises
+    Cuts are opened first, and the parts that they leave are pieces. Flat edges of the drawings of
+    others are left out (:mod:`miurafab.origami.folding.flat_edges`). Raises
     :class:`~miurafab.errors.PatternError` for a pattern in which nothing folds, or whose folds do
     not go together.
     """
     pattern = cut_open(pattern)
     first_facets(pattern, place(pattern, np.zeros((1, len(pattern.edges_vertices)))).depth)
+    lean = without_flat_edges(pattern)
+    found = _find(lean.pattern, steps, on_progress)
+    verdict = found.verdict
+    if verdict is not None:
+        verdict = replace(verdict, wrong_edges=lean.edges[verdict.wrong_edges])
+    return replace(found, motion=lean.lifted(found.motion), verdict=verdict)
+
+
+def _find(pattern: CreasePattern, steps: int, on_progress: Progress | None) -> FoundMotion:
     mismatch = None
     if _has_closed_form(pattern):
         motion = rigid_motion(pattern, states_between(pattern, steps))
@@ -88,9 +103,16 @@ def find_motion(
 def _from_flat(
     pattern: CreasePattern, steps: int, mismatch: float | None, on_progress: Progress | None
 ) -> FoundMotion:
+    softness = SOFTNESS
     motion, verdict = ramp_motion(pattern, steps, on_progress=on_progress)
+    if verdict.is_held_back:
+        soft, its_verdict = ramp_motion(pattern, steps, softness=SOFTER, on_progress=on_progress)
+        if its_verdict.is_better_than(verdict):
+            softness, motion, verdict = SOFTER, soft, its_verdict
     if verdict.wrong_signs <= MOST_WRONG and contacts(motion):
-        motion, verdict = ramp_motion(pattern, steps, touching=True, on_progress=on_progress)
+        motion, verdict = ramp_motion(
+            pattern, steps, touching=True, softness=softness, on_progress=on_progress
+        )
     if verdict.wrong_signs > MOST_WRONG:
         raise _sequence(verdict)
     motion, certificate = certified(motion)

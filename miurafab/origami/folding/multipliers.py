@@ -13,6 +13,8 @@ The equations are consistent only if the sheet folds rigidly, which the loop mis
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -27,13 +29,14 @@ from miurafab.origami.invariants import corner_ring, interior_vertices
 def fold_angle_multipliers(pattern: CreasePattern) -> Floats:
     """(E,) tan(rho / 2) of each crease when the median of the folding creases is at 90 degrees.
 
-    Mountains are negative; creases that are neither mountain nor valley do not fold. Vertices of
-    other degrees than four are skipped. Raises :class:`~miurafab.errors.PatternError` for a vertex
+    Mountains are negative; creases that are neither mountain nor valley do not fold. At a vertex of
+    two creases both fold alike. Vertices of other degrees than two and four are skipped; edges of
+    letter F do not count. Raises :class:`~miurafab.errors.PatternError` for a vertex
     whose creases cannot fold together.
     """
     sign = np.where(pattern.edges_assignment == "V", 1.0, 0.0)
     sign[pattern.edges_assignment == "M"] = -1.0
-    spokes, sectors, vertices = _vertices_of_four(pattern)
+    spokes, sectors, vertices = _vertices_of(pattern, 4)
     around = sign[spokes]
     odd_one = np.argmax(around * around.sum(axis=1, keepdims=True) < 0, axis=1)
     wrong = np.flatnonzero(np.abs(around.sum(axis=1)) != 2)
@@ -53,33 +56,56 @@ def fold_angle_multipliers(pattern: CreasePattern) -> Floats:
             f"The creases at vertex {vertices[stuck[0]]} fold one pair after the other and not "
             "together, so the closed form does not hold for them."
         )
-    more = np.concatenate([unequal[0], equal[0], unequal[0]])
-    less = np.concatenate([unequal[1], equal[1], equal[0]])
-    step = np.concatenate([np.zeros(2 * len(row)), np.log(ratio)])
+    straight = _vertices_of(pattern, 2).spokes
+    more = np.concatenate([unequal[0], equal[0], unequal[0], straight[:, 0]])
+    less = np.concatenate([unequal[1], equal[1], equal[0], straight[:, 1]])
+    step = np.concatenate([np.zeros(2 * len(row)), np.log(ratio), np.zeros(len(straight))])
     multipliers = sign * np.exp(_potential(len(sign), more, less, step))
     folding = np.abs(multipliers[multipliers != 0])
     return multipliers / float(np.median(folding)) if len(folding) else multipliers
 
 
-def _vertices_of_four(pattern: CreasePattern) -> tuple[Ints, Floats, Ints]:
-    """The interior vertices of degree four whose edges all fold.
+class _Vertices(NamedTuple):
+    """n interior vertices at which d creases fold and all other edges are flat (letter F).
 
-    Returns their edges (n, 4) counter-clockwise, the sector (n, 4) after each edge in radians, and
-    their numbers (n,).
+    Their creases ``spokes`` (n, d) counter-clockwise, the ``sectors`` (n, d) after each in radians,
+    and their ``numbers`` (n,).
     """
+
+    spokes: Ints
+    sectors: Floats
+    numbers: Ints
+
+
+def _vertices_of(pattern: CreasePattern, degree: int) -> _Vertices:
+    """The interior vertices at which ``degree`` creases fold."""
     ring = corner_ring(pattern, np.pad(pattern.vertices_coords, ((0, 0), (0, 1))))
     corners = np.flatnonzero(ring.vertex >= 0)
     start = np.full(len(pattern.vertices_coords), -1, dtype=np.int64)
     start[ring.vertex[corners]] = corners
-    first = start[interior_vertices(pattern)]
-    around = [first]
-    for _ in range(4):
-        around.append(ring.following[around[-1]])
-    four = around[4] == first
-    corner = np.stack(around[:4], axis=1)[four]
-    spokes = pattern.faces_edges.reshape(-1)[corner]
-    folds = np.isin(pattern.edges_assignment[spokes], ("M", "V")).all(axis=1)
-    return spokes[folds], ring.angle[corner[folds]], ring.vertex[first[four][folds]]
+    numbers = interior_vertices(pattern)
+    first = start[numbers]
+    edge = pattern.faces_edges.reshape(-1)
+    folds = np.isin(pattern.edges_assignment, ("M", "V"))
+    still = pattern.edges_assignment == "F"
+    spokes = np.full((len(first), degree), -1, dtype=np.int64)
+    at = np.zeros((len(first), degree))
+    count, turned = np.zeros(len(first), dtype=np.int64), np.zeros(len(first))
+    sound = np.ones(len(first), dtype=bool)
+    corner, going = first.copy(), np.ones(len(first), dtype=bool)
+    while going.any():
+        here = edge[corner]
+        sound &= ~going | folds[here] | still[here]
+        row = np.flatnonzero(going & folds[here] & (count < degree))
+        spokes[row, count[row]], at[row, count[row]] = here[row], turned[row]
+        count += going & folds[here]
+        turned += np.where(going, ring.angle[corner], 0.0)
+        corner = np.where(going, ring.following[corner], corner)
+        going &= corner != first
+    chosen = sound & (count == degree)
+    at, turned = at[chosen], turned[chosen, None]
+    sectors = np.diff(at, axis=1, append=at[:, :1] + turned)
+    return _Vertices(spokes[chosen], sectors, numbers[chosen])
 
 
 def _potential(count: int, more: Ints, less: Ints, step: Floats) -> Floats:

@@ -13,7 +13,7 @@ import numpy as np
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.energy.bar_hinge import has_folds
+from miurafab.origami.energy.bar_hinge import SOFTNESS, has_folds
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.pieces import part_of
 from miurafab.origami.folding.from_flat import RampPath, fold_from_flat, ramp_parts
@@ -23,6 +23,8 @@ from miurafab.origami.piece import Piece, pieces_of
 
 MOST_WRONG = 0.02
 """A pattern with more creases of the wrong sign does not fold in one motion."""
+HELD_BACK = np.radians(30.0)
+"""A mean distance from the fold angles asked for that is worth a remark."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,17 +50,31 @@ class RampVerdict:
     complete: bool
     touching: bool
 
+    @property
+    def is_held_back(self) -> bool:
+        """Whether creases end far from what is asked of them, or the way ends early."""
+        wrong = self.wrong_signs > MOST_WRONG
+        return wrong or not self.complete or self.angle_error > HELD_BACK
+
+    def is_better_than(self, other: RampVerdict) -> bool:
+        """Whether the way comes nearer to what is asked of it than the ``other`` way."""
+        if self.complete and self.wrong_signs <= MOST_WRONG:
+            return other.wrong_signs > MOST_WRONG or self.angle_error < other.angle_error
+        return False
+
 
 def ramp_motion(
     pattern: CreasePattern,
     steps: int = 20,
     *,
     touching: bool = False,
+    softness: float = SOFTNESS,
     on_progress: Callable[[float, str], None] | None = None,
 ) -> tuple[FoldingMotion, RampVerdict]:
     """The motion of ``pattern`` from flat, all creases together, and its verdict.
 
-    With ``touching`` springs keep facets from passing through each other.
+    With ``touching`` springs keep facets from passing through each other. ``softness`` is the
+    compliance of a side over its length, in facets' stiffness k_f.
 
     ``states`` are the parts of the fold angles of the pattern that creases strive for. Creases of
     half a turn go to nine tenths of it. If the solver loses the path, the motion ends there. Raises
@@ -76,7 +92,10 @@ def ramp_motion(
     paths = []
     for number, piece in enumerate(folding):
         progress = part_of(on_progress, number, len(folding))
-        paths.append(fold_from_flat(piece.pattern, parts, touching=touching, on_progress=progress))
+        path = fold_from_flat(
+            piece.pattern, parts, touching=touching, softness=softness, on_progress=progress
+        )
+        paths.append(path)
     count = min(len(path.frames) for path in paths)
     if not count:
         raise _stuck(paths)

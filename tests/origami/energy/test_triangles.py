@@ -81,6 +81,9 @@ def test_corners_on_a_straight_side_leave_no_triangle_without_width() -> None:
     flat = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]])
     triangles, _ = split_facets(in_space(flat), np.arange(6)[None])
     assert signed_areas(flat[triangles]).min() > 0.4
+    quad = np.array([[0.0, 0.9], [0.04, 0.9], [0.09, 0.9], [0.0, 1.0]])  # a flat diagonal
+    triangles, _ = split_facets(in_space(quad), np.arange(4)[None])
+    assert signed_areas(quad[triangles]).min() > 1e-3
 
 
 def test_the_facets_of_a_trimmed_sheet_are_covered() -> None:

@@ -112,6 +112,22 @@ def test_a_square_twist_bends_and_says_where() -> None:
     assert "bent-facets" in {finding.code for finding in motion_findings(found, ())}
 
 
+def test_a_sheet_that_is_held_back_is_folded_with_softer_sides() -> None:
+    """A windmill base folds only by stretching on the way: its square drives its creases apart."""
+    pattern = named_patterns.windmill()
+    assert ramp_motion(pattern, 10)[1].is_held_back
+    found = find_motion(pattern, 10)
+    assert found.verdict is not None
+    assert not found.verdict.is_held_back
+    assert not len(found.verdict.wrong_edges)
+    assert math.degrees(found.verdict.angle_error) < 10
+    assert found.mismatch is not None
+    assert found.mismatch > 0.1
+    assert not found.motion.is_rigid
+    assert found.verdict.strain.max() > 0.02
+    assert "stretched" in {finding.code for finding in motion_findings(found, ())}
+
+
 def test_a_pleated_hypar_leaves_the_plane_by_stretching_a_little() -> None:
     """No paper folds it exactly (Demaine et al., 2011); alternating triangles come near."""
     found = find_motion(named_patterns.pleated_hypar(), 8)

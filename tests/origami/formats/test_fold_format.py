@@ -150,6 +150,23 @@ def test_missing_angles_are_measured_in_the_folded_form() -> None:
     assert np.array_equal(found.edges_assignment, expected.edges_assignment)
 
 
+def test_a_form_that_is_folded_flat_leaves_the_letters_as_they_are() -> None:
+    """Half a turn to either side is the same form; the letters of the file tell which."""
+    sheet = regular(4, 3)
+    given_ = document()
+    del given_["edges_foldAngle"]
+    flat = rigid_motion(sheet, [np.inf]).frames[0]
+    given_["file_frames"] = [
+        {**given_["file_frames"][0], "vertices_coords": flat.tolist()},
+    ]
+    found = parse_fold(given_)
+    assert np.array_equal(found.edges_assignment, sheet.edges_assignment)
+    assert {"M", "V"} <= set(found.edges_assignment.tolist())
+    half = np.isin(sheet.edges_assignment, ("M", "V"))
+    wanted = np.pi * np.sign(sheet.edges_fold_angle[half])
+    assert found.edges_fold_angle[half] == pytest.approx(wanted, abs=1e-6)
+
+
 def test_the_crease_pattern_may_stand_in_a_later_frame() -> None:
     given_ = document()
     flat = given_["vertices_coords"]

@@ -1,0 +1,165 @@
+"""A pattern of another program without its flat edges: what they part is one facet.
+
+Drawings hold lines that nobody folds (letter F): auxiliary lines, and creases of another state. A
+sheet moves as if they were not there. With them, a vertex in the middle of a facet adds bars that
+say the same twice, and a format that leaves such lines out would give another answer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.polygons import signed_areas
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.triangles import split_facets
+from miurafab.origami.folding.kinematics import FoldingMotion
+
+
+@dataclass(frozen=True, eq=False)
+class Dissolved:
+    """The ``pattern`` of the ``vertices`` (v,) and ``edges`` (e,) that are left of the ``whole``.
+
+    The vertices ``inside`` (n,) of facets are left out; they lie in the triangles ``corners``
+    (n, 3) of the pattern, at the barycentric coordinates ``places`` (n, 3).
+    """
+
+    whole: CreasePattern
+    pattern: CreasePattern
+    vertices: Ints
+    edges: Ints
+    inside: Ints
+    corners: Ints
+    places: Floats
+
+    def lifted(self, motion: FoldingMotion) -> FoldingMotion:
+        """``motion`` of the pattern, as one of the whole; flat edges stay flat."""
+        if self.pattern is self.whole:
+            return motion
+        count = len(motion.frames)
+        flat = np.pad(self.whole.vertices_coords, ((0, 0), (0, 1)))
+        frames = np.repeat(flat[None], count, axis=0)
+        frames[:, self.vertices] = motion.frames
+        frames[:, self.inside] = np.einsum(
+            "nc,tnck->tnk", self.places, motion.frames[:, self.corners]
+        )
+        angles = np.zeros((count, len(self.whole.edges_vertices)))
+        angles[:, self.edges] = motion.fold_angles
+        return replace(motion, pattern=self.whole, frames=frames, fold_angles=angles)
+
+
+def without_flat_edges(pattern: CreasePattern) -> Dissolved:
+    """``pattern`` with facets joined over edges of letter F where they make one polygon.
+
+    A fitted sheet keeps its facets, as does a part in which a crease ends inside the joined facet.
+    """
+    everything = [np.arange(len(a)) for a in (pattern.vertices_coords, pattern.edges_vertices)]
+    none = np.empty(0, dtype=np.int64)
+    same = Dissolved(pattern, pattern, *everything, none, none.reshape(0, 3), none.reshape(0, 3))
+    if pattern.grid is not None or pattern.cells is not None:
+        return same
+    part = _parts(pattern)
+    loops = {}
+    for number in np.flatnonzero(np.bincount(part) > 1).tolist():
+        loop = _loop(pattern, part == number)
+        if loop is not None:
+            loops[number] = loop
+    if not loops:
+        return same
+    return _dissolved(pattern, part, loops)
+
+
+def _parts(pattern: CreasePattern) -> Ints:
+    """(F,) the part of each facet; flat edges join the facets of a part."""
+    one, other = pattern.edges_faces[_flat_edges(pattern)].T
+    count = len(pattern.faces_vertices)
+    graph = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _flat_edges(pattern: CreasePattern) -> Bools:
+    """(E,) whether an edge between two facets is not folded, by its letter and its angle."""
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    flat = (pattern.edges_assignment == "F") & (pattern.edges_fold_angle == 0)
+    return np.asarray(inner & flat)
+
+
+def _loop(pattern: CreasePattern, own: Bools) -> list[int] | None:
+    """The corners around the facets ``own`` (F,); None if they make no polygon."""
+    faces = pattern.faces_vertices[own]
+    following: dict[int, int] = {}
+    sides = set()
+    for face in faces.tolist():
+        corners = [v for v in face if v >= 0]
+        sides |= set(zip(corners, corners[1:] + corners[:1], strict=True))
+    outer = [side for side in sides if side[::-1] not in sides]
+    for tail, head in outer:
+        if tail in following:
+            return None  # the facets touch themselves in a corner
+        following[tail] = head
+    inner = (pattern.edges_faces >= 0) & own[pattern.edges_faces]
+    if (inner.all(axis=1) & ~_flat_edges(pattern)).any():
+        return None  # a crease ends in the middle
+    start = outer[0][0]
+    loop, at = [start], following[start]
+    while at != start:
+        loop.append(at)
+        at = following[at]
+    return loop if len(loop) == len(outer) else None  # else there is a hole
+
+
+def _dissolved(pattern: CreasePattern, part: Ints, loops: dict[int, list[int]]) -> Dissolved:
+    first = np.unique(part, return_index=True)[1]
+    joined = np.isin(part, list(loops))
+    kept = np.sort(np.concatenate([np.flatnonzero(~joined), first[list(loops)]]))
+    polygons = [
+        loops[p] if p in loops else [v for v in face if v >= 0]
+        for p, face in zip(part[kept].tolist(), pattern.faces_vertices[kept].tolist(), strict=True)
+    ]
+    width = max(map(len, polygons))
+    faces = np.array([polygon + [-1] * (width - len(polygon)) for polygon in polygons])
+    vertices = np.unique(faces[faces >= 0])
+    gone = _flat_edges(pattern) & joined[pattern.edges_faces[:, 0]]
+    edges = np.flatnonzero(~gone)
+    number = np.full(len(pattern.vertices_coords) + 1, -1, dtype=np.int64)  # the last maps -1
+    number[vertices] = np.arange(len(vertices))
+    folded, pieces = pattern.folded_coords, pattern.pieces
+    place = np.cumsum(~gone) - 1
+    lean = replace(
+        pattern,
+        vertices_coords=pattern.vertices_coords[vertices],
+        edges_vertices=number[pattern.edges_vertices[edges]],
+        edges_assignment=pattern.edges_assignment[edges],
+        edges_fold_angle=pattern.edges_fold_angle[edges],
+        faces_vertices=number[faces],
+        folded_coords=None if folded is None else folded[vertices],
+        pieces=None if pieces is None else pieces[kept],
+        seams=None if pattern.seams is None else place[pattern.seams],
+    )
+    inside = np.flatnonzero(np.bincount(pattern.edges_vertices.ravel(), minlength=len(number) - 1))
+    inside = inside[number[inside] < 0]
+    corners, places = _places(lean, pattern.vertices_coords[inside])
+    return Dissolved(pattern, lean, vertices, edges, inside, corners, places)
+
+
+def _places(pattern: CreasePattern, points: Floats) -> tuple[Ints, Floats]:
+    """The triangle (n, 3) of ``pattern`` around each of ``points`` (n, 2), and their barycentric
+    coordinates (n, 3) in it.
+    """
+    flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
+    triangles, _ = split_facets(flat, pattern.faces_vertices)
+    corners = pattern.vertices_coords[triangles]
+    area = signed_areas(corners)
+    shares = np.empty((len(points), len(triangles), 3))
+    for corner in range(3):
+        sub = np.repeat(corners[None], len(points), axis=0)
+        sub[:, :, corner] = points[:, None]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            part = signed_areas(sub.reshape(-1, 3, 2)).reshape(shares.shape[:2])
+            shares[..., corner] = part / area
+    best = np.argmax(np.nan_to_num(shares, nan=-np.inf).min(axis=2), axis=1)
+    return triangles[best], shares[np.arange(len(points)), best]

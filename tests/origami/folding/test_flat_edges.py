@@ -1,0 +1,73 @@
+"""Lines that nobody folds change nothing: facets are joined over them, and frames hold them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import named_patterns
+import numpy as np
+import pytest
+
+from miurafab.geometry.polygons import edge_lengths
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding.flat_edges import without_flat_edges
+from miurafab.origami.folding.kinematics import CLOSED_FORM, FROM_FLAT
+from miurafab.origami.folding.motion import find_motion
+
+CORNERS = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+BASE = [*named_patterns.border(*CORNERS)]
+BASE += [((0.0, 0.0), corner, "V", 180.0) for corner in CORNERS]
+BASE += [((0.0, 0.0), (x, 0.0), "M", 180.0) for x in (-1.0, 1.0)]
+# a cross in the upper facet, whose middle is a vertex of its own, and a line that meets a valley
+STRAY = [((-0.5, 0.5), (0.5, 0.5), "F", 0.0), ((0.0, 0.0), (0.0, 1.0), "F", 0.0)]
+STRAY += [((0.5, -0.5), (1.0, -0.5), "F", 0.0)]
+
+
+def folded(pattern: CreasePattern) -> dict[tuple[float, ...], float]:
+    """The last fold angle at the middle of each crease, whatever its number."""
+    motion = find_motion(pattern, 6).motion
+    folds = np.isin(pattern.edges_assignment, ("M", "V"))
+    ends = pattern.vertices_coords[pattern.edges_vertices[folds]]
+    angle = motion.fold_angles[-1, folds]
+    turn = np.degrees(np.arctan2(*(ends.mean(axis=1) - 10.0).T[::-1]))
+    return {round(float(t) / 5): float(a) for t, a in zip(turn, angle, strict=True)}
+
+
+def test_stray_lines_change_no_fold_angle_and_are_carried_along() -> None:
+    plain, stray = named_patterns.drawn(BASE), named_patterns.drawn(BASE + STRAY)
+    assert len(stray.faces_vertices) > len(plain.faces_vertices)
+    assert folded(stray) == pytest.approx(folded(plain), abs=1e-5)
+    found = find_motion(stray, 6)
+    assert found.motion.method == FROM_FLAT
+    assert found.motion.is_rigid
+    assert found.motion.frames.shape[1] == len(stray.vertices_coords)
+    flat = edge_lengths(stray.vertices_coords, stray.edges_vertices)
+    for frame in found.motion.frames:
+        assert edge_lengths(frame, stray.edges_vertices) == pytest.approx(flat, abs=1e-9)
+    assert not found.motion.fold_angles[:, stray.edges_assignment == "F"].any()
+
+
+def test_what_is_joined_is_a_polygon() -> None:
+    stray = named_patterns.drawn(BASE + STRAY)
+    lean = without_flat_edges(stray)
+    assert len(lean.pattern.faces_vertices) == 6
+    assert len(lean.inside) == 1
+    # a crease that ends inside keeps its facets apart, and a flat edge that is folded is a crease
+    ends_inside = named_patterns.drawn([*BASE, *STRAY, ((0.0, 0.5), (0.2, 0.7), "V", 90.0)])
+    plain = without_flat_edges(ends_inside)
+    assert plain.pattern.faces_vertices.shape[0] >= 6
+    bent = replace(stray, edges_fold_angle=np.where(stray.edges_assignment == "F", 0.1, np.pi))
+    assert without_flat_edges(bent).pattern is bent
+
+
+def test_creases_cut_in_two_by_a_stray_line_keep_the_closed_form() -> None:
+    """At a vertex of two creases in a line both fold alike; flat edges do not count."""
+    lines = named_patterns.border((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (0.0, 2.0))
+    lines += [((x, 0.0), (x, 2.0), letter, 180.0) for x, letter in ((1.0, "V"), (2.0, "M"))]
+    lines += [((0.0, 1.0), (3.0, 1.0), "F", 0.0)]
+    pattern = named_patterns.drawn(lines)
+    motion = find_motion(pattern, 6).motion
+    assert motion.method == CLOSED_FORM
+    assert motion.is_rigid
+    angles = np.abs(motion.fold_angles[:, np.isin(pattern.edges_assignment, ("M", "V"))])
+    assert angles == pytest.approx(angles[:, :1].repeat(angles.shape[1], 1), abs=1e-12)
