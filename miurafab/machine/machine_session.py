@@ -7,8 +7,7 @@ jog, set the origin, frame, cut. A command such as ``machine jog`` is a session 
 Whatever may leave the machine moving or burning sets it at risk, and a status report that says idle
 and dark ends that. A session that is closed at risk resets the controller first.
 
-Marlin and HPGL machines only take jobs: what a person does at the machine with them is done at its
-panel.
+Marlin and HPGL machines only take jobs; the rest is done at their panel.
 """
 
 from __future__ import annotations
@@ -35,6 +34,7 @@ from miurafab.machine.known_controller import (
 from miurafab.machine.owner import Owner, claim, this_owner
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import JobAborted, Progress, StreamResult
+from miurafab.machine.resting_beam import RestingBeam
 from miurafab.machine.session import HOMING_S, Session
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import FlowTransport
@@ -64,13 +64,12 @@ class MachineSession:
         most = setup.most_in_flight(transport.name)
         self.conversation = Session(transport, Connection(most), check=self._check)
         self.known = KnownController(self.conversation, setup.dialect)
+        self._resting_beam = RestingBeam(self.known)
         self._keys = keys or NoKeys()
         if not isinstance(self._keys, NoKeys):
             self.conversation.patience = _KEY_S
         self._wire = OpenWire(transport, self.conversation, self.known, self._keys, signals)
-        self._transport = transport
-        self._signals = signals
-        self._setup = setup
+        self._transport, self._signals, self._setup = transport, signals, setup
         self._orders = session_keys(setup.dialect)
         self._pad = JogPad()
         self._at_risk = self._in_job = self._stops = False
@@ -277,8 +276,8 @@ class MachineSession:
     def say(self, text: str) -> None:
         """Send a person's line: ``?``, ``!`` and ``~`` alone, and ``reset``, are realtime bytes.
 
-        Raises :class:`~miurafab.errors.GcodeError` for a line that cannot be sent, and what
-        :meth:`command` raises.
+        Raises :class:`~miurafab.errors.GcodeError` for a line that cannot be sent or would burn at
+        rest (:mod:`~miurafab.machine.resting_beam`), and what :meth:`command` raises.
         """
         text = text.strip()
         if text == "reset":
@@ -290,7 +289,8 @@ class MachineSession:
         elif text:
             bare = next(Job("The console", text).send_lines(), None)
             if bare is not None:
-                self.command(bare.data.decode("ascii"))
+                self.open()
+                self.command(self._resting_beam.sure_of(bare.data.decode("ascii")))
 
     def settle(self) -> MachineState:
         """Wait while the axes move with the beam off."""

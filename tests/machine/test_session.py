@@ -10,9 +10,18 @@ import sys
 from dataclasses import replace
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from session_walk import HOMING, JOB, MACHINE, Cable, Walk
 
-from miurafab.errors import ControllerError, InputError, JobStopped, MachineError, PersonNeeded
+from miurafab.errors import (
+    ControllerError,
+    GcodeError,
+    InputError,
+    JobStopped,
+    MachineError,
+    PersonNeeded,
+)
 from miurafab.machine.jog_pad import JogPad
 from miurafab.machine.keys import JOG_CANCEL
 from miurafab.machine.known_controller import PortSetup
@@ -48,6 +57,13 @@ def session(**changes: float) -> tuple[MachineSession, Wire]:
     values = virtual_settings(MACHINE) | {int(name[1:]): value for name, value in changes.items()}
     wire = Wire(VirtualGrbl(values, baud=115_200))
     return MachineSession(wire, StopSignals(), PortSetup.of(MACHINE)), wire
+
+
+def light(here: MachineSession) -> None:
+    """Have the beam on at rest, which has to be asked for twice."""
+    with pytest.raises(GcodeError, match=r"After M3S500 .* Send the same line again"):
+        here.say("M3 S500")
+    here.say("M3 S500")
 
 
 def test_unlock_home_and_cut_in_one_session_on_a_board_that_locks() -> None:
@@ -162,7 +178,7 @@ class Hammered(Pressed):
 
 def test_a_reset_that_a_resting_controller_missed_is_sent_again() -> None:
     here, wire = session(s32=0)
-    here.say("M3 S500")
+    light(here)
     wire.lose_resets = 2
     assert here.abort(at_once=True)
     assert wire.sent.count(b"\x18") == 3
@@ -174,7 +190,7 @@ def test_a_second_press_does_not_end_a_stop_that_the_controller_has_not_heard() 
     wire = Wire(VirtualGrbl(virtual_settings(MACHINE) | {32: 0}, baud=115_200))
     keys = Hammered(wire)
     here = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
-    here.say("M3 S500")
+    light(here)
     assert here.watch(0.2).beam_on
     wire.lose_resets = 1
     keys.press(wire.now())
@@ -187,9 +203,40 @@ def test_a_second_press_does_not_end_a_stop_that_the_controller_has_not_heard() 
     assert here.close()
 
 
+TYPED = st.sampled_from(
+    ["M3 S500", "M3", "M4", "M4S20", "M5", "S300", "S0", "S9", "G1 X1 F6000", "G0 X0", "G80",
+     "G1 F6000 S40", "G0 M3 S5", "G1 X2 F6000 M3 S60", "(M3) S7", "$32=0", "$32=1", "M30"]
+)  # fmt: skip
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(TYPED, max_size=8), st.booleans())
+def test_no_line_of_a_person_lights_a_resting_beam_unless_it_is_sent_twice(
+    lines: list[str], laser_mode: bool
+) -> None:
+    here, wire = session(s32=laser_mode)
+    here.open()
+    wanted = False
+    for line in lines:
+        sent = wire.sent
+        try:
+            here.say(line)
+        except GcodeError:
+            assert wire.sent.replace(sent, b"").strip() in (b"", b"$G")  # it was not sent
+            here.say(line)
+            here.settle()
+            assert wire.device.beam_on, line  # and would indeed have done that
+            wanted = True
+        here.settle()
+        wanted &= wire.device.beam_on
+        assert wanted or not wire.device.beam_on, line
+    assert here.close()
+    assert not wire.device.beam_on
+
+
 def test_a_session_that_is_left_with_the_beam_on_goes_dark() -> None:
     here, wire = session(s32=0)
-    here.say("M3 S500")
+    light(here)
     assert wire.device.beam_on
     assert here.close()
     assert wire.sent.endswith(b"\x18")

@@ -1,0 +1,79 @@
+"""A person's line that would leave the beam on while the head rests: it has to be sent twice.
+
+Without laser mode (``$32=0``) GRBL sets the beam at ``M3`` and ``M4`` whether anything moves or
+not. With it, ``M3`` keeps the beam on at rest in ``G1``, ``G2`` and ``G3``, and ``M4`` never
+(gnea/grbl 1.1, ``gcode.c``, ``spindle_control.c``). So after each such line the beam burns one spot
+until somebody ends that. Some want it, to focus; nobody wants it by mistake.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable
+
+from miurafab.errors import GcodeError
+from miurafab.gcode.block_errors import BlockError
+from miurafab.gcode.words import split_words
+from miurafab.machine.known_controller import MODES, KnownController
+
+_LASER_MODE = 32
+_BURNING = (1.0, 2.0, 3.0)
+
+
+def resting_power(words: Iterable[tuple[str, float]], *, laser_mode: bool) -> float:
+    """The S with which the beam is on at rest after ``words``, letters with numbers, the modes in
+    force first; 0 where it is off.
+
+    >>> resting_power([("M", 3), ("S", 1000)], laser_mode=False)
+    1000.0
+    >>> resting_power([("M", 3), ("S", 1000)], laser_mode=True)
+    0.0
+    """
+    spindle, motion, speed = 5.0, 0.0, 0.0
+    for letter, number in words:
+        if letter == "M" and number in (2, 3, 4, 5, 30):
+            spindle = number
+        elif letter == "S":
+            speed = float(number)
+        elif letter == "G" and (number in (0, *_BURNING, 80) or 38 <= number < 39):
+            motion = number
+    armed = spindle in (3, 4)
+    if laser_mode:
+        armed = spindle == 3 and motion in _BURNING
+    return speed if armed else 0.0
+
+
+class RestingBeam:
+    """Knows which line was held back last, for the controller that is ``known``; mutable."""
+
+    def __init__(self, known: KnownController) -> None:
+        self._known = known
+        self._held = ""
+
+    def sure_of(self, line: str) -> str:
+        """``line`` as it is to be sent. Raises :class:`~miurafab.errors.GcodeError` for one that
+        would put the resting beam on, or its power up, unless it is the same as the last.
+        """
+        held, self._held = self._held, ""
+        if line == held or line.startswith("$"):
+            return line
+        self._known.refresh(MODES)
+        laser_mode = bool(self._known.settings.values.get(_LASER_MODE))
+        before = [word for mode in self._known.modes.modes for word in _words(mode)]
+        power = resting_power([*before, *_words(line)], laser_mode=laser_mode)
+        if power <= resting_power(before, laser_mode=laser_mode):
+            return line
+        self._held = line
+        raise GcodeError(
+            f"After {line} the beam would be on, with S{power:g}, while the head rests "
+            f"(${_LASER_MODE}={laser_mode:d}): it burns one spot until M5 or a reset. Send the "
+            "same line again if you want that."
+        )
+
+
+def _words(text: str) -> list[tuple[str, float]]:
+    found = []
+    with contextlib.suppress(BlockError):  # the controller refuses the whole line
+        for letter, number in split_words(text):
+            found.append((letter, float(number)))
+    return found
