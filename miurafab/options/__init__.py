@@ -84,7 +84,8 @@ class Declared:
 
     ``name`` is its name outside, ``field`` that of the dataclass field. ``default`` is the value
     inside if nobody gives it; ``default_text`` how that is written, empty for none. ``page`` is
-    where the form of the page has it: ``first``, under ``more``, or not at all (empty).
+    where the form of the page has it: ``first``, under ``more``, among those for a ``mesh``, or not
+    at all (empty).
     """
 
     name: str
@@ -112,7 +113,7 @@ def option(
     *,
     group: str = "",
     default_text: str | None = None,
-    page: Literal["first", "more", ""] = "",
+    page: Literal["first", "more", "mesh", ""] = "",
 ) -> Any:
     """Declare an option as a field of a frozen dataclass.
 
@@ -130,7 +131,8 @@ def option(
     default_text : str, optional
         What holds where ``default`` is None, such as ``the material's``.
     page : str
-        Where the form of the page has it: ``first``, under ``more``, or not at all (empty).
+        Where the form of the page has it: ``first``, under ``more``, among those for a ``mesh``,
+        or not at all (empty).
     """
     shown = default_text
     if shown is None:

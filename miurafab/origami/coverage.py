@@ -59,10 +59,7 @@ def coverage(pattern: CreasePattern, tiles: Floats) -> Coverage:
     target = Shell.of_triangles(tiles)
     sheet, facet, normals = pressed(pattern, target)
     points, areas = _samples(target)
-    feet, triangle = closest_triangles(points, sheet.triangles)
-    longest = np.linalg.norm(_sides(sheet.triangles), axis=2).max(axis=1)
-    gap = np.linalg.norm(feet - points, axis=1)
-    missed = sheet.on_border(feet, triangle) | (gap > longest[triangle])
+    missed = _missed(sheet, points)
     places, parts = _samples(sheet)
     beyond = target.on_border(*closest_triangles(places, target.triangles))
     return Coverage(
@@ -70,6 +67,21 @@ def coverage(pattern: CreasePattern, tiles: Floats) -> Coverage:
         float(parts[beyond].sum() / parts.sum()),
         _area_of_pieces(pattern, sheet.triangles, facet, normals),
     )
+
+
+def uncovered(pattern: CreasePattern, tiles: Floats, points: Floats) -> Bools:
+    """(n,) whether the folded ``pattern`` leaves ``points`` (n, 3) of the target of these ``tiles``
+    uncovered, all in the frame of the target.
+    """
+    return _missed(pressed(pattern, Shell.of_triangles(tiles))[0], points)
+
+
+def _missed(sheet: Shell, points: Floats) -> Bools:
+    """(n,) which of ``points`` (n, 3) of the target the pressed ``sheet`` does not cover."""
+    feet, triangle = closest_triangles(points, sheet.triangles)
+    longest = np.linalg.norm(_sides(sheet.triangles), axis=2).max(axis=1)
+    gap = np.linalg.norm(feet - points, axis=1)
+    return np.asarray(sheet.on_border(feet, triangle) | (gap > longest[triangle]))
 
 
 @dataclass(frozen=True, eq=False)

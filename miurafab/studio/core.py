@@ -13,6 +13,8 @@ fit, open       POST   starts to make or read a pattern
 sheets          POST   starts to lay it out
 live, live/plan POST   asks for a coarse fit, or for the sheets that the pattern on the bench needs
 live/N          GET    the answer to the N-th of these
+target          POST   the picture of a target, and the number of a second one
+target/N        GET    the second picture, once it is there
 cancel          POST   ends the task
 machine         GET    the session with a machine, and what was said since ``?after=N``
 machine/sheet/N GET    the strokes of sheet N of the job there
@@ -46,22 +48,26 @@ from miurafab.profiles import (
 )
 from miurafab.profiles.shipped import Kind
 from miurafab.studio.desk import Desk
+from miurafab.studio.first_sight import FirstSight
 from miurafab.studio.form import by_label, filled
 from miurafab.studio.guard import FILE_LIMIT, UPLOAD, Guard
 from miurafab.studio.kept_jobs import keep_job
 from miurafab.studio.live import Live
 from miurafab.studio.machine_orders import ROUTES, carry_out
 from miurafab.studio.machine_words import NO_JOB, plain
+from miurafab.studio.mends import mends
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
 from miurafab.studio.orders import read_fit, read_glance, read_layout, read_plan, read_source
 from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.texts import with_texts
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
+from miurafab.surfaces.height_field import IMAGE_SUFFIXES
 from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED
 from miurafab.workflow.at_machine import STEPS
 from miurafab.workflow.design import can_close
+from miurafab.workflow.image_targets import PARAMETERS as OF_IMAGE
 
-PAGE, MACHINE, LIVE = "studio.html", "machine", "live"
+PAGE, MACHINE, LIVE, TARGET = "studio.html", "machine", "live", "target"
 PARTS = (
     *("icon.svg", "studio.css", "machine.css", "tools.js", "choices.js", "results.js"),
     *("machine.js", "sheet.js", "studio.js", "texts.js"),
@@ -88,6 +94,7 @@ class Studio:
         self.guard = guard
         self.desk = Desk() if desk is None else desk
         self.live = Live() if live is None else live
+        self.sight = FirstSight(bench.start)
         self._own_job = own_job
         self._lock = threading.Lock()
         self._first = first
@@ -105,6 +112,8 @@ class Studio:
             return self._live(route.removeprefix(LIVE).removeprefix("/"), request)
         if route == MACHINE or route.startswith(f"{MACHINE}/"):
             return self._machine(route.removeprefix(MACHINE).removeprefix("/"), request)
+        if route == TARGET or route.startswith(f"{TARGET}/"):
+            return self._target(route.removeprefix(TARGET).removeprefix("/"), request)
         with self._lock:
             self.bench.take_in()
             try:
@@ -143,6 +152,27 @@ class Studio:
         options = dict(asked.options)
         beside = layout and asdict(layout)
         return {"do": "coarse", "target": target, "options": options, "layout": beside}
+
+    def _target(self, route: str, request: HttpRequest) -> Response:
+        """What is seen of a target; it waits for the list of files alone."""
+        if request.method != "POST":
+            number = int(route[:9]) if route.isascii() and route.isdigit() else -1
+            return self._told(self.sight.more(number))
+        try:
+            asked = read_fit(request.body)
+            with self._lock:
+                target, source = self.bench.target_of(asked), self.bench.source_of(asked)
+            return self._told(self.sight.show(asked, target, source))
+        except MiurafabError as fault:
+            return self._told({"refused": fault.sentence, "mends": mends(fault.sentence)})
+
+    def _told(self, said: dict[str, Any]) -> Response:
+        """An answer about a target with its sentences in the words of the page."""
+        if "refused" in said:
+            said = said | {"refused": self.bench.plain(said["refused"])}
+        if "findings" in said:
+            said = said | {"findings": self.bench.plain_findings(said["findings"])}
+        return answer(said)
 
     def _machine(self, route: str, request: HttpRequest) -> Response:
         """What belongs to the session with a machine; nothing here waits for the bench, but the
@@ -231,7 +261,8 @@ def _catalogue() -> dict[str, Any]:
         "materials": [
             {"name": name, "title": load_material(name).title} for name in known_names("materials")
         ],
-        "file_suffixes": (*MESH_SUFFIXES, PACKED, PATTERN_SUFFIX),
+        "file_suffixes": (*MESH_SUFFIXES, PACKED, *IMAGE_SUFFIXES, PATTERN_SUFFIX),
+        "of_image": OF_IMAGE,
         "file_limit": FILE_LIMIT,
         "defaults": {
             "facets": FACETS.show(DEFAULT_FACETS),
@@ -253,6 +284,8 @@ def _surface(entry: NamedSurface) -> dict[str, Any]:
     return {
         "name": entry.name,
         "summary": entry.summary,
+        "formulas": entry.formulas,
+        "profile": entry.profile_axes,
         "parameters": [
             {
                 "key": key,

@@ -19,7 +19,7 @@ LABELS = {name: field.label for name, field in (FIT | LAYOUT).items()}
 def filled(page: str) -> str:
     """The page with its fields, each where ``<!-- fit first -->`` and its like stand."""
     for form, fields in (("fit", FIT), ("layout", LAYOUT)):
-        for place in ("first", "more"):
+        for place in ("first", "more", "mesh"):
             rows = "\n".join(_row(field) for field in fields.values() if field.page == place)
             page = page.replace(f"<!-- {form} {place} -->", rows)
     return page

@@ -40,6 +40,7 @@ TYPES = {
     ".css": "text/css; charset=utf-8",
     ".fold": "application/json; charset=utf-8",
     ".html": "text/html; charset=utf-8",
+    ".json": "application/json; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
     ".pdf": "application/pdf",
     ".svg": "image/svg+xml; charset=utf-8",

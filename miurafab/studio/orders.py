@@ -19,16 +19,21 @@ from miurafab.profiles import known_names
 from miurafab.studio.form import FIT, LAYOUT
 from miurafab.studio.recipe import Value
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface
+from miurafab.surfaces.profile_files import LARGEST
 from miurafab.workflow.design import design
+from miurafab.workflow.image_targets import PARAMETERS as OF_IMAGE
 
-_LONGEST = 200
+_LONGEST = 500
+_MOST_POINTS = 200
+"""Points of a profile that was drawn on the page."""
 
 
 @dataclass(frozen=True)
 class FitOrder:
     """A fit to a named ``surface`` with its ``parameters``, or to the file of ``source``.
 
-    ``replaces`` is the number of the task whose place it takes, if that one still runs.
+    ``replaces`` is the number of the task whose place it takes, if that one still runs. The options
+    hold the ``profile`` that was drawn, if one was.
     """
 
     surface: str | None
@@ -40,16 +45,25 @@ class FitOrder:
     def as_dict(self) -> dict[str, Any]:
         """The order as the page wrote it."""
         target: dict[str, Any] = {"source": self.source}
-        if self.source is None:
-            target = {"surface": self.surface, "parameters": dict(self.parameters)}
-        return {"target": target, "options": dict(self.options)}
+        if self.surface is not None:
+            target = {"surface": self.surface}
+        if self.surface is not None or self.parameters:
+            target["parameters"] = dict(self.parameters)
+        options = dict(self.options)
+        if "profile" in options:
+            target["profile"] = options.pop("profile")
+        return {"target": target, "options": options}
 
     @property
     def target(self) -> str:
         """The named surface as the command line writes it."""
         assert self.surface is not None
+        return self.on(self.surface)
+
+    def on(self, name: str) -> str:
+        """The surface or the file ``name`` with its parameters, as the command line writes it."""
         values = ",".join(f"{key}={value}" for key, value in self.parameters.items())
-        return f"{self.surface}:{values}" if values else self.surface
+        return f"{name}:{values}" if values else name
 
 
 @dataclass(frozen=True)
@@ -94,14 +108,34 @@ def _fit_of(order: Mapping[str, Any]) -> FitOrder:
     target = _table(order.get("target"), "The target")
     options = _options(order.get("options", {}), FIT)
     if "source" in target:
-        return FitOrder(None, {}, text_of("source", target["source"]), options)
-    return _named(text_of("surface", target.get("surface")), target.get("parameters", {}), options)
+        given = _texts(_table(target.get("parameters", {}), "The parameters"), tuple(OF_IMAGE))
+        return FitOrder(None, given, text_of("source", target["source"]), options)
+    surface = text_of("surface", target.get("surface"))
+    if target.get("profile") is not None:
+        options["profile"] = _profile(target["profile"])
+    return _named(surface, target.get("parameters", {}), options)
+
+
+def _profile(points: Any) -> list[list[float]]:
+    """Points that were drawn, as numbers."""
+    if not isinstance(points, list) or not 2 <= len(points) <= _MOST_POINTS:
+        raise TargetError(f"A profile has 2 to {_MOST_POINTS} points.")
+    for point in points:
+        if not isinstance(point, list) or len(point) != 2 or not all(map(_is_place, point)):
+            raise TargetError("A point of a profile is two numbers.")
+    return [[float(x), float(y)] for x, y in points]
+
+
+def _is_place(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < LARGEST
 
 
 def _named(surface: str, parameters: Any, options: Mapping[str, Value]) -> FitOrder:
     if surface not in CATALOGUE:
         raise TargetError(f"'{surface}' is not a known surface.")
-    given = _texts(_table(parameters, "The parameters"), tuple(CATALOGUE[surface].parameters))
+    entry = CATALOGUE[surface]
+    keys = (*entry.formulas, *entry.parameters)
+    given = _texts(_table(parameters, "The parameters"), keys)
     make_surface(surface, given)
     order = FitOrder(surface, given, None, options)
     design(order.target, **options)

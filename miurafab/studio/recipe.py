@@ -12,11 +12,14 @@ from collections.abc import Mapping
 PORT = "/dev/ttyUSB0"
 """The port in the command for cutting; readers put their own in its place."""
 
-Value = str | int | bool
+Value = str | int | bool | list[list[float]]
+"""A list is the profile that was drawn."""
 
 
 def fit_command(target: str, options: Mapping[str, Value], name: str) -> str:
-    """``miurafab fit`` with the options of the page."""
+    """``miurafab fit`` with the options of the page; with a drawn profile, of the design file."""
+    if "profile" in options:
+        return shlex.join(["miurafab", "fit", f"{name}.toml", "-o", f"{name}.fold"])
     return shlex.join(["miurafab", "fit", target, *_words(options), "-o", f"{name}.fold"])
 
 
@@ -34,8 +37,12 @@ def subject(
     words = [", ".join([name, *(f"{key} {value}" for key, value in parameters.items())])]
     for key, value in options.items():
         label = labels.get(key, key)
-        words.append(label if value is True else f"{label} {value}")
+        words.append(label if value is True else f"{label} {_said(value)}")
     return " · ".join(words)
+
+
+def _said(value: Value) -> str:
+    return f"of {len(value)} points" if isinstance(value, list) else str(value)
 
 
 def check_command(file: str) -> str:
@@ -69,13 +76,15 @@ def job_name(name: str) -> str:
 
 def design_text(
     title: str,
-    target: Mapping[str, str],
+    target: Mapping[str, Value],
     options: Mapping[str, Value],
     layout: Mapping[str, Value],
 ) -> str:
     """A design file (``miurafab fit DESIGN.toml``) that asks for the same."""
-    parts = ["# Made by miurafab studio.", *_lines({"title": title, **options})]
-    parts += ["", "[target]", *_lines(target)]
+    drawn = {name: value for name, value in options.items() if name == "profile"}
+    rest = {name: value for name, value in options.items() if name != "profile"}
+    parts = ["# Made by miurafab studio.", *_lines({"title": title, **rest})]
+    parts += ["", "[target]", *_lines({**target, **drawn})]
     if layout:
         parts += ["", "[layout]", *_lines(layout)]
     return "\n".join(parts) + "\n"

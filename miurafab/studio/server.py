@@ -46,8 +46,10 @@ from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
 from miurafab.studio.worker import Process
 from miurafab.surfaces.catalogue import make_surface, parse_target
 from miurafab.surfaces.mesh_files import mesh_suffix
+from miurafab.surfaces.profile_files import read_profile
 from miurafab.workflow.cut import GCODE_SUFFIXES
 from miurafab.workflow.design import design
+from miurafab.workflow.image_targets import image_named
 
 
 def serve(
@@ -86,6 +88,7 @@ def serve(
         guard, known = _watched(server, hosting, place)
         server.studio = Studio(bench, guard, first, own_job=own_job)
         at_end.callback(server.studio.live.stop)
+        at_end.callback(server.studio.sight.stop)
         at_end.callback(server.studio.desk.leave)  # before anything else: the machine is dark
         at_end.callback(signals.hold)
         if thing is not None and first is not None and first.get("open"):
@@ -132,9 +135,15 @@ def _put_on(bench: Bench, thing: str) -> dict[str, Any]:
             raise error(f"{path} does not exist.")
         kind = "pattern" if suffix == PATTERN_SUFFIX else "mesh"
         return {"source": bench.add_own(path, kind).id, "open": kind == "pattern"}
+    image = image_named(thing)
+    if image is not None:
+        design(thing)
+        return {"source": bench.add_own(image[0], "image").id, "parameters": image[1]}
     name, parameters = parse_target(thing)
-    make_surface(name, parameters)
-    return {"surface": name, "parameters": parameters}
+    profile = parameters.pop("profile", None)
+    drawn = {} if profile is None else {"profile": read_profile(Path(profile))}
+    make_surface(name, parameters | drawn)
+    return {"surface": name, "parameters": parameters, **drawn}
 
 
 class _Server(ThreadingHTTPServer):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from miurafab.studio.orders import FitOrder, LayoutOrder
 from miurafab.studio.report_text import headline, layout_lines, pattern_lines
 from miurafab.studio.work import Order
 from miurafab.studio.worker import News, Running
+from miurafab.surfaces.height_field import IMAGE_SUFFIXES
 from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED, mesh_suffix
 
 PATTERN_SUFFIX, DESIGN_SUFFIX = ".fold", ".toml"
@@ -32,7 +33,7 @@ _KEPT = 8
 
 @dataclass(frozen=True)
 class Source:
-    """A file to fit or to open: a ``mesh``, a ``pattern`` or a ``design``.
+    """A file to fit or to open: a ``mesh``, an ``image``, a ``pattern`` or a ``design``.
 
     ``ours`` says that the command line named the file; ``shown`` is its name in command lines.
     """
@@ -47,6 +48,16 @@ class Source:
     def name(self) -> str:
         """The name of what is made of it."""
         return safe_stem(self.path.name)
+
+
+def kind_of(path: Path) -> str | None:
+    """The kind of the file ``path`` by its ending, None for one that is not known here."""
+    suffix = path.suffix.lower()
+    if mesh_suffix(path):
+        return "mesh"
+    if suffix in IMAGE_SUFFIXES:
+        return "image"
+    return {PATTERN_SUFFIX: "pattern", DESIGN_SUFFIX: "design"}.get(suffix)
 
 
 @dataclass
@@ -89,7 +100,7 @@ class Bench:
         self.job: dict[str, Any] | None = None
         self._folder = folder
         self._own = re.compile(re.escape(str(folder)) + r"[/\\][0-9]+[/\\]")
-        self._start = start
+        self.start = start
         self._numbers = 0
         self._asked: Asked | None = None
         self._coming: Asked | None = None
@@ -97,9 +108,9 @@ class Bench:
     def add_upload(self, name: str, content: bytes) -> Source:
         """Keep an uploaded file. Raises :class:`~miurafab.errors.InputError`."""
         suffix = suffix_of(name)
-        kind = "pattern" if suffix == PATTERN_SUFFIX else "mesh"
-        if kind == "mesh" and not mesh_suffix(Path(f"mesh{suffix}")):
-            known = ", ".join((*MESH_SUFFIXES, PACKED, PATTERN_SUFFIX))
+        kind = kind_of(Path(f"file{suffix}"))
+        if kind in (None, "design"):
+            known = ", ".join((*MESH_SUFFIXES, PACKED, *IMAGE_SUFFIXES, PATTERN_SUFFIX))
             raise InputError(f"'{name[-60:]}' cannot be opened here; known files are {known}.")
         if not content:
             raise InputError(f"'{name[-60:]}' is empty.")
@@ -125,15 +136,16 @@ class Bench:
         if self.task is not None and self.task.id == asked.replaces:
             self.cancel()
         self._check_idle()
-        if asked.source is None:
+        source = self.source_of(asked)
+        if source is None:
             assert asked.surface is not None
             shown, name = asked.target, asked.surface
             described: Mapping[str, str] | None = {"surface": name, **asked.parameters}
             words = name
         else:
-            source = self.sources[asked.source]
-            shown, name = source.shown, source.name
-            described = {"mesh": source.shown} if source.kind == "mesh" else None
+            shown, name = asked.on(source.shown), source.name
+            of_file = {source.kind: source.shown, **asked.parameters}
+            described = None if source.kind == "design" else of_file
             words = source.path.name
         self._coming = Asked(
             recipe.fit_command(shown, asked.options, name),
@@ -145,13 +157,21 @@ class Bench:
         )
         self._begin("fit", name, target=target, options=asked.options)
 
+    def source_of(self, asked: FitOrder) -> Source | None:
+        """The file of a fit, None where it has none. Raises as :meth:`target_of`."""
+        if asked.source is None:
+            return None
+        source = self._source(asked.source, ("mesh", "image", "design"))
+        if asked.parameters and source.kind != "image":
+            raise InputError("Only an image of heights has parameters.")
+        return source
+
     def target_of(self, asked: FitOrder) -> str:
         """The target of a fit as the verbs take it. Raises ``InputError`` for a file that is gone
         or cannot be fitted.
         """
-        if asked.source is None:
-            return asked.target
-        return str(self._source(asked.source, ("mesh", "design")).path)
+        source = self.source_of(asked)
+        return asked.target if source is None else asked.on(str(source.path))
 
     def pattern_file(self) -> Path:
         """The file of the pattern on the bench. Raises ``InputError`` if there is none."""
@@ -254,7 +274,7 @@ class Bench:
             self._new_pattern(task, part)
         elif part["part"] == "motion" and self.pattern is not None:
             self.pattern["files"] |= self._put_down(task.id, part.get("files", {}))
-            self.pattern["findings"] += self._findings(part)
+            self.pattern["findings"] += self.plain_findings(part.get("findings", []))
             self.pattern |= {"folding": False, "still": part.get("missing", "")}
         elif part["part"] == "job":
             self._new_job(task, part)
@@ -274,7 +294,7 @@ class Bench:
             "advice": self.plain(report["advice"]),
             "seams": bool(report.get("seam_mm")),
             "lines": pattern_lines(report),
-            "findings": self._findings(part),
+            "findings": self.plain_findings(part.get("findings", [])),
             "files": self._put_down(task.id, part["files"]),
             "folding": bool(part["files"]),
             "still": "",
@@ -299,7 +319,7 @@ class Bench:
             "name": recipe.job_name(name),
             "lines": layout_lines(part["totals"]),
             "doubts": self._doubts(),
-            "findings": self._findings(part),
+            "findings": self.plain_findings(part.get("findings", [])),
             "files": self._put_down(task.id, part["files"]),
             "pictures": list(self._put_down(task.id, pictures).values()),
             "command": recipe.both(self._asked.command, sheets, sound=not self._doubts()),
@@ -312,11 +332,9 @@ class Bench:
             return []
         return [f"{self.pattern['headline']} {self.pattern['advice']}".strip()]
 
-    def _findings(self, part: News) -> list[dict[str, Any]]:
-        return [
-            finding | {"sentence": self.plain(finding["sentence"])}
-            for finding in part.get("findings", [])
-        ]
+    def plain_findings(self, findings: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """``findings`` in the words of :meth:`plain`."""
+        return [{**each, "sentence": self.plain(each["sentence"])} for each in findings]
 
     def plain(self, sentence: str) -> str:
         """``sentence`` with files of the studio's folder named without a path, and options named
@@ -327,7 +345,7 @@ class Bench:
     def _begin(self, do: str, name: str, **what: Any) -> None:
         number = self._number()
         order = Order(do, self._new_folder(number), name, **what)
-        self.task = Task(order, number, self._start(order))
+        self.task = Task(order, number, self.start(order))
 
     def _settle(self) -> None:
         """Stop waiting for a folding that will not come, and delete a folder without results."""

@@ -23,22 +23,26 @@ from miurafab.origami.formats.fold import read_fold
 from miurafab.origami.picture import flat_svg
 from miurafab.origami.verify import Audit
 from miurafab.studio.recipe import job_name
-from miurafab.surfaces.description import no_target
+from miurafab.studio.target_view import compared, placed
+from miurafab.surfaces.description import described_surface, no_target
+from miurafab.surfaces.surface import TargetSurface
 from miurafab.workflow.drawings import GUIDE
+from miurafab.workflow.json_text import json_text
 from miurafab.workflow.page import write_page
 from miurafab.workflow.picture import svg_text
 from miurafab.workflow.preview import Preview
 
 Tell = Callable[[dict[str, Any]], None]
 
-PAGE, MOTION, PICTURE = "still.html", "folding.html", "pattern.svg"
+PAGE, MOTION, PICTURE, TARGET = "still.html", "folding.html", "pattern.svg", "target.json"
 _FITTING = 0.6
 """The share of the progress bar for the fit; the rest is for the folding."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """What to do (``fit``, ``open`` or ``sheets``) in ``folder``, for the pattern ``name``.
+    """What to do (``fit``, ``open``, ``sheets`` or ``place``) in ``folder``, for the pattern
+    ``name``.
 
     ``target`` is for a fit; ``file`` is the pattern to open or lay out. ``ours`` says that the
     command line named the file, and that the browser did not send it.
@@ -69,7 +73,12 @@ def carry_out(order: Order, tell: Tell) -> None:
 
     Raises what the verbs raise: :class:`~miurafab.errors.MiurafabError` for wrong input.
     """
-    {"fit": _fit, "open": _open, "sheets": _sheets}[order.do](order, tell)
+    {"fit": _fit, "open": _open, "sheets": _sheets, "place": _place}[order.do](order, tell)
+
+
+def _place(order: Order, tell: Tell) -> None:
+    """What a fit would make of a mesh, for the picture of the target."""
+    tell({"placed": placed(order.target, order.options)})
 
 
 def _fit(order: Order, tell: Tell) -> None:
@@ -86,28 +95,29 @@ def _fit(order: Order, tell: Tell) -> None:
     pattern = _with_mesh_in(order.folder, result.pattern)
     file = order.folder / f"{order.name}.fold"
     pattern.save(file, title=wanted.title)
-    _show(order, pattern, part | {"files": {"fold": file.name}}, tell)
+    _show(order, pattern, wanted.request.surface, part | {"files": {"fold": file.name}}, tell)
 
 
 def _open(order: Order, tell: Tell) -> None:
     tell({"progress": 0.0, "note": "checking the pattern"})
-    checked, missing = _checked(order)
+    checked, missing, surface = _checked(order)
     copy = order.folder / f"{order.name}.fold"
     shutil.copyfile(order.file, copy)
     part = {"part": "pattern", "report": checked.report(), "findings": findings_json(missing)}
-    _show(order, read_fold(order.file), part | {"files": {"fold": copy.name}}, tell)
+    _show(order, read_fold(order.file), surface, part | {"files": {"fold": copy.name}}, tell)
 
 
-def _checked(order: Order) -> tuple[Audit, tuple[Finding, ...]]:
-    """The audit, and findings on the target. A file from the browser must not name a mesh by its
-    path.
+def _checked(order: Order) -> tuple[Audit, tuple[Finding, ...], TargetSurface | None]:
+    """The audit, findings on the target, and the target. A file from the browser must not name a
+    mesh by its path.
     """
     pattern = read_fold(order.file)
     if "mesh" in pattern.target and not order.ours:
         missing = no_target("its target is a mesh, which is not in the file")
-        return miurafab.check(replace(pattern, target={})), missing
+        return miurafab.check(replace(pattern, target={})), missing, None
     checked = miurafab.check(pattern)
-    return checked, tuple(each for each in checked.findings if each.code == "no-target")
+    missing = tuple(each for each in checked.findings if each.code == "no-target")
+    return checked, missing, described_surface(pattern.target)[0]
 
 
 def _with_mesh_in(folder: Path, pattern: CreasePattern) -> CreasePattern:
@@ -120,12 +130,22 @@ def _with_mesh_in(folder: Path, pattern: CreasePattern) -> CreasePattern:
     return replace(pattern, target={**pattern.target, "mesh": str(copy.resolve())})
 
 
-def _show(order: Order, pattern: CreasePattern, part: dict[str, Any], tell: Tell) -> None:
-    """Report the pattern as a drawing and in space, first still, then folding."""
+def _show(
+    order: Order,
+    pattern: CreasePattern,
+    surface: TargetSurface | None,
+    part: dict[str, Any],
+    tell: Tell,
+) -> None:
+    """Report the pattern as a drawing and in space, first still, then folding; and its target."""
     folder = order.folder
     write_text(folder / PICTURE, flat_svg(pattern, 640.0))
     write_page(folder / PAGE, title=order.name, pattern=pattern)
-    tell(part | {"files": {**part["files"], "picture": PICTURE, "page": PAGE}})
+    files = {**part["files"], "picture": PICTURE, "page": PAGE}
+    if surface is not None and pattern.folded_coords is not None:
+        write_text(folder / TARGET, json_text(compared(pattern, surface), one_line=True))
+        files["target"] = TARGET
+    tell(part | {"files": files})
     tell({"progress": _FITTING, "note": "folding"})
     try:
         folding = miurafab.fold(pattern, on_progress=_progress(tell, _FITTING, 1.0))

@@ -136,12 +136,14 @@ class FitOptions(Shown):
         "The part of the mesh to cover, in its flat layout, as fractions or lengths.",
         group="Mesh targets",
         default_text="automatic",
+        page="mesh",
     )
     rotate: float | None = option(
         angle(-360, 360),
         "Turn the grid on the mesh by this angle.",
         group="Mesh targets",
         default_text="automatic",
+        page="mesh",
     )
     pieces: int | None = option(
         Pieces(),
@@ -163,7 +165,7 @@ class FitOptions(Shown):
         "the other.",
         group="Mesh targets",
         default_text="automatic",
-        page="more",
+        page="mesh",
     )
     polar_hole_mm: float | None = option(
         length(above=True),
@@ -171,7 +173,7 @@ class FitOptions(Shown):
         "own unit.",
         group="Mesh targets",
         default_text="6 % of the root of the area",
-        page="more",
+        page="mesh",
     )
     side: Side = option(
         Choice(get_args(Side)),
@@ -179,6 +181,7 @@ class FitOptions(Shown):
         "the middle between them.",
         "outer",
         group="Mesh targets",
+        page="mesh",
     )
     holes: Holes = option(
         Choice(get_args(Holes)),
@@ -186,6 +189,7 @@ class FitOptions(Shown):
         "large ones, fill all, or fill small ones and keep large ones as windows in the sheet.",
         "small",
         group="Mesh targets",
+        page="mesh",
     )
     edge: str = option(
         Choice(("trim", "whole", "rectangle")),
@@ -193,7 +197,7 @@ class FitOptions(Shown):
         "(whole), or a rectangle of the mesh (rectangle; so with `region`).",
         "trim",
         group="Mesh targets",
-        page="more",
+        page="mesh",
     )
     polish: str = option(
         Choice(("on", "off")),

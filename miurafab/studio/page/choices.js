@@ -76,6 +76,7 @@ function showTarget(value, parameters = {}) {
     );
   }));
   byId("close-row").hidden = Boolean(surface && !surface.turned) || source?.kind === "mesh";
+  byId("mesh-options").hidden = !["mesh", "design"].includes(source?.kind);
   byId("sheet-options").hidden = pattern;
   byId("fit").textContent = pattern ? shape.open : shape.fit;
   const { facets, size } = catalogue.defaults;

@@ -77,6 +77,9 @@ export const texts = {
     "save_drawing": "Drawing .svg",
     "save_design": "Design .toml"
   },
+  "target": {
+    "mesh_options": "More about the mesh"
+  },
   "layout": {
     "machine_and_material": "Machine and material",
     "more": "More about the sheets",

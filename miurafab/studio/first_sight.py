@@ -1,0 +1,103 @@
+"""What is seen of a target as soon as it is chosen, in two steps.
+
+The first step is the answer itself: a surface as it is, a mesh as its file has it. What a fit would
+make of a mesh takes longer and is computed by another process; it is asked for by its number. Only
+the newest question has an answer.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import miurafab
+from miurafab.errors import MiurafabError, TargetError
+from miurafab.profiles import read_toml
+from miurafab.studio.mends import mends
+from miurafab.studio.orders import FitOrder
+from miurafab.studio.session import Source
+from miurafab.studio.target_view import AT_ONCE, SHAPING, file_shown, shown
+from miurafab.studio.work import Order
+from miurafab.studio.worker import Running
+
+
+class FirstSight:
+    """The target that the page shows; ``start`` starts an order. Methods may be called in any
+    thread.
+    """
+
+    def __init__(self, start: Callable[[Order], Running]) -> None:
+        self._start = start
+        self._lock = threading.Lock()
+        self._number = 0
+        self._running: Running | None = None
+        self._said: dict[str, Any] | None = None
+
+    def show(self, asked: FitOrder, target: str, source: Source | None) -> dict[str, Any]:
+        """The first picture of ``target``, and as ``more`` the number of the second, if there is
+        one. ``source`` is its file, if it has one. What is refused is told in the answer, with what
+        mends it.
+        """
+        options = {name: value for name, value in asked.options.items() if name in SHAPING}
+        with self._lock:
+            self._end()
+            self._number += 1
+            mesh = None if source is None else _mesh_of(source)
+            try:
+                picture = _first(target, options, mesh)
+            except MiurafabError as fault:
+                return {"refused": fault.sentence, "mends": mends(fault.sentence)}
+            if mesh is not None:
+                order = Order("place", Path(), "", target=target, options=options)
+                self._running = self._start(order)
+            return {"picture": picture, "more": None if mesh is None else self._number}
+
+    def more(self, number: int) -> dict[str, Any]:
+        """The second picture; ``{"wait": true}`` while there is none, ``{"gone": true}`` where a
+        newer target was chosen.
+        """
+        with self._lock:
+            if number != self._number or (self._running is None and self._said is None):
+                return {"gone": True}
+            for news in [] if self._running is None else self._running.news():
+                if "placed" in news:
+                    self._said = news["placed"]
+                elif "error" in news:
+                    self._said = {"refused": news["error"], "mends": []}
+            if self._said is None:
+                return {"wait": True}
+            self._stop()
+            return self._said
+
+    def stop(self) -> None:
+        """End the process, if there is one."""
+        with self._lock:
+            self._end()
+
+    def _end(self) -> None:
+        self._stop()
+        self._said = None
+
+    def _stop(self) -> None:
+        running, self._running = self._running, None
+        if running is not None:
+            running.stop()
+
+
+def _first(target: str, options: Mapping[str, Any], mesh: Path | None) -> dict[str, Any] | None:
+    if mesh is None:
+        return shown(miurafab.design(target, **options))
+    return file_shown(mesh) if mesh.is_file() and mesh.stat().st_size <= AT_ONCE else None
+
+
+def _mesh_of(source: Source) -> Path | None:
+    """The mesh file of a target, if it has one."""
+    if source.kind == "mesh":
+        return source.path
+    if source.kind == "design":
+        target = read_toml(source.path, TargetError).get("target")
+        mesh = target.get("mesh") if isinstance(target, dict) else None
+        return source.path.parent / mesh if isinstance(mesh, str) else None
+    return None
