@@ -44,7 +44,7 @@ class Browser:
         self._from, to_write = os.pipe()
         # the shell puts the two ends where the browser looks for them
         command = ["bash", "-c", f'exec "$@" 3<&{to_read} 4>&{to_write}', "bash", CHROMIUM]
-        self._process = subprocess.Popen(
+        self.process = subprocess.Popen(
             [*command, *_FLAGS, f"--user-data-dir={profile}", "about:blank"],
             pass_fds=(to_read, to_write),
             stdout=subprocess.DEVNULL,
@@ -67,8 +67,8 @@ class Browser:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._process.terminate()
-        self._process.wait(timeout=30)
+        self.process.terminate()
+        self.process.wait(timeout=30)
         os.close(self._to)
         os.close(self._from)
 

@@ -41,7 +41,7 @@ from miurafab.origami.formats.fold import write_fold
 from miurafab.origami.formats.mesh import glb_bytes
 from miurafab.workflow.fold_gif import target_frame, write_gif
 from miurafab.workflow.layers import layer_facts, layer_findings
-from miurafab.workflow.page import Slider, write_page
+from miurafab.workflow.page import Curve, Slider, write_page
 from miurafab.workflow.panels import METHODS
 from miurafab.workflow.patterns import PatternLike, movable_pattern
 
@@ -52,6 +52,9 @@ ENDINGS = (".fold", ".gif", ".glb", ".html")
 """What a motion can be written as."""
 
 Progress = Callable[[float, str], None]
+
+_NO_STRAIN, _NO_ENERGY = 1e-9, 1e-12
+"""Strains, and energies in k_f times the mean edge, that are rounding."""
 
 
 @dataclass(frozen=True)
@@ -143,12 +146,13 @@ class Folding(Shown):
             write_gif(file, motion, _strain(motion) if by_strain else None, on_progress, shifts)
         else:
             slider = Slider(
-                _names(motion),
-                target_frame(motion),
-                _strain(motion),
-                by_strain,
-                shifts,
-                facet_energies(motion),
+                names=_names(motion),
+                start=target_frame(motion),
+                fold_angles=motion.fold_angles,
+                strain=_strain(motion),
+                show_strain=by_strain,
+                shifts=shifts,
+                curve=_energy(motion),
             )
             write_page(file, title=title, pattern=pattern, motion=motion.frames, slider=slider)
 
@@ -303,10 +307,22 @@ def fold(
 described(fold, FoldOptions, without=("colour", "thickness", "method"))
 
 
-def _strain(motion: FoldingMotion) -> Floats:
-    """Strains as the page shows them: rounding, which a rigid motion has for strain, is none."""
+def _strain(motion: FoldingMotion) -> Floats | None:
+    """(T, F) the strain of the facets; None where it is rounding, which a rigid motion has."""
     strain = facet_strain(motion.pattern, motion.frames)
-    return np.where(strain < 1e-9, 0.0, strain)
+    return strain if strain.max() > _NO_STRAIN else None
+
+
+def _energy(motion: FoldingMotion) -> Curve | None:
+    """The energy of the facets; None where it is rounding."""
+    energies = facet_energies(motion)
+    if energies is None or not energies.max() > _NO_ENERGY:
+        return None
+    return Curve(
+        "Bending energy of the facets, in k_f times the mean edge",
+        energies,
+        f"{energies.max():.2g} k_f L",
+    )
 
 
 def _glb(motion: FoldingMotion, shifts: Floats | None) -> bytes:

@@ -159,12 +159,20 @@ def test_nothing_between_flat_and_folded_unless_it_is_given():
     assert (motion["name"], motion["frames"]) == ("Motion", 3)
     read = points(motion["points"], motion["box"]).reshape(frames.shape)
     assert np.abs(read - frames).max() <= max(motion["box"][3:]) / 65535
-    told = Slider(("flat", "half", "folded"), 2, np.full((3, len(pattern.faces_vertices)), 0.1))
+    facets, edges = len(pattern.faces_vertices), len(pattern.edges_vertices)
+    angles = np.linspace(-np.pi, np.pi, 3 * edges).reshape(3, edges)
+    told = Slider(("flat", "half", "folded"), 2, angles, np.full((3, facets), 0.1))
     fold = data_of(page_text("a", None, pattern, frames, told))["fold"]
     assert (fold["names"], fold["start"]) == (["flat", "half", "folded"], 2)
-    assert fold["strain"]["most"] == 0.1
-    assert set(unpack(fold["strain"]["values"], "u1")) == {255}
-    assert len(unpack(fold["strain"]["owners"], "<u4")) == len(unpack(fold["triangles"], "<u4")) / 3
+    assert (fold["strain"]["most"], fold["rigid"]) == (0.1, False)
+    assert set(unpack(fold["strain"]["values"], "<u2")) == {65535}
+    shown = unpack(fold["forms"][2]["angles"], "<i2").reshape(3, edges) / 16383 * np.pi
+    assert np.abs(shown - angles).max() <= 0.5 / 16383 * np.pi * 1.0001
+    owners = unpack(fold["owners"], "<u4")
+    corners = unpack(fold["triangles"], "<u4").reshape(-1, 3)
+    for owner, corner in zip(owners, corners, strict=True):
+        assert set(corner) < set(pattern.faces_vertices[owner])
+    assert fold["forms"][0]["angles"] is None
     with pytest.raises(InputError, match="folding motion"):
         page_text("a", None, None, frames)
 

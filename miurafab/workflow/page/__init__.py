@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from miurafab.errors import InputError, shown
 from miurafab.files import write_text
 from miurafab.gcode.program import strokes
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.folding.layers_apart import CLOSED
@@ -31,30 +31,64 @@ from miurafab.version import __version__
 from miurafab.workflow.dry_run import LAYERS, SheetPreview, at_work, clock_text, length_text
 from miurafab.workflow.preview import Preview
 
-_SCRIPTS = ("viewer.js", "sheets.js", "fold.js", "page.js")
+SCENE = ("viewer.js", "space.js", "shaders.js", "scene.js")
+"""The scripts that draw a sheet in space, in their order; they know nothing of the rest."""
+
+_SCRIPTS = (*SCENE, "sheets.js", "plates.js", "flat.js", "chart.js", "fold.js", "page.js")
 _SEAM = "S"
 """What the page calls a border that is glued to another."""
 _STEPS = 65535
-_NO_ENERGY = 1e-12
+_HALF_TURN = 16383
+"""A fold angle of 180 degrees, on the page."""
 _BEGINS_STROKE = np.uint8(128)
 """Added to the layer of the first move of each stroke."""
 
 
 @dataclass(frozen=True, eq=False)
+class Curve:
+    """A curve beside the slider: ``values`` (T,) over ``places`` (T,), by default over the frames.
+
+    ``title`` says what it is, ``top`` is the text at its highest point and ``bottom`` at its end.
+    """
+
+    title: str
+    values: Floats
+    top: str
+    places: Floats | None = None
+    bottom: str = ""
+
+
+@dataclass(frozen=True, eq=False)
 class Slider:
-    """The slider of a motion of T frames: a name for each frame in ``names`` (T, or none), the
-    first frame ``start``, and the ``strain`` (T, F) of the facets, which colours can show; they do
-    from the start if ``show_strain``. ``shifts`` (F, 3), mm, are those of the layers of the last
-    frame when they stand apart. ``energies`` (T,) of the facets, in k_f times the mean edge, have a
-    curve beside the view.
+    """The slider of a motion of T frames.
+
+    Attributes
+    ----------
+    names : tuple of str
+        A name for each frame, or none.
+    start : int
+        The first frame that is shown.
+    fold_angles : (T, E) float64, optional
+        Radians, valleys positive.
+    strain : (T, F) float64, optional
+        Of the facets, None if they stay flat; they have its colours from the start if
+        ``show_strain``.
+    shifts : (F, 3) float64, optional
+        How far the facets of the last frame move when the layers stand apart, mm.
+    curve : Curve, optional
+        The energy of the facets, or the force.
+    thickness_mm : float
+        The thickness with which facets are drawn at first. 0 is paper.
     """
 
     names: tuple[str, ...] = ()
     start: int = 0
+    fold_angles: Floats | None = None
     strain: Floats | None = None
     show_strain: bool = False
     shifts: Floats | None = None
-    energies: Floats | None = None
+    curve: Curve | None = None
+    thickness_mm: float = 0.0
 
 
 def write_page(
@@ -179,66 +213,83 @@ def _fold(pattern: CreasePattern, motion: Floats | None, slider: Slider) -> dict
     flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
     forms = [_form("Flat", flat[None], flat=True)]
     if pattern.folded_coords is not None:
-        forms.append(_form("Folded", pattern.folded_coords[None]))
+        forms.append(_form("Folded", pattern.folded_coords[None], pattern.edges_fold_angle[None]))
     if motion is not None:
-        forms.append(_form("Motion", motion))
+        forms.append(_form("Motion", motion, slider.fold_angles))
     return {
         "assignments": assignments,
         "lengths": np.bincount(kinds, lengths, len(assignments)).round(3).tolist(),
         "kinds": _base64(kinds, np.uint8),
         "edges": _base64(pattern.edges_vertices, np.uint32),
         "triangles": _base64(triangles, np.uint32),
+        "owners": _base64(owners, np.uint32),
         "forms": forms,
         "first": len(forms) - 1,
         "names": slider.names,
         "start": slider.start,
-        "strain": _strain(slider, owners),
-        "layers": _layers(pattern, slider, owners),
-        "energy": _energy(slider),
+        "rigid": motion is not None and slider.strain is None,
+        "strain": _strain(slider),
+        "layers": _layers(slider),
+        "curve": _curve(slider),
+        "thickness": slider.thickness_mm,
     }
 
 
-def _strain(slider: Slider, owners: Ints) -> dict[str, Any] | None:
-    """Strains in 255ths of the greatest, and the facet of each triangle."""
+def _strain(slider: Slider) -> dict[str, Any] | None:
+    """Strains in 65535ths of the greatest."""
     if slider.strain is None:
         return None
     most = float(slider.strain.max())
+    values = np.rint(slider.strain / (most or 1.0) * _STEPS)
+    return {"most": most, "shown": slider.show_strain, "values": _base64(values, np.uint16)}
+
+
+def _curve(slider: Slider) -> dict[str, Any] | None:
+    curve = slider.curve
+    if curve is None:
+        return None
+
+    def short(numbers: Floats) -> list[float]:
+        return [float(f"{number:.5g}") for number in numbers.tolist()]
+
     return {
-        "most": most,
-        "shown": slider.show_strain,
-        "values": _base64(np.rint(slider.strain / (most or 1.0) * 255), np.uint8),
-        "owners": _base64(owners, np.uint32),
+        "title": curve.title,
+        "top": curve.top,
+        "bottom": curve.bottom,
+        "values": short(curve.values),
+        "places": None if curve.places is None else short(curve.places),
     }
 
 
-def _energy(slider: Slider) -> dict[str, Any] | None:
-    """The energies, with the greatest; None where they are no more than rounding."""
-    if slider.energies is None or not slider.energies.max() > _NO_ENERGY:
-        return None
-    values = [float(f"{value:.4g}") for value in slider.energies.tolist()]
-    return {"values": values, "most": max(values), "unit": "k_f × mean edge"}
-
-
-def _layers(pattern: CreasePattern, slider: Slider, owners: Ints) -> dict[str, Any] | None:
-    """How far each facet moves along one direction when the layers stand apart, and its edges."""
+def _layers(slider: Slider) -> dict[str, Any] | None:
+    """How far each facet moves along one direction when the layers stand apart."""
     if slider.shifts is None:
         return None
-    facet, slot = np.nonzero(pattern.faces_edges >= 0)
     farthest = slider.shifts[int(np.argmax(np.abs(slider.shifts).sum(axis=1)))]
     along = farthest / (np.linalg.norm(farthest) or 1.0)
+    shifts = slider.shifts @ along
     return {
         "closed": CLOSED,
         "along": along.round(6).tolist(),
-        "shifts": _base64(slider.shifts @ along, np.float32),
-        "owners": _base64(owners, np.uint32),
-        "sides": _base64(pattern.faces_edges[facet, slot], np.uint32),
-        "side_owners": _base64(facet, np.uint32),
+        "shifts": _base64(shifts, np.float32),
+        "height": float(np.ptp(shifts)),
+        "levels": len(np.unique(shifts.round(6))),
     }
 
 
-def _form(name: str, frames: Floats, *, flat: bool = False) -> dict[str, Any]:
+def _form(
+    name: str, frames: Floats, angles: Floats | None = None, *, flat: bool = False
+) -> dict[str, Any]:
     box, packed = _packed(frames.reshape(-1, 3))
-    return {"name": name, "flat": flat, "frames": len(frames), "box": box, "points": packed}
+    turned = None if angles is None else np.rint(angles / np.pi * _HALF_TURN)
+    return {
+        "name": name,
+        "flat": flat,
+        "frames": len(frames),
+        "box": box,
+        "points": packed,
+        "angles": None if turned is None else _base64(turned, np.int16),
+    }
 
 
 def _packed(points: Floats) -> tuple[list[float], str]:

@@ -39,6 +39,7 @@ function table(sheets, choose) {
 // within another page (the studio) the drawing stands alone
 const within = window.parent !== window;
 document.documentElement.classList.toggle("within", within);
+document.documentElement.classList.toggle("whole", location.hash === "#whole"); // with the flat pattern and the curve
 if (within) { // where Escape aborts a machine, whatever has the focus
   document.addEventListener("keydown", ({ key, repeat }) => {
     if (key === "Escape" && !repeat) window.parent.postMessage(key, "*");

@@ -197,7 +197,7 @@ class SheetView {
       this.fit();
     }
     const ratio = this.stage.ratio;
-    gl.clearColor(0, 0, 0, 0);
+    gl.clearColor(...rgb("--view"), 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
     const [paperWidth, paperHeight] = this.sheet.paper;
     const [left, bottom] = this.pixel([0, 0]);

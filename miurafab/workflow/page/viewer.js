@@ -65,8 +65,20 @@ function compile(gl, vertex, fragment) {
   return { program, uniform, attribute: (name) => gl.getAttribLocation(program, name) };
 }
 
-// Four vertices a segment from a to b: it is widened on the screen to a rectangle of the wanted
-// pixels. Dashed ones shorter than a dash are left out: hops over the gaps of a perforation would
+// Four vertices a segment from p to q: it is widened on the screen to a rectangle of the wanted pixels.
+const WIDEN = `
+  vec2 s = p.xy / p.w * size * 0.5, t = q.xy / q.w * size * 0.5;
+  float corner = float(gl_VertexID & 1), side = float((gl_VertexID >> 1) & 1) * 2.0 - 1.0;
+  reach = distance(s, t);
+  vec2 way = reach > 0.0 ? (t - s) / reach : vec2(1.0, 0.0);
+  half_width = widths[k] * 0.5;
+  place = vec2(mix(-0.5, reach + 0.5, corner), side * (half_width + 0.5));
+  vec2 spot = s + way * place.x + vec2(-way.y, way.x) * place.y;
+  float depth = mix(p.z / p.w, q.z / q.w, corner) - nearer;
+  gl_Position = vec4(spot / (size * 0.5), depth, 1.0);
+`;
+
+// The segment goes from a to b. Dashed ones shorter than a dash are left out: hops over the gaps of a perforation would
 // fill them. A segment is drawn while its kind is shown and its time has come; the one under way only in part.
 const LINE_VERTEX = `#version 300 es
 precision highp float;
@@ -89,18 +101,9 @@ void main() {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     return;
   }
-  vec2 s = p.xy / p.w * size * 0.5, t = q.xy / q.w * size * 0.5;
-  float corner = float(gl_VertexID & 1), side = float((gl_VertexID >> 1) & 1) * 2.0 - 1.0;
-  reach = distance(s, t);
-  vec2 along = reach > 0.0 ? (t - s) / reach : vec2(1.0, 0.0);
-  half_width = widths[k] * 0.5;
-  place = vec2(mix(-1.0, reach + 1.0, corner), side * (half_width + 1.0));
-  vec2 at = s + along * place.x + vec2(-along.y, along.x) * place.y;
-  float depth = mix(p.z / p.w, q.z / q.w, corner) - nearer;
-  gl_Position = vec4(at / (size * 0.5), depth, 1.0);
   colour = colours[k];
   dash = ((dashed >> k) & 1) == 1 ? 1.0 : 0.0;
-}`;
+${WIDEN}}`;
 
 const LINE_FRAGMENT = `#version 300 es
 precision highp float;
@@ -114,17 +117,19 @@ void main() {
   cover *= clamp(place.x + 0.5, 0.0, 1.0) * clamp(reach - place.x + 0.5, 0.0, 1.0);
   if (dash > 0.5) cover *= reach < dash_pixels ? 0.0 : 0.8 * step(mod(place.x, dash_pixels * 1.8), dash_pixels);
   if (cover <= 0.0) discard;
-  result = vec4(colour * cover, cover);
+  result = vec4(colour, 1.0) * cover;
 }`;
 
 /** A canvas that is drawn when something changed, and never otherwise. Lines smooth themselves. */
 class Stage {
   constructor(canvas, antialias, paint) {
     this.canvas = canvas;
-    this.gl = canvas.getContext("webgl2", { antialias, premultipliedAlpha: true });
+    this.gl = canvas.getContext("webgl2", { antialias, alpha: false });
     if (!this.gl) throw new Error("no WebGL 2");
     this.paint = paint;
     this.waiting = false;
+    this.moment = 0;
+    this.pace = 0; // ms between frames that follow each other
     this.line = compile(this.gl, LINE_VERTEX, LINE_FRAGMENT);
     new ResizeObserver(() => this.draw()).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
@@ -139,8 +144,11 @@ class Stage {
   draw() {
     if (this.waiting) return;
     this.waiting = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((moment) => {
       this.waiting = false;
+      const gap = moment - this.moment;
+      this.pace = gap < 150 ? 0.7 * this.pace + 0.3 * gap : 0;
+      this.moment = moment;
       if (!this.width || !this.height) return;
       const [width, height] = [Math.round(this.width * this.ratio), Math.round(this.height * this.ratio)];
       if (this.canvas.width !== width || this.canvas.height !== height) {
@@ -247,11 +255,13 @@ class Lines {
 }
 
 /**
- * Mouse, touch and keys on a canvas as three wishes: turn(dx, dy) and shift(dx, dy) in pixels,
- * zoom(factor, x, y) about a point of the canvas; and keys, a map from a key to what it does.
+ * Mouse, touch and keys on a drawing as wishes: turn(dx, dy) and shift(dx, dy) in pixels, zoom(factor, x, y)
+ * about a point of the drawing, hover(x, y) and leave() of a pointer that is not pressed, tap(x, y, slack) where
+ * one is pressed and let go, with the pixels that its kind may miss by; and keys, a map from a key to what it does.
  */
-function gestures(canvas, { turn, shift, zoom, keys }) {
+function gestures(canvas, { turn, shift, zoom, keys, hover = () => {}, leave = () => {}, tap = () => {} }) {
   const fingers = new Map();
+  let moved = 0;
   const place = (event) => {
     const box = canvas.getBoundingClientRect();
     return { x: event.clientX - box.left, y: event.clientY - box.top };
@@ -262,17 +272,26 @@ function gestures(canvas, { turn, shift, zoom, keys }) {
   };
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
+    moved = fingers.size ? Infinity : 0;
     fingers.set(event.pointerId, place(event));
   });
-  for (const name of ["pointerup", "pointercancel"]) {
-    canvas.addEventListener(name, (event) => fingers.delete(event.pointerId));
-  }
+  canvas.addEventListener("pointerup", (event) => {
+    const { x, y } = place(event);
+    if (fingers.delete(event.pointerId) && moved < 6) tap(x, y, event.pointerType === "touch" ? 14 : 7);
+  });
+  canvas.addEventListener("pointercancel", (event) => fingers.delete(event.pointerId));
+  canvas.addEventListener("pointerleave", leave);
   canvas.addEventListener("pointermove", (event) => {
-    if (!fingers.has(event.pointerId)) return;
+    if (!fingers.has(event.pointerId)) {
+      const { x, y } = place(event);
+      hover(x, y);
+      return;
+    }
     const before = fingers.get(event.pointerId);
     const spreadBefore = fingers.size === 2 ? spread() : null;
     fingers.set(event.pointerId, place(event));
     const now = fingers.get(event.pointerId);
+    moved += Math.hypot(now.x - before.x, now.y - before.y);
     if (spreadBefore) {
       const wide = spread();
       shift(wide.x - spreadBefore.x, wide.y - spreadBefore.y);
@@ -292,10 +311,12 @@ function gestures(canvas, { turn, shift, zoom, keys }) {
   canvas.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const arrows = { ArrowLeft: [-30, 0], ArrowRight: [30, 0], ArrowUp: [0, -30], ArrowDown: [0, 30] };
-    if (event.key in arrows) (event.shiftKey ? shift : turn)(...arrows[event.key]);
-    else if (event.key === "+" || event.key === "=") zoom(1.25, canvas.clientWidth / 2, canvas.clientHeight / 2);
-    else if (event.key === "-") zoom(0.8, canvas.clientWidth / 2, canvas.clientHeight / 2);
+    const { width, height } = canvas.getBoundingClientRect();
+    if (event.key in arrows && event.shiftKey) shift(...arrows[event.key]);
     else if (event.key in keys) keys[event.key]();
+    else if (event.key in arrows) turn(...arrows[event.key]);
+    else if (event.key === "+" || event.key === "=") zoom(1.25, width / 2, height / 2);
+    else if (event.key === "-") zoom(0.8, width / 2, height / 2);
     else return;
     event.preventDefault();
   });
