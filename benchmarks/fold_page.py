@@ -2,9 +2,10 @@
 
     python benchmarks/fold_page.py [COLSxROWS] [STEPS]
 
-Chromium draws with SwiftShader in a window of 1280 x 800 pixels. Each step moves the slider and waits until the frame is
-drawn (``readPixels``). Told are the frames a second, and the processor time of all processes of the browser for a frame,
-which is what counts on a busy machine. The first motion is a fit of the hypar, by default with 60x60 facets.
+Chromium draws with SwiftShader in a window of 1280 x 800 pixels. Each step moves the slider and
+waits until the frame is drawn (``readPixels``). Told are the frames a second, and the processor
+time of all processes of the browser for a frame, which counts on a busy machine. What moves is an
+exactly flat-foldable fit of the hypar, by default with 60x60 facets.
 """
 
 from __future__ import annotations
