@@ -25,6 +25,8 @@ from miurafab.workflow.dry_run import length_text
 from miurafab.workflow.scaling import size_of
 
 ONE = "One sheet, no glue"
+_SLACK = 1e-3
+"""A box may be so many mm larger than its sheet by rounding."""
 
 
 def at_once(
@@ -41,14 +43,17 @@ def at_once(
     scale = sizing.bound()
     largest = _floor(scale * size_of(pattern))
     exact = _is_exact(sizing)
+    on = _on_bed(sizing, scale)
     if scale >= 1:
         if exact:
-            return _words(ONE, f"it may be as large as {largest:g} mm", largest, good=True)
-        return _words("Perhaps one sheet", f"at most {largest:g} mm fit", largest, good=None)
+            words = _words(ONE, f"it may be as large as {largest:g} mm", largest, good=True)
+        else:
+            words = _words("Perhaps one sheet", f"at most {largest:g} mm fit", largest, good=None)
+        return words | on
     remark = f"at {largest:g} mm: one sheet, no glue" if exact else f"at most {largest:g} mm fit"
     least = _least_sheets(sizing)
     title = f"At least {least} sheets" if least > 1 else "Larger than a sheet in one piece"
-    return _words(title, remark, largest, good=False)
+    return _words(title, remark, largest, good=False) | on
 
 
 def planned(
@@ -73,12 +78,33 @@ def planned(
         remark = quick["remark"] if quick["mark"] == "good" else ""
     else:
         remark = f"{count(row.patches, 'patch', 'patches')}; {quick['remark']}"
-    return _words(f"{sheets}, {glue}", remark, largest, good=one)
+    return quick | _words(f"{sheets}, {glue}", remark, largest, good=one)
 
 
 def _words(title: str, remark: str, largest: float, *, good: bool | None) -> dict[str, Any]:
     mark = "" if good is None else "good" if good else "more"
     return {"title": title, "remark": remark, "mark": mark, "largest_mm": largest}
+
+
+def _on_bed(sizing: Sizing, scale: float) -> dict[str, Any]:
+    """The flat pattern over one sheet, both in mm about their middles: the ``sheet`` [width,
+    height] that can be used, and the ``border`` [x, y, x, y] of each edge, turned as it lies on the
+    sheet at the largest ``scale``.
+    """
+    room, flat = sizing.room, sizing.pattern.vertices_coords
+    fitting = scale * flat
+    turn = room.turn(fitting) or 0.0
+    cos, sin = math.cos(turn), math.sin(turn)
+    points = flat @ np.array([[cos, -sin], [sin, cos]])
+    wide, high = scale * np.ptp(points, axis=0)
+    if wide > room.width + _SLACK or high > room.height + _SLACK:
+        points = points @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    points -= (points.min(axis=0) + points.max(axis=0)) / 2
+    border = sizing.pattern.edges_vertices[sizing.pattern.edges_assignment == "B"]
+    return {
+        "sheet": [round(room.width, 1), round(room.height, 1)],
+        "border": points[border].reshape(-1, 4).round(1).tolist(),
+    }
 
 
 def _is_exact(sizing: Sizing) -> bool:

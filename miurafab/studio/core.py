@@ -70,7 +70,7 @@ from miurafab.workflow.image_targets import PARAMETERS as OF_IMAGE
 PAGE, MACHINE, LIVE, TARGET = "studio.html", "machine", "live", "target"
 PARTS = (
     *("icon.svg", "studio.css", "machine.css", "tools.js", "choices.js", "results.js"),
-    *("machine.js", "sheet.js", "studio.js", "texts.js"),
+    *("live.js", "machine.js", "sheet.js", "sketch.js", "sliders.js", "studio.js", "texts.js"),
 )
 """The files of the page, beside the page itself."""
 
@@ -151,6 +151,10 @@ class Studio:
         target = self.bench.target_of(asked)
         options = dict(asked.options)
         beside = layout and asdict(layout)
+        whole = self.bench.scaled_from(asked)
+        if whole is not None:
+            of = {"file": str(whole[0]), "report": whole[1], "size": options["size"]}
+            return {"do": "scale", "layout": beside, **of}
         return {"do": "coarse", "target": target, "options": options, "layout": beside}
 
     def _target(self, route: str, request: HttpRequest) -> Response:

@@ -31,6 +31,7 @@ from miurafab.studio.bed_words import at_once, planned
 from miurafab.studio.report_text import headline, pattern_lines
 from miurafab.surfaces.mesh_files import mesh_suffix
 from miurafab.workflow.design import Design
+from miurafab.workflow.scaling import ScaleOptions, scaled, size_of
 
 MOST = 400
 """The facets of a coarse fit: 20 x 20 take 0.03 to 0.2 s on the built-in surfaces."""
@@ -47,17 +48,49 @@ class Glances:
 
     def __init__(self) -> None:
         self._read: tuple[object, Design | None] = (None, None)
+        self._held: tuple[str, CreasePattern | None] = ("", None)
 
     def answer(self, asked: Mapping[str, Any], on_progress: Progress) -> dict[str, Any]:
-        """What ``asked`` asks for: ``{"do": "coarse", "target", "options", "layout"}``, or
-        ``{"do": "plan", "file", "layout"}``; ``layout`` has ``machine``, ``material`` and
-        ``options``, or is None.
+        """What ``asked`` asks for, by its ``do``:
+
+        - ``coarse``: the coarse fit of ``target`` with ``options``;
+        - ``scale``: the pattern in ``file``, whose fit gave ``report``, at another ``size``;
+        - ``plan``: the sheets that the pattern in ``file`` needs.
+
+        ``layout`` has ``machine``, ``material`` and ``options``, or is None.
 
         Raises :class:`~miurafab.errors.MiurafabError` for what cannot be read.
         """
         if asked["do"] == "plan":
-            return {"bed": _bed(read_fold(Path(asked["file"])), asked["layout"], planned)}
+            return {"bed": _bed(self._pattern(asked["file"]), asked["layout"], planned)}
+        if asked["do"] == "scale":
+            return self._scaled(asked)
         return self._coarse(asked, on_progress)
+
+    def _pattern(self, file: str) -> CreasePattern:
+        if self._held[0] != file:
+            self._held = file, read_fold(Path(file))
+        assert self._held[1] is not None
+        return self._held[1]
+
+    def _scaled(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        """A sheet is linear in its size, unless a limit in mm was asked for: so are its figures."""
+        before = self._pattern(asked["file"])
+        pattern = scaled(before, read_options(ScaleOptions, {"size": asked["size"]}))
+        factor = size_of(pattern) / size_of(before)
+        report = {
+            name: value * factor if name.endswith("_mm") and value is not None else value
+            for name, value in asked["report"].items()
+        }
+        return {
+            "way": "scaled",
+            "status": report["status"],
+            "headline": headline(report["status"]),
+            "advice": "",
+            "lines": pattern_lines(report | {"seconds": None}),
+            "findings": [],
+            **_seen(pattern, asked["layout"]),
+        }
 
     def _coarse(self, asked: Mapping[str, Any], on_progress: Progress) -> dict[str, Any]:
         wanted = self._design(asked["target"], asked["options"])
@@ -66,6 +99,7 @@ class Glances:
         # the distance of the middle is that of the fit itself; nothing else was measured
         measured = {"hausdorff_midsurface_mm": result.deviation_mm, "seconds": None}
         told: dict[str, Any] = {
+            "way": "coarse",
             "status": result.status,
             "headline": headline(result.status),
             "advice": result.advice,
@@ -82,9 +116,7 @@ class Glances:
         best = next(each for each in result.attempts if each.score == result.score.total)
         return told | {
             "amplitude": round(best.corrugation.amplitude, 3),
-            "box_mm": [round(side, 1) for side in np.ptp(pattern.folded_coords, axis=0).tolist()],
-            "bed": _bed(pattern, asked["layout"], at_once),
-            "picture": picture(pattern),
+            **_seen(pattern, asked["layout"]),
         }
 
     def _design(self, target: str, options: Mapping[str, Any]) -> Design:
@@ -128,6 +160,17 @@ def _stock(layout: Mapping[str, Any]) -> tuple[MachineProfile, Material, LayoutO
         read_material(layout["material"]),
         read_options(LayoutOptions, layout["options"]),
     )
+
+
+def _seen(pattern: CreasePattern, layout: Mapping[str, Any] | None) -> dict[str, Any]:
+    """How large a pattern is, its picture, and what it needs of the bed."""
+    folded = pattern.folded_coords
+    assert folded is not None
+    return {
+        "box_mm": [round(side, 1) for side in np.ptp(folded, axis=0).tolist()],
+        "bed": _bed(pattern, layout, at_once),
+        "picture": picture(pattern),
+    }
 
 
 def _bed(

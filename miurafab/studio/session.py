@@ -16,6 +16,7 @@ from typing import Any
 
 from miurafab.errors import InputError
 from miurafab.files import write_bytes
+from miurafab.origami.fitting.request import BED
 from miurafab.studio import recipe
 from miurafab.studio.form import LABELS, by_label
 from miurafab.studio.names import safe_stem, suffix_of
@@ -27,6 +28,8 @@ from miurafab.surfaces.height_field import IMAGE_SUFFIXES
 from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED, mesh_suffix
 
 PATTERN_SUFFIX, DESIGN_SUFFIX = ".fold", ".toml"
+_IN_MM = {"min_edge", "max_deviation", "max_distance"}
+"""Options that depend on the size of a sheet."""
 _KEPT = 8
 """The number of uploads kept; a further one removes the oldest."""
 
@@ -104,6 +107,7 @@ class Bench:
         self._numbers = 0
         self._asked: Asked | None = None
         self._coming: Asked | None = None
+        self._report: Mapping[str, Any] = {}
 
     def add_upload(self, name: str, content: bytes) -> Source:
         """Keep an uploaded file. Raises :class:`~miurafab.errors.InputError`."""
@@ -172,6 +176,20 @@ class Bench:
         """
         source = self.source_of(asked)
         return asked.target if source is None else asked.on(str(source.path))
+
+    def scaled_from(self, asked: FitOrder) -> tuple[Path, Mapping[str, Any]] | None:
+        """The file and the report of the pattern on the bench, if ``asked`` asks for the same at
+        another size in mm, on which nothing else depends; else None.
+        """
+        form = asked.as_dict()
+        before = {} if self._asked is None else self._asked.form
+        if self.pattern is None or form["target"] != before.get("target"):
+            return None
+        now, then = ({**each["options"]} for each in (form, before))
+        sizes = now.pop("size", BED), then.pop("size", BED)
+        linear = BED not in sizes and not set(now) & _IN_MM and now == then
+        good = self.pattern["status"] == "converged" and "fold" in self.pattern["files"]
+        return (self.pattern_file(), self._report) if linear and good else None
 
     def pattern_file(self) -> Path:
         """The file of the pattern on the bench. Raises ``InputError`` if there is none."""
@@ -284,7 +302,7 @@ class Bench:
         self._forget(self.pattern)
         self.job, self._asked = None, self._coming
         assert self._asked is not None
-        report = part["report"]
+        report = self._report = part["report"]
         opened = task.order.do == "open"
         self.pattern = {
             "id": task.id,

@@ -1,5 +1,6 @@
 """What is answered while a hand drags: the newest question alone, quickly, and by a true sheet."""
 
+import json
 import os
 import time
 
@@ -13,7 +14,9 @@ from miurafab.fabrication.sheets import lay_out
 from miurafab.origami.fitting.fit import coarse
 from miurafab.studio import glance
 from miurafab.studio.glance import MOST, Glances, _stock
+from miurafab.studio.bed_words import planned
 from miurafab.studio.live import Live
+from miurafab.studio.report_text import pattern_lines
 from miurafab.workflow import design as designs
 
 LAYOUT = {"machine": "grbl-laser-400", "material": "card-250", "options": {}}
@@ -214,6 +217,49 @@ def test_the_page_asks_and_the_process_stays(studio):
     glue = f"{totals.seam_mm / 1000:.2f} m of glue"
     assert said["title"] == f"{totals.sheets} sheets, {glue}"
     assert f"{totals.patches} patches" in said["remark"]
+
+
+def test_another_size_alone_is_the_whole_sheet_scaled(studio):
+    studio.fit("hypar", "6x6", size="120mm")
+    order = {"target": {"surface": "hypar", "parameters": {}}}
+
+    def way(**options):
+        studio.state()  # takes the news in
+        body = order | {"options": options, "layout": LAYOUT}
+        return studio.studio._question("", json.dumps(body).encode())
+
+    question = way(facets="6x6", size="150mm")
+    told = Glances().answer(question, lambda fraction, note: None)
+    made = miurafab.fit("hypar", facets="6x6", size="150mm")
+    anew = {line["name"]: line["value"] for line in pattern_lines(made.report())}
+    scaled = {line["name"]: line["value"] for line in told["lines"]}
+    assert set(anew) - set(scaled) == {"Computed in"}
+    exact = {name: value for name, value in anew.items() if name != "Computed in"}
+    assert scaled == exact
+    assert max(told["box_mm"]) == 150
+    made_bed = planned(made.pattern, *_stock(LAYOUT))
+    assert told["bed"]["largest_mm"] == made_bed["largest_mm"]
+    for other in ({"min_edge": "1mm"}, {"facets": "6x8"}, {"size": "bed"}, {"amplitude": "1"}):
+        assert way(**({"facets": "6x6", "size": "150mm"} | other))["do"] == "coarse"
+    studio.fit("plane", "4x4", min_edge="900mm")  # misses its limit
+    order = {"target": {"surface": "plane", "parameters": {}}}
+    assert way(facets="4x4", size="150mm")["do"] == "coarse"
+
+
+def test_the_drawing_on_the_bed_lies_within_the_sheet_just_as_long_as_it_fits():
+    largest = coarsely("hypar", facets="8x8")["bed"]["largest_mm"]
+    for size, inside in ((largest, True), (largest + 4, False)):
+        bed = coarsely("hypar", facets="8x8", size=f"{size}mm")["bed"]
+        border = np.reshape(bed["border"], (-1, 2))
+        assert len(border) == 2 * 32
+        within = (np.ptp(border, axis=0) <= np.array(bed["sheet"]) + 0.2).all()
+        assert within == inside
+        # turned and moved, nothing else: as long as the border of a fit
+        lengths = np.linalg.norm(border[::2] - border[1::2], axis=1)
+        made = miurafab.fit("hypar", facets="8x8", size=size, polish="off").pattern
+        edges = made.edges_vertices[made.edges_assignment == "B"]
+        ends = made.vertices_coords[edges]
+        assert lengths == pytest.approx(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), abs=0.2)
 
 
 def test_a_result_says_what_it_is_a_result_of(studio):

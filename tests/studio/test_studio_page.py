@@ -58,6 +58,7 @@ def address(tmp_path_factory):
     server.shutdown()
     serving.join()
     server.server_close()
+    server.studio.live.stop()
     bench.cancel()
 
 
@@ -153,11 +154,75 @@ def test_a_file_is_chosen_and_a_fit_is_cancelled(page):
     page.type("facets", "200x200")
     page.press("Enter")
     page.until("!document.getElementById('task').hidden")
-    assert page.run("document.getElementById('fit').disabled")
     page.run("document.getElementById('cancel').click()")
     page.idle()
-    assert not page.run("document.getElementById('fit').disabled")
     assert page.run("document.getElementById('fault').hidden")
+
+
+DRAG = """{
+  const slider = document.querySelector('#%s-row .slider'); slider.focus(); slider.value = %s;
+  slider.dispatchEvent(new Event('input', { bubbles: true }));
+}"""
+
+
+def test_a_slider_refits_coarsely_then_wholly_and_is_undone(page):
+    shown = "!document.getElementById('{}').hidden".format
+    page.run("document.getElementById('target').value = 'surface:plane'")
+    page.run("document.getElementById('target').dispatchEvent(new Event('change'))")
+    page.type("facets", "6x6")
+    page.until(shown("coarse"))
+    page.run(DRAG % ("size", 90))
+    page.until("document.getElementById('coarse-subject').textContent.endsWith('Size 90mm')")
+    assert page.run("document.getElementById('size').value") == "90mm"
+    assert "× 90 ×" in page.text("coarse-size") or "90 ×" in page.text("coarse-size")
+    assert "One sheet, no glue" in page.text("coarse-bed")
+    assert "coarse fit of 6 × 6" in page.text("coarse-note")
+    drawn = (
+        "[...document.getElementById('sketch').getContext('2d')"
+        ".getImageData(0, 0, 2000, 2000).data].some((value) => value > 0)"
+    )
+    page.until(drawn)
+
+    page.until(shown("pattern"))  # the whole fit came by itself
+    page.idle()
+    assert not page.run(shown("coarse"))
+    assert page.text("subject") == "plane · Facets 6x6 · Size 90mm"
+    page.until(shown("bed"))
+    assert "One sheet, no glue" in page.text("bed")
+
+    # a larger size: the same sheet, scaled, and no download of the old one within reach
+    page.run(DRAG % ("size", 120))
+    page.until("document.getElementById('coarse-subject').textContent.endsWith('Size 120mm')")
+    assert "linear" in page.text("coarse-note")
+    assert not page.run(shown("pattern"))
+    page.run("document.activeElement.dispatchEvent(new KeyboardEvent('keydown', "
+             "{ key: 'z', ctrlKey: true, bubbles: true, cancelable: true }))")  # fmt: skip
+    assert page.run("document.getElementById('size').value") == "90mm"
+    assert page.run("document.querySelector('#size-row .slider').value") == "90"
+    page.run("document.getElementById('redo').click()")
+    assert page.run("document.getElementById('size').value") == "120mm"
+    page.until("document.getElementById('subject').textContent.endsWith('Size 120mm')")
+    page.idle()
+    page.until(shown("pattern"))
+
+    # without the refit the old result stays, greyed, and says what it is
+    page.run("document.getElementById('follow').click()")
+    page.type("facets", "9x6")
+    assert page.run("document.getElementById('pattern').classList.contains('old')")
+    assert "Facets 6x6 · Size 120mm" in page.text("stale-words")
+    assert page.run("document.getElementById('go-on').disabled")
+    page.run("document.getElementById('back-to').click()")
+    assert page.run("document.getElementById('facets').value") == "6x6"
+    assert not page.run("document.getElementById('pattern').classList.contains('old')")
+    page.run("document.getElementById('follow').click()")
+
+    # something wrong has no result, and says why beside the form
+    page.type("facets", "6x")
+    page.until(shown("refused"))
+    assert "'Facets' is '6x'" in page.text("refused")
+    page.type("facets", "6x6")
+    assert not page.run(shown("refused"))
+    page.idle()
 
 
 def test_a_studio_that_has_ended_is_told(page):

@@ -67,7 +67,7 @@ class FitOptions(Shown):
         "Height of the corrugation over the row spacing.",
         group="Sheet",
         default_text="automatic",
-        page="more",
+        page="first",
     )
     zigzag: float | None = option(
         number(0, 100, above=True),

@@ -125,3 +125,16 @@ function values(fieldset) {
   }
   return found;
 }
+
+/** Put the values of an order of the first form back into it. */
+export function restoreForm({ target, source, options = {} }) {
+  const file = source ?? target.source;
+  byId("target").value = file ? `source:${file}` : `surface:${target.surface}`;
+  if (byId("target").selectedIndex < 0) return;
+  showTarget();
+  for (const [key, value] of Object.entries(target?.parameters ?? {})) byId(`parameter-${key}`).value = value;
+  for (const field of byId("sheet-options").querySelectorAll("input[name], select[name]")) {
+    if (field.type === "checkbox") field.checked = Boolean(options[field.name]);
+    else field.value = options[field.name] ?? "";
+  }
+}

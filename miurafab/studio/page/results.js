@@ -12,6 +12,8 @@ const terms = (lines) => lines.map(({ name, value, remark, mark }) => (
   )
 ));
 
+export const showTerms = (id, lines) => byId(id).replaceChildren(...terms(lines));
+
 const items = (texts) => texts.map((text) => element("li", { textContent: text }));
 
 const download = (text, address) => (
@@ -24,8 +26,6 @@ function load(view, attribute, address) {
 }
 
 export function showPattern(pattern) {
-  byId("shape-empty").hidden = pattern !== null;
-  byId("pattern").hidden = pattern === null;
   if (pattern === null) return;
   const { files } = pattern;
   byId("verdict").classList.toggle("bad", pattern.status !== "converged");
@@ -48,7 +48,7 @@ export function showPattern(pattern) {
     load(byId("flat"), "src", files.picture);
     byId("flat-link").href = files.picture;
   }
-  byId("figures").replaceChildren(...terms(pattern.lines));
+  showTerms("figures", pattern.lines);
   byId("pattern-command").textContent = pattern.command;
 }
 

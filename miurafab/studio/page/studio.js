@@ -1,6 +1,7 @@
 // The page: asks for work, follows it, and shows what came of it.
 
-import { fillForms, fitOrder, layoutOrder, showSources, tooLarge } from "./choices.js";
+import { fillForms, layoutOrder, restoreForm, showSources, tooLarge } from "./choices.js";
+import { beginLive, changed, fitNow, followLive, restLive } from "./live.js";
 import { beginMachine, offerJob } from "./machine.js";
 import { showJob, showPattern } from "./results.js";
 import { texts } from "./texts.js";
@@ -27,15 +28,13 @@ function show(state) {
     if (task.fraction > 0) byId("task-bar").value = task.fraction;
     else byId("task-bar").removeAttribute("value");
   }
-  const renewed = running && task.id !== pattern?.id;
-  byId("pattern").classList.toggle("old", renewed && task.kind !== "sheets");
-  byId("job").classList.toggle("old", renewed);
-  byId("fit").disabled = running;
+  byId("job").classList.toggle("old", running && task.id !== pattern?.id);
   byId("lay-out").disabled ||= running;
   const names = JSON.stringify(sources);
   if (names !== told) showSources(sources);
   told = names;
   if (!running && task?.error) fault(task.error);
+  followLive(state);
 }
 
 function fault(sentence) {
@@ -80,6 +79,7 @@ async function open(file) {
     told = JSON.stringify(sources);
     showSources(sources, source);
     if (kind === "pattern") await order("open", { source });
+    else changed();
   } catch (error) {
     fault(error.message);
   }
@@ -109,14 +109,17 @@ function listen() {
   }
   byId("fit-form").addEventListener("submit", (event) => {
     event.preventDefault();
-    order(...fitOrder());
+    fitNow();
   });
   byId("layout-form").addEventListener("submit", (event) => {
     event.preventDefault();
     order("sheets", layoutOrder());
   });
   document.addEventListener("input", () => fault(""));
-  byId("cancel").addEventListener("click", () => order("cancel", {}));
+  byId("cancel").addEventListener("click", () => {
+    restLive();
+    order("cancel", {});
+  });
   byId("to-machine").addEventListener("click", () => {
     turnTo("desk");
     byId("desk-tab").focus();
@@ -159,9 +162,11 @@ async function begin() {
     ownJob = catalogue.own_job;
     await beginMachine(catalogue, fault);
     if (ownJob) turnTo("desk");
-    const { sources } = await ask("state");
+    const { sources, pattern } = await ask("state");
     told = JSON.stringify(sources);
     showSources(sources, catalogue.first?.source);
+    if (pattern) restoreForm(pattern.form);
+    beginLive(catalogue, { asks: order });
     await follow();
   } catch (error) {
     fault(error.message);

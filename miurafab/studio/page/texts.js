@@ -77,8 +77,32 @@ export const texts = {
     "save_drawing": "Drawing .svg",
     "save_design": "Design .toml"
   },
+<<<<<<< HEAD
   "target": {
     "mesh_options": "More about the mesh"
+=======
+  "live": {
+    "follow": "Refit while I change values",
+    "undo": "Undo",
+    "redo": "Redo",
+    "slider": "{name}, slider",
+    "automatic": "automatic",
+    "columns": "columns of facets",
+    "rows": "rows of facets",
+    "size": "size",
+    "amplitude": "amplitude",
+    "sketch": "The coarse sheet, folded, in space; the arrow keys turn it",
+    "not_polished": "A coarse fit of {columns} × {rows} facets: exact, not polished.",
+    "fewer": "A coarse fit of only {columns} × {rows} facets: exact, not polished. Sheets and figures will differ.",
+    "scaled": "The whole fit at another size: a sheet is linear in its size.",
+    "bed_picture": "The flat pattern over one sheet of the material",
+    "bed_title": "On the sheet",
+    "coming": "The whole fit is being computed.",
+    "box": "Folded: {box} mm",
+    "make": "Make it {size}",
+    "stale": "What is shown is {subject}. The form asks for something else.",
+    "back_to": "Back to the values of what is shown"
+>>>>>>> 28fafa7 (Refit on the studio's page while a hand moves the sliders)
   },
   "layout": {
     "machine_and_material": "Machine and material",
