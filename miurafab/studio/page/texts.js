@@ -77,10 +77,9 @@ export const texts = {
     "save_drawing": "Drawing .svg",
     "save_design": "Design .toml"
   },
-<<<<<<< HEAD
   "target": {
     "mesh_options": "More about the mesh"
-=======
+  },
   "live": {
     "follow": "Refit while I change values",
     "undo": "Undo",
@@ -102,7 +101,6 @@ export const texts = {
     "make": "Make it {size}",
     "stale": "What is shown is {subject}. The form asks for something else.",
     "back_to": "Back to the values of what is shown"
->>>>>>> 28fafa7 (Refit on the studio's page while a hand moves the sliders)
   },
   "layout": {
     "machine_and_material": "Machine and material",
