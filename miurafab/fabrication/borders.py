@@ -61,11 +61,19 @@ class OpenBorder:
         return f"{self.length_mm:.1f} mm long{across}"
 
 
+def is_loose(pattern: CreasePattern) -> bool:
+    """Whether ``pattern`` is of several facets of which none is joined to another; they make no
+    shell.
+    """
+    joined = bool((pattern.edges_faces >= 0).all(axis=1).any())
+    return pattern.pieces_count > 1 and not joined and not len(border_seams(pattern).edges)
+
+
 def open_borders(pattern: CreasePattern) -> tuple[OpenBorder, ...]:
-    """The open borders of the shell, the longest first."""
+    """The open borders of the shell, the longest first; none of loose parts."""
     seams = border_seams(pattern)
     edges = _open_edges(pattern, seams)
-    if not len(edges):
+    if not len(edges) or is_loose(pattern):
         return ()
     ends = shell_points(pattern, seams)[pattern.edges_vertices[edges]]
     size = int(ends.max()) + 1

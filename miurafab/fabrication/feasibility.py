@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from miurafab.errors import LayoutError
+from miurafab.fabrication.borders import is_loose
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.perforation import burnt_shares, perforate
 from miurafab.fabrication.wording import count
@@ -52,7 +53,11 @@ def require_foldable(pattern: CreasePattern, material: Material) -> None:
 def strength_findings(
     pattern: CreasePattern, material: Material, options: LayoutOptions
 ) -> list[Finding]:
-    """What is too small to fold or too weak to hold; ``where`` is the facets or edges."""
+    """What is too small to fold or too weak to hold; ``where`` is the facets or edges. Loose parts
+    are not folded.
+    """
+    if is_loose(pattern):
+        return []
     return [
         *_small_facets(pattern, material),
         *_corners(pattern, material),

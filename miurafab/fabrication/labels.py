@@ -6,8 +6,8 @@ the clearance to its sides if for each side, with inward normal n at distance d 
     s (w |n·u| + |n·v|) / 2 <= d - clearance,
 
 where v is u turned by a right angle. So the largest s is the least of the quotients. A text that
-would be too small to read is left out. For a polygon that is not convex the rule is stricter than
-necessary.
+would be too small to read is left out. In a facet that is not convex, such as a plate with notches,
+the sides of its convex hull are moved inwards by the depth of the gaps between hull and facet.
 
 The label of a tab is engraved on the tab, followed by M or V if its fold is a mountain or a valley,
 and on the facet to which it is glued, at the place that the tab covers. A patch name is engraved
@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from miurafab.fabrication.lettering import text_strokes, text_width
 from miurafab.fabrication.options import LayoutOptions
@@ -225,7 +226,7 @@ def _facet_spots(
 ) -> _Spots:
     """A place in each facet, along its longest side, outside of the tabs that cover it."""
     corners = pattern.faces_vertices
-    points, count = pattern.vertices_coords[corners], (corners >= 0).sum(axis=1)
+    points, count = _convex(pattern.vertices_coords[corners], (corners >= 0).sum(axis=1))
     ends = pattern.vertices_coords[pattern.edges_vertices[pattern.faces_edges]]
     step = ends[:, :, 1] - ends[:, :, 0]
     # Of sides equal up to rounding the first is taken, so that rounding decides nothing.
@@ -247,6 +248,31 @@ def _facet_spots(
         left = np.delete(left, first)
     present = np.arange(points.shape[1]) < count[:, None]
     return _spots(points, present, _upright(longest, turns, side))
+
+
+def _convex(points: Floats, count: Ints) -> tuple[Floats, Ints]:
+    """The polygons ``points`` (F, k, 2) of ``count`` corners, counter-clockwise, with a convex part
+    in place of each that is not convex.
+    """
+    points, count = points.copy(), count.copy()
+    for facet, corners in enumerate(count.tolist()):
+        outline = points[facet, :corners]
+        side, after = np.roll(outline, -1, axis=0) - outline, np.arange(1, corners + 1) % corners
+        turn = side[:, 0] * side[after, 1] - side[:, 1] * side[after, 0]
+        if corners == 0 or turn.min() >= -1e-9 * np.abs(turn).max():
+            continue
+        around = np.flatnonzero(np.isin(np.arange(corners), ConvexHull(outline).vertices))
+        part = outline[around][None], np.array([len(around)])
+        for start, end in zip(around, np.roll(around, -1), strict=True):
+            along = outline[end] - outline[start]
+            inward = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+            between = np.arange(start, end if end > start else end + corners) % corners
+            part = clip_convex(*part, inward[None], (outline[between] @ inward).max()[None])
+        inner = part[0][0, : part[1][0]]
+        step = np.linalg.norm(np.roll(inner, -1, axis=0) - inner, axis=1)
+        inner = inner[step > 1e-9 * np.linalg.norm(side, axis=1).sum()]  # a side needs a direction
+        points[facet, : len(inner)], count[facet] = inner, len(inner)
+    return points, count
 
 
 def _spots(points: Floats, present: Bools, along: Floats) -> _Spots:

@@ -2,8 +2,8 @@
 
 The first page shows the folded form and the flat pattern, with the patches in the same colours, and
 the settings. Then follow each sheet with its patches and their places, and the folding and gluing,
-step by step. Everything is drawn from the layout and the pattern; the same input gives the same
-bytes.
+step by step, unless the pattern is of loose parts. Everything is drawn from the layout and the
+pattern; the same input gives the same bytes.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from reportlab.lib.colors import HexColor
 from reportlab.lib.units import mm
 from reportlab.pdfgen.canvas import Canvas
 
+from miurafab.fabrication.borders import is_loose
 from miurafab.fabrication.drawing.flow import flow
 from miurafab.fabrication.drawing.glue_sections import GlueSections
 from miurafab.fabrication.drawing.jig_section import jig_section
@@ -69,7 +70,9 @@ def assembly_guide(
     """Both forms of the guide. ``layout`` must have its toolpaths."""
     views = Views(layout, pattern)
     overview = _Overview(views, machine, material, title)
-    sections = [*KitSections(views).sections(), *GlueSections(views).sections()]
+    sections = []
+    if not is_loose(pattern):
+        sections = [*KitSections(views).sections(), *GlueSections(views).sections()]
     if layout.jig is not None:
         sections.append(jig_section(layout.jig, pattern))
     pages: list[Page] = [overview.page]
