@@ -49,7 +49,11 @@ def fold(
     ] = None,
     panels: Annotated[
         Path | None,
-        option(File(), "Write the panels: outlines (.dxf, .svg) or solids (.stl, .glb)."),
+        option(
+            File(),
+            "Write the panels: outlines (.dxf, .svg), parts for `sheets` (.fold), or solids "
+            "(.stl, .glb).",
+        ),
     ] = None,
     console: Console = Console(),
     **given: str,
@@ -76,17 +80,17 @@ def fold(
     pattern = miurafab.load(file)
     with console.progress("folding") as progress:
         folding = miurafab.fold(pattern, asked.steps, on_progress=progress)
-        if out is not None:
-            folding.save(out, title=file.stem, colour=asked.colour, on_progress=progress)
-        if csv is not None:
-            folding.save_angles(csv)
         thick = None
         if asked.thickness_mm is not None:
             thick = miurafab.thick_panels(
                 pattern, asked.thickness_mm, method=asked.method, on_progress=progress
             )
         made = None if thick is None else thickness_report(thick)
-        written = None if made is None or made.get("facets_too_small") else panels
+        written = None if made is None or made["facets_too_small"] else panels
+        if out is not None:
+            folding.save(out, title=file.stem, colour=asked.colour, on_progress=progress)
+        if csv is not None:
+            folding.save_angles(csv)
         if thick is not None and written is not None:
             thick.save(written, title=file.stem)
     answer: dict[str, Any] = folding.report()
@@ -96,6 +100,12 @@ def fold(
     console.answer(answer, lambda: _show(console, folding, answer))
     if panels is not None and written is None:
         console.note(f"{panels} is not written, since facets are too small for such panels.")
+    if made is not None and written is not None and written.suffix.lower() == ".fold":
+        first, last = made["parts"][0], made["parts"][-1]
+        console.note(
+            f"Each part is a patch, {first['patch']} being {first['name']} and {last['patch']} "
+            f"{last['name']}. Lay them out: miurafab sheets {written} -o job --material ..."
+        )
     return DONE if made is None or made.get("usable", made["folds"]) else NO
 
 
@@ -205,6 +215,17 @@ def _show_plates(console: Console, thick: dict[str, Any]) -> None:
         title=f"plates {thick['thickness_mm']:g} mm thick on shifted hinges",
     )
     _show_too_small(console, thick)
+    for seam in thick["seams"]:
+        one, other = seam["between"]
+        slits = ", ".join(map(str, seam["slits"]))
+        if seam["opens_mm"] is None:
+            console.line(f"patches {one} and {other}: nothing joins them at edges {slits}")
+        else:
+            hinges = ", ".join(map(str, seam["hinges"])) or "none"
+            console.line(
+                f"blocks {one} and {other}: hinges at edges {hinges}; slit along {slits}, which "
+                f"opens up to {seam['opens_mm']:.3g} mm"
+            )
     for number, patch in enumerate(patches):
         if patch["collision"] is not None:
             a, b = patch["collision"]

@@ -14,9 +14,11 @@ import numpy as np
 
 from miurafab.options import Choice, length, read_value
 from miurafab.options.verbs import verb
-from miurafab.origami.folding.plates import PlatePatch, ThickPlates, thick_plates
+from miurafab.origami.folding.plate_patch import PlatePatch
+from miurafab.origami.folding.plates import ThickPlates, thick_plates
 from miurafab.origami.folding.thick_panels import ThickPanels
 from miurafab.origami.folding.thick_panels import thick_panels as make_panels
+from miurafab.origami.formats.panel_parts import panel_parts
 from miurafab.workflow.patterns import PatternLike, consistent_pattern
 
 METHODS = ("tapered", "bennett")
@@ -83,11 +85,18 @@ def thickness_report(panels: ThickPanels | ThickPlates) -> dict[str, Any]:
             "method": "bennett",
             "thickness_mm": panels.thickness_mm,
             "folds": panels.folds,
-            "facets_too_small": [
-                {"facet": facet, "greatest_thickness_mm": limit}
-                for facet, limit in panels.too_small
-            ],
+            "facets_too_small": _too_small(panels),
             "patches": [_patch_report(patch) for patch in panels.patches],
+            "seams": [
+                {
+                    "between": list(seam.blocks),
+                    "hinges": list(seam.hinges),
+                    "slits": list(seam.slits),
+                    "opens_mm": seam.opens_mm,
+                }
+                for seam in panels.seams
+            ],
+            "parts": _parts(panels),
         }
     pattern = panels.pattern
     creases = np.flatnonzero(panels.closing_side != "")
@@ -103,10 +112,7 @@ def thickness_report(panels: ThickPanels | ThickPlates) -> dict[str, Any]:
         "least_scale": panels.least_scale,
         "greatest_thickness_mm": float(panels.limit_mm.min()),
         "max_offset_mm": float(finite.max(initial=0.0)),
-        "facets_too_small": [
-            {"facet": int(facet), "greatest_thickness_mm": float(panels.limit_mm[facet])}
-            for facet in panels.too_small
-        ],
+        "facets_too_small": _too_small(panels),
         "collisions": [
             {"state": state, "facets": [one, other]} for state, one, other in panels.collisions
         ],
@@ -121,12 +127,34 @@ def thickness_report(panels: ThickPanels | ThickPlates) -> dict[str, Any]:
             }
             for edge in creases
         ],
+        "parts": _parts(panels),
     }
 
 
+def _too_small(panels: ThickPanels | ThickPlates) -> list[dict[str, Any]]:
+    return [
+        {"facet": int(facet), "greatest_thickness_mm": float(panels.limit_mm[facet])}
+        for facet in panels.too_small
+    ]
+
+
+def _parts(panels: ThickPanels | ThickPlates) -> list[dict[str, Any]]:
+    """The parts in the order in which they are the patches of a layout; none where facets are too
+    small.
+    """
+    if len(panels.too_small):
+        return []
+    return [
+        {"patch": f"P{number}", "name": part.name, "facet": part.facet, "edge": part.edge}
+        for number, part in enumerate(panel_parts(panels), 1)
+    ]
+
+
 def _patch_report(patch: PlatePatch) -> dict[str, Any]:
+    tape = {edge: float(np.linalg.norm(line[1] - line[0])) for edge, line in patch.tapes}
     return {
         "range_mm": patch.range_mm,
+        "tape_width_mm": patch.tape_width_mm,
         "clear_deg": patch.clear_deg,
         "clear_state": patch.clear_state,
         "collision": None if patch.collision is None else list(patch.collision),
@@ -139,8 +167,9 @@ def _patch_report(patch: PlatePatch) -> dict[str, Any]:
                 "edge": int(patch.edges[edge]),
                 "assignment": str(patch.pattern.edges_assignment[edge]),
                 "axis_mm": float(patch.axis_mm[edge]),
+                "tape_mm": tape[edge],
             }
-            for edge in patch.edges_inner
+            for edge in patch.edges_inner.tolist()
         ],
         "brackets": [
             {

@@ -89,6 +89,10 @@ def test_panels_are_written_and_little_use_is_told(run, rigid, tmp_path):
     plates = run("fold", rigid, "--steps", "4", "--thickness", "1mm", "--method", "bennett")
     assert plates.returncode == 0
     assert "clear up to deg" in plates.stdout
+    parts = tmp_path / "parts.fold"
+    plates = run("fold", rigid, "--steps", "4", "--thickness", "1mm", "--panels", parts)
+    assert f"P1 being t0 and P40 b19. Lay them out: miurafab sheets {parts}" in plates.stderr
+    assert len(json.loads(parts.read_text())["faces_vertices"]) == 40
     assert "thickness" in sentence(run("fold", rigid, "--panels", out), 2)
     assert "panels.doc" in sentence(run("fold", rigid, "--panels", tmp_path / "panels.doc"), 2)
 
@@ -96,7 +100,10 @@ def test_panels_are_written_and_little_use_is_told(run, rigid, tmp_path):
 def test_what_cannot_be_folded_is_one_sentence(run, rigid, stiff, tmp_path):
     assert "a.mp4" in sentence(run("fold", rigid, "-o", tmp_path / "a.mp4"), 2)
     assert "none.fold" in sentence(run("fold", tmp_path / "none.fold"), 2)
-    assert "does not fold rigidly" in sentence(run("fold", stiff, "--thickness", "1mm"), 2)
+    motion = tmp_path / "motion.fold"
+    stiff_panels = run("fold", stiff, "--thickness", "1mm", "-o", motion)
+    assert "does not fold rigidly" in sentence(stiff_panels, 2)
+    assert not motion.exists()
     assert run("fold", rigid, "--colour", "mood").returncode == 2
 
 

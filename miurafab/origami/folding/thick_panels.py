@@ -26,15 +26,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from miurafab.display import Shown
 from miurafab.errors import InputError
-from miurafab.files import AnyPath
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import filled, next_corners, previous_corners, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.angles_csv import ON_EACH_OTHER
 from miurafab.origami.folding.contact import self_intersections, triangulate
 from miurafab.origami.folding.kinematics import first_facets, fold_angles_at, place, rigid_motion
+from miurafab.origami.folding.made_panels import MadePanels
 
 SIDES = ("top", "bottom")
 LEAST_USEFUL = 0.25
@@ -47,7 +46,7 @@ folded form panels touch along their sides.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ThickPanels(Shown):
+class ThickPanels(MadePanels):
     """A pattern made of thick panels, which folds from flat to its folded form.
 
     Attributes
@@ -74,11 +73,6 @@ class ThickPanels(Shown):
     offset_mm: Floats
     limit_mm: Floats
     collisions: tuple[tuple[float, int, int], ...]
-
-    @property
-    def too_small(self) -> Ints:
-        """(n,) the facets that are too small for the thickness."""
-        return np.flatnonzero(~(self.limit_mm > self.thickness_mm))
 
     @property
     def least_scale(self) -> float:
@@ -128,37 +122,13 @@ class ThickPanels(Shown):
         Points on a hinge come once for each panel. Raises :class:`~miurafab.errors.InputError` if a
         facet is too small.
         """
-        if len(self.too_small):
-            raise InputError(
-                f"Facet {self.too_small[0]} is too small for panels of {self.thickness_mm:g} mm, "
-                "so that it has no outline; enlarge the sheet or choose a smaller `thickness`."
-            )
+        self.refuse_too_small()
         solids = _Solids.of(self.pattern, self.thickness_mm)
         hinge = np.pad(self.pattern.vertices_coords, ((0, 0), (0, 1)))
         points = np.concatenate([hinge, solids.corners])[solids.triangles].reshape(-1, 3)
         keys = np.column_stack([np.repeat(solids.triangle_facet, 3), solids.triangles.reshape(-1)])
         _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         return points[first], number.reshape(-1, 3), keys[first, 0]
-
-    def save(self, path: AnyPath, *, title: str = "") -> None:
-        """Write the panels: outlines to cut, or solids.
-
-        Parameters
-        ----------
-        path : str or os.PathLike
-            A ``.dxf`` or ``.svg`` file with outlines, an ``.stl`` file with the panels flat, or a
-            ``.glb`` file in which they move.
-        title : str
-            The title inside an SVG file. The default is the name of the target.
-
-        Raises
-        ------
-        InputError
-            For another ending, for a folder that does not exist, and for facets that are too small.
-        """
-        from miurafab.origami.formats.panels import write_panels
-
-        write_panels(self, path, title)
 
     @property
     def _angles(self) -> Floats:

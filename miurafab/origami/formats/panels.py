@@ -1,4 +1,4 @@
-"""Files of thick panels: drawings of what is cut, and solids."""
+"""Files of thick panels: drawings of what is cut, parts for sheets, and solids."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import facet_areas, facet_means
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.kinematics import fold_angles_at, place, states_between
+from miurafab.origami.folding.made_panels import MadePanels
 from miurafab.origami.folding.plates import ThickPlates
 from miurafab.origami.folding.thick_panels import ThickPanels
+from miurafab.origami.formats.fold import fold_text
 from miurafab.origami.formats.mesh import glb_bytes, stl_bytes
 from miurafab.origami.formats.panel_drawing import (
     PanelDrawing,
@@ -19,22 +21,24 @@ from miurafab.origami.formats.panel_drawing import (
     panels_dxf,
     panels_svg,
 )
+from miurafab.origami.formats.panel_parts import panel_parts, parts_pattern
 from miurafab.origami.piece import shelved
 
-PANEL_ENDINGS = (".dxf", ".svg", ".stl", ".glb")
+PANEL_ENDINGS = (".dxf", ".svg", ".fold", ".stl", ".glb")
 """What panels can be written as."""
 
 _FRAMES = 24  # of the motion in a .glb file
 
 
-def write_panels(panels: ThickPanels | ThickPlates, path: AnyPath, title: str) -> None:
-    """Write panels as outlines to cut (DXF, SVG), or as solids: flat in an STL file, moving in a
-    GLB file.
+def write_panels(panels: MadePanels, path: AnyPath, title: str) -> None:
+    """Write panels as outlines to cut (DXF, SVG), as a pattern whose pieces are the parts (FOLD),
+    or as solids: flat in an STL file, moving in a GLB file.
 
     Raises :class:`~miurafab.errors.InputError` for another ending, for a folder that does not
     exist, and for facets that are too small.
     """
     file = new_file(path, "The drawing of the panels", PANEL_ENDINGS)
+    panels.refuse_too_small()
     ending = file.suffix.lower()
     if ending in (".stl", ".glb"):
         frames, triangles = _solids(panels, 1 if ending == ".stl" else _FRAMES)
@@ -43,14 +47,15 @@ def write_panels(panels: ThickPanels | ThickPlates, path: AnyPath, title: str) -
         else:
             write_bytes(file, glb_bytes(frames[0], triangles, frames))
         return
+    name = title or panels.pattern.name
+    if ending == ".fold":
+        write_text(file, fold_text(parts_pattern(panel_parts(panels), panels.thickness_mm), name))
+        return
     drawing = _plate_drawing(panels) if isinstance(panels, ThickPlates) else _ply_drawing(panels)
-    if ending == ".dxf":
-        write_text(file, panels_dxf(drawing))
-    else:
-        write_text(file, panels_svg(drawing, title or panels.pattern.name))
+    write_text(file, panels_dxf(drawing) if ending == ".dxf" else panels_svg(drawing, name))
 
 
-def _solids(panels: ThickPanels | ThickPlates, count: int) -> tuple[Floats, Ints]:
+def _solids(panels: MadePanels, count: int) -> tuple[Floats, Ints]:
     """The solids in ``count`` frames (T, n, 3) from flat on, and their triangles (m, 3)."""
     if isinstance(panels, ThickPanels):
         points, triangles, facet = panels.solids()
@@ -58,6 +63,7 @@ def _solids(panels: ThickPanels | ThickPlates, count: int) -> tuple[Floats, Ints
         placement = place(panels.pattern, fold_angles_at(panels.pattern, states))
         moved = np.einsum("tnij,nj->tni", placement.turn[:, facet], points)
         return moved + placement.shift[:, facet], triangles
+    assert isinstance(panels, ThickPlates)
     frames, made, first = [], [], 0
     for patch in panels.patches:
         solids = patch.solids()
@@ -69,55 +75,58 @@ def _solids(panels: ThickPanels | ThickPlates, count: int) -> tuple[Floats, Ints
     return np.concatenate(frames, axis=1), np.concatenate(made)
 
 
-def _ply_drawing(panels: ThickPanels) -> PanelDrawing:
+def _ply_drawing(panels: MadePanels) -> PanelDrawing:
     """The plies of tapered panels beside each other, both seen from the top."""
-    panels.solids()  # refuses facets that have no outline
+    assert isinstance(panels, ThickPanels)
     pattern = panels.pattern
     size = np.ptp(pattern.vertices_coords, axis=0)
     lines, labels = [], []
-    for number, (name, ply) in enumerate(zip(("TopPly", "BottomPly"), panels.plies, strict=True)):
+    parts = panel_parts(panels)
+    for number, name in enumerate(("TopPly", "BottomPly")):
+        own = parts[number * len(pattern.faces_vertices) :][: len(pattern.faces_vertices)]
         move = np.array([number * 1.1 * size[0], 0.0])
-        lines += _outlines(pattern, ply + move, name)
+        lines += [PanelLine(name, "cut", part.outline + move) for part in own]
         lines += _hinges(pattern, np.flatnonzero(panels.closing_side != ""), move)
-        labels += _labels(pattern, [str(facet) for facet in range(len(ply))], move)
+        labels += _labels(pattern, [part.name for part in own], move)
     return PanelDrawing(tuple(lines), tuple(labels))
 
 
 def _plate_drawing(plates: ThickPlates) -> PanelDrawing:
-    """Plates with the feet of their brackets, and below them the brackets, lying on their sides."""
+    """Notched plates with their hinges and tapes, and below them the brackets, lying flat."""
     lines: list[PanelLine] = []
     labels: list[PanelLabel] = []
-    parts: list[tuple[str, float, float]] = []
+    parts = panel_parts(plates)
+    lines += [PanelLine("Plate", "cut", part.outline) for part in parts if part.edge is None]
     for patch in plates.patches:
         pattern = patch.pattern
-        lines += _outlines(pattern, patch.outlines, "Plate")
         lines += _hinges(pattern, patch.edges_inner, np.zeros(2))
+        lines += [PanelLine("HingeTape", "mark", outline) for _, outline in patch.tapes]
         names = [
             f"f{facet} {z:+.2f}" for facet, z in zip(patch.facets, patch.bottom_mm, strict=True)
         ]
         labels += _labels(pattern, names, np.zeros(2))
         for each in patch.brackets:
-            lines.append(PanelLine("BracketFoot", "mark", each.foot))
-            wide = float(np.linalg.norm(each.foot[1] - each.foot[0]))
-            name = f"e{patch.edges[each.edge]} f{patch.facets[each.facet]}"
-            parts.append((name, wide, each.high - each.low))
-    if parts:
-        sizes = np.array([part[1:] for part in parts])
+            rises = each.low >= float(patch.bottom_mm[each.facet])
+            name = f"e{patch.edges[each.edge]} {'up' if rises else 'down'}"
+            height = min(0.5 * plates.thickness_mm, each.length_mm / (0.7 * len(name)))
+            inward = (each.foot[3] - each.foot[0]) / plates.thickness_mm
+            # beside the notch: the half of the text that points to it stays clear of it
+            reach = height * (0.35 * len(name) * abs(inward[0]) + abs(inward[1]))
+            x, y = (each.foot.mean(axis=0) + (plates.thickness_mm / 2 + reach) * inward).tolist()
+            labels.append(PanelLabel(name, x, y, height))
+    brackets = [part for part in parts if part.edge is not None]
+    if brackets:
+        sizes = np.array([np.ptp(part.outline, axis=0) for part in brackets])
         gap = plates.thickness_mm
         places = shelved(sizes, gap)
         start = plates.pattern.vertices_coords.min(axis=0)
         start[1] -= 2 * gap + float((places + sizes)[:, 1].max())
-        for (name, wide, high), (x, y) in zip(parts, (places + start).tolist(), strict=True):
-            corners = [[x, y], [x + wide, y], [x + wide, y + high], [x, y + high]]
-            lines.append(PanelLine("Bracket", "cut", np.array(corners)))
-            height = min(high, wide / (0.7 * len(name)))
-            labels.append(PanelLabel(name, x + wide / 2, y + high / 2, 0.8 * height))
+        for part, size, place_at in zip(brackets, sizes, places + start, strict=True):
+            lines.append(PanelLine("Bracket", "cut", part.outline + place_at))
+            x, y = (place_at + size / 2).tolist()
+            height = min(float(size[1]), float(size[0]) / (0.7 * len(part.name)))
+            labels.append(PanelLabel(part.name, x, y, 0.8 * height))
     return PanelDrawing(tuple(lines), tuple(labels))
-
-
-def _outlines(pattern: CreasePattern, corners: Floats, layer: str) -> list[PanelLine]:
-    real = pattern.faces_vertices >= 0
-    return [PanelLine(layer, "cut", points[own]) for points, own in zip(corners, real, strict=True)]
 
 
 def _hinges(pattern: CreasePattern, edges: Ints, move: Floats) -> list[PanelLine]:

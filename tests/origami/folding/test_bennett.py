@@ -21,11 +21,12 @@ from scipy.spatial import ConvexHull
 from miurafab.errors import InputError, PatternError
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.folding import plates as plates_module
 from miurafab.origami.folding.bennett import bennett_heights, nearest_heights, thick_loop_gap
 from miurafab.origami.folding.kinematics import fold_angles_at, place, states_between
 from miurafab.origami.folding.plates import ThickPlates, thick_plates
+from miurafab.origami.folding.slits import blocks_of, facet_cells
 from miurafab.origami.folding.thick_panels import LEAST_USEFUL, thick_panels
+from miurafab.origami.invariants import interior_vertices
 
 STATES = np.geomspace(0.1, 10.0, 10)
 
@@ -106,8 +107,10 @@ def deepest(one: np.ndarray, other: np.ndarray) -> float:
 
 
 @pytest.mark.large
-def test_convex_solids_have_no_ball_in_common_at_finer_states() -> None:
-    (patch,) = plywood().patches
+@pytest.mark.parametrize("cells", [4, 6])
+def test_convex_solids_have_no_ball_in_common_at_finer_states(cells: int) -> None:
+    """Of a sheet that is whole, and of one with a slit."""
+    (patch,) = thick_plates(exact("hypar", cells), 4.0).patches
     solids = patch.solids()
     graph = trimesh.Trimesh(solids.corners, solids.triangles, process=False)
     parts = trimesh.graph.connected_components(graph.edges, nodes=np.arange(len(graph.vertices)))
@@ -134,19 +137,86 @@ def test_collisions_are_found_where_heights_are_wrong(fault: str) -> None:
         ),
         "thicker plates": replace(patch, thickness_mm=6.0),
     }[fault]
-    found = plates_module._cleared(wrong)
+    found = wrong.cleared()
     assert found.clear_deg < 180
     assert found.collision is not None
 
 
-def test_sheets_without_plates_are_parted_into_patches() -> None:
-    made = thick_plates(exact("hypar", 6), 2.0)
+def test_sheets_without_plates_are_slit_and_stay_one_mechanism() -> None:
+    pattern = exact("hypar", 6)
+    assert not bennett_heights(pattern).exists
+    made = thick_plates(pattern, 2.0)
+    (patch,), (seam,) = made.patches, made.seams
+    assert made.folds
+    assert patch.range_mm <= 16 * 2.0
+    # the two creases at one vertex of the seam keep their hinges, so that this vertex ties both
+    ends = pattern.edges_vertices[list(seam.hinges)]
+    (tied,) = set(ends[0]) & set(ends[1])
+    assert tied in interior_vertices(pattern)
+    block = blocks_of(facet_cells(pattern), 2, 1)
+    apart = block[pattern.edges_faces]
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    across = np.flatnonzero(inner & (apart[:, 0] != apart[:, 1]))
+    assert sorted((*seam.hinges, *seam.slits)) == across.tolist()
+    assert set(patch.edges[patch.edges_inner]) == set(np.flatnonzero(inner)) - set(seam.slits)
+    assert thick_loop_gap(patch.pattern, patch.axis_mm, STATES).max() <= 1e-11
+
+
+def test_slits_open_as_far_as_the_solids_beside_them() -> None:
+    pattern = exact("hypar", 6)
+    made = thick_plates(pattern, 2.0)
+    (patch,), (seam,) = made.patches, made.seams
+    solids = patch.solids()
+    widest = 0.0
+    for placed in patch.placed(solids, states_between(patch.pattern, 12)):
+        for edge in seam.slits:
+            for vertex in pattern.edges_vertices[edge]:
+                corner = []
+                for facet in pattern.edges_faces[edge]:
+                    # a plate has two corners at the vertex, on its bottom and on its top
+                    away = np.linalg.norm(
+                        solids.corners[:, :2] - pattern.vertices_coords[vertex], axis=1
+                    )
+                    away[solids.facet != facet] = np.inf
+                    corner.append(placed[np.argsort(away)[:2]].mean(axis=0))
+                widest = max(widest, float(np.linalg.norm(corner[0] - corner[1])))
+    assert seam.opens_mm == pytest.approx(widest, abs=1.0)  # plates keep 0.1 mm from vertices
+    assert widest > 5.0
+
+
+def test_loose_patches_are_made_where_slits_do_not_help() -> None:
+    made = thick_plates(exact("hypar", 8), 2.0)
     assert len(made.patches) == 4
     facets = np.concatenate([patch.facets for patch in made.patches])
-    assert sorted(facets.tolist()) == list(range(36))
+    assert sorted(facets.tolist()) == list(range(64))
     assert made.folds
-    whole = bennett_heights(exact("hypar", 6))
-    assert not whole.exists
+    assert [(seam.blocks, seam.hinges, seam.opens_mm) for seam in made.seams] == [
+        ((0, 1), (), None),
+        ((0, 2), (), None),
+        ((1, 3), (), None),
+        ((2, 3), (), None),
+    ]
+    assert all(len(seam.slits) == 4 for seam in made.seams)
+
+
+def test_the_pieces_of_a_pattern_are_made_one_by_one() -> None:
+    pattern = exact("bump", 6)
+    assert pattern.pieces is not None
+    made = thick_plates(pattern, 2.0)
+    assert len(made.patches) == pattern.pieces_count == 2
+    for number, patch in enumerate(made.patches):
+        assert set(pattern.pieces[patch.facets]) == {number}
+        assert np.array_equal(
+            pattern.vertices_coords[pattern.edges_vertices[patch.edges]],
+            patch.pattern.vertices_coords[patch.pattern.edges_vertices],
+        )
+
+
+def test_a_sheet_without_a_grid_has_plates_as_a_whole_or_is_refused() -> None:
+    whole = replace(exact("plane", 6), grid=None)
+    assert len(thick_plates(whole, 2.0).patches) == 1
+    with pytest.raises(PatternError, match="has no grid of facets by which it could be slit"):
+        thick_plates(replace(exact("hypar", 6), grid=None), 2.0)
 
 
 @pytest.mark.parametrize("name", ["plane", "hypar"])
@@ -156,9 +226,10 @@ def test_the_guide_tells_what_is_made(name: str) -> None:
     row = next(line for line in guide.splitlines() if line.startswith(f"| {name} | 10 |"))
     assert f"| {heights.thickness / 2:.4f} |" in row
     made = thick_plates(exact(name), 2.0)
+    slits = sum(len(seam.slits) for seam in made.seams)
     patches = "one" if len(made.patches) == 1 else f"{len(made.patches)} patches"
     most = max(patch.range_mm for patch in made.patches) / 2.0
-    assert row.endswith(f"| {patches} | {most:.1f} t | 180° |")
+    assert row.endswith(f"| {patches} | {slits} | {most:.1f} t | 180° |")
     assert all(patch.clear_deg == 180.0 for patch in made.patches)
 
 
@@ -179,9 +250,9 @@ def test_plates_that_their_clearance_eats_up_are_refused(tmp_path: Path) -> None
     assert thin.folds
     thin.save(tmp_path / "thin.svg")
     thick = thick_plates(strip("V"), 10.1)
-    assert [facet for facet, _ in thick.too_small] == [0, 1]
+    assert thick.too_small.tolist() == [0, 1]
     assert not thick.folds
-    with pytest.raises(InputError, match=r"too small for 10\.1 mm plates"):
+    with pytest.raises(InputError, match=r"too small for panels of 10\.1 mm"):
         thick.save(tmp_path / "thick.svg")
     assert not (tmp_path / "thick.svg").exists()
 
@@ -193,31 +264,6 @@ def test_what_has_no_shifted_hinges_is_refused() -> None:
         thick_plates(developable, 4.0)
     with pytest.raises(InputError, match="greater than zero"):
         thick_plates(regular(), 0.0)
-
-
-def test_plates_are_written_as_outlines_and_brackets(tmp_path: Path) -> None:
-    (patch,) = plywood().patches
-    plywood().save(tmp_path / "plates.dxf")
-    space = ezdxf.readfile(tmp_path / "plates.dxf").modelspace()
-    by_layer: dict[str, list[np.ndarray]] = {}
-    for line in space.query("POLYLINE"):
-        points = np.array([tuple(vertex.dxf.location)[:2] for vertex in line.vertices])
-        by_layer.setdefault(line.dxf.layer, []).append(points)
-    assert {name: len(lines) for name, lines in by_layer.items()} == {
-        "Plate": 16,
-        "Hinge": 24,
-        "BracketFoot": len(patch.brackets),
-        "Bracket": len(patch.brackets),
-    }
-    # plates are facets less the clearance, of which 0.2 mm is on each side
-    facets = patch.pattern.vertices_coords[patch.pattern.faces_vertices]
-    around = np.linalg.norm(facets - np.roll(facets, 1, axis=1), axis=2).sum(axis=1)
-    lost = signed_areas(facets) - signed_areas(np.array(by_layer["Plate"]))
-    assert lost == pytest.approx(0.2 * around, rel=0.01)
-    heights = sorted(float(np.ptp(points[:, 1])) for points in by_layer["Bracket"])
-    assert heights == pytest.approx(sorted(b.high - b.low for b in patch.brackets), abs=1e-5)
-    labels = [text.dxf.text for text in space.query("TEXT")]
-    assert f"f5 {patch.bottom_mm[5]:+.2f}" in labels
 
 
 def test_plates_are_written_as_solids_that_move(tmp_path: Path) -> None:
