@@ -9,7 +9,7 @@ TOOLS := .venv/tools
 COMPILE = $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --upgrade
 AUDIT = $(TOOLS)/bin/pip-audit --strict --disable-pip --require-hashes
 
-.PHONY: demo test test-large lint gallery lock audit sbom clean
+.PHONY: demo test test-large lint gallery docs lock audit sbom clean
 
 demo: .venv/installed
 	$(BIN)/miurafab cut patterns/hypar.toml --port virtual
@@ -32,6 +32,10 @@ lint: .venv/installed-dev
 gallery: .venv/installed-dev
 	$(BIN)/python benchmarks/gallery.py
 	$(BIN)/python benchmarks/gallery.py --front
+
+# Makes a site of docs/ in site/, and fails on any warning.
+docs: .venv/installed-dev
+	$(BIN)/zensical build --clean --strict
 
 # The versions and hashes of all libraries are in locks/; `make lock` writes them anew.
 .venv/installed: pyproject.toml locks/run.txt
@@ -73,4 +77,4 @@ sbom:
 	$(PYTHON) locks/sbom.py
 
 clean:
-	rm -rf .venv jobs dist build
+	rm -rf .venv jobs dist build site

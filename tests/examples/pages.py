@@ -7,7 +7,9 @@ A page is a Markdown file. Its fenced blocks are examples:
             ``...`` stands for anything
 ``python``  run in one namespace for the page, in the page's folder
 ``usage``   how a command is called; each word of it must be known to the command line
-``toml``    with ``<!-- file: NAME -->`` before it: put into the page's folder under that name
+``console`` what a terminal shows, made by ``tables.py``
+``toml``    with ``<!-- file: NAME -->`` before it: put into the page's folder under that name;
+            ``csv`` likewise
 
 A comment before a block directs it: ``<!-- file: NAME -->``, ``<!-- exit 1 -->`` for commands that
 end with another code than 0, and ``<!-- not run: REASON -->``.
@@ -20,7 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")),
-    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
 ]
 
 _FENCE = re.compile(r"^ *```(\w*)$")

@@ -1,14 +1,20 @@
-"""The tables of the pages that are made from the program: options, keys of TOML files, findings.
+"""What the pages have from the program: tables of options, keys and findings, and the reference.
 
     python tests/examples/tables.py     writes them anew
 
-A table stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
+Each stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
 """
 
+import contextlib
+import inspect
+import io
 import re
 
 from pages import PAGES
+from rich.console import Console
 
+import miurafab
+from miurafab.cli.program import COMMANDS, app
 from miurafab.errors import EXIT_CODES, spell_options
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.findings import RULES
@@ -20,6 +26,8 @@ from miurafab.profiles.material import CreaseStiffness, Perforation, TabRule
 from miurafab.workflow.cut_options import CutOptions
 
 _PLACE = re.compile(r"(<!-- table: (\w+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
+WIDTH = 80
+"""Columns of the terminal in which the commands show their help."""
 
 
 def _flag(name):
@@ -72,7 +80,52 @@ def _exits():
     return ("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()]
 
 
+def _help(words):
+    shown = io.StringIO()
+    console = Console(file=shown, width=WIDTH, color_system=None)
+    with contextlib.suppress(SystemExit):
+        app.help_print(words, console=console)
+    return shown.getvalue().strip()
+
+
+def _commands():
+    """Every command under its group, with the help that the terminal shows."""
+    groups = dict.fromkeys(command.group for command in COMMANDS.values())
+    parts = []
+    for group in groups:
+        parts.append(f"## {group.name}")
+        for name, command in COMMANDS.items():
+            if command.group is group:
+                parts += [f"### miurafab {name}", _console([name])]
+                for action in command.actions:
+                    parts += [f"#### miurafab {name} {action}", _console([name, action])]
+    return "\n\n".join(parts) + "\n"
+
+
+def _console(words):
+    return f"```console\n{_help(words)}\n```"
+
+
+def _names():
+    """Every public name of the package, as mkdocstrings asks for it."""
+    kinds = {"Functions": [], "Values": [], "Exceptions": []}
+    for name in miurafab.__all__:
+        value = getattr(miurafab, name)
+        if inspect.isfunction(value):
+            kinds["Functions"].append(name)
+        elif inspect.isclass(value) and issubclass(value, BaseException):
+            kinds["Exceptions"].append(name)
+        elif inspect.isclass(value):
+            kinds["Values"].append(name)
+    return "\n".join(
+        f"## {kind}\n\n" + "".join(f"::: miurafab.{name}\n\n" for name in names)
+        for kind, names in kinds.items()
+    )
+
+
 TABLES = {
+    "api": _names,
+    "commands": _commands,
     "FitOptions": lambda: _options(FitOptions),
     "LayoutOptions": lambda: _options(LayoutOptions),
     "CutOptions": lambda: _options(CutOptions),
@@ -92,7 +145,10 @@ TABLES = {
 }
 
 
-def _markdown(head, rows):
+def _markdown(made):
+    if isinstance(made, str):
+        return made
+    head, rows = made
     lines = [head, ["---"] * len(head), *rows]
     return "".join(
         "| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |\n" for line in lines
@@ -101,7 +157,7 @@ def _markdown(head, rows):
 
 def with_tables(text):
     """``text`` of a page with each of its tables as the program has it."""
-    return _PLACE.sub(lambda match: f"{match[1]}\n{_markdown(*TABLES[match[2]]())}\n", text)
+    return _PLACE.sub(lambda match: f"{match[1]}\n{_markdown(TABLES[match[2]]())}\n", text)
 
 
 def tables_in(text):
