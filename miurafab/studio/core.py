@@ -58,7 +58,8 @@ from miurafab.studio.machine_words import NO_JOB, plain
 from miurafab.studio.mends import mends
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
 from miurafab.studio.orders import read_fit, read_glance, read_layout, read_plan, read_source
-from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
+from miurafab.studio.session import Bench
+from miurafab.studio.source import DESIGN_SUFFIX, PATTERN_SUFFIX
 from miurafab.studio.texts import with_texts
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
 from miurafab.surfaces.height_field import IMAGE_SUFFIXES

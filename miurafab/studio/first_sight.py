@@ -17,7 +17,7 @@ from miurafab.errors import MiurafabError, TargetError
 from miurafab.profiles import read_toml
 from miurafab.studio.mends import mends
 from miurafab.studio.orders import FitOrder
-from miurafab.studio.session import Source
+from miurafab.studio.source import Source
 from miurafab.studio.target_view import AT_ONCE, SHAPING, file_shown, shown
 from miurafab.studio.work import Order
 from miurafab.studio.worker import Running

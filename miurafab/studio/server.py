@@ -42,7 +42,8 @@ from miurafab.studio.guard import ADDRESS, BodyRoom, Guard, new_key
 from miurafab.studio.hosting import Hosting, ServingPlace, place_of
 from miurafab.studio.messages import HttpRequest, Response, refusal
 from miurafab.studio.password import PasswordLock
-from miurafab.studio.session import DESIGN_SUFFIX, PATTERN_SUFFIX, Bench
+from miurafab.studio.session import Bench
+from miurafab.studio.source import DESIGN_SUFFIX, PATTERN_SUFFIX
 from miurafab.studio.worker import Process
 from miurafab.surfaces.catalogue import make_surface, parse_target
 from miurafab.surfaces.mesh_files import mesh_suffix

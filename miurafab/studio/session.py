@@ -22,45 +22,16 @@ from miurafab.studio.form import LABELS, by_label
 from miurafab.studio.names import safe_stem, suffix_of
 from miurafab.studio.orders import FitOrder, LayoutOrder
 from miurafab.studio.report_text import headline, layout_lines, pattern_lines
+from miurafab.studio.source import PATTERN_SUFFIX, Source, kind_of
 from miurafab.studio.work import Order
 from miurafab.studio.worker import News, Running
 from miurafab.surfaces.height_field import IMAGE_SUFFIXES
-from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED, mesh_suffix
+from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED
 
-PATTERN_SUFFIX, DESIGN_SUFFIX = ".fold", ".toml"
 _IN_MM = {"min_edge", "max_deviation", "max_distance"}
 """Options that depend on the size of a sheet."""
 _KEPT = 8
 """The number of uploads kept; a further one removes the oldest."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """A file to fit or to open: a ``mesh``, an ``image``, a ``pattern`` or a ``design``.
-
-    ``ours`` says that the command line named the file; ``shown`` is its name in command lines.
-    """
-
-    id: str
-    kind: str
-    path: Path
-    shown: str
-    ours: bool = False
-
-    @property
-    def name(self) -> str:
-        """The name of what is made of it."""
-        return safe_stem(self.path.name)
-
-
-def kind_of(path: Path) -> str | None:
-    """The kind of the file ``path`` by its ending, None for one that is not known here."""
-    suffix = path.suffix.lower()
-    if mesh_suffix(path):
-        return "mesh"
-    if suffix in IMAGE_SUFFIXES:
-        return "image"
-    return {PATTERN_SUFFIX: "pattern", DESIGN_SUFFIX: "design"}.get(suffix)
 
 
 @dataclass
