@@ -58,7 +58,7 @@ def write_layout(layout: Layout, pattern_file: str, pattern_sha256: str) -> str:
 @dataclass(frozen=True)
 class LayoutHead:
     """What a layout says of the whole job: the names of its machine and material, the file of its
-    pattern with its SHA-256, and the sheets.
+    pattern with its SHA-256, and the sheets. ``is_whole`` tells that patches are in it, too.
     """
 
     machine: str
@@ -66,6 +66,7 @@ class LayoutHead:
     pattern_file: str
     pattern_sha256: str
     sheets: tuple[Sheet, ...]
+    is_whole: bool
 
 
 def read_head(text: str, where: object = "The layout") -> LayoutHead:
@@ -126,6 +127,7 @@ def _head(document: dict[str, Any], where: str) -> LayoutHead:
         file_name(pattern["file"], where),
         _text(pattern["sha256"]),
         sheets,
+        "patches" in document,
     )
 
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import miurafab
 from miurafab.errors import MiurafabError, PatternError
+from miurafab.fabrication.mates import seam_tabs
 from miurafab.files import write_text
 from miurafab.findings import Finding, findings_json
 from miurafab.origami.crease_pattern import CreasePattern
@@ -164,7 +165,8 @@ def _sheets(order: Order, tell: Tell) -> None:
     )
     job = made.write(directory, on_progress=_progress(tell, 0.6, 0.9))
     tell({"progress": 0.9, "note": "drawing the sheets"})
-    shown = Preview(order.name, job.machine, job.dry_runs, None, ())
+    tabs = tuple(seam_tabs(made.layout, made.pattern))
+    shown = Preview(order.name, job.machine, job.dry_runs, None, (), tabs)
     page = f"{order.name}-preview.html"
     write_page(order.folder / page, title=order.name, preview=shown)
     pictures = []

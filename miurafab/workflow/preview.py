@@ -36,6 +36,7 @@ from miurafab.workflow.job_files import job_machine, job_material, settle_job
 from miurafab.workflow.manifest import LAYOUT, edits, sha256
 
 if TYPE_CHECKING:
+    from miurafab.fabrication.mates import SeamTab
     from miurafab.workflow.job_directory import JobDirectory
     from miurafab.workflow.sheets import SheetJob
 
@@ -61,6 +62,8 @@ class Preview(Shown):
         The pattern that the sheets fold into, None where it is not known.
     findings : tuple of Finding
         About the job as a whole; each sheet has its own.
+    tabs : tuple of SeamTab
+        The tabs with their mates, none where the layout is not known.
     """
 
     name: str
@@ -68,6 +71,7 @@ class Preview(Shown):
     sheets: tuple[SheetPreview, ...]
     pattern: CreasePattern | None
     findings: tuple[Finding, ...]
+    tabs: tuple[SeamTab, ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -213,14 +217,25 @@ def preview(
         if on_progress is not None:
             on_progress(number / len(files), file.name)
         sheets.append(dry_run(file.stem, gcode, profile, papers.get(file.stem, bed), most_power))
-    seen = Preview(
-        name=path.resolve().name,
-        machine=profile,
-        sheets=tuple(sheets),
-        pattern=None if layout is None else _pattern(path, layout, findings),
-        findings=tuple(findings),
-    )
+    pattern = None if layout is None else _pattern(path, layout, findings)
+    is_whole = layout is not None and layout.is_whole
+    tabs = _tabs(path / LAYOUT, pattern, findings) if is_whole else ()
+    name = path.resolve().name
+    seen = Preview(name, profile, tuple(sheets), pattern, tuple(findings), tabs)
     return _chosen(seen, jobs, most_power, chosen, marks)
+
+
+def _tabs(
+    layout: Path, pattern: CreasePattern | None, findings: list[Finding]
+) -> tuple[SeamTab, ...]:
+    """The tabs of a job as it was made; a changed layout may name anything."""
+    if pattern is None or any(each.code == "edited" for each in findings):
+        return ()
+    from miurafab.fabrication.layout import read_layout  # slow to load
+    from miurafab.fabrication.mates import seam_tabs
+
+    text = read_text(layout, InputError, "a layout")
+    return (*seam_tabs(read_layout(text, layout), pattern),)
 
 
 def _chosen(
@@ -246,7 +261,8 @@ def _of_value(
     job: object, machine: MachineProfile | None, settings: AnyPath | None
 ) -> tuple[Preview, Sequence[Job], float]:
     """The preview of a job in memory or of one that was read, its programs and most power."""
-    from miurafab.workflow.job_directory import JobDirectory  # slow to load
+    from miurafab.fabrication.mates import seam_tabs  # slow to load
+    from miurafab.workflow.job_directory import JobDirectory
     from miurafab.workflow.sheets import SheetJob
 
     if not isinstance(job, SheetJob | JobDirectory):
@@ -270,7 +286,8 @@ def _of_value(
         )
     else:
         profile = job.machine
-    made = Preview(name, profile, dry_runs, pattern, (*edited, *elsewhere))
+    tabs = tuple(seam_tabs(job.layout, job.pattern)) if isinstance(job, SheetJob) else ()
+    made = Preview(name, profile, dry_runs, pattern, (*edited, *elsewhere), tabs)
     return made, job.jobs, job.most_power
 
 
@@ -377,6 +394,7 @@ def _pattern(path: Path, layout: LayoutHead, findings: list[Finding]) -> CreaseP
         says = f"{file} has changed since the sheets were made, so it is not shown."
         findings.append(Finding("pattern-changed", says, str(file)))
         return None
-    says = f"The pattern {layout.pattern_file} is not there, so its fold is not shown."
-    findings.append(Finding("pattern-missing", says, layout.pattern_file))
+    name = layout.pattern_file
+    says = f"The pattern {name} is not there, so its fold is not shown."
+    findings.append(Finding("pattern-missing", says, name))
     return None

@@ -15,7 +15,7 @@ import re
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ from miurafab.origami.folding.layers_apart import CLOSED
 from miurafab.version import __version__
 from miurafab.workflow.dry_run import LAYERS, SheetPreview, at_work, clock_text, length_text
 from miurafab.workflow.preview import Preview
+
+if TYPE_CHECKING:
+    from miurafab.fabrication.mates import SeamTab
 
 SCENE = ("viewer.js", "space.js", "shaders.js", "scene.js")
 """The scripts that draw a sheet in space, in their order; they know nothing of the rest."""
@@ -172,6 +175,7 @@ def _data(
             for layer in LAYERS
         ],
         "sheets": [] if preview is None else [_sheet(preview, sheet) for sheet in preview.sheets],
+        "tabs": [] if preview is None else [_tab(tab) for tab in preview.tabs],
         "fold": None if pattern is None else _fold(pattern, motion, slider),
         "made_by": f"Made by miurafab {__version__}",
     }
@@ -197,6 +201,21 @@ def _sheet(preview: Preview, sheet: SheetPreview) -> dict[str, Any]:
         "points": packed,
         "layers": _base64(layers, np.uint8),
         "ends": _base64(sheet.end_seconds, np.float32),
+    }
+
+
+def _tab(tab: SeamTab) -> dict[str, Any]:
+    """A tab and its mate, in mm to 1 µm."""
+    mate = tab.mate_mm
+    return {
+        "number": tab.number,
+        "label": tab.label,
+        "patch": tab.patch,
+        "sheet": tab.sheet,
+        "polygon": tab.polygon_mm.round(3).ravel().tolist(),
+        "matePatch": tab.mate_patch,
+        "mateSheet": tab.mate_sheet,
+        "mate": None if mate is None else mate.round(3).ravel().tolist(),
     }
 
 

@@ -55,7 +55,7 @@ table(data.sheets, (at) => {
 });
 try {
   document.querySelector("main").classList.toggle("both", data.sheets.length > 0 && data.fold !== null);
-  if (data.sheets.length) views.sheets = new SheetView(data.sheets, data.layers);
+  if (data.sheets.length) views.sheets = new SheetView(data.sheets, data.layers, data.tabs);
   if (data.fold) views.fold = new FoldView(data.fold);
   document.documentElement.dataset.ready = Object.keys(views).join(" ");
 } catch (fault) {

@@ -1,9 +1,14 @@
 // A sheet is every move of its job in order, drawn up to a moment that a slider or a clock chooses.
 
+const CLICK_PX = 4; // a pointer that moves farther drags
+const NEAR_PX = 7; // from the edge that a tab is joined to
+
 class SheetView {
-  constructor(sheets, layers) {
+  constructor(sheets, layers, tabs) {
     this.sheets = sheets;
     this.layers = layers;
+    this.tabs = tabs.filter(({ sheet }) => this.find(sheet) >= 0);
+    this.tab = null;
     this.stage = new Stage(byId("sheet-canvas"), false, (gl) => this.paint(gl));
     this.kinds = layers.map((layer) => ({ colour: layer.colour, width: layer.travel ? 1.1 : 1.8, dashed: layer.travel }));
     this.playing = false;
@@ -28,12 +33,98 @@ class SheetView {
       turn: (dx, dy) => this.shift(dx, dy),
       shift: (dx, dy) => this.shift(dx, dy),
       zoom: (factor, x, y) => this.zoom(factor, x, y),
-      keys: { 0: () => this.fit(), " ": () => this.play(!this.playing) },
+      keys: {
+        0: () => this.fit(), " ": () => this.play(!this.playing),
+        t: () => this.step(1), T: () => this.step(-1), m: () => this.toMate(),
+      },
     });
+    this.offerTabs();
     canvas.addEventListener("pointermove", (event) => this.say(event));
     canvas.addEventListener("pointerleave", () => { byId("sheet-cursor").value = ""; });
     byId("sheets").hidden = false;
     this.choose(0);
+  }
+
+  find(name) {
+    return this.sheets.findIndex((sheet) => sheet.name === name);
+  }
+
+  // Tabs and their mates
+
+  offerTabs() {
+    byId("tabs-bar").hidden = this.tabs.length === 0;
+    byId("tab-choice").append(...this.tabs.map((tab, at) => element("option", {
+      value: at, textContent: `${tab.label}: ${tab.patch}${tab.matePatch ? ` to ${tab.matePatch}` : ", open border"}`,
+    })));
+    byId("tab-choice").addEventListener("change", ({ target }) => this.pick(this.tabs[target.value] ?? null, true));
+    byId("tab-mate").addEventListener("click", () => this.toMate());
+    const { canvas } = this.stage;
+    let down = null;
+    canvas.addEventListener("pointerdown", ({ clientX, clientY }) => { down = [clientX, clientY]; });
+    canvas.addEventListener("pointerup", (event) => {
+      const still = down && Math.hypot(event.clientX - down[0], event.clientY - down[1]) <= CLICK_PX;
+      down = null;
+      if (still && event.button === 0) this.pick(this.tabAt(...this.place(event)));
+    });
+  }
+
+  /** The tab at a place of this sheet: under it, or the one whose mate's edge is nearest. */
+  tabAt(x, y) {
+    const { name } = this.sheet;
+    const under = this.tabs.find(({ sheet, polygon }) => sheet === name && holds(polygon, x, y));
+    if (under) return under;
+    const near = this.tabs.filter(({ mate, mateSheet }) => mate && mateSheet === name)
+      .map((tab) => [fromSegment(tab.mate, x, y) * this.scale, tab])
+      .filter(([pixels]) => pixels <= NEAR_PX).sort(([a], [b]) => a - b);
+    return near[0]?.[1] ?? null;
+  }
+
+  /** Mark a tab and its mate, or none; `go` shows the sheet that it is on. */
+  pick(tab, go = false) {
+    this.tab = tab;
+    byId("tab-choice").value = tab ? this.tabs.indexOf(tab) : "";
+    byId("tab-mate").disabled = !tab?.mate || this.find(tab.mateSheet) < 0;
+    const where = (sheet) => (sheet === this.sheet.name ? "on this sheet" : `on ${sheet}`);
+    byId("tab-said").value = !tab ? "" : `Tab ${tab.label} of patch ${tab.patch}, ${where(tab.sheet)}${
+      tab.mate ? `, is joined to patch ${tab.matePatch}, ${where(tab.mateSheet)}.` : ", stands on an open border."}`;
+    if (tab && go && tab.sheet !== this.sheet.name) this.choose(this.find(tab.sheet));
+    else this.stage.draw();
+  }
+
+  step(by) {
+    if (!this.tabs.length) return;
+    const at = this.tab ? this.tabs.indexOf(this.tab) + by : Math.min(by, 0);
+    this.pick(this.tabs.at(at % this.tabs.length), true);
+  }
+
+  /** Show the sheet of the mate; a second time that of the tab again. */
+  toMate() {
+    if (!this.tab?.mate) return;
+    const { sheet, mateSheet } = this.tab;
+    const other = this.sheet.name === mateSheet ? sheet : mateSheet;
+    if (this.find(other) >= 0) this.choose(this.find(other));
+  }
+
+  /** The lines that mark the chosen tab and its mate on this sheet: kind 0 the tab, kind 1 the mate. */
+  markTab() {
+    if (this.marked) this.marked.free();
+    this.marked = null;
+    if (!this.tab) return 0;
+    const { polygon, sheet, mate, mateSheet } = this.tab;
+    const ends = [];
+    const kinds = [];
+    if (sheet === this.sheet.name) {
+      for (let at = 0; at < polygon.length; at += 2) {
+        ends.push(polygon[at], polygon[at + 1], polygon[(at + 2) % polygon.length], polygon[(at + 3) % polygon.length]);
+        kinds.push(0);
+      }
+    }
+    if (mate && mateSheet === this.sheet.name) {
+      ends.push(...mate);
+      kinds.push(1);
+    }
+    if (kinds.length) this.marked = new Lines(this.stage, new Uint8Array(kinds)).place(new Float32Array(ends), 2);
+    return kinds.length;
   }
 
   choose(index) {
@@ -51,15 +142,15 @@ class SheetView {
     this.strokes = [...marked.keys()].filter((at) => marked[at] & 128);
     this.points = points;
     this.count = this.ends.length;
-    const times = new Float32Array(2 * this.count);
+    const moments = new Float32Array(2 * this.count);
     const ends = new Uint16Array(4 * this.count);
     for (let at = 0; at < this.count; at += 1) {
-      times[2 * at] = at ? this.ends[at - 1] : 0;
-      times[2 * at + 1] = this.ends[at];
+      moments[2 * at] = at ? this.ends[at - 1] : 0;
+      moments[2 * at + 1] = this.ends[at];
       ends.set(points.subarray(2 * at, 2 * at + 4), 4 * at);
     }
     if (this.moves) this.moves.free();
-    this.moves = new Lines(this.stage, marked.map((mark) => mark & 127), times).place(ends, 2);
+    this.moves = new Lines(this.stage, marked.map((mark) => mark & 127), moments).place(ends, 2);
     this.frame = this.outline(sheet);
     const shown = this.shown ? this.shown() : null;
     const entries = this.layers.flatMap((layer, at) => {
@@ -73,8 +164,13 @@ class SheetView {
     this.shown = legend(byId("layers"), entries, () => this.stage.draw());
     const best = [1, 10, 60, 300].find((speed) => sheet.seconds / speed <= 45) || 300;
     byId("speed").value = best;
+    const times = Object.entries(sheet.operation_seconds).filter(([, seconds]) => seconds >= 0.5);
+    byId("operations").replaceChildren(...times.map(([name, seconds]) => element(
+      "div", {}, element("dt", { textContent: name }), element("dd", { textContent: clockText(seconds) }),
+    )));
     this.seek(sheet.seconds);
     this.fit();
+    this.pick(this.tab);
   }
 
   /** The bed and its margin as eight segments in mm, of kinds 0 and 1. */
@@ -116,10 +212,17 @@ class SheetView {
     this.stage.draw();
   }
 
-  say(event) {
+  /** Where the pointer is, in mm. */
+  place(event) {
     const box = this.stage.canvas.getBoundingClientRect();
-    const x = this.x + (event.clientX - box.left - this.stage.width / 2) / this.scale;
-    const y = this.y - (event.clientY - box.top - this.stage.height / 2) / this.scale;
+    return [
+      this.x + (event.clientX - box.left - this.stage.width / 2) / this.scale,
+      this.y - (event.clientY - box.top - this.stage.height / 2) / this.scale,
+    ];
+  }
+
+  say(event) {
+    const [x, y] = this.place(event);
     byId("sheet-cursor").value = `X ${x.toFixed(1)}  Y ${y.toFixed(1)} mm`;
   }
 
@@ -220,6 +323,11 @@ class SheetView {
     for (const mask of [shown & travels, shown & ~travels]) {
       if (mask) this.stage.lines(this.moves, Math.min(move + 1, this.count), view, this.kinds, { shown: mask, now: this.now });
     }
+    const marks = this.markTab();
+    if (marks) {
+      const looks = [{ colour: "--chosen", width: 4 }, { colour: "--chosen", width: 7 }];
+      this.stage.lines(this.marked, marks, this.camera(0, 0, 1, 1), looks);
+    }
     const head = byId("sheet-head");
     head.hidden = this.count === 0 || this.now >= this.sheet.seconds;
     if (!head.hidden) {
@@ -237,4 +345,22 @@ class SheetView {
     byId("sheet-scale").style.width = `${mm * this.scale}px`;
     byId("sheet-scale").firstElementChild.textContent = `${Number(mm.toPrecision(2))} mm`;
   }
+}
+
+/** Whether a polygon, x and y in turn, holds a point: the crossings of a ray are odd. */
+function holds(polygon, x, y) {
+  let inside = false;
+  const corners = polygon.length / 2;
+  for (let at = 0, before = corners - 1; at < corners; before = at, at += 1) {
+    const [ax, ay, bx, by] = [polygon[2 * at], polygon[2 * at + 1], polygon[2 * before], polygon[2 * before + 1]];
+    if ((ay > y) !== (by > y) && x < ((bx - ax) * (y - ay)) / (by - ay) + ax) inside = !inside;
+  }
+  return inside;
+}
+
+/** The distance of a point from a segment. */
+function fromSegment([ax, ay, bx, by], x, y) {
+  const [dx, dy] = [bx - ax, by - ay];
+  const part = Math.min(Math.max(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy || 1), 0), 1);
+  return Math.hypot(x - ax - part * dx, y - ay - part * dy);
 }
