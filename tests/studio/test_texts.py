@@ -3,14 +3,17 @@
 import re
 from html.parser import HTMLParser
 from importlib import resources
+from pathlib import Path
 
 import pytest
 
+from miurafab.studio import entrance
 from miurafab.studio.core import PARTS
 from miurafab.studio.texts import texts, with_texts
 
 PAGE = resources.files("miurafab.studio").joinpath("page")
-SCRIPTS = [name for name in PARTS if name.endswith(".js") and name != "texts.js"]
+SCRIPTS = [name for name in (*PARTS, "enter.js") if name.endswith(".js") and name != "texts.js"]
+PAGES = ("studio.html", "enter.html")
 KNOWN = {f"{group}.{name}" for group, words in texts().items() for name in words}
 NAMES = {"miurafab", "studio", "miurafab studio", "$$", ""}
 
@@ -30,9 +33,10 @@ class Reader(HTMLParser):
         self.read.append(data)
 
 
-def test_the_page_has_no_text_of_its_own():
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_has_no_text_of_its_own(name):
     reader = Reader()
-    reader.feed(PAGE.joinpath("studio.html").read_text(encoding="utf-8"))
+    reader.feed(PAGE.joinpath(name).read_text(encoding="utf-8"))
     left = [re.sub(r"@[a-z_]+\.[a-z_]+@", " ", text) for text in reader.read]
     left = [re.sub(r"[^\w$]+", " ", text).strip() for text in left]
     assert [text for text in left if text not in NAMES] == []
@@ -54,13 +58,15 @@ def test_a_sentence_in_a_script_is_found():
 
 
 def test_each_text_is_used_and_each_mark_is_known():
-    page = PAGE.joinpath("studio.html").read_text(encoding="utf-8")
+    pages = "".join(PAGE.joinpath(name).read_text(encoding="utf-8") for name in PAGES)
     scripts = "".join(PAGE.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
-    marks = set(re.findall(r"@([a-z_]+\.[a-z_]+)@", page))
+    marks = set(re.findall(r"@([a-z_]+\.[a-z_]+)@", pages))
     groups = "|".join(texts())
-    in_scripts = {f"{g}.{n}" for g, n in re.findall(rf"\b({groups})\.([a-z_]+)\b", scripts)}
+    used = {f"{g}.{n}" for g, n in re.findall(rf"\b({groups})\.([a-z_]+)\b", scripts)}
+    server = Path(entrance.__file__).read_text(encoding="utf-8")
+    used |= {f"{g}.{n}" for g, n in re.findall(r'texts\(\)\["([a-z_]+)"\]\["([a-z_]+)"\]', server)}
     assert marks <= KNOWN
-    assert KNOWN - marks - in_scripts == set()
+    assert KNOWN - marks - used == set()
 
 
 def test_a_text_can_be_put_into_html_and_holds_only_small_tags():

@@ -20,8 +20,8 @@ from miurafab.workflow.preview import preview
 
 def shells():
     """A cut through a height field, a ring that closes on itself, and two copies of a model."""
-    open_shell = miurafab.fit("hypar", facets=(6, 6), size=260).pattern
-    ring = miurafab.fit("vase", facets=(12, 6), size=120, angle="360deg").pattern
+    open_shell = miurafab.fit("hypar", facets=(4, 4), size=260).pattern
+    ring = miurafab.fit("vase", facets=(8, 4), size=120, angle="360deg").pattern
     yield "cut", open_shell, {"max_patch": "150mmx150mm"}
     yield "ring", ring, {"max_patch": "150mmx150mm"}
     yield "copies", open_shell, {"max_patch": "180mmx180mm", "quantity": 2}
