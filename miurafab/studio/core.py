@@ -71,7 +71,8 @@ from miurafab.workflow.image_targets import PARAMETERS as OF_IMAGE
 PAGE, MACHINE, LIVE, TARGET = "studio.html", "machine", "live", "target"
 PARTS = (
     *("icon.svg", "studio.css", "machine.css", "tools.js", "choices.js", "results.js"),
-    *("live.js", "machine.js", "sheet.js", "sketch.js", "sliders.js", "studio.js", "texts.js"),
+    *("folding.js", "live.js", "machine.js", "sheet.js", "sketch.js", "sliders.js", "studio.js"),
+    "texts.js",
 )
 """The files of the page, beside the page itself."""
 

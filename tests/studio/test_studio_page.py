@@ -5,6 +5,7 @@ import threading
 import time
 
 import pytest
+from axe import needs_axe, serious_faults
 from browser import CHROMIUM, Browser
 from studios import saddle_obj
 
@@ -99,6 +100,10 @@ def test_from_a_surface_to_sheets_by_keyboard(page):
 
     page.run("document.getElementById('shape-tab').focus()")
     page.press("ArrowRight")
+    assert page.run("document.activeElement.id") == "fold-tab"
+    page.until("document.getElementById('folding').clientHeight > 600")
+    assert page.run("document.getElementById('folding').getAttribute('src')") == f"{folding}#whole"
+    page.press("ArrowRight")
     assert page.run("document.activeElement.id") == "layout-tab"
     assert page.run("document.getElementById('shape').hidden")
     page.type("gap", "4mm")
@@ -119,9 +124,20 @@ def test_from_a_surface_to_sheets_by_keyboard(page):
             "Emulation.setDeviceMetricsOverride",
             width=width, height=height, deviceScaleFactor=1, mobile=width < 600,
         )  # fmt: skip
-        for tab in ("shape", "layout"):
+        for tab in ("shape", "fold", "layout"):
             page.run(f"document.getElementById('{tab}-tab').click()")
             assert page.run("document.documentElement.scrollWidth") <= width
+
+
+@needs_axe
+def test_the_tabs_of_a_pattern_have_no_serious_fault(page):
+    if page.run("document.getElementById('pattern').hidden"):  # none is there from the test above
+        page.run("document.getElementById('fit').click()")
+    page.until("!document.getElementById('pattern').hidden")
+    page.until("!document.querySelector('.old')")
+    for tab in ("shape", "fold", "layout"):
+        page.run(f"document.getElementById('{tab}-tab').click()")
+        assert serious_faults(page) == [], tab
 
 
 def test_what_is_shown_within_draws_and_can_ask_for_nothing(page, address):

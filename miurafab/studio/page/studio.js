@@ -1,13 +1,14 @@
 // The page: asks for work, follows it, and shows what came of it.
 
 import { fillForms, layoutOrder, restoreForm, showSources, tooLarge } from "./choices.js";
+import { showFolding } from "./folding.js";
 import { beginLive, changed, fitNow, followLive, restLive } from "./live.js";
 import { beginMachine, offerJob } from "./machine.js";
 import { showJob, showPattern } from "./results.js";
 import { texts } from "./texts.js";
 import { ask, byId, copy, say } from "./tools.js";
 
-const TABS = ["shape", "layout", "desk"];
+const TABS = ["shape", "fold", "layout", "desk"];
 const DOING = { fit: texts.frame.fitting, open: texts.frame.opening, sheets: texts.frame.laying_out };
 let following = 0;
 let told = "";
@@ -16,6 +17,7 @@ let ownJob = null;
 function show(state) {
   const { task, pattern, job, sources } = state;
   showPattern(pattern);
+  showFolding(pattern);
   showJob(job, pattern);
   offerJob(job, ownJob);
   const running = Boolean(task?.running);
@@ -93,6 +95,7 @@ function turnTo(tab) {
     byId(`${each}-tab`).setAttribute("aria-selected", chosen);
     byId(`${each}-tab`).tabIndex = chosen ? 0 : -1;
   }
+  showFolding();
 }
 
 function listen() {

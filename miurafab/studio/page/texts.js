@@ -3,6 +3,7 @@
 // <code>, <kbd> and <small> stand in texts of studio.html alone.
 export const texts = {
   "words": {
+    "fold": "Fold",
     "layout": "Layout",
     "machine": "Machine",
     "material": "Material",
@@ -101,6 +102,10 @@ export const texts = {
     "make": "Make it {size}",
     "stale": "What is shown is {subject}. The form asks for something else.",
     "back_to": "Back to the values of what is shown"
+  },
+  "fold": {
+    "frame": "The folding, with the flat pattern and the energy beside it",
+    "none": "Fit or open a pattern first."
   },
   "layout": {
     "machine_and_material": "Machine and material",
