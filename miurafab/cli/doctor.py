@@ -10,9 +10,10 @@ EXAMPLES = ("miurafab doctor",)
 
 
 def doctor(*, console: Console = Console()) -> int:
-    """Say what is installed and what would stop a job.
+    """Try what is installed, and say what would stop a job and what mends it.
 
-    Sends nothing to any port. Exits with 1 if anything would stop a job.
+    Loads each library, draws a plot, looks for a browser and at the permissions of the ports. Sends
+    nothing to any port. Exits with 1 if anything would stop a job.
     """
     report = miurafab.doctor()
 
@@ -23,6 +24,8 @@ def doctor(*, console: Console = Console()) -> int:
             console.rows(("port", "what it is", "state"), rows, "Ports")
         for problem in report.problems:
             console.line(f"Would stop a job: {problem}")
+        for note in report.notes:
+            console.line(f"Note: {note}")
         if not report.problems:
             console.line("Nothing found that would stop a job.")
 

@@ -50,7 +50,7 @@ from miurafab.studio.machine_words import (
 )
 from miurafab.workflow.at_machine import Operator
 from miurafab.workflow.cut import Prepared, prepare
-from miurafab.workflow.doctor import serial_ports
+from miurafab.workflow.ports import serial_ports
 
 PRACTICE_SPEED = 1.0
 """The practice machine keeps real time."""

@@ -1,33 +1,47 @@
-"""What would stop a job on this computer, looked at without sending a byte to any machine."""
+"""What would stop a job on this computer, tried without sending a byte to any machine.
+
+What is tried is what fails on real computers: each library is loaded, a plot is drawn, a browser is
+looked for, the permissions of each serial port and of the folder of the user's own profiles are
+read. Each problem ends with the command that mends it.
+"""
 
 from __future__ import annotations
 
+import getpass
+import importlib
 import importlib.metadata
+import importlib.util
+import io
 import os
 import platform
 import re
+import shlex
 import shutil
+import sys
+import webbrowser
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from miurafab.display import Shown
 from miurafab.errors import ProfileError
-from miurafab.machine.transport import list_ports
 from miurafab.profiles import known_names, load_machine, load_material
+from miurafab.profiles.own import configuration_folder
 from miurafab.version import __version__
+from miurafab.workflow.ports import Port, no_port, serial_ports
 
 ROOM_NEEDED_MB = 100
 """Free disk below which drawings, journal and transcript of a large job may not fit."""
 
+EXTRAS = {
+    "cluster": ("distributed", "tradeoff on a cluster"),
+    "host": ("cryptography", "the studio for other computers"),
+    "layers": ("python-sat", "the search for all layer orders"),
+    "step": ("cascadio", "STEP files"),
+}
+"""What each extra brings, and what it is for."""
 
-@dataclass(frozen=True)
-class Port:
-    """A serial port of this computer; ``trouble`` says why you cannot use it, if so."""
-
-    device: str
-    description: str
-    trouble: str | None
+_MODULES = {"fonttools": "fontTools", "pillow": "PIL", "pyserial": "serial"}  # others: their name
 
 
 @dataclass(frozen=True, repr=False)
@@ -42,12 +56,16 @@ class Examination(Shown):
     ports : tuple of Port
         The serial ports: ``device``, ``description``, and ``trouble`` where you cannot use one.
     problems : tuple of str
-        What would stop a job, one sentence each; empty if nothing would.
+        What would stop a job, one sentence each with the command that mends it; empty if nothing
+        would.
+    notes : tuple of str
+        What is missing and stops no job: extras, a browser, a port.
     """
 
     versions: dict[str, str]
     ports: tuple[Port, ...]
     problems: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     def answer(self) -> dict[str, Any]:
         """The same, ready for JSON."""
@@ -55,11 +73,12 @@ class Examination(Shown):
             "versions": self.versions,
             "ports": [asdict(port) for port in self.ports],
             "problems": list(self.problems),
+            "notes": list(self.notes),
         }
 
 
 def doctor() -> Examination:
-    """Look at the installation, the ports, the shipped profiles, and the free disk.
+    """Try the installation, plots, the ports, the profiles, and the disk.
 
     Returns
     -------
@@ -76,46 +95,105 @@ def doctor() -> Examination:
         "miurafab": __version__,
         "python": f"{platform.python_version()} on {platform.system()} {platform.machine()}",
     }
-    problems = []
+    problems, notes = [], []
     try:
         needed = importlib.metadata.requires("miurafab") or []
     except importlib.metadata.PackageNotFoundError:
         needed = []
         problems.append("miurafab runs from its source and is not installed; run pip install .")
-    for name in _names(needed):
+    for name, least in _needs(needed):
+        versions[name], trouble = _library(name, least)
+        if trouble:
+            problems.append(trouble)
+    for extra, (name, purpose) in EXTRAS.items():
         try:
             versions[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
-            versions[name] = "missing"
-            problems.append(f"{name} is not installed; run pip install {name}.")
+            notes.append(f"{name}, for {purpose}, is not installed: {_pip()} 'miurafab[{extra}]'")
+    problems += _plot_problems()
     ports = serial_ports()
     problems.extend(f"{port.device}: {port.trouble}." for port in ports if port.trouble)
-    problems.extend(_profile_problems())
+    if not ports:
+        notes.append(no_port())
+    try:
+        webbrowser.get()
+    except webbrowser.Error:
+        notes.append(
+            "No browser is found: open the address that the studio prints by hand, or name a "
+            "browser in the variable BROWSER."
+        )
+    problems += _folder_problems(configuration_folder())
+    problems += _profile_problems()
     free = shutil.disk_usage(Path.cwd()).free // 1_000_000
     if free < ROOM_NEEDED_MB:
         problems.append(f"Only {free} MB are free on this disk; a job needs {ROOM_NEEDED_MB} MB.")
-    return Examination(versions, ports, tuple(problems))
+    return Examination(versions, ports, tuple(problems), tuple(notes))
 
 
-def serial_ports() -> tuple[Port, ...]:
-    """The serial ports of this computer."""
-    return tuple(Port(device, text, _trouble(device)) for device, text in list_ports())
-
-
-def _names(requirements: list[str]) -> list[str]:
-    """The names in lines such as ``numpy>=2.1``, without those that only an extra asks for."""
+def _needs(requirements: list[str]) -> list[tuple[str, str]]:
+    """The names and least versions in lines such as ``numpy>=2.1``, without those that only an
+    extra asks for.
+    """
     always = (line for line in requirements if "extra ==" not in line)
-    return sorted({re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in always})
+    found = (re.match(r"([\w.-]+)(?:\[.*\])?\s*(?:>=([\w.]+))?", line) for line in always)
+    return sorted({(line[1], line[2] or "") for line in found if line})
 
 
-def _trouble(device: str) -> str | None:
-    path = Path(device)
-    if not path.exists() or os.access(path, os.R_OK | os.W_OK):
-        return None
-    return (
-        "you may not open it; join the group that owns it "
-        f"(on Linux: sudo usermod -aG dialout {os.environ.get('USER', 'NAME')}, then log in again)"
-    )
+def _library(name: str, least: str) -> tuple[str, str | None]:
+    """The version of the library ``name``, and what is wrong with it."""
+    try:
+        version = importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return "missing", f"{name} is not installed; run {_pip()} {name}."
+    if _numbers(version) < _numbers(least):
+        return version, f"{name} is {version}; run {_pip()} --upgrade '{name}>={least}'."
+    try:
+        importlib.import_module(_MODULES.get(name.lower(), name.replace("-", "_")))
+    except (ImportError, OSError, ValueError) as fault:  # ValueError: built for another numpy
+        told = " ".join(str(fault).split())
+        return version, f"{name} does not load ({told}); run {_pip()} --force-reinstall {name}."
+    return version, None
+
+
+def _pip() -> str:
+    """What installs into this environment, which has no pip of its own where uv made it."""
+    python = shlex.quote(sys.executable)
+    if importlib.util.find_spec("pip") is None:
+        return f"uv pip install --python {python}"
+    return f"{python} -m pip install"
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """The leading numbers of a version: (2, 1) of ``2.1rc1``."""
+    found = re.match(r"\d+(?:\.\d+)*", version)
+    return tuple(map(int, found[0].split("."))) if found else ()
+
+
+def _plot_problems() -> list[str]:
+    """What keeps a plot from being drawn."""
+    try:
+        from matplotlib.figure import Figure
+
+        Figure((1, 1)).savefig(io.BytesIO(), format="png")
+    except (ImportError, OSError, ValueError, RuntimeError) as fault:
+        told = " ".join(str(fault).split())
+        return [f"No plot is drawn ({told}); run {_pip()} --force-reinstall matplotlib pillow."]
+    return []
+
+
+def _folder_problems(folder: Path) -> list[str]:
+    """What keeps the user's own profiles from being written to ``folder``."""
+    there = next(each for each in (folder, *folder.parents) if each.exists())
+    if not there.is_dir():
+        return [
+            f"{there} is a file, so your own profiles have no folder; run mv {there} {there}.old."
+        ]
+    if os.access(there, os.W_OK | os.X_OK):
+        return []
+    return [
+        f"Your own profiles cannot be written to {folder}; run sudo chown -R "
+        f"{getpass.getuser()} {there}, or name another folder in XDG_CONFIG_HOME."
+    ]
 
 
 def _profile_problems() -> list[str]:

@@ -13,8 +13,8 @@ import miurafab
 from miurafab.fabrication.sheets import lay_out
 from miurafab.origami.fitting.fit import coarse
 from miurafab.studio import glance
-from miurafab.studio.glance import MOST, Glances, _stock
 from miurafab.studio.bed_words import planned
+from miurafab.studio.glance import MOST, Glances, _stock
 from miurafab.studio.live import Live
 from miurafab.studio.report_text import pattern_lines
 from miurafab.workflow import design as designs

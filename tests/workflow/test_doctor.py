@@ -1,13 +1,24 @@
-"""``doctor`` names each package that miurafab needs; a missing one stops a job."""
+"""``doctor`` tries what a job needs, and each problem names the command that mends it."""
 
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
+import os
+import shlex
+import sys
+import tomllib
+import webbrowser
+from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 import miurafab as mf
+from miurafab.workflow import doctor as doctor_module
+from miurafab.workflow import ports as ports_module
 
+PIP = f"{shlex.quote(sys.executable)} -m pip install"
 REQUIRED = ["numpy>=2.1", "resvg_py>=0.4", "casadi>=3.6; extra == 'bench'"]
 VERSIONS = {"numpy": "2.4.6", "resvg_py": "0.4"}
 
@@ -35,7 +46,7 @@ def test_a_missing_package_stops_a_job(installed, run):
     installed.delitem(VERSIONS, "resvg_py")
     found = mf.doctor()
     assert found.versions["resvg_py"] == "missing"
-    assert "resvg_py is not installed; run pip install resvg_py." in found.problems
+    assert f"resvg_py is not installed; run {PIP} resvg_py." in found.problems
     done = run("doctor")
     assert done.returncode == 1
     assert "Would stop a job: resvg_py is not installed" in done.stdout
@@ -49,3 +60,97 @@ def test_a_source_tree_is_named_as_one(monkeypatch):
     assert "miurafab runs from its source and is not installed; run pip install ." in (
         mf.doctor().problems
     )
+
+
+def test_a_library_that_is_too_old_or_does_not_load_stops_a_job(installed):
+    installed.setitem(VERSIONS, "numpy", "2.0.9")
+    assert f"numpy is 2.0.9; run {PIP} --upgrade 'numpy>=2.1'." in mf.doctor().problems
+    installed.setitem(VERSIONS, "numpy", "2.4.6")
+    load = importlib.import_module
+
+    def broken(name):
+        if name == "resvg_py":
+            raise ImportError("libc.so.7:\n cannot open shared object file")
+        return load(name)
+
+    installed.setattr(importlib, "import_module", broken)
+    assert mf.doctor().problems == (
+        "resvg_py does not load (libc.so.7: cannot open shared object file); run "
+        f"{PIP} --force-reinstall resvg_py.",
+    )
+    installed.setattr(importlib.util, "find_spec", lambda name: None)
+    (problem,) = mf.doctor().problems
+    assert f"run uv pip install --python {sys.executable} --force-reinstall resvg_py" in problem
+
+
+def test_each_extra_is_told_with_its_command(installed):
+    notes = mf.doctor().notes
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    assert doctor_module.EXTRAS.keys() == extras.keys() - {"bench", "dev"}
+    for extra, (name, purpose) in doctor_module.EXTRAS.items():
+        assert name in [Requirement(line).name for line in extras[extra]]
+        command = f"{PIP} 'miurafab[{extra}]'"
+        assert f"{name}, for {purpose}, is not installed: {command}" in notes
+
+
+def test_a_plot_that_cannot_be_drawn_is_a_problem(installed):
+    def fails(*args, **kwargs):
+        raise OSError("no fonts")
+
+    installed.setattr("matplotlib.figure.Figure.savefig", fails)
+    assert any("No plot is drawn (no fonts); run" in each for each in mf.doctor().problems)
+
+
+def test_a_computer_without_a_browser_is_told_what_to_do(installed):
+    def none():
+        raise webbrowser.Error("could not locate runnable browser")
+
+    installed.setattr(webbrowser, "get", none)
+    assert any("the variable BROWSER" in note for note in mf.doctor().notes)
+    installed.setattr(webbrowser, "get", lambda: None)
+    assert not any("browser" in note for note in mf.doctor().notes)
+
+
+@pytest.mark.parametrize("listed", [True, False])
+def test_a_port_that_may_not_be_opened_names_its_group(installed, tmp_path, listed):
+    device = tmp_path / "ttyUSB0"
+    device.touch()
+    installed.setattr(ports_module, "list_ports", lambda: [(str(device), "CH340")])
+    installed.setattr(os, "access", lambda path, mode: path != device)
+    installed.setattr(Path, "group", lambda self: "uucp")
+    installed.setattr(ports_module.getpass, "getuser", lambda: "ada")
+    installed.setattr(ports_module, "_members", lambda group: ["ada"] if listed else ["bob"])
+    (port,) = mf.doctor().ports
+    way = (
+        "you are in its group uucp from your next login on: log out and in again"
+        if listed
+        else "join its group: sudo usermod -aG uucp ada, then log in again"
+    )
+    assert port.trouble == f"you may not open it; {way}"
+    assert f"{device}: you may not open it; {way}." in mf.doctor().problems
+
+
+def test_before_a_port_is_plugged_in_its_group_is_told(installed):
+    installed.setattr(ports_module, "list_ports", list)
+    installed.setattr(ports_module.sys, "platform", "linux")
+    installed.setattr(ports_module.getpass, "getuser", lambda: "ada")
+    installed.setattr(ports_module.os, "geteuid", lambda: 1000, raising=False)
+    installed.setattr(ports_module, "_members", {"dialout": []}.get)
+    installed.setattr(ports_module, "_is_in", lambda group: False)
+    wanted = "to open it, join its group: sudo usermod -aG dialout ada, then log in again."
+    assert any(note.endswith(wanted) for note in mf.doctor().notes)
+    installed.setattr(ports_module, "_is_in", lambda group: True)
+    assert any(note.endswith("a cable that carries data.") for note in mf.doctor().notes)
+
+
+def test_profiles_that_cannot_be_written_are_a_problem(installed, tmp_path):
+    installed.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    assert mf.doctor().problems == ()
+    installed.setattr(os, "access", lambda path, mode: path != tmp_path)
+    (problem,) = mf.doctor().problems
+    assert "run sudo chown -R " in problem
+    assert f" {tmp_path}, or name another folder in XDG_CONFIG_HOME." in problem
+    (tmp_path / "config").write_text("")
+    (problem,) = mf.doctor().problems
+    assert f"run mv {tmp_path / 'config'} {tmp_path / 'config'}.old." in problem
