@@ -38,15 +38,6 @@ from urllib.parse import unquote
 import miurafab
 from miurafab.errors import InputError, MiurafabError
 from miurafab.origami.fitting.request import DEFAULT_FACETS, DEFAULT_SIZE_MM, FACETS
-from miurafab.profiles import (
-    DEFAULT_MACHINE,
-    DEFAULT_MATERIAL,
-    find_profile,
-    known_names,
-    load_machine,
-    load_material,
-)
-from miurafab.profiles.shipped import Kind
 from miurafab.studio.desk import Desk
 from miurafab.studio.first_sight import FirstSight
 from miurafab.studio.form import by_label, filled
@@ -57,7 +48,15 @@ from miurafab.studio.machine_orders import ROUTES, carry_out
 from miurafab.studio.machine_words import NO_JOB, plain
 from miurafab.studio.mends import mends
 from miurafab.studio.messages import HttpRequest, Response, answer, made_file, own_file, refusal
-from miurafab.studio.orders import read_fit, read_glance, read_layout, read_plan, read_source
+from miurafab.studio.orders import (
+    LayoutOrder,
+    read_fit,
+    read_glance,
+    read_layout,
+    read_plan,
+    read_source,
+)
+from miurafab.studio.own_things import own_things
 from miurafab.studio.session import Bench
 from miurafab.studio.source import DESIGN_SUFFIX, PATTERN_SUFFIX
 from miurafab.studio.texts import with_texts
@@ -66,6 +65,7 @@ from miurafab.surfaces.height_field import IMAGE_SUFFIXES
 from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED
 from miurafab.workflow.at_machine import STEPS
 from miurafab.workflow.design import can_close
+from miurafab.workflow.drawings import FORMATS
 from miurafab.workflow.image_targets import PARAMETERS as OF_IMAGE
 
 PAGE, MACHINE, LIVE, TARGET = "studio.html", "machine", "live", "target"
@@ -148,16 +148,22 @@ class Studio:
         if route == "plan":
             layout = read_plan(body)
             file = str(self.bench.pattern_file())
-            return {"do": "plan", "file": file, "layout": layout and asdict(layout)}
+            return {"do": "plan", "file": file, "layout": self._beside(layout)}
         asked, layout = read_glance(body)
         target = self.bench.target_of(asked)
         options = dict(asked.options)
-        beside = layout and asdict(layout)
+        beside = self._beside(layout)
         whole = self.bench.scaled_from(asked)
         if whole is not None:
             of = {"file": str(whole[0]), "report": whole[1], "size": options["size"]}
             return {"do": "scale", "layout": beside, **of}
         return {"do": "coarse", "target": target, "options": options, "layout": beside}
+
+    def _beside(self, layout: LayoutOrder | None) -> dict[str, Any] | None:
+        """A layout for the process beside it."""
+        if layout is None:
+            return None
+        return {**asdict(layout), "options": self.bench.laid_by(layout)}
 
     def _target(self, route: str, request: HttpRequest) -> Response:
         """What is seen of a target; it waits for the list of files alone."""
@@ -219,7 +225,8 @@ class Studio:
             return own_file(name, content)
         if route == "catalogue":
             own = None if self._own_job is None else self._own_job.name
-            return answer({**self._catalogue, "first": self._first, "own_job": own})
+            known = {**self._catalogue, **own_things()}
+            return answer({**known, "first": self._first, "own_job": own})
         if route == "state":
             return answer(self.bench.state())
         if route == "design.toml":
@@ -259,30 +266,16 @@ def _catalogue() -> dict[str, Any]:
     return {
         "version": miurafab.__version__,
         "surfaces": [_surface(entry) for entry in CATALOGUE.values()],
-        "machines": [
-            {"name": name, "title": load_machine(name).title}
-            for name in known_names("firmware_profiles")
-        ],
         "steps": STEPS,
-        "materials": [
-            {"name": name, "title": load_material(name).title} for name in known_names("materials")
-        ],
+        "formats": FORMATS,
         "file_suffixes": (*MESH_SUFFIXES, PACKED, *IMAGE_SUFFIXES, PATTERN_SUFFIX),
         "of_image": OF_IMAGE,
         "file_limit": FILE_LIMIT,
         "defaults": {
             "facets": FACETS.show(DEFAULT_FACETS),
             "size": f"{DEFAULT_SIZE_MM:g}mm",
-            "machine": _default("firmware_profiles", DEFAULT_MACHINE),
-            "material": _default("materials", DEFAULT_MATERIAL),
         },
     }
-
-
-def _default(kind: Kind, usual: str) -> str:
-    """The person's own default, if it is known by its name: the page chooses by name."""
-    own = find_profile(kind, None).stem
-    return own if own in known_names(kind) else usual
 
 
 def _surface(entry: NamedSurface) -> dict[str, Any]:

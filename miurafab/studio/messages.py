@@ -101,4 +101,5 @@ def made_file(path: Path, *, download: bool) -> Response:
     headers = {"Content-Security-Policy": MADE_POLICY}
     if download:
         headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(path.name)}"
-    return Response(200, TYPES[path.suffix], path, headers)
+    kind = TYPES.get(path.suffix, "application/octet-stream")  # a browser guesses none (nosniff)
+    return Response(200, kind, path, headers)

@@ -21,6 +21,7 @@ from miurafab.studio.recipe import Value
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface
 from miurafab.surfaces.profile_files import LARGEST
 from miurafab.workflow.design import design
+from miurafab.workflow.drawings import read_formats
 from miurafab.workflow.image_targets import PARAMETERS as OF_IMAGE
 
 _LONGEST = 500
@@ -68,11 +69,17 @@ class FitOrder:
 
 @dataclass(frozen=True)
 class LayoutOrder:
-    """A layout for a shipped ``machine`` and ``material``, with options as in a design file."""
+    """A layout for a known ``machine`` and ``material``, with options as in a design file.
+
+    ``stock`` is the number of an uploaded file, empty for sheets of the bed's size; ``formats``
+    are drawings besides those that there always are, comma-separated.
+    """
 
     machine: str
     material: str
     options: Mapping[str, Value] = field(default_factory=dict)
+    stock: str = ""
+    formats: str = ""
 
 
 def read_fit(body: bytes) -> FitOrder:
@@ -152,7 +159,7 @@ def read_layout(body: bytes) -> LayoutOrder:
 
     Raises :class:`~miurafab.errors.InputError`.
     """
-    return _layout_of(read_order(body, ("machine", "material", "options")))
+    return _layout_of(read_order(body, ("machine", "material", "options", "stock", "formats")))
 
 
 def _layout_of(order: Mapping[str, Any]) -> LayoutOrder:
@@ -160,7 +167,13 @@ def _layout_of(order: Mapping[str, Any]) -> LayoutOrder:
     material = listed("material", order.get("material"), known_names("materials"))
     options = _options(order.get("options", {}), LAYOUT)
     read_options(LayoutOptions, options)
-    return LayoutOrder(machine, material, options)
+    stock = text_of("stock", order.get("stock", ""))
+    formats = text_of("formats", order.get("formats", ""))
+    return LayoutOrder(machine, material, options, stock, ",".join(read_formats(_parts(formats))))
+
+
+def _parts(text: str) -> list[str]:
+    return [part for part in text.split(",") if part]
 
 
 def _options(given: Any, fields: Mapping[str, Declared]) -> dict[str, Value]:

@@ -8,6 +8,10 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from miurafab.studio.orders import LayoutOrder
 
 PORT = "/dev/ttyUSB0"
 """The port in the command for cutting; readers put their own in its place."""
@@ -50,12 +54,11 @@ def check_command(file: str) -> str:
     return shlex.join(["miurafab", "check", file])
 
 
-def sheets_command(
-    file: str, name: str, machine: str, material: str, options: Mapping[str, Value]
-) -> str:
-    """``miurafab sheets`` with the options of the page."""
+def sheets_command(file: str, name: str, layout: LayoutOrder, options: Mapping[str, Value]) -> str:
+    """``miurafab sheets`` for ``layout``, with its ``options`` as the command line writes them."""
     words = ["miurafab", "sheets", file, "-o", job_name(name)]
-    words += ["--machine", machine, "--material", material, *_words(options)]
+    words += ["--machine", layout.machine, "--material", layout.material, *_words(options)]
+    words += ["--formats", layout.formats] if layout.formats else []
     return shlex.join(words)
 
 

@@ -22,7 +22,7 @@ from miurafab.studio.form import LABELS, by_label
 from miurafab.studio.names import safe_stem, suffix_of
 from miurafab.studio.orders import FitOrder, LayoutOrder
 from miurafab.studio.report_text import headline, layout_lines, pattern_lines
-from miurafab.studio.source import PATTERN_SUFFIX, Source, kind_of
+from miurafab.studio.source import PATTERN_SUFFIX, Source, kind_of, require_stock
 from miurafab.studio.work import Order
 from miurafab.studio.worker import News, Running
 from miurafab.surfaces.height_field import IMAGE_SUFFIXES
@@ -84,7 +84,8 @@ class Bench:
         """Keep an uploaded file. Raises :class:`~miurafab.errors.InputError`."""
         suffix = suffix_of(name)
         kind = kind_of(Path(f"file{suffix}"))
-        if kind in (None, "design"):
+        kind = "stock" if kind == "design" else kind  # the browser sends no designs
+        if kind is None:
             known = ", ".join((*MESH_SUFFIXES, PACKED, *IMAGE_SUFFIXES, PATTERN_SUFFIX))
             raise InputError(f"'{name[-60:]}' cannot be opened here; known files are {known}.")
         if not content:
@@ -97,6 +98,8 @@ class Bench:
         file = f"{safe_stem(name)}{suffix}"
         path = self._new_folder(number) / file
         write_bytes(path, content)
+        if kind == "stock":
+            require_stock(path)
         return self._keep(Source(number, kind, path, file))
 
     def add_own(self, path: Path, kind: str) -> Source:
@@ -191,8 +194,16 @@ class Bench:
             file=file,
             machine=asked.machine,
             material=asked.material,
-            options=asked.options,
+            options=self.laid_by(asked),
+            formats=asked.formats,
         )
+
+    def laid_by(self, asked: LayoutOrder, *, shown: bool = False) -> dict[str, recipe.Value]:
+        """The options of a layout with the file of its stock, or its name as it is ``shown``."""
+        if not asked.stock:
+            return {**asked.options}
+        stock = self._source(asked.stock, ("stock",))
+        return {**asked.options, "stock": stock.shown if shown else str(stock.path)}
 
     def cancel(self) -> None:
         """End the task; earlier results and finished parts stay."""
@@ -234,7 +245,7 @@ class Bench:
         layout: dict[str, Any] = {}
         if asked.layout is not None:
             layout = {"machine": asked.layout.machine, "material": asked.layout.material}
-            layout |= asked.layout.options
+            layout |= self.laid_by(asked.layout, shown=True)
         return recipe.design_text(self.pattern["name"], asked.target, asked.options, layout)
 
     def state(self) -> dict[str, Any]:
@@ -300,7 +311,7 @@ class Bench:
         assert self._asked.layout is not None
         layout, name = self._asked.layout, task.order.name
         sheets = recipe.sheets_command(
-            self._asked.file, name, layout.machine, layout.material, layout.options
+            self._asked.file, name, layout, self.laid_by(layout, shown=True)
         )
         pictures = {str(n): file for n, file in enumerate(part["pictures"])}
         self.job = {
@@ -310,6 +321,7 @@ class Bench:
             "doubts": self._doubts(),
             "findings": self.plain_findings(part.get("findings", [])),
             "files": self._put_down(task.id, part["files"]),
+            "every": self._put_down(task.id, {file: file for file in part["every"]}),
             "pictures": list(self._put_down(task.id, pictures).values()),
             "command": recipe.both(self._asked.command, sheets, sound=not self._doubts()),
             "cut": recipe.cut_command(name),

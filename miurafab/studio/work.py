@@ -58,6 +58,7 @@ class Order:
     machine: str = ""
     material: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
+    formats: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """The order as JSON for another process."""
@@ -163,7 +164,8 @@ def _sheets(order: Order, tell: Tell) -> None:
     made = miurafab.sheets(
         order.file, order.machine, order.material, on_progress=progress, **order.options
     )
-    job = made.write(directory, on_progress=_progress(tell, 0.6, 0.9))
+    formats = order.formats or ()
+    job = made.write(directory, formats=formats, on_progress=_progress(tell, 0.6, 0.9))
     tell({"progress": 0.9, "note": "drawing the sheets"})
     tabs = tuple(seam_tabs(made.layout, made.pattern))
     shown = Preview(order.name, job.machine, job.dry_runs, None, (), tabs)
@@ -183,6 +185,7 @@ def _sheets(order: Order, tell: Tell) -> None:
             "findings": findings_json(job.findings),
             "files": {"zip": packed, "guide": GUIDE, "page": page},
             "pictures": pictures,
+            "every": [f"{directory.name}/{path.name}" for path in sorted(directory.iterdir())],
         }
     )
 

@@ -97,7 +97,7 @@ def test_the_catalogue_is_what_the_commands_list(tmp_path):
     assert named["cylinder"]["turned"]
     assert not named["hypar"]["turned"]
     assert "grbl-laser-400" in {machine["name"] for machine in found["machines"]}
-    assert found["defaults"]["material"] in {material["name"] for material in found["materials"]}
+    assert found["material"] in {material["name"] for material in found["materials"]}
 
 
 def test_a_fit_is_followed_and_ends_in_an_error(asked):
@@ -291,7 +291,7 @@ def test_a_pattern_of_the_browser_reads_no_other_file(done, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["x.toml", "x.nc", "x", "", "x.stl.exe", "%00.py", "x.gz", "x.exe.gz", "x.fold.gz"]
+    "name", ["x.nc", "x", "", "x.stl.exe", "%00.py", "x.gz", "x.exe.gz", "x.fold.gz"]
 )
 def test_other_files_are_not_taken(asked, name):
     assert "known files are" in sentence(asked.upload(name, b"content"))

@@ -118,7 +118,7 @@ def test_command_lines():
             options={"two_sided": True, "full_facet": False, "quantity": "2", "gap": "3mm"},
         )
     )
-    assert sheets_command("a b.fold", "a-b", layout.machine, layout.material, layout.options) == (
+    assert sheets_command("a b.fold", "a-b", layout, layout.options) == (
         "miurafab sheets 'a b.fold' -o a-b-job --machine grbl-laser-400 --material card-250 "
         "--two-sided --quantity 2 --gap 3mm"
     )

@@ -4,7 +4,7 @@
 import { texts } from "./texts.js";
 import { byId, element, say } from "./tools.js";
 
-const { shape, words } = texts;
+const { layout, shape, words } = texts;
 
 let catalogue;
 let sourcesNow = [];
@@ -15,8 +15,12 @@ export function fillForms(given) {
   byId("version").textContent = given.version;
   byId("facets").value = defaults.facets;
   byId("size").value = defaults.size;
-  options(byId("machine"), given.machines, first?.machine ?? defaults.machine);
-  options(byId("material"), given.materials, first?.material ?? defaults.material);
+  profileOptions(byId("machine"), given.machines, first?.machine ?? given.machine);
+  profileOptions(byId("material"), given.materials, first?.material ?? given.material);
+  byId("profile-faults").replaceChildren(...given.faults.map((text) => element("li", { textContent: text })));
+  byId("formats").append(...given.formats.map((name) => element(
+    "label", { className: "check" }, element("input", { type: "checkbox", value: name }), name,
+  )));
   byId("file").accept = given.file_suffixes.join(",");
   byId("file-help").textContent = say(shape.files, { suffixes: given.file_suffixes.join(" "), limit: given.file_limit >> 20 });
   byId("target").addEventListener("change", () => showTarget());
@@ -25,17 +29,39 @@ export function fillForms(given) {
   else showTarget();
 }
 
-function options(select, entries, chosen) {
-  select.append(...entries.map(({ name, title }) => (
+const group = (label, entries) => (entries.length ? [element("optgroup", { label }, ...entries)] : []);
+
+/** Machines or materials: the person's own before those that came with miurafab. */
+export function profileOptions(select, entries, chosen) {
+  const made = (own) => entries.filter((each) => each.own === own).map(({ name, title }) => (
     element("option", { value: name, textContent: title, selected: name === chosen })
-  )));
+  ));
+  select.append(...group(words.your_own, made(true)), ...group(words.shipped, made(false)));
+}
+
+/** The stock files that were brought, beside sheets of the bed's size. */
+function showStocks(sources, chosen) {
+  const select = byId("stock");
+  const before = chosen ?? select.value;
+  select.replaceChildren(
+    element("option", { value: "", textContent: layout.bed_sheets }),
+    ...sources.map(({ id, name }) => element("option", { value: id, textContent: name })),
+  );
+  select.value = before;
+  if (select.selectedIndex < 0) select.value = "";
 }
 
 /** The list of targets: the built-in ones, and files that can be fitted or opened. */
-export function showSources(sources, chosen) {
+export function showSources(all, chosen) {
+  const stocks = all.filter(({ kind }) => kind === "stock");
+  const stock = stocks.find(({ id }) => id === chosen);
+  showStocks(stocks, stock?.id);
+  showTargets(all.filter(({ kind }) => kind !== "stock"), stock ? undefined : chosen);
+}
+
+function showTargets(sources, chosen) {
   const select = byId("target");
   const before = chosen ? `source:${chosen}` : select.value;
-  const group = (label, entries) => (entries.length ? [element("optgroup", { label }, ...entries)] : []);
   select.replaceChildren(
     ...group(shape.your_files, sources.map(({ id, name, kind }) => (
       element("option", { value: `source:${id}`, textContent: kind === "pattern" ? say(shape.pattern_file, { name }) : name })
@@ -113,6 +139,8 @@ export function fitOrder() {
 export function layoutOrder() {
   return {
     machine: byId("machine").value, material: byId("material").value, options: values("layout-options"),
+    stock: byId("stock").value,
+    formats: [...byId("formats").querySelectorAll(":checked")].map(({ value }) => value).join(","),
   };
 }
 

@@ -1,6 +1,7 @@
 // The tab Machine: asks for the state of the session several times a second, and shows it. A state
 // that is not asked for is not shown as true: an answer that is late greys it out.
 
+import { profileOptions } from "./choices.js";
 import { mark, setSheet } from "./sheet.js";
 import { ask, byId, element } from "./tools.js";
 
@@ -323,10 +324,8 @@ function listen() {
 
 export function beginMachine(catalogue, onFault) {
   fault = onFault;
-  const { machines, steps, defaults, first } = catalogue;
-  byId("desk-machine").append(...machines.map(({ name, title }) => (
-    element("option", { value: name, textContent: title, selected: name === (first?.machine ?? defaults.machine) })
-  )));
+  const { machines, steps, machine, first } = catalogue;
+  profileOptions(byId("desk-machine"), machines, first?.machine ?? machine);
   byId("steps-mm").append(...steps.map((value) => {
     const button = element("button", { type: "button", value, textContent: value });
     button.setAttribute("role", "radio");

@@ -70,8 +70,14 @@ export function showJob(job, pattern) {
   byId("job-downloads").replaceChildren(
     download(layout.save_job, `${files.zip}?save`),
     download(layout.save_guide, `${files.guide}?save`),
+    ...Object.entries(job.every).filter(([name]) => name.endsWith("/assembly.html")).map(([, address]) => (
+      download(layout.save_guide_page, `${address}?save`)
+    )),
     download(shape.save_pattern, `${pattern.files.fold}?save`),
   );
+  byId("every").replaceChildren(...Object.entries(job.every).map(([name, address]) => element(
+    "li", {}, element("a", { href: `${address}?save`, download: "", textContent: name.split("/").at(-1) }),
+  )));
   const warnings = [...job.doubts, ...job.findings.map(({ sentence }) => sentence)];
   byId("warnings").hidden = warnings.length === 0;
   byId("warnings").lastElementChild.replaceChildren(...items(warnings));

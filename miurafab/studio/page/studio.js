@@ -131,10 +131,12 @@ function listen() {
     turnTo("layout");
     byId("layout-tab").focus();
   });
-  byId("file").addEventListener("change", ({ target }) => {
-    if (target.files.length) open(target.files[0]);
-    target.value = "";
-  });
+  for (const id of ["file", "stock-file"]) {
+    byId(id).addEventListener("change", ({ target }) => {
+      if (target.files.length) open(target.files[0]);
+      target.value = "";
+    });
+  }
   for (const button of document.querySelectorAll("[data-copy]")) {
     button.addEventListener("click", () => copy(button));
   }

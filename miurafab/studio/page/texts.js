@@ -22,6 +22,8 @@ export const texts = {
     "as_in_file": "as in its file",
     "as_it_says": "as it says",
     "copied": "Copied",
+    "your_own": "Your own",
+    "shipped": "Shipped",
     "sheet_number": "Sheet {number}"
   },
   "frame": {
@@ -108,6 +110,12 @@ export const texts = {
     "none": "Fit or open a pattern first."
   },
   "layout": {
+    "stock": "Stock",
+    "open_stock": "Open a stock file…",
+    "stock_help": "A .toml with the sheets that you have: sizes, quantities, defects.",
+    "bed_sheets": "sheets of the bed's size",
+    "more_drawings": "More drawings of the sheets",
+    "every_file": "Every file of the job",
     "machine_and_material": "Machine and material",
     "more": "More about the sheets",
     "lay_out": "Lay out",
@@ -121,7 +129,8 @@ export const texts = {
     "hint_ready": "Choose a machine and a material, and lay the pattern out.",
     "hint_none": "Fit or open a pattern first.",
     "save_job": "Job .zip",
-    "save_guide": "Assembly guide .pdf"
+    "save_guide": "Assembly guide .pdf",
+    "save_guide_page": "Guide as a page .html"
   },
   "machine": {
     "stay": "Stay beside a laser that is on, with an extinguisher at hand. The practice machine needs none.",
