@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -45,6 +46,7 @@ class Task:
     note: str = ""
     error: str = ""
     cancelled: bool = False
+    began: float = field(default_factory=time.monotonic)
 
 
 @dataclass(frozen=True)
@@ -262,6 +264,7 @@ class Bench:
                 "running": task.running is not None,
                 "fraction": task.fraction,
                 "note": task.note,
+                "seconds": round(time.monotonic() - task.began, 1),
                 "error": task.error,
                 "cancelled": task.cancelled,
             },

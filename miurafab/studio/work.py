@@ -84,6 +84,7 @@ def _place(order: Order, tell: Tell) -> None:
 
 
 def _fit(order: Order, tell: Tell) -> None:
+    tell({"progress": 0.0, "note": "reading the target"})
     wanted = miurafab.design(order.target, **order.options)
     result = miurafab.fit(wanted, on_progress=_progress(tell, 0.0, _FITTING))
     part = {

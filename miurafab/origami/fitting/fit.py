@@ -49,6 +49,8 @@ TOO_FAR = 1.2
 """A size whose first sheets miss a limit on the distance by this factor is too coarse."""
 FAR = 4.0
 """The plain search goes on while the deviation is over this many times that of a good sheet."""
+USUAL_STEPS = 30
+"""The steps of the fair objective in which two thirds of an attempt are told as done."""
 GLANCES = 6
 """So many starts a coarse fit makes at most, if none is a clean sheet."""
 
@@ -135,6 +137,7 @@ class _FitSearch:
         self.made: list[Attempt] = []
         self.best: Candidate | None = None
         self.nearest = math.inf
+        self.trying, self.before, self.steps = "", 0, 0
 
     def result(self) -> FitResult:
         """Run to the end, the time limit or Ctrl-C."""
@@ -186,7 +189,7 @@ class _FitSearch:
                     return
                 best = min(best or (made.rank, start), (made.rank, start), key=lambda pair: pair[0])
         if best is not None and not self.request.is_tube and self.request.polish == "on":
-            yield from polished(self.request, best[1], self._check_time)
+            yield from polished(self.request, best[1], self._step)
 
     def _pieces(self) -> tuple[int, ...]:
         request = self.request
@@ -243,7 +246,7 @@ class _FitSearch:
                 return
             self._tell(start)
             shaken = start.shaken(request.seed) if request.seed else start
-            yield from polished(request, shaken, self._check_time)
+            yield from polished(request, shaken, self._step)
             if self._settled() or (large and self._one_will_do()) or self._too_far():
                 return
 
@@ -258,9 +261,19 @@ class _FitSearch:
 
     def _tell(self, start: Start) -> None:
         self._check_time()
+        self.trying, self.before, self.steps = start.describe(), len(self.made), 0
         if self.on_progress is not None:
             # the number of attempts is not known beforehand; most sheets need one or two
-            self.on_progress(1 - 0.8 ** len(self.made), start.describe())
+            self.on_progress(1 - 0.8**self.before, self.trying)
+
+    def _step(self, _number: int, objective: float) -> None:
+        """A step of the fair objective: a part of an attempt, the less the more there were."""
+        self._check_time()
+        self.steps += 1
+        if self.on_progress is not None:
+            part = 1 - math.exp(-self.steps / USUAL_STEPS)
+            note = f"{self.trying}, step {self.steps}, objective {objective:.3g}"
+            self.on_progress(1 - 0.8 ** (self.before + part), note)
 
     def _measured(self, best: Candidate) -> Measurements:
         return best.with_distances()

@@ -58,13 +58,14 @@ def plain(request: FitRequest, start: Start) -> Candidate | Attempt:
 
 
 def polished(
-    request: FitRequest, start: Start, on_step: Callable[[], None] | None = None
+    request: FitRequest, start: Start, on_step: Callable[[int, float], None] | None = None
 ) -> Iterator[Candidate | Attempt]:
     """The fair sheets of ``start``, each better than the one before unless it crosses itself.
 
     The first round leaves all limits but that on the distance out. Where it misses one of them, the
     next rounds go on from there within the limits, at the scale that the last round left.
-    ``on_step`` is called before each step, and may end the search by an exception.
+    ``on_step`` gets the number and the objective of each step, and may end the search by an
+    exception.
     """
     unknowns = start.unknowns
     unlimited = replace(
@@ -75,7 +76,7 @@ def polished(
         max_aspect=None,
         flat_foldable=0.0 if request.exactly_flat_foldable else None,
     )
-    tick, solver = _ticking(on_step), SymmetricSolver()
+    solver = SymmetricSolver()
     x, iterations, scale = start.x, 0, _scale_of(request, start)
     excess = np.inf
     aim = (1 - REACH_MARGIN) * (request.max_distance_mm or np.inf)
@@ -97,7 +98,7 @@ def polished(
                 steps=steps,
                 penalty=penalty,
                 solver=solver,
-                on_step=tick,
+                on_step=on_step,
             )
             x, feet = sheet.x, sheet.feet
             iterations += sheet.steps
@@ -130,10 +131,6 @@ def polished(
 
 def _too_far(sheet: Candidate) -> bool:
     return any(fault.code == "max-distance" for fault in sheet.faults)
-
-
-def _ticking(on_step: Callable[[], None] | None) -> Callable[[int, float], None] | None:
-    return None if on_step is None else lambda _number, _value: on_step()
 
 
 def _scale_of(request: FitRequest, start: Start) -> float:

@@ -23,8 +23,9 @@ function show(state) {
   const running = Boolean(task?.running);
   byId("task").hidden = !running;
   if (running) {
+    const { kind, note, seconds } = task;
     byId("task-note").textContent = say(
-      task.note ? texts.frame.task : texts.frame.task_begins, { doing: DOING[task.kind], note: task.note },
+      note ? texts.frame.task : texts.frame.task_begins, { doing: DOING[kind], note, seconds: seconds.toFixed(0) },
     );
     // nothing is known of how long it takes before the first step is done
     if (task.fraction > 0) byId("task-bar").value = task.fraction;

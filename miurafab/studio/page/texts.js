@@ -38,8 +38,8 @@ export const texts = {
     "fitting": "Fitting",
     "opening": "Opening",
     "laying_out": "Laying out",
-    "task": "{doing}: {note}",
-    "task_begins": "{doing}…"
+    "task": "{doing}: {note} · {seconds} s",
+    "task_begins": "{doing}… {seconds} s"
   },
   "enter": {
     "title": "Enter the studio",

@@ -264,11 +264,11 @@ def test_requests_that_make_no_sense_name_the_option(changes: dict[str, object],
 
 
 def interrupting(calls: int) -> Callable[[float, str], None]:
-    """A progress callback in which Ctrl-C comes once, after so many calls."""
+    """A progress callback in which Ctrl-C comes once, after so many calls between two steps."""
     left = iter([*[False] * calls, True])
 
     def on_progress(fraction: float, note: str) -> None:
-        if next(left, False):
+        if ", step " not in note and next(left, False):
             raise KeyboardInterrupt
 
     return on_progress
@@ -286,3 +286,16 @@ def test_ctrl_c_leaves_the_best_sheet_up_to_then(searches: bool) -> None:
     assert "interrupted" in result.advice
     assert result.pattern is not None
     assert max(result.measurements.max_planarity, result.measurements.max_developability) < 1e-9
+
+
+@pytest.mark.parametrize("target", ["hypar", "vase"])
+def test_the_progress_of_a_fit_moves_with_each_step_and_never_back(target) -> None:
+    told: list[tuple[float, str]] = []
+    fit(request(target, 6, 6), lambda fraction, note: told.append((fraction, note)))
+    fractions = [fraction for fraction, _ in told]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    assert len(set(fractions)) > 10
+    steps = [float(note.rpartition(" ")[2]) for _, note in told if "objective" in note]
+    assert len(steps) > 10
+    assert steps[-1] < steps[0]
