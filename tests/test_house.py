@@ -24,7 +24,12 @@ HOMES = {
 """Each library is imported only below its paths."""
 MOST_LINES = 400
 FLAG = re.compile(r"(?<![\w-])--[a-z]{2,}")
-WRITE_COMMANDS = ("errors.py", "studio/recipe.py", "fabrication/drawing/calibration_guide.py")
+WRITE_COMMANDS = (
+    "errors.py",
+    "studio/recipe.py",
+    "fabrication/drawing/calibration_guide.py",
+    "workflow/doctor.py",
+)
 """Below ``cli``, these spell options for it, or write whole command lines for a person to type."""
 
 ONE_SYSTEM = {
