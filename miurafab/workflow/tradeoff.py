@@ -13,7 +13,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -257,6 +257,24 @@ def _on_cluster(jobs: list[Job], address: str) -> Iterator[Sample]:
     with client:
         if not client.scheduler_info()["workers"]:
             raise InputError(f"The cluster at {address} has no workers; start one and try again.")
-        for future in client.map(sample, jobs, pure=False):
+        yield from _results(client.map(sample, jobs, pure=False), address)
+
+
+def _results(futures: Iterable[Any], address: str) -> Iterator[Sample]:
+    """The results in their order. A fit whose worker dies is made again by another worker."""
+    lost: Any = importlib.import_module("distributed.client").FutureCancelledError
+    killed: Any = importlib.import_module("distributed.scheduler").KilledWorker
+    for future in futures:
+        try:
             found: Sample = future.result()
-            yield found
+        except ImportError as fault:
+            raise InputError(
+                f"The workers of the cluster at {address} cannot load miurafab: {fault}. Install "
+                "it there, in this version."
+            ) from None
+        except (lost, killed) as fault:
+            raise InputError(
+                f"The cluster at {address} lost its workers or its scheduler in mid-run "
+                f"({type(fault).__name__}); start them anew, with more memory if they need it."
+            ) from None
+        yield found

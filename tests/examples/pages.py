@@ -9,7 +9,7 @@ A page is a Markdown file. Its fenced blocks are examples:
 ``usage``   how a command is called; each word of it must be known to the command line
 ``console`` what a terminal shows, made by ``tables.py``
 ``toml``    with ``<!-- file: NAME -->`` before it: put into the page's folder under that name;
-            ``csv`` likewise
+            ``csv`` and ``yaml`` likewise
 
 A comment before a block directs it: ``<!-- file: NAME -->``, ``<!-- exit 1 -->`` for commands that
 end with another code than 0, and ``<!-- not run: REASON -->``.
