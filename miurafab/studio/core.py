@@ -60,21 +60,27 @@ from miurafab.studio.own_things import own_things
 from miurafab.studio.session import Bench
 from miurafab.studio.source import DESIGN_SUFFIX, PATTERN_SUFFIX
 from miurafab.studio.texts import with_texts
+from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
 from miurafab.surfaces.catalogue import CATALOGUE, NamedSurface, make_surface
 from miurafab.surfaces.height_field import IMAGE_SUFFIXES
 from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED
+from miurafab.surfaces.surface import TargetSurface
 from miurafab.workflow.at_machine import STEPS
 from miurafab.workflow.design import can_close
 from miurafab.workflow.drawings import FORMATS
 from miurafab.workflow.image_targets import PARAMETERS as OF_IMAGE
+from miurafab.workflow.page import SCENE
 
 PAGE, MACHINE, LIVE, TARGET = "studio.html", "machine", "live", "target"
 PARTS = (
     *("icon.svg", "studio.css", "machine.css", "tools.js", "choices.js", "results.js"),
     *("folding.js", "live.js", "machine.js", "sheet.js", "sketch.js", "sliders.js", "studio.js"),
     "texts.js",
+    *("target.js", "target_scene.js", "layout_map.js", "profile.js", *SCENE),
 )
 """The files of the page, beside the page itself."""
+DRAWN_FROM = 5
+"""Points with which the drawing of a profile begins."""
 
 
 class Studio:
@@ -101,6 +107,7 @@ class Studio:
         self._lock = threading.Lock()
         self._first = first
         self._page = resources.files(__package__).joinpath("page")
+        self._scene = resources.files("miurafab.workflow.page")
         self._catalogue = _catalogue()
 
     def handle(self, request: HttpRequest) -> Response:
@@ -219,7 +226,8 @@ class Studio:
     def _get(self, route: str, query: str) -> Response:
         if route in ("", *PARTS):
             name = route or PAGE
-            content = self._page.joinpath(name).read_bytes()
+            folder = self._scene if name in SCENE else self._page
+            content = folder.joinpath(name).read_bytes()
             if name == PAGE:
                 content = filled(with_texts(content.decode())).encode()
             return own_file(name, content)
@@ -278,13 +286,22 @@ def _catalogue() -> dict[str, Any]:
     }
 
 
+def _profile(axes: str, surface: TargetSurface) -> dict[str, Any]:
+    """Where the drawing of a profile begins: a few points of the surface's own."""
+    assert isinstance(surface, Revolution | GeneralizedCylinder)
+    return {"axes": axes, "points": surface.profile.evenly(DRAWN_FROM).round(3).tolist()}
+
+
 def _surface(entry: NamedSurface) -> dict[str, Any]:
     surface, values = make_surface(entry.name, {})
     return {
         "name": entry.name,
         "summary": entry.summary,
-        "formulas": entry.formulas,
-        "profile": entry.profile_axes,
+        "formulas": [
+            {"key": key, "meaning": meaning, "default": values.get(key, "")}
+            for key, meaning in entry.formulas.items()
+        ],
+        "profile": entry.profile_axes and _profile(entry.profile_axes, surface),
         "parameters": [
             {
                 "key": key,

@@ -2,6 +2,7 @@
 
 A sentence names an option in backquotes and a value beside it ("`holes` keep cuts the sheet along
 it"). Where the option has a field on the page and takes that value, the page offers it as a button.
+Poles have no value in a sentence: they are picked on the target.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ def mends(sentence: str) -> list[dict[str, Any]]:
         value = word.rstrip(".,")
         if name in FIT and _taken(name, value):
             found.append({"option": name, "value": value})
+    if "`poles`" in sentence:
+        found.append({"option": "poles", "value": None})
     return found
 
 

@@ -46,9 +46,12 @@ AT_ONCE = 4 * 2**20
 _NEAR = 6
 """Facets over whose deviations the colour of a place is a mean."""
 
-SHAPING = ("close", "facets", "poles", "polar_hole", "side", "holes", "pieces", "profile")
-"""What decides what the target is and how it is parted. ``region`` and ``rotate`` are
-left to the page, which knows the layout."""
+SHAPING = (
+    *("close", "facets", "poles", "polar_hole", "side", "holes", "pieces", "profile"),
+    *("region", "rotate"),
+)
+"""What decides what the target is and how it is parted. The page knows the layout, and so gives
+``region`` and ``rotate`` only where it wants to know what fits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,8 +177,12 @@ def compared(pattern: CreasePattern, surface: TargetSurface) -> dict[str, Any]:
     weight = 1 / np.maximum(apart, 1e-9 * float(np.ptp(means, axis=0).max())) ** 2
     there = (weight * deviation[nearest]).sum(axis=1) / weight.sum(axis=1)
     missed = uncovered(pattern, surface.tiles(), corners.mean(axis=1))
+    where = {"edge": pattern.target.get("edge", "")}
+    if "rectangle" in pattern.target:
+        where |= {"angle": pattern.target["rotate"], "rectangle": pattern.target["rectangle"]}
     return {
         **found.picture(),
+        **where,
         "scale": pattern.scale,
         "deviation": _packed(there, np.float32),
         "missed": _packed(missed, np.uint8),

@@ -10,9 +10,14 @@ import pytest
 from miurafab.studio import entrance
 from miurafab.studio.core import PARTS
 from miurafab.studio.texts import texts, with_texts
+from miurafab.workflow.page import SCENE
 
 PAGE = resources.files("miurafab.studio").joinpath("page")
-SCRIPTS = [name for name in (*PARTS, "enter.js") if name.endswith(".js") and name != "texts.js"]
+SCRIPTS = [
+    name
+    for name in (*PARTS, "enter.js")
+    if name.endswith(".js") and name not in ("texts.js", *SCENE)
+]
 PAGES = ("studio.html", "enter.html")
 KNOWN = {f"{group}.{name}" for group, words in texts().items() for name in words}
 NAMES = {"miurafab", "studio", "miurafab studio", "$$", ""}

@@ -57,9 +57,10 @@ def without_flat_edges(pattern: CreasePattern) -> Dissolved:
 
     A fitted sheet keeps its facets, as does a part in which a crease ends inside the joined facet.
     """
-    everything = [np.arange(len(a)) for a in (pattern.vertices_coords, pattern.edges_vertices)]
+    vertices, edges = (np.arange(len(a)) for a in (pattern.vertices_coords, pattern.edges_vertices))
     none = np.empty(0, dtype=np.int64)
-    same = Dissolved(pattern, pattern, *everything, none, none.reshape(0, 3), none.reshape(0, 3))
+    corners, places = none.reshape(0, 3), np.empty((0, 3))
+    same = Dissolved(pattern, pattern, vertices, edges, none, corners, places)
     if pattern.grid is not None or pattern.cells is not None:
         return same
     part = _parts(pattern)

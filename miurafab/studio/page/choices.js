@@ -1,13 +1,16 @@
 // The forms: surfaces, machines and materials filled in from the catalogue, all read back as orders.
 // Values stay as they were written.
 
+import { drawnProfile, offerProfile } from "./profile.js";
 import { texts } from "./texts.js";
 import { byId, element, say } from "./tools.js";
 
 const { layout, shape, words } = texts;
 
 let catalogue;
+const OF_ONE_MESH = ["region", "rotate", "poles", "polar_hole"];
 let sourcesNow = [];
+let shown = ""; // the target whose rows the form has
 
 export function fillForms(given) {
   catalogue = given;
@@ -23,9 +26,11 @@ export function fillForms(given) {
   )));
   byId("file").accept = given.file_suffixes.join(",");
   byId("file-help").textContent = say(shape.files, { suffixes: given.file_suffixes.join(" "), limit: given.file_limit >> 20 });
-  byId("target").addEventListener("change", () => showTarget());
+  for (const kind of ["input", "change"]) { // a browser tells of both, the form hears the first
+    byId("target").addEventListener(kind, () => { if (byId("target").value !== shown) showTarget(); });
+  }
   showSources([]);
-  if (first?.surface) showTarget(`surface:${first.surface}`, first.parameters);
+  if (first?.surface) showTarget(`surface:${first.surface}`, first.parameters, first.profile);
   else showTarget();
 }
 
@@ -83,25 +88,39 @@ function chosenTarget() {
     : { source: sourcesNow.find((each) => each.id === name) };
 }
 
-function showTarget(value, parameters = {}) {
+/** What may be given of a target: its formulas, its numbers, those of an image. */
+function given({ surface, source }) {
+  const image = source?.kind === "image" ? Object.entries(catalogue.of_image) : [];
+  return [
+    ...(surface?.formulas ?? []).map((each) => ({ ...each, unit: "", wide: true })),
+    ...(surface?.parameters ?? []),
+    ...image.map(([key, meaning]) => ({ key, meaning, unit: "", default: "" })),
+  ];
+}
+
+function showTarget(value, parameters = {}, profile = null) {
   if (value) byId("target").value = value;
+  if (shown !== byId("target").value) for (const name of OF_ONE_MESH) byId(name).value = "";
+  shown = byId("target").value;
   const { surface, source } = chosenTarget();
   const pattern = source?.kind === "pattern";
   byId("summary").textContent = surface ? `${capital(surface.summary)}.` : {
     mesh: shape.of_mesh,
+    image: shape.of_image,
     design: shape.of_design,
     pattern: shape.of_pattern,
   }[source.kind];
-  byId("parameters").replaceChildren(...(surface?.parameters ?? []).map((each) => {
+  byId("parameters").replaceChildren(...given({ surface, source }).map((each) => {
     const id = `parameter-${each.key}`;
     const text = parameters[each.key] ?? `${each.default}${each.unit}`;
     return element(
-      "div", { className: "row" },
+      "div", { className: each.wide ? "row wide" : "row" },
       element("label", { htmlFor: id }, capital(each.key), element("small", { textContent: each.meaning })),
       element("input", { id, name: each.key, value: text, autocomplete: "off", spellcheck: false }),
     );
   }));
-  byId("close-row").hidden = Boolean(surface && !surface.turned) || source?.kind === "mesh";
+  offerProfile(surface, profile);
+  byId("close-row").hidden = Boolean(surface && !surface.turned) || ["mesh", "image"].includes(source?.kind);
   byId("mesh-options").hidden = !["mesh", "design"].includes(source?.kind);
   byId("sheet-options").hidden = pattern;
   byId("fit").textContent = pattern ? shape.open : shape.fit;
@@ -127,11 +146,15 @@ export function tooLarge(file) {
 export function fitOrder() {
   const { surface, source } = chosenTarget();
   if (source?.kind === "pattern") return ["open", { source: source.id }];
-  const target = source ? { source: source.id } : { surface: surface.name, parameters: {} };
-  for (const { key, unit, default: usual } of surface?.parameters ?? []) {
+  const parameters = {};
+  for (const { key, unit, default: usual } of given({ surface, source })) {
     const value = byId(`parameter-${key}`).value.trim();
-    if (value && value !== `${usual}${unit}`) target.parameters[key] = value;
+    if (value && value !== `${usual}${unit}`) parameters[key] = value;
   }
+  const target = source ? { source: source.id } : { surface: surface.name };
+  if (surface || source.kind === "image") target.parameters = parameters;
+  const profile = surface && drawnProfile();
+  if (profile) target.profile = profile;
   return ["fit", { target, options: values("sheet-options") }];
 }
 
@@ -159,8 +182,7 @@ export function restoreForm({ target, source, options = {} }) {
   const file = source ?? target.source;
   byId("target").value = file ? `source:${file}` : `surface:${target.surface}`;
   if (byId("target").selectedIndex < 0) return;
-  showTarget();
-  for (const [key, value] of Object.entries(target?.parameters ?? {})) byId(`parameter-${key}`).value = value;
+  showTarget("", target?.parameters, target?.profile);
   for (const field of byId("sheet-options").querySelectorAll("input[name], select[name]")) {
     if (field.type === "checkbox") field.checked = Boolean(options[field.name]);
     else field.value = options[field.name] ?? "";

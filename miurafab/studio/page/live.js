@@ -6,6 +6,7 @@ import { fitOrder, layoutOrder, restoreForm } from "./choices.js";
 import { showTerms } from "./results.js";
 import { beginSketch, sketch } from "./sketch.js";
 import { beginSliders, placeSliders } from "./sliders.js";
+import { seeTarget } from "./target.js";
 import { texts } from "./texts.js";
 import { ask, byId, element, say } from "./tools.js";
 
@@ -194,6 +195,7 @@ export function changed() {
   refused = "";
   clearTimeout(resting);
   resting = setTimeout(rest, REST_MS);
+  seeTarget();
   show();
   if (follows()) pump();
 }

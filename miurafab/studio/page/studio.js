@@ -4,7 +4,9 @@ import { fillForms, layoutOrder, restoreForm, showSources, tooLarge } from "./ch
 import { showFolding } from "./folding.js";
 import { beginLive, changed, fitNow, followLive, restLive } from "./live.js";
 import { beginMachine, offerJob } from "./machine.js";
+import { beginProfile } from "./profile.js";
 import { showJob, showPattern } from "./results.js";
+import { beginTarget, followTarget } from "./target.js";
 import { texts } from "./texts.js";
 import { ask, byId, copy, say } from "./tools.js";
 
@@ -38,6 +40,7 @@ function show(state) {
   told = names;
   if (!running && task?.error) fault(task.error);
   followLive(state);
+  followTarget(state);
 }
 
 function fault(sentence) {
@@ -172,7 +175,9 @@ async function begin() {
     told = JSON.stringify(sources);
     showSources(sources, catalogue.first?.source);
     if (pattern) restoreForm(pattern.form);
+    beginProfile(changed);
     beginLive(catalogue, { asks: order });
+    beginTarget();
     await follow();
   } catch (error) {
     fault(error.message);
