@@ -17,13 +17,14 @@ A ``FrontalPlan`` depends on the pattern alone and serves all matrices of that p
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg.blas import dsyrk, dtrsm
+from scipy.linalg.blas import dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
 from miurafab.geometry.arrays import Floats, Ints, places_in_runs
@@ -148,19 +149,24 @@ class FrontalFactor:
     def solve(self, rhs: NDArray[Any], /) -> Floats:
         """The solution (n,) or (n, m) for the right-hand side ``rhs`` of the same shape."""
         order, fronts = self._plan.order, self._plan.fronts
-        right = np.asarray(rhs, dtype=np.float64)
-        x = (right if right.ndim == 2 else right[:, None])[order]
+        x = np.asarray(rhs, dtype=np.float64)[order]
+        # for one column dtrsv costs two thirds of dtrsm
+        forth, back = (_FORTH, _BACK) if x.ndim == 1 else (_FORTH_ALL, _BACK_ALL)
         for front, lower, panel in zip(fronts, self._pivots, self._panels, strict=True):
-            own = dtrsm(1.0, lower, x[front.start : front.end], lower=1)
-            x[front.start : front.end] = own
+            own = x[front.start : front.end] = forth(lower, x[front.start : front.end])
             x[front.border] -= panel @ own
         for index in range(len(fronts) - 1, -1, -1):
-            front, lower = fronts[index], self._pivots[index]
+            front = fronts[index]
             own = x[front.start : front.end] - self._panels[index].T @ x[front.border]
-            x[front.start : front.end] = dtrsm(1.0, lower, own, lower=1, trans_a=1)
+            x[front.start : front.end] = back(self._pivots[index], own)
         solution = np.empty_like(x)
         solution[order] = x
-        return solution.reshape(right.shape)
+        return solution
+
+
+_FORTH, _BACK = partial(dtrsv, lower=1), partial(dtrsv, lower=1, trans=1)
+"""L^-1 and L^-T times one column."""
+_FORTH_ALL, _BACK_ALL = partial(dtrsm, 1.0, lower=1), partial(dtrsm, 1.0, lower=1, trans_a=1)
 
 
 def _add(target: Floats, blocks: list[_Block], source: Floats) -> None:

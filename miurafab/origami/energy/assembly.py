@@ -31,13 +31,17 @@ class Assembly:
     stencils: tuple[Ints, ...]
     held: Ints
 
-    def gather(self, vectors: Sequence[Floats]) -> Floats:
-        """The free coordinates of the sums at vertices of ``vectors``, (n, k, 3) for each group."""
-        flat = np.concatenate([v.reshape(-1, 3) for v in vectors])
-        total = np.empty((self.count, 3))
-        for axis in range(3):
-            total[:, axis] = np.bincount(self._ends, flat[:, axis], self.count)
-        return np.asarray(total.ravel()[self.free])
+    def gather(self, vectors: Sequence[Floats | None]) -> Floats:
+        """The free coordinates of the sums at vertices of ``vectors``, (n, k, 3) for each group, or
+        None for a group without forces.
+        """
+        total = np.zeros((3, self.count))
+        for stencils, group in zip(self.stencils, vectors, strict=True):
+            if group is not None and len(stencils):
+                ends, flat = stencils.ravel(), group.reshape(-1, 3)
+                for axis in range(3):
+                    total[axis] += np.bincount(ends, flat[:, axis], self.count)
+        return np.asarray(total.T.ravel()[self.free])
 
     def matrix(self, blocks: Sequence[Floats]) -> sparse.csc_array:
         """The sum of ``blocks``, (n, k, k, 3, 3) for each group, between the free coordinates."""
@@ -60,10 +64,6 @@ class Assembly:
         held = [first, first + 1, first + 2, second + 1, second + 2, third + 2]
         coordinates = (self._elimination[:, None] * 3 + np.arange(3)).ravel()
         return coordinates[~np.isin(coordinates, held)]
-
-    @cached_property
-    def _ends(self) -> Ints:
-        return np.concatenate([stencils.ravel() for stencils in self.stencils])
 
     @cached_property
     def _pairs(self) -> tuple[Ints, Ints]:

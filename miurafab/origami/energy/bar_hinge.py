@@ -80,7 +80,15 @@ class BarHingeModel:
 
     def strains(self, points: Floats) -> Floats:
         """(B,) c = (|d|^2 - L^2) / (2 L) of each bar at ``points`` (V, 3)."""
-        d = points[self.bars[:, 1]] - points[self.bars[:, 0]]
+        return self.strains_of(self.bar_vectors(points))
+
+    def bar_vectors(self, points: Floats) -> Floats:
+        """(B, 3) from the first to the second end of each bar."""
+        first, second = (points.take(ends, axis=0) for ends in self.bars.T)
+        return np.asarray(second - first)
+
+    def strains_of(self, d: Floats) -> Floats:
+        """(B,) the strains of bars that are the vectors ``d`` (B, 3)."""
         return np.asarray((np.einsum("bk,bk->b", d, d) - self.lengths**2) / (2 * self.lengths))
 
     def energy(self, points: Floats) -> float:

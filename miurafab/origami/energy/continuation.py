@@ -20,7 +20,9 @@ from miurafab.origami.energy.equilibrium import (
 Progress = Callable[[float, str], None]
 
 HISTORY = 4
-"""The number of states for the prediction: a cubic through the last four."""
+"""The states of a prediction that cannot be tested: a cubic through the last four."""
+LONGEST = 9
+"""The most states that a prediction is made of."""
 MAX_HALVINGS = 7
 MAX_FALSI = 30
 ZERO_LOAD = 1e-9
@@ -50,8 +52,7 @@ class Walk:
     def to(self, drive: float) -> bool:
         """Go on to ``drive``; whether it was reached.
 
-        The polynomial through the last four states predicts the next. A step that does not converge
-        is halved, up to seven times.
+        A step that does not converge is halved, up to seven times.
         """
         goals = [drive]
         while goals:
@@ -66,7 +67,7 @@ class Walk:
 
     def towards(self, drive: float) -> Solution:
         """The equilibrium at ``drive`` in one step, without going there."""
-        guess = extrapolate(self.known, drive) if self.known else self.start
+        guess = self._predicted(drive) if self.known else self.start
         solution = solve(self.driven, guess, drive, self._factored)
         self._factored = solution.factored
         return solution
@@ -74,7 +75,20 @@ class Walk:
     def take(self, new: Known) -> None:
         """Go to ``new``, which is in equilibrium."""
         self.driven.arrive(new.state)
-        self.known = [*(k for k in self.known[1 - HISTORY :] if k.drive != new.drive), new]
+        self.known = [*(k for k in self.known[-LONGEST:] if k.drive != new.drive), new]
+
+    def _predicted(self, drive: float) -> EquilibriumState:
+        """The state at ``drive`` after the polynomial through the last states; through as many of
+        them as would have predicted the last one best.
+        """
+        *before, last = self.known
+        best, least = HISTORY, np.inf
+        for count in range(2, len(before) + 1):
+            missed = extrapolate(before[-count:], last.drive).points - last.state.points
+            miss = np.abs(missed).max()
+            if miss < least:
+                best, least = count, miss
+        return extrapolate(self.known[-best:], drive)
 
     def turn(self) -> None:
         """Turn back: earlier states predict nothing of what follows."""

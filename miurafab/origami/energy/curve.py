@@ -19,7 +19,7 @@ import numpy as np
 
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
-from miurafab.origami.energy.continuation import HISTORY, Known, without_load
+from miurafab.origami.energy.continuation import LONGEST, Known, without_load
 from miurafab.origami.energy.equilibrium import solve
 from miurafab.origami.energy.path import (
     NEARLY_FLAT,
@@ -197,8 +197,8 @@ def _stationary(traced: Traced, path: Path) -> tuple[list[StableState], list[Sta
     minima: list[StableState] = []
     turns = np.flatnonzero(path.loads[1:-1] * path.loads[2:] < 0) + 1
     for k in turns:
-        first = max(0, min(int(k) - 1, len(path.drives) - HISTORY))
-        near = slice(first, first + HISTORY)
+        first = max(0, min(int(k) + 1 - LONGEST // 2, len(path.drives) - LONGEST))
+        near = slice(first, first + LONGEST)
         known = [
             Known(float(drive), state)
             for drive, state in zip(path.drives[near], traced.states[near], strict=True)
@@ -213,9 +213,10 @@ def _stationary(traced: Traced, path: Path) -> tuple[list[StableState], list[Sta
 def _stiffness(traced: Traced) -> float:
     """d load / d drive at the first state, by a central difference."""
     driven, _, drives, states = traced
-    loads = []
+    loads, factored = [], None
     for turn in (-SMALL_TURN, SMALL_TURN):
         drive = float(drives[0]) + turn
-        solution = solve(driven, states[0], drive)
+        solution = solve(driven, states[0], drive, factored)
+        factored = solution.factored
         loads.append(driven.load(solution.state, drive) if solution.converged else math.nan)
     return (loads[1] - loads[0]) / (2 * SMALL_TURN)

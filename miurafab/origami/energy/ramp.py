@@ -23,7 +23,6 @@ import numpy as np
 from scipy import sparse
 
 from miurafab.geometry.arrays import Floats
-from miurafab.geometry.sparse import Factor, SymmetricSolver, factor_symmetric
 from miurafab.origami.energy.equilibrium import (
     NO_TOUCH,
     Balance,
@@ -95,13 +94,6 @@ class Ramped(Balance):
         """The state at ``points`` (V, 3) whose bars pull by their strain; all have a compliance."""
         return EquilibriumState(points, self.model.strains(points) / self.model.compliance, 0.0)
 
-    def factored(self, matrix: sparse.csc_array) -> Factor:
-        """The factor of ``matrix``: by Cholesky, five times as fast, where it is definite."""
-        try:
-            return self._solver.factor(matrix)
-        except RuntimeError:  # an unstable state
-            return factor_symmetric(matrix, reorder=False)
-
     def moments(self, angle: Floats, target: float) -> tuple[Floats, Floats]:
         """The moments and slopes of hinges, with the springs beyond the limit."""
         angle = self._counted_on(angle)
@@ -125,7 +117,7 @@ class Ramped(Balance):
         model = self.model
         angle, turn = hinge_gradients(points, self.hinges)
         moment, slope = self.moments(angle, target)
-        bars = self.bar_vectors(points) / model.lengths[:, None]
+        bars = model.bar_vectors(points) / model.lengths[:, None]
         forces = model.strains(points) / model.compliance
         pull = forces[:, None] * bars
         push = self.touch(points, definite=True)
@@ -143,10 +135,6 @@ class Ramped(Balance):
     def _counted_on(self, angle: Floats) -> Floats:
         """``angle`` (H,) in (-pi, pi], with the whole turns nearest to the last state."""
         return np.asarray(angle + 2 * np.pi * np.round((self.last - angle) / (2 * np.pi)))
-
-    @cached_property
-    def _solver(self) -> SymmetricSolver:
-        return SymmetricSolver()
 
     @cached_property
     def _stop(self) -> Floats:
