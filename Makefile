@@ -37,6 +37,11 @@ gallery: .venv/installed-dev
 docs: .venv/installed-dev
 	$(BIN)/zensical build --clean --strict
 
+# Builds wheel and sdist, installs them with pip, uv and pipx into each Python that is promised and
+# there, and runs the first commands; it needs the network.
+packages: .venv/installed-dev $(TOOLS)/installed
+	$(BIN)/python .ci/packages.py
+
 # The versions and hashes of all libraries are in locks/; `make lock` writes them anew.
 .venv/installed: pyproject.toml locks/run.txt
 	@echo "Installing miurafab and its libraries into .venv. This takes a minute."

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from email.parser import Parser
 from importlib.metadata import PackageNotFoundError, packages_distributions, requires
 from pathlib import Path
 
@@ -197,6 +198,64 @@ def test_the_wheel_holds_what_the_checkout_holds(installed):
         }
         found = {name: (installed / "miurafab" / page / name).read_bytes() for name in parts}
         assert found == parts
+
+
+def test_the_wheel_says_what_the_project_says(installed):
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    (info,) = installed.glob("*.dist-info")
+    told = Parser().parsestr((info / "METADATA").read_text(encoding="utf-8"))
+    assert told["Version"] == miurafab.__version__
+    assert told["Requires-Python"] == project["requires-python"]
+    assert set(told.get_all("Provides-Extra")) == set(project["optional-dependencies"])
+    urls = dict(line.split(", ", 1) for line in told.get_all("Project-URL"))
+    assert urls == project["urls"]
+    assert (info / "entry_points.txt").read_text().split() == [
+        *("[console_scripts]", "miurafab", "=", "miurafab.__main__:main"),
+    ]
+    assert (info / "licenses" / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
+
+
+def test_the_container_copies_all_that_its_installation_needs(installed, tmp_path):
+    """It makes the same wheel from what it copies, to the byte."""
+    text = (ROOT / "Containerfile").read_text()
+    copied = [line.split()[1:] for line in text.splitlines() if line.startswith("COPY")]
+    for *sources, target in copied:
+        folder = tmp_path / target.removeprefix("/")
+        for source in sources:
+            if (ROOT / source).is_dir():
+                shutil.copytree(ROOT / source, folder, ignore=shutil.ignore_patterns("__pycache__"))
+            else:
+                folder.mkdir(parents=True, exist_ok=True)
+                shutil.copy(ROOT / source, folder)
+    source = tmp_path / "source"
+    build = (sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tmp_path)
+    subprocess.run([*build, source], check=True, capture_output=True)
+    (wheel,), (ours,) = tmp_path.glob("*.whl"), installed.parent.glob("*.whl")
+    assert wheel.read_bytes() == ours.read_bytes()
+    assert (source / "locks" / "run.txt").exists()
+    assert "pip install --require-hashes --requirement /source/locks/run.txt" in text
+
+
+@pytest.mark.large
+def test_the_first_commands_run_from_the_wheel(installed, tmp_path):
+    """As `make packages` runs them in each Python."""
+    spec = importlib.util.spec_from_file_location("packages", ROOT / ".ci" / "packages.py")
+    packages = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(packages)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert [f">={packages.promised()[0]}"] == [project["requires-python"]]
+    program = tmp_path / "miurafab"
+    program.write_text(
+        f"#!{sys.executable}\nimport sys\nsys.path.insert(0, {str(installed)!r})\n"
+        "from miurafab.__main__ import main\nsys.exit(main())\n"
+    )
+    program.chmod(0o755)
+    packages.tried(program, tmp_path / "work")
+    job = {path.name for path in (tmp_path / "work" / "job").iterdir()}
+    assert {"manifest.json", "sheet-01.nc", "assembly.pdf"} <= job
+    program.write_text("#!/bin/sh\nexit 2\n")
+    with pytest.raises(subprocess.CalledProcessError):
+        packages.tried(program, tmp_path / "again")
 
 
 @pytest.mark.parametrize("place", ["wheel", "checkout"])
