@@ -100,7 +100,7 @@ def owner_of(port: str) -> Owner | None:
     """The session that holds ``port``, None if none says so or its process is gone."""
     try:
         owner = Owner(**json.loads(_file(port).read_text("utf-8")))
-        return owner if str(owner) and _lives(owner.holder) else None
+        return owner if str(owner) and is_alive(owner.holder) else None
     except (OSError, ValueError, TypeError, OverflowError):  # a damaged file names nobody
         return None
 
@@ -130,7 +130,8 @@ def _file(port: str) -> Path:
     return state_folder() / "ports" / f"{name}.json"
 
 
-def _lives(process: int) -> bool:
+def is_alive(process: int) -> bool:
+    """Whether there is a process of this number."""
     if sys.platform == "win32":
         import ctypes
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -30,6 +30,8 @@ from miurafab.motion.stepper import Processor, Stepper
 _OK_BYTES = 4
 _FOREVER = 1 << 62
 _LEAST_FEED = 1.0  # mm/min (``MINIMUM_FEED_RATE`` of ``config.h``)
+TOLD = 1000
+"""The moves (0.04 s of processor time) after which the share that is done is told."""
 _LONGEST_MOVE = 72_000.0
 """Seconds. In a longer move the way of one segment is below the last digit of the length left, a
 32-bit float (2^23 segments of 10 ms are 84,000 s): the firmware would never arrive. It is timed by
@@ -51,16 +53,22 @@ class Estimate:
     end: Floats
 
 
-def estimate(program: Program, parameters: MotionParameters, link: Link | None = None) -> Estimate:
+def estimate(
+    program: Program,
+    parameters: MotionParameters,
+    link: Link | None = None,
+    on_share: Callable[[float], None] | None = None,
+) -> Estimate:
     """Estimate the time of ``program`` on a machine with ``parameters`` behind ``link``.
 
-    ``link`` None is the usual link of GRBL: 115200 baud, 1 ms, 128 bytes.
+    ``link`` None is the usual link of GRBL: 115200 baud, 1 ms, 128 bytes. ``on_share`` gets the
+    share that is done, every :data:`TOLD` moves.
     """
     plain = _plain_seconds(program, parameters)
     if plain.max(initial=0.0) > _LONGEST_MOVE or plain.sum() > _LONGEST_JOB:
         return _plain(program, plain)
     run = _Run(program, parameters, link or Link())
-    run.lines()
+    run.lines(on_share)
     return run.result()
 
 
@@ -140,8 +148,13 @@ class _Run:
         self.first: int | None = None
         self.last_end = 0
 
-    def lines(self) -> None:
+    def lines(self, on_share: Callable[[float], None] | None) -> None:
+        done, told = 0, 0
         for line in _lines(self.program):
+            done += len(line.actions)
+            if on_share is not None and done >= told:
+                on_share(min(1.0, done / len(self.program)))
+                told = done + TOLD
             self._receive(line.size)
             reading = cpu.words_cost(line.words, line.size - 1, line.points)
             self._work(cpu.LINE_FIXED + reading)

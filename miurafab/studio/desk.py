@@ -21,7 +21,7 @@ from miurafab.errors import InputError
 from miurafab.machine.known_controller import MachineState, require_talk
 from miurafab.machine.owner import owner_of
 from miurafab.machine.transport import VIRTUAL, require_port
-from miurafab.profiles import load_machine
+from miurafab.profiles import MachineProfile, load_machine
 from miurafab.profiles.own import own_defaults
 from miurafab.studio.desk_view import (
     burn_table,
@@ -92,6 +92,7 @@ class Desk:
         self._seen: dict[str, Any] = {}
         self._settings: tuple[object, dict[str, Any]] = (None, {})
         self._prepared: Prepared | None = None
+        self._reading: dict[str, Any] | None = None
         self._jobs = 0  # put on up to now: a page draws a new one anew
 
     # Beginning and end
@@ -202,9 +203,10 @@ class Desk:
         """
         taken, session = self._taken, self._require_session()
         self._armed = None
-        prepared = prepare(job)
-        if prepared.machine != session.machine:
-            prepared = prepare(job, machine=session.machine)
+        try:
+            prepared = self._read(job, session.machine)
+        finally:
+            self._reading = None
         prepared = replace(prepared, name=name)
 
         def work(operator: Operator) -> None:
@@ -215,6 +217,21 @@ class Desk:
                 self._jobs += 1
 
         session.ask(work)  # not another, which was opened while a large job was read
+
+    def _read(self, job: Path, machine: MachineProfile) -> Prepared:
+        """The job for ``machine``; how far it has come is told by :meth:`state`."""
+
+        def tell(share: float, note: str) -> None:
+            self._reading = {"share": round(share, 3), "words": note}
+
+        tell(0.0, f"reading {job.name}")
+        if not job.is_dir():  # it is timed once
+            return prepare(job, machine=machine, on_progress=tell)
+        prepared = prepare(job, on_progress=tell)
+        if prepared.machine != machine:
+            tell(1.0, f"timing it on {machine.title}")
+            prepared = prepare(job, machine=machine)
+        return prepared
 
     def arm(self) -> None:
         """The first step of a start; raises :class:`~miurafab.errors.InputError` where somebody
@@ -293,6 +310,7 @@ class Desk:
                 "silent_s": round(silent, 1),
                 "trouble": plain(session.trouble),
                 "busy": busy,
+                "reading": self._reading,
                 "job": None
                 if job is None
                 else {"name": job.name, "folder": str(job.folder), "number": self._jobs},

@@ -111,11 +111,14 @@ def prepare(
     if path.is_dir():
         from miurafab.workflow.job_directory import read_job
 
-        return _from_directory(read_job(path, unread=unread), machine, unread)
+        read = read_job(path, unread=unread, on_progress=on_progress)
+        return _from_directory(read, machine, unread)
     gcode = read_gcode(path)
     named = named_machine(gcode, path.parent) if machine is None else read_machine(machine)
     profile = named or assumed_machine(path)
-    sheet = _dry_run(gcode, profile, unread=unread)
+    sheet = _dry_run(
+        gcode, profile, unread=unread, on_share=lambda share: tell(share, f"timing {path.name}")
+    )
     elsewhere = tuple(another_beam(maker_of(gcode, path.parent), profile, path.name))
     return Prepared(path.name, profile, (gcode,), (sheet,), None, path.parent, elsewhere=elsewhere)
 
@@ -246,7 +249,13 @@ def _from_pattern(
 
 
 def _dry_run(
-    job: Job, machine: MachineProfile, most_power: float = 1.0, *, unread: bool = False
+    job: Job,
+    machine: MachineProfile,
+    most_power: float = 1.0,
+    *,
+    unread: bool = False,
+    on_share: Callable[[float], None] | None = None,
 ) -> SheetPreview:
     bed = (machine.bed.width_mm, machine.bed.height_mm)
-    return dry_run(Path(job.name).stem, job, machine, bed, most_power, unread=unread)
+    name = Path(job.name).stem
+    return dry_run(name, job, machine, bed, most_power, unread=unread, on_share=on_share)

@@ -6,7 +6,7 @@ All figures come from the text alone, so they hold for a foreign file as well as
 from __future__ import annotations
 
 import codecs
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from pathlib import Path
@@ -149,11 +149,12 @@ def dry_run(
     most_power: float = 1.0,
     *,
     unread: bool = False,
+    on_share: Callable[[float], None] | None = None,
 ) -> SheetPreview:
     """Read ``job`` back, time it on ``machine`` and judge it.
 
     ``paper_mm`` is the size of its sheet; ``most_power`` the most that the material takes, as a
-    fraction of full power.
+    fraction of full power. ``on_share`` gets the share that is timed.
 
     Raises :class:`~miurafab.errors.GcodeError`, naming the line, for a program that the
     controller would refuse. With ``unread`` that is the finding ``program``, and the preview holds
@@ -171,7 +172,8 @@ def dry_run(
         if judged is None
         else judged.findings
     )
-    times = estimate(program, MotionParameters.from_profile(machine), Link.from_profile(machine))
+    parameters, link = MotionParameters.from_profile(machine), Link.from_profile(machine)
+    times = estimate(program, parameters, link, on_share)
     burning = program.beam_on
     layer = np.where(burning, _layers(program), np.int8(_TRAVEL))
     lengths = program.lengths

@@ -8,7 +8,7 @@ opened for the job is in it as it was laid out, under a name of its own.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,7 +73,12 @@ class JobDirectory(Shown):
         return {"path": self.path, "machine": self.machine.title, "time": clock_text(seconds)}
 
 
-def read_job(directory: AnyPath, *, unread: bool = False) -> JobDirectory:
+def read_job(
+    directory: AnyPath,
+    *,
+    unread: bool = False,
+    on_progress: Callable[[float, str], None] | None = None,
+) -> JobDirectory:
     """Read the job of a directory that :meth:`SheetJob.write` made.
 
     Parameters
@@ -83,6 +88,8 @@ def read_job(directory: AnyPath, *, unread: bool = False) -> JobDirectory:
     unread : bool
         Whether a program that the controller would refuse is a finding of its dry run instead of
         an error.
+    on_progress : callable, optional
+        Called with a fraction in 0..1 and a short text.
 
     Returns
     -------
@@ -102,6 +109,11 @@ def read_job(directory: AnyPath, *, unread: bool = False) -> JobDirectory:
     1
     """
     written = read_written(as_path(directory, "The job directory"))
+    tell = on_progress or (lambda fraction, note: None)
+
+    def share_of(number: int, name: str) -> Callable[[float], None]:
+        return lambda share: tell((number + share) / len(written.jobs), f"timing {name}")
+
     dry_runs = (
         dry_run(
             name,
@@ -110,8 +122,11 @@ def read_job(directory: AnyPath, *, unread: bool = False) -> JobDirectory:
             (sheet.width_mm, sheet.height_mm),
             written.most_power,
             unread=unread,
+            on_share=share_of(number, name),
         )
-        for (name, sheet), job in zip(written.passes, written.jobs, strict=True)
+        for number, ((name, sheet), job) in enumerate(
+            zip(written.passes, written.jobs, strict=True)
+        )
     )
     return JobDirectory(
         written.directory,

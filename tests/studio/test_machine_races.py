@@ -7,8 +7,9 @@ import pytest
 from rigs import MACHINE, ROWS, AtMachine, Pumped, until
 from studios import sentence
 
-from miurafab.errors import JobStopped, MachineError
+from miurafab.errors import InputError, JobStopped, MachineError
 from miurafab.studio import desk, held_session
+from miurafab.workflow.cut import prepare
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/task").exists(), reason="needs pseudo-terminals and /proc"
@@ -54,6 +55,23 @@ def test_a_start_that_an_abort_overtakes_burns_nothing(at, monkeypatch):
     at.until(busy="", state="Idle")
     assert b"M4" not in at.bench.commands
     assert at.seen()["armed"] is None
+
+
+def test_a_job_that_is_being_read_tells_how_far_it_has_come(at, monkeypatch):
+    told = []
+
+    def seen(job, machine=None, on_progress=None):
+        on_progress(0.25, "timing rows.nc")
+        told.append(at.seen()["reading"])
+        return prepare(job, machine=machine, on_progress=on_progress)
+
+    monkeypatch.setattr(desk, "prepare", seen)
+    at.ok("job")
+    assert told == [{"share": 0.25, "words": "timing rows.nc"}]  # a file is timed once
+    assert at.seen()["reading"] is None
+    monkeypatch.setattr(desk, "prepare", lambda *_, **__: (_ for _ in ()).throw(InputError("No.")))
+    assert sentence(at.ask("job")) == "No."
+    assert at.seen()["reading"] is None
 
 
 def test_what_got_no_answer_is_not_done_later(at, monkeypatch):

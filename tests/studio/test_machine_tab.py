@@ -19,11 +19,13 @@ from studios import request, sentence
 from miurafab.errors import InputError
 from miurafab.machine.owner import Owner, owner_of
 from miurafab.machine.watchdog import SILENCE_S
+from miurafab.studio import kept_jobs
 from miurafab.studio.core import Studio
 from miurafab.studio.desk import Desk
 from miurafab.studio.kept_jobs import keep_job
 from miurafab.studio.machine_orders import ACTIONS, KEYS, ROUTES
 from miurafab.studio.machine_words import alarm_of, plain, state_words
+from miurafab.workflow.manifest import MANIFEST
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/task").exists(), reason="needs pseudo-terminals and /proc"
@@ -202,8 +204,11 @@ def command(pid):
     return Path(f"/proc/{pid}/cmdline").read_bytes()
 
 
-def test_the_studio_is_killed_and_its_port_was_named_as_held(tmp_path):
-    """A second command is told who has the port; then the whole studio dies in mid-job."""
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGTSTP"])
+def test_the_studio_is_killed_or_suspended_and_its_port_was_named_as_held(tmp_path, how):
+    """A second command is told who has the port; then the whole studio dies in mid-job, or stands
+    still after Ctrl-Z.
+    """
     job = tmp_path / "rows.nc"
     job.write_text(ROWS)
     pumped = Pumped()
@@ -232,7 +237,7 @@ def test_the_studio_is_killed_and_its_port_was_named_as_held(tmp_path):
             code = page.ask("arm", control=control)["armed"]["code"]
             page.ask("start", control=control, code=code)
             until(lambda: bench.device.beam_on and bench.bytes_came.count(b"\n") > 20)
-            server.kill()
+            server.send_signal(getattr(signal, how))
             until(lambda: b"\x18" in bench.bytes_came)
             dark = next(moment for _, moment, data in bench.came if b"\x18" in data)
             pumped.stop().assert_dark_from(dark)
@@ -383,6 +388,24 @@ def test_the_job_of_a_layout_is_kept_where_its_journal_stays(tmp_path):
     kept.parent.write_text("a file")
     with pytest.raises(InputError, match="which is a file; give a folder"):
         keep_job(job)
+
+
+def test_a_job_that_another_studio_holds_outlives_twenty_more(tmp_path, monkeypatch):
+    monkeypatch.setattr(kept_jobs, "_KEPT", 2)
+    jobs = [write_job(tmp_path / f"job-{number}", 1) for number in range(5)]
+    kept = []
+    for number, job in enumerate(jobs):
+        (job / MANIFEST).write_text(str(number))  # no two alike
+        kept.append(keep_job(job))
+        os.utime(kept[-1], (number, number))
+        if number == 0:  # the mark of a studio that lives, and of one that is gone
+            mark = kept[0].parent / f".held-{kept[0].name}-{os.getppid()}"
+            mark.touch()
+        if number == 1:
+            (kept[1].parent / f".held-{kept[1].name}-{2**22 + 1}").touch()
+    assert [folder.is_dir() for folder in kept] == [True, False, False, True, True]
+    marks = {path.name for path in kept[0].parent.glob(".held-*")}
+    assert marks == {mark.name, f".held-{kept[4].name}-{os.getpid()}"}  # one of each studio
 
 
 def test_a_port_that_somebody_holds_says_so(tmp_path, monkeypatch):

@@ -15,6 +15,7 @@ import miurafab
 from miurafab.errors import GcodeError, InputError, ProfileError
 from miurafab.gcode.job import Job
 from miurafab.profiles import load_machine
+from miurafab.workflow.cut import prepare
 from miurafab.workflow.dry_run import LAYERS, clock_text, dry_run, length_text
 from miurafab.workflow.preview import preview
 
@@ -271,3 +272,15 @@ def test_length_text(mm, text):
 def test_known_lengths_are_what_the_tests_say():
     lengths = {name: sum(np.hypot(*np.diff(points, axis=0).T)) for name, points in KNOWN.items()}
     assert lengths == {"engrave": 5, "score": 30, "perforate": 40, "cut": 100}
+
+
+def test_the_timing_of_a_program_tells_its_share(tmp_path):
+    lines = "".join(f"G1 X{n % 200 + 1} Y{n % 7} F3000\n" for n in range(3000))
+    (tmp_path / "long.nc").write_text(f"M4 S0\nS500\n{lines}M5\n")
+    told = []
+    prepare(tmp_path / "long.nc", on_progress=lambda share, note: told.append((share, note)))
+    shares = [share for share, _ in told]
+    assert shares == sorted(shares)
+    assert shares[0] < 0.1
+    assert 0.6 < shares[-1] <= 1
+    assert {note for _, note in told} == {"timing long.nc"}

@@ -123,7 +123,12 @@ function showPorts(ports) {
   set("desk-held", ports.find(({ name }) => name === select.value)?.held ?? "");
 }
 
-function showJob({ job, sheet, sheets = [], next, progress, work, practice }) {
+function showJob({ job, sheet, sheets = [], next, progress, work, practice, reading }) {
+  toggle("reading", Boolean(reading));
+  if (reading) {
+    byId("reading-bar").value = reading.share;
+    set("reading-words", reading.words);
+  }
   toggle("job-work", job !== null);
   set("job-name", job?.name ?? "");
   toggle("no-job", job === null && !byId("put-on").dataset.from);
@@ -181,7 +186,7 @@ function showSettings({ verdict, differ, refused, rows }) {
   if (differ) byId("settings").open = true;
 }
 
-function enable({ busy, words, job, state, loaded, fresh_wanted: wanted }) {
+function enable({ busy, reading, words, job, state, loaded, fresh_wanted: wanted }) {
   const mine = controls();
   const idle = mine && !busy && state === "Idle";
   const allowed = {
@@ -194,7 +199,7 @@ function enable({ busy, words, job, state, loaded, fresh_wanted: wanted }) {
   byId("arm").disabled = !(idle && job);
   byId("start").disabled = !mine;
   byId("disarm").disabled = !mine;
-  byId("put-on").disabled = !mine || Boolean(busy) || !byId("put-on").dataset.from;
+  byId("put-on").disabled = !mine || Boolean(busy) || Boolean(reading) || !byId("put-on").dataset.from;
   byId("sheet-number").disabled = !mine || Boolean(busy);
   byId("say").disabled = !mine || Boolean(busy);
   byId("leave").disabled = !mine;

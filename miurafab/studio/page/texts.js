@@ -215,6 +215,7 @@ export const texts = {
     "loaded": "Sheet in it",
     "job": "Job",
     "take_job": "Take the job",
+    "reading": "Reading the job",
     "no_job": "No job yet: lay a pattern out on the tab Layout, or start the studio with a job: <code>miurafab studio jobs/hypar</code>.",
     "share": "Share of the time",
     "frame": "Frame",
