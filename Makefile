@@ -3,7 +3,10 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-LOCKED := $(BIN)/python -m pip install --quiet --require-hashes --requirement
+SHELL := bash
+.SHELLFLAGS := -o pipefail -c
+SHOWN := | sed -u -n 's/^Collecting \([^=]*\).*/  \1/p'
+LOCKED := $(BIN)/python -m pip install --require-hashes --requirement
 OURS := $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 TOOLS := .venv/tools
 COMPILE = $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --upgrade
@@ -46,14 +49,15 @@ packages: .venv/installed-dev $(TOOLS)/installed
 .venv/installed: pyproject.toml locks/run.txt
 	@echo "Installing miurafab and its libraries into .venv. This takes a minute."
 	$(PYTHON) -m venv .venv
-	$(LOCKED) locks/run.txt
+	$(LOCKED) locks/run.txt $(SHOWN)
+	@echo "Installed. The first job:"
 	$(OURS)
 	touch $@
 
 .venv/installed-dev: pyproject.toml locks/dev.txt
 	@echo "Installing miurafab and its development tools into .venv. This takes a minute or two."
 	$(PYTHON) -m venv .venv
-	$(LOCKED) locks/dev.txt
+	$(LOCKED) locks/dev.txt $(SHOWN)
 	$(OURS)
 	touch $@
 
