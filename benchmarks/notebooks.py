@@ -1,7 +1,7 @@
 """The notebooks of docs/notebooks: runs them and keeps what they print and draw.
 
-    python benchmarks/notebooks.py            # runs all, and writes their outputs anew
-    python benchmarks/notebooks.py barrier    # this one
+python benchmarks/notebooks.py            # runs all, and writes their outputs anew
+python benchmarks/notebooks.py barrier    # this one
 """
 
 from __future__ import annotations

@@ -144,11 +144,15 @@ class Studio:
                 number = int(route[:9])
             else:
                 return refusal(404, "Nothing is at this address.")
-        except MiurafabError as fault:
-            return refusal(400, by_label(fault.sentence))
-        said = self.live.answer(number)
+        except MiurafabError as fault:  # half a word is no fault of the page: it is no refusal
+            return answer({"number": 0, "said": {"error": by_label(fault.sentence)}})
+        said = dict(self.live.answer(number))
         if "error" in said:
-            said = {"error": bench.plain(said["error"])}
+            said["error"] = bench.plain(said["error"])
+        told = said.get("answer", {})
+        if "advice" in told:
+            findings = bench.plain_findings(told["findings"])
+            said["answer"] = told | {"advice": bench.plain(told["advice"]), "findings": findings}
         return answer({"number": number, "said": said})
 
     def _question(self, route: str, body: bytes) -> dict[str, Any]:

@@ -50,24 +50,29 @@ class FirstSight:
             except MiurafabError as fault:
                 return {"refused": fault.sentence, "mends": mends(fault.sentence)}
             if mesh is not None:
-                order = Order("place", Path(), "", target=target, options=options)
+                file = mesh if picture is None else Path()
+                order = Order("place", Path(), "", target=target, file=file, options=options)
                 self._running = self._start(order)
             return {"picture": picture, "more": None if mesh is None else self._number}
 
     def more(self, number: int) -> dict[str, Any]:
-        """The second picture; ``{"wait": true}`` while there is none, ``{"gone": true}`` where a
-        newer target was chosen.
+        """The second picture; ``{"wait": true}`` while there is none, with the first as
+        ``picture`` when a large file has been read; ``{"gone": true}`` where a newer target was
+        chosen.
         """
         with self._lock:
             if number != self._number or (self._running is None and self._said is None):
                 return {"gone": True}
+            told: dict[str, Any] = {"wait": True}
             for news in [] if self._running is None else self._running.news():
-                if "placed" in news:
+                if "shown" in news:
+                    told["picture"] = news["shown"]
+                elif "placed" in news:
                     self._said = news["placed"]
                 elif "error" in news:
                     self._said = {"refused": news["error"], "mends": []}
             if self._said is None:
-                return {"wait": True}
+                return told
             self._stop()
             return self._said
 

@@ -24,7 +24,7 @@ from miurafab.origami.formats.fold import read_fold
 from miurafab.origami.picture import flat_svg
 from miurafab.origami.verify import Audit
 from miurafab.studio.recipe import job_name
-from miurafab.studio.target_view import compared, placed
+from miurafab.studio.target_view import compared, file_shown, placed
 from miurafab.surfaces.description import described_surface, no_target
 from miurafab.surfaces.surface import TargetSurface
 from miurafab.workflow.drawings import GUIDE
@@ -79,7 +79,11 @@ def carry_out(order: Order, tell: Tell) -> None:
 
 
 def _place(order: Order, tell: Tell) -> None:
-    """What a fit would make of a mesh, for the picture of the target."""
+    """What a fit would make of a mesh, for the picture of the target; before that, the mesh of
+    ``file`` as it is, if one is named.
+    """
+    if order.file.name:
+        tell({"shown": file_shown(order.file)})
     tell({"placed": placed(order.target, order.options)})
 
 

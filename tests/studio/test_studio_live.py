@@ -22,6 +22,14 @@ from miurafab.workflow import design as designs
 LAYOUT = {"machine": "grbl-laser-400", "material": "card-250", "options": {}}
 
 
+def refused(response):
+    """The sentence about a question that cannot be asked; it comes as an answer."""
+    said = response.json()["said"]
+    assert response.status == 200
+    assert list(said) == ["error"]
+    return said["error"]
+
+
 class Told:
     """A process that answers when the test says so."""
 
@@ -202,14 +210,15 @@ def test_the_page_asks_and_the_process_stays(studio):
     assert said["answer"]["bed"] is None
     said = told_by(studio, "live", {"target": target, "options": {"min_edge": "9m"}})
     assert "asked for" in said["answer"]["advice"]
+    assert "`" not in said["answer"]["advice"]  # fields are named as the page names them
     assert studio.studio.live._process._process is process
-    assert "'Facets' is '8x'" in sentence(
+    assert "'Facets' is '8x'" in refused(
         studio.post("live", {"target": target, "options": {"facets": "8x"}})
     )
-    assert "gone" in sentence(studio.post("live", {"target": {"source": "9"}}))
+    assert "gone" in refused(studio.post("live", {"target": {"source": "9"}}))
     assert sentence(studio.get("live/x"), 404)
 
-    assert "no pattern" in sentence(studio.post("live/plan", {"layout": LAYOUT}))
+    assert "no pattern" in refused(studio.post("live/plan", {"layout": LAYOUT}))
     studio.fit("plane", "4x4", size="420mm")
     said = told_by(studio, "live/plan", {"layout": LAYOUT})["answer"]["bed"]
     pattern = miurafab.fit("plane", facets="4x4", size="420mm").pattern

@@ -218,6 +218,23 @@ def test_a_mesh_is_answered_in_two_steps_and_only_the_newest(asked):
     assert asked.get(f"target/{second['more']}").json() == {"gone": True}
 
 
+def test_a_large_mesh_is_read_by_the_process(asked, monkeypatch):
+    monkeypatch.setattr("miurafab.studio.first_sight.AT_ONCE", 100)
+    source = asked.upload("saddle.obj", saddle_obj()).json()["source"]
+    first = asked.post("target", {"target": {"source": source}, "options": {}}).json()
+    assert first["picture"] is None
+    running, address = asked.orders[0], f"target/{first['more']}"
+    assert running.order.file.read_bytes() == saddle_obj()
+    told = Done(running.order).coming
+    assert told[0]["shown"]["kind"] == "file"
+    assert told[1]["placed"]["kind"] == "disk"
+    running.coming = told[:1]
+    assert asked.get(address).json() == {"wait": True, "picture": told[0]["shown"]}
+    assert asked.get(address).json() == {"wait": True}
+    running.coming = told
+    assert asked.get(address).json()["kind"] == "disk"
+
+
 def test_a_refused_mesh_has_its_buttons_in_the_words_of_the_page(done):
     source = done.upload("hole.stl", stl("hole")).json()["source"]
     first = done.post("target", {"target": {"source": source}, "options": {}}).json()

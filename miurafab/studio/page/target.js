@@ -91,6 +91,7 @@ async function laid(number, now) {
   for (;;) {
     const told = await ask(`target/${number}`);
     if (told.gone || JSON.stringify(question()) !== now) break;
+    if (told.picture) take({ file: unpack(told.picture), laid: null });
     if (!told.wait) {
       refuse(told);
       if (!told.refused) take({ file: pictures.file, laid: unpack(told) }, Boolean(pictures.file));
