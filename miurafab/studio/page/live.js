@@ -23,6 +23,7 @@ let again = false;
 let resting = null;
 let bench = { pattern: null, task: null };
 let fitting = null; // the form that is being fitted wholly, by its key
+let alone = false; // it began by itself
 let plan = { key: "", bed: null };
 const past = { forms: [], at: -1 };
 
@@ -147,8 +148,10 @@ function show() {
   const whole = pattern && keyOf(pattern.form) === key;
   const quick = coarse?.key === key;
   const useCoarse = Boolean(coarse) && !whole && (quick || follows()) && isFit();
-  byId("coarse").hidden = !useCoarse;
-  byId("coarse").classList.toggle("behind", useCoarse && !quick);
+  for (const part of ["coarse", "sketch-panel", "coarse-rest"]) {
+    byId(part).hidden = !useCoarse;
+    byId(part).classList.toggle("behind", useCoarse && !quick);
+  }
   byId("pattern").hidden = useCoarse || !pattern;
   const stale = !useCoarse && Boolean(pattern) && !whole;
   byId("pattern").classList.toggle("old", stale);
@@ -160,7 +163,8 @@ function show() {
   byId("go-on").disabled = stale;
   byId("fit").disabled = false;
   const runs = Boolean(task?.running);
-  byId("coming").textContent = runs && task.kind === "fit" ? live.coming : "";
+  const comes = runs && task.kind === "fit" && quick ? live.coming : "";
+  byId("coming").textContent = useCoarse && !quick ? live.behind : comes;
   byId("shape-empty").hidden = useCoarse || Boolean(pattern);
   byId("undo").disabled = past.at < 1;
   byId("redo").disabled = past.at >= past.forms.length - 1;
@@ -196,6 +200,10 @@ export function changed() {
   clearTimeout(resting);
   resting = setTimeout(rest, REST_MS);
   seeTarget();
+  if (alone && fitting !== keyOf(present()) && bench.task?.running && bench.task.kind === "fit") {
+    alone = false;
+    order("cancel", {}); // nobody asked for it, and nobody waits for it any more
+  }
   show();
   if (follows()) pump();
 }
@@ -214,12 +222,16 @@ function rest() {
   byId("live-said").textContent = [coarse.said.headline, coarse.said.bed?.title, coarse.said.bed?.remark].filter(Boolean).join(" ");
   if (bench.pattern && keyOf(bench.pattern.form) === key) return;
   const mayBegin = !bench.task?.running || fitting !== null;
-  if (count(form) <= MOST_ALONE && mayBegin) fitWhole(form);
+  if (count(form) <= MOST_ALONE && mayBegin) {
+    fitWhole(form);
+    alone = true;
+  }
 }
 
 function fitWhole(form) {
   const { task } = bench;
   fitting = keyOf(form);
+  alone = false;
   const replaces = task?.running && task.kind === "fit" ? task.id : "";
   return order("fit", { ...form, replaces });
 }

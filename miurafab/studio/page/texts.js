@@ -144,6 +144,7 @@ export const texts = {
     "bed_picture": "The flat pattern over one sheet of the material",
     "bed_title": "On the sheet",
     "coming": "The whole fit is being computed.",
+    "behind": "The form asks for something else by now; its refit is on the way.",
     "box": "Folded: {box} mm",
     "make": "Make it {size}",
     "stale": "What is shown is {subject}. The form asks for something else.",
