@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 EXAMPLES = (
     "miurafab energy hypar.fold",
     "miurafab energy hypar.fold --material card-250 -o energy.csv",
-    "miurafab energy hypar.fold --pull corners --strain 0.2 --cycles 3",
+    "miurafab energy hypar.fold --pull corners --strain 0.2 -o pull.html",
 )
 
 
@@ -37,7 +37,9 @@ def energy(
     *,
     out: Annotated[
         Path | None,
-        option(File(), "Write a plot (.png, .svg) or a table (.csv).", "-o", "--out"),
+        option(
+            File(), "Write a plot (.png, .svg), a table (.csv) or a page (.html).", "-o", "--out"
+        ),
     ] = None,
     material: Annotated[
         str | None,
@@ -60,12 +62,18 @@ def energy(
     if out is not None:
         from miurafab.origami.plotting import RESULTS
 
-        new_file(out, "The energy", RESULTS)
+        new_file(out, "The energy", (*RESULTS, ".html"))
+    pattern = miurafab.load(file)
     with console.progress("pulling" if "pull" in given else "unfolding") as progress:
-        curve = miurafab.energy(file, material=material, on_progress=progress, **given)
+        curve = miurafab.energy(pattern, material=material, on_progress=progress, **given)
     answer = curve.report()
     if out is not None:
-        curve.save(out, title=file.stem)
+        if out.suffix.lower() == ".html":
+            from miurafab.workflow.energy_page import write_energy_page
+
+            write_energy_page(curve, pattern, out, title=file.stem)
+        else:
+            curve.save(out, title=file.stem)
         answer["file"] = str(out)
     console.answer(answer, lambda: _show(console, curve, answer))
     return DONE if curve.converged else NO

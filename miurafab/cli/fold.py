@@ -65,12 +65,13 @@ def fold(
     answer says which, and whether the facets could all stay flat.
     """
     from miurafab.origami.formats.panels import PANEL_ENDINGS
-    from miurafab.workflow.fold import ENDINGS, FoldOptions
+    from miurafab.workflow.fold import ENDINGS, FoldOptions, check_colour
     from miurafab.workflow.panels import thickness_report
 
     asked = read_options(FoldOptions, given)
     if out is not None:
         new_file(out, "The motion", ENDINGS)
+        check_colour(out, by_strain=asked.colour == "strain")
     if panels is not None:
         new_file(panels, "The drawing of the panels", PANEL_ENDINGS)
         if asked.thickness_mm is None:
@@ -88,7 +89,13 @@ def fold(
         made = None if thick is None else thickness_report(thick)
         written = None if made is None or made["facets_too_small"] else panels
         if out is not None:
-            folding.save(out, title=file.stem, colour=asked.colour, on_progress=progress)
+            folding.save(
+                out,
+                title=file.stem,
+                colour=asked.colour,
+                thickness_mm=asked.thickness_mm or 0.0,
+                on_progress=progress,
+            )
         if csv is not None:
             folding.save_angles(csv)
         if thick is not None and written is not None:

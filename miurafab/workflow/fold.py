@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from miurafab.display import Shown
+from miurafab.errors import OptionError
 from miurafab.files import AnyPath, new_file, write_bytes, write_text
 from miurafab.findings import Finding, findings_json
 from miurafab.geometry.arrays import Floats
@@ -51,6 +53,9 @@ if TYPE_CHECKING:
 ENDINGS = (".fold", ".gif", ".glb", ".html")
 """What a motion can be written as."""
 
+COLOURED = (".gif", ".html")
+"""Those with colours that change as the sheet moves."""
+
 Progress = Callable[[float, str], None]
 
 _NO_STRAIN, _NO_ENERGY = 1e-9, 1e-12
@@ -76,6 +81,14 @@ class FoldOptions:
         "How panels make room: cut back beside creases, or plates on shifted hinges.",
         default="tapered",
     )
+
+
+def check_colour(path: Path, *, by_strain: bool) -> None:
+    """Raise :class:`~miurafab.errors.OptionError` where ``path`` cannot have colours by strain."""
+    if by_strain and path.suffix.lower() not in COLOURED:
+        raise OptionError(
+            "colour", f"is for a .gif or .html file; {path.name} has no colours by strain"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,6 +127,7 @@ class Folding(Shown):
         *,
         title: str = "",
         colour: str | None = None,
+        thickness_mm: float = 0.0,
         on_progress: Progress | None = None,
     ) -> None:
         """Write the motion, in the format of the ending of ``path``.
@@ -125,6 +139,8 @@ class Folding(Shown):
         title : str
             The title inside the file. The default is the name of the target.
         {options}
+        thickness_mm : float
+            How thick a page draws the facets at first; its reader can change it.
         on_progress : callable, optional
             Called with a fraction in 0..1 and a short text.
 
@@ -132,9 +148,12 @@ class Folding(Shown):
         ------
         InputError
             For another ending, and for a folder that does not exist.
+        OptionError
+            For colours by strain in a file that has none.
         """
         file = new_file(path, "The motion", ENDINGS)
         by_strain = read_options(FoldOptions, {"colour": colour}).colour == "strain"
+        check_colour(file, by_strain=by_strain)
         motion, ending = self.motion, file.suffix.lower()
         pattern, title = motion.pattern, title or motion.pattern.name
         shifts = None if ending == ".fold" else layer_shifts(motion, self.layers)
@@ -153,6 +172,7 @@ class Folding(Shown):
                 show_strain=by_strain,
                 shifts=shifts,
                 curve=_energy(motion),
+                thickness_mm=thickness_mm,
             )
             write_page(file, title=title, pattern=pattern, motion=motion.frames, slider=slider)
 

@@ -190,3 +190,10 @@ def test_a_path_that_is_lost_is_exit_1(run, saved):
     answer = json.loads(done.stdout)
     assert not answer["converged"]
     assert not answer["bistable"]
+
+
+def test_a_page_is_written_by_its_ending(run, saved, tmp_path):
+    page = tmp_path / "pull.html"
+    done = run("energy", saved, "--steps", "2", "--pull", "corners", "--cycles", "1", "-o", page)
+    assert done.returncode == 0
+    assert '"word":"Pulling"' in page.read_text()

@@ -46,6 +46,20 @@ def test_a_sheet_that_bends_says_so(run, stiff, tmp_path):
     assert quiet.stderr == ""
 
 
+@pytest.mark.parametrize("ending", ["fold", "glb"])
+def test_colours_by_strain_are_refused_where_there_are_none(run, stiff, tmp_path, ending):
+    out = tmp_path / f"a.{ending}"
+    done = run("fold", stiff, "-o", out, "--steps", "6", "--colour", "strain")
+    assert "--colour is for a .gif or .html file" in sentence(done, 2)
+    assert not out.exists()
+
+
+def test_the_page_begins_with_the_thickness_of_the_panels(run, rigid, tmp_path):
+    done = run("fold", rigid, "-o", tmp_path / "a.html", "--steps", "6", "--thickness", "2mm")
+    assert done.returncode == 0
+    assert '"thickness":2.0}' in (tmp_path / "a.html").read_text()
+
+
 def test_frames_in_which_paper_meets_paper_are_told_in_runs(run, tmp_path):
     tube = tmp_path / "tube.fold"
     made = run("fit", "cylinder", "--close", "seam", "--facets", "6x12", "-o", tube)

@@ -56,6 +56,9 @@ class PullCurve(EnergyResult):
     works, stored, dissipated : arrays (n,)
         Joules since the folded form: the work of the force (by the trapezium rule), what is stored
         in creases and facets, and what yielding creases have dissipated.
+    coords : array (n, V, 3)
+        The vertices in each state, mm, in the axes of the folded form, with one triangle near the
+        middle held still.
     slips : array (C,)
         How far the rest angle of each crease has moved at the end, radians.
     converged : bool
@@ -72,6 +75,7 @@ class PullCurve(EnergyResult):
     works: Floats
     stored: Floats
     dissipated: Floats
+    coords: Floats
     slips: Floats
     converged: bool
 
@@ -269,6 +273,7 @@ class _Pulled:
         self.count = cycles
         self.walk = Walk(driven, driven.rest)
         self.rows: list[tuple[float, ...]] = []
+        self.shapes: list[Floats] = []
 
     def run(self) -> bool:
         """Whether all cycles were walked to their end."""
@@ -313,6 +318,7 @@ class _Pulled:
         lost = sum(self.driven.spent)
         load, stored = self._load(), self.driven.stored(state)
         self.rows.append((cycle, loading, drive, load, stored, lost))
+        self.shapes.append(state.points)
         if self.on_progress is not None:
             share = (cycle - 1 + 0.5 * (not loading)) / self.count
             self.on_progress(share, f"cycle {cycle} of {self.count}")
@@ -342,6 +348,7 @@ def _curve(
         works=work * joule,
         stored=stored * joule,
         dissipated=lost * joule,
+        coords=np.stack(pulled.shapes) @ pulled.driven.axes.T * model.unit_mm,
         slips=slips,
         converged=converged,
     )

@@ -80,6 +80,8 @@ class Slider:
         How far the facets of the last frame move when the layers stand apart, mm.
     curve : Curve, optional
         The energy of the facets, or the force.
+    word : str
+        What the slider does.
     thickness_mm : float
         The thickness with which facets are drawn at first. 0 is paper.
     """
@@ -91,6 +93,7 @@ class Slider:
     show_strain: bool = False
     shifts: Floats | None = None
     curve: Curve | None = None
+    word: str = "Folding"
     thickness_mm: float = 0.0
 
 
@@ -246,6 +249,7 @@ def _fold(pattern: CreasePattern, motion: Floats | None, slider: Slider) -> dict
         "first": len(forms) - 1,
         "names": slider.names,
         "start": slider.start,
+        "word": slider.word,
         "rigid": motion is not None and slider.strain is None,
         "strain": _strain(slider),
         "layers": _layers(slider),

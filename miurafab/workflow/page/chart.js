@@ -4,7 +4,7 @@ const HIGH = 88; // per cent of the box for the curve; the rest is margin
 const LOW = 6;
 
 class Chart {
-  /** `seek(part)` is asked for when somebody points at a part (0..1) of the curve. */
+  /** `seek(frame)` is asked for when somebody points at the curve. */
   constructor(box, seek) {
     this.box = box;
     this.svg = box.querySelector("svg");
@@ -13,7 +13,7 @@ class Chart {
     const point = (event) => {
       if (event.type === "pointermove" && !event.buttons) return;
       const { left, width } = box.getBoundingClientRect();
-      seek(Math.min(Math.max(((event.clientX - left) / width - 0.03) / 0.94, 0), 1));
+      if (this.places) seek(this.nearest((100 * (event.clientX - left)) / width));
     };
     box.addEventListener("pointerdown", point);
     box.addEventListener("pointermove", point);
@@ -39,6 +39,14 @@ class Chart {
     this.box.querySelector(".top").textContent = top;
     this.box.querySelector(".bottom").textContent = bottom;
     this.at(this.now ?? 0);
+  }
+
+  /** The frame at a place across the box; of several there, the one nearest to the frame that is shown. */
+  nearest(across) {
+    const far = this.places.map((place, at) => (
+      Math.abs(this.across(place) - across) + (3 * Math.abs(at - this.now)) / this.places.length
+    ));
+    return far.indexOf(Math.min(...far));
   }
 
   /** Move the mark to a frame, between two frames blended. */

@@ -55,10 +55,12 @@ class FoldView {
     this.pattern = new FlatPattern(byId("flat-pattern"), this.mesh, flat, this.looks, {
       hover: (found) => this.hover(found), pick: (found) => this.pick(found), chosen: () => this.pinned,
     });
-    this.chart = new Chart(byId("curve"), (part) => {
+    this.chart = new Chart(byId("curve"), (frame) => {
       this.play(false);
-      this.show(Math.round(part * (this.form.frames - 1)));
+      this.show(frame);
     });
+    byId("fold-heading").textContent = fold.word;
+    byId("motion-word").textContent = fold.word;
     this.legend();
     this.listen();
     this.thick();
@@ -333,13 +335,13 @@ class FoldView {
       const angle = this.angle(edge);
       const folded = angle === null ? "" : `, folded by ${angle.toFixed(1)}° now`;
       const what = this.mesh.sidesOf[edge].length > 1 ? "Crease" : "Edge";
-      return `${what} ${edge}: ${this.looks[this.mesh.kinds[edge]].name.toLowerCase()}, ${Math.hypot(...minus(a, b)).toFixed(2)} mm long${folded}`;
+      return `${what} ${edge}: ${this.looks[this.mesh.kinds[edge]].name.toLowerCase()}, ${Math.hypot(...minus(a, b)).toFixed(1)} mm long${folded}`;
     }
     if (facet < 0) return "Point at a crease or a facet in either picture.";
     const moves = this.form.frames > 1 && this.strains;
     const strain = moves ? (this.blended(this.strains, this.mesh.facets, facet, this.frame) / 65535) * this.fold.strain.most : 0;
     const bent = moves ? `, strain ${strain.toExponential(1)} now` : this.fold.rigid ? ", stays flat" : "";
-    return `Facet ${facet}: ${this.loops[facet].length} sides, ${this.area(facet).toFixed(1)} mm²${bent}`;
+    return `Facet ${facet}: ${this.loops[facet].length} sides, ${this.area(facet).toPrecision(4)} mm²${bent}`;
   }
 
   area(facet) {

@@ -73,11 +73,12 @@ function plates({ triangles, owners }, loops, moves, flat, thickness) {
     const [ax, ay] = [flat[3 * frame[0]], flat[3 * frame[0] + 1]];
     const [ux, uy] = [flat[3 * frame[1]] - ax, flat[3 * frame[1] + 1] - ay];
     const long = Math.hypot(ux, uy) || 1;
-    const plies = [0, 1].map((ply) => loop.map((vertex, at) => {
-      const { move } = moves[facet][ply][at];
+    // the top, the bottom, and between them the outline through the creases
+    const [top, bottom, middle] = [1, -1, 0].map((side, ply) => loop.map((vertex, at) => {
+      const move = side ? moves[facet][ply][at].move : [0, 0];
       const x = flat[3 * vertex] + (thickness / 2) * move[0] - ax;
       const y = flat[3 * vertex + 1] + (thickness / 2) * move[1] - ay;
-      return [(x * ux + y * uy) / long, (y * ux - x * uy) / long, (ply ? -1 : 1) * (thickness / 2)];
+      return [(x * ux + y * uy) / long, (y * ux - x * uy) / long, side * (thickness / 2)];
     }));
     const add = (p, q, r) => {
       const normal = cross(minus(q, p), minus(r, p));
@@ -91,13 +92,15 @@ function plates({ triangles, owners }, loops, moves, flat, thickness) {
     };
     for (const part of parts[facet]) {
       const [p, q, r] = Array.from(part, (vertex) => loop.indexOf(vertex));
-      add(plies[0][p], plies[0][q], plies[0][r]);
-      add(plies[1][p], plies[1][r], plies[1][q]);
+      add(top[p], top[q], top[r]);
+      add(bottom[p], bottom[r], bottom[q]);
     }
     loop.forEach((_, at) => {
       const next = (at + 1) % loop.length;
-      add(plies[1][at], plies[1][next], plies[0][next]);
-      add(plies[1][at], plies[0][next], plies[0][at]);
+      for (const [low, high] of [[bottom, middle], [middle, top]]) {
+        add(low[at], low[next], high[next]);
+        add(low[at], high[next], high[at]);
+      }
     });
   });
   return { corners, owners: facetOf, local: Float32Array.from(local), facing: Float32Array.from(facing) };

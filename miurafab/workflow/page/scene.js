@@ -378,7 +378,8 @@ class Scene {
 
   /** The front facet under a point of the canvas, and its side within `slack` pixels; -1: none. */
   pick(x, y, slack) {
-    if (!this.rows) return NONE;
+    if (!this.points.length) return NONE;
+    this.look();
     const { width, height } = this.stage;
     const screen = [((2 * x) / width - 1) * FIELD * this.aspect, (1 - (2 * y) / height) * FIELD, -1];
     const ray = [0, 1, 2].map((axis) => this.rows.reduce((sum, row, at) => sum + row[axis] * screen[at], 0));
