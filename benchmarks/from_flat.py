@@ -1,9 +1,11 @@
 """Fold named patterns from flat: processor time, strain, certificate, signs, stability.
 
     python benchmarks/from_flat.py [NAME ...]
+    python benchmarks/from_flat.py contact [NAME ...]
 
 Without names all patterns of tests/named_patterns.py but the largest are folded; ``miura-60`` has
-3,600 facets.
+3,600 facets. With ``contact``, sheets that come to touch themselves are folded without contact and
+with it: processor time, pairs of facets that pass through each other, and how far they get.
 """
 
 from __future__ import annotations
@@ -38,6 +40,32 @@ PATTERNS = {
     "miura-60": partial(named_patterns.miura, 60),
 }
 
+TOUCHING = {
+    "roll": partial(named_patterns.roll, 8, 100.0),
+    "spiral": partial(named_patterns.roll, 10, 95.0, 0.93),
+    "kresling to 72": partial(named_patterns.kresling, 8, 4, 72.0),
+    "kresling to 120": partial(named_patterns.kresling, 8, 4, 120.0),
+    "pleated hypar to 162": partial(named_patterns.pleated_hypar, 8, 162.0),
+    "yoshimura to 60": partial(named_patterns.yoshimura, 8, 8, 60.0),
+    "yoshimura to 72": partial(named_patterns.yoshimura, 8, 8, 72.0),
+    "miura 20x20": partial(named_patterns.miura, 20),
+    "yoshimura 13x16 to 60": partial(named_patterns.yoshimura, 13, 16, 60.0),
+}
+
+
+def contact_row(name: str) -> str:
+    """What contact takes and keeps apart in one pattern."""
+    pattern = TOUCHING[name]()
+    cells = [name, str(len(pattern.faces_vertices))]
+    for touching in (False, True):
+        started = time.process_time()
+        motion, verdict = ramp_motion(pattern, STEPS, touching=touching)
+        walked = time.process_time() - started
+        pairs = max((len(each.facets) for each in contacts(motion)), default=0)
+        error = f"{math.degrees(verdict.angle_error):.1f}"
+        cells += [f"{walked:.1f}", str(pairs), f"{motion.states[-1]:.0%}", error]
+    return "| " + " | ".join([*cells, str(verdict.snaps)]) + " |"
+
 
 def row(name: str) -> str:
     """What the motion of one pattern takes and shows."""
@@ -65,6 +93,12 @@ def row(name: str) -> str:
 
 def main(names: list[str]) -> None:
     """Print the table of ``names``."""
+    if names[:1] == ["contact"]:
+        print("| pattern | facets | s | pairs | end | error | s | pairs | end | error | snaps |")
+        print("| --- " * 11 + "|")
+        for name in names[1:] or TOUCHING:
+            print(contact_row(name), flush=True)
+        return
     print(
         "| pattern | facets | s | strain | rigid | residual | wrong | stable | error deg | pairs |"
     )

@@ -1,8 +1,9 @@
 """Sums over the vertices of a mesh: forces and stiffness of springs, each between a few vertices.
 
 A stencil is a row of vertices that one spring joins: two for a bar, four for a hinge. The matrix is
-as sparse as the stencils, and its sparsity and the order of elimination are found once. Six
-coordinates of one triangle are held, in axes along it, to exclude rigid motions.
+as sparse as the stencils, and its sparsity and the order of elimination are found once. Springs
+that come and go, of facets that touch, belong to no group: they are added to it. Six coordinates of
+one triangle are held, in axes along it, to exclude rigid motions.
 """
 
 from __future__ import annotations
@@ -51,6 +52,24 @@ class Assembly:
         size = len(starts) - 1
         return sparse.csc_array((data, rows, starts), shape=(size, size))
 
+    def scattered(self, stencils: Ints, vectors: Floats) -> Floats:
+        """As :meth:`gather`, of ``vectors`` (n, k, 3) at ``stencils`` (n, k) of no group."""
+        total = np.zeros((self.count, 3))
+        np.add.at(total, stencils, vectors)
+        return np.asarray(total.ravel()[self.free])
+
+    def joined(self, matrix: sparse.csc_array, stencils: Ints, blocks: Floats) -> sparse.csc_array:
+        """``matrix`` plus ``blocks`` (n, k, k, 3, 3) at ``stencils`` (n, k) of no group."""
+        if not len(stencils):
+            return matrix
+        at = self._places[stencils]
+        k = stencils.shape[1]
+        rows = np.broadcast_to(at[:, :, None, :, None], (len(at), k, k, 3, 3))
+        columns = np.broadcast_to(at[:, None, :, None, :], rows.shape)
+        real = (rows >= 0) & (columns >= 0)
+        more = sparse.coo_array((blocks[real], (rows[real], columns[real])), shape=matrix.shape)
+        return sparse.csc_array(matrix + more.tocsc())
+
     def vectors(self, coordinates: Floats) -> Floats:
         """(V, 3) the free ``coordinates`` at their vertices, and zeros where they are held."""
         whole = np.zeros(3 * self.count)
@@ -86,14 +105,18 @@ class Assembly:
         return minimum_degree(graph)
 
     @cached_property
+    def _places(self) -> Ints:
+        """(V, 3) the place of each coordinate among the free ones, -1 for a held one."""
+        places = np.full(3 * self.count, -1, dtype=np.int64)
+        places[self.free] = np.arange(len(self.free))
+        return places.reshape(-1, 3)
+
+    @cached_property
     def _sparsity(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Ints]:
         """Rows and column starts of the matrix (CSC), and the place of each computed value in its
         data: 1 + the index, or 0 for a held coordinate.
         """
-        new = np.full(3 * self.count, -1, dtype=np.int64)
-        new[self.free] = np.arange(len(self.free))
-        of_vertex = new.reshape(-1, 3)
-        row, column = (of_vertex[ends] for ends in self._pairs)
+        row, column = (self._places[ends] for ends in self._pairs)
         rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
         real = (rows >= 0) & (columns >= 0)
         key = np.where(real, columns * len(self.free) + rows, -1).ravel()

@@ -108,7 +108,8 @@ class Drive(NamedTuple):
 
 class Touch(NamedTuple):
     """n springs between four vertices each: their ``stencils`` (n, 4), and the ``forces`` (n, 4, 3)
-    and ``stiffness`` (n, 4, 4, 3, 3), gradient and Hessian of their energy.
+    and ``stiffness`` (n, 4, 4, 3, 3), gradient and Hessian of their energy; the stiffness may be
+    left out.
     """
 
     stencils: Ints
@@ -169,7 +170,7 @@ class Balance:
     def arrive(self, state: EquilibriumState) -> None:
         """Take note that the path has come to ``state``. Elastic hinges have no memory."""
 
-    def touch(self, points: Floats) -> Touch:
+    def touch(self, points: Floats, *, stiff: bool = True) -> Touch:
         """The springs between facets that touch at ``points``; none here."""
         return NO_TOUCH
 
@@ -181,7 +182,9 @@ class Balance:
         along = model.bar_vectors(points)
         pull = (state.forces / model.lengths)[:, None] * along
         drive = self.drive(points, target)
-        force = self._gather(bend, pull, state.mu * drive.gradient, self.touch(points).forces)
+        push = self.touch(points, stiff=False)
+        force = self._gather(bend, pull, state.mu * drive.gradient)
+        force += self.assembly.scattered(push.stencils, push.forces)
         strain = model.strains_of(along) - model.compliance * state.forces
         return Residual(force, strain, drive.value - target)
 
@@ -206,8 +209,9 @@ class Balance:
         drive = self.drive(points, target)
         across = drive.gradient[:, None, :, None] * drive.gradient[None, :, None, :]
         held = state.mu * drive.hessian + across / EPS
-        touching = self.touch(points).stiffness
-        matrix = self.assembly.matrix([bend, stretch_blocks(block), held[None], touching])
+        matrix = self.assembly.matrix([bend, stretch_blocks(block), held[None]])
+        touch = self.touch(points)
+        matrix = self.assembly.joined(matrix, touch.stencils, touch.stiffness)
         return Factored(self.factored(matrix), bars, weights, drive.gradient)
 
     def factored(self, matrix: sparse.csc_array) -> Factor:
@@ -223,7 +227,7 @@ class Balance:
         """The Newton step (dx, dn) for ``residual`` with K as ``factored``."""
         bars, weights, drive = factored.bars, factored.weights, factored.drive
         pull = (weights * residual.strain)[:, None] * bars
-        right = residual.force + self._gather(None, pull, residual.miss / EPS * drive, None)
+        right = residual.force + self._gather(None, pull, residual.miss / EPS * drive)
         dx = self.assembly.vectors(-factored.k.solve(right))
         first, second = self.model.bars.T
         stretch = np.einsum("bk,bk->b", bars, dx[second] - dx[first])
@@ -240,16 +244,13 @@ class Balance:
 
     @cached_property
     def assembly(self) -> Assembly:
-        """The sums over hinges, bars, the driven quantity and touching facets."""
-        touching = self.touch(self.rest.points).stencils
-        stencils = (self.hinges, self.model.bars, self.drive_stencil[None], touching)
+        """The sums over hinges, bars and the driven quantity."""
+        stencils = (self.hinges, self.model.bars, self.drive_stencil[None])
         return Assembly(len(self.model.points), stencils, self._held)
 
-    def _gather(
-        self, bend: Floats | None, pull: Floats, drive: Floats, push: Floats | None
-    ) -> Floats:
-        """The free coordinates of the sums at vertices of hinge, bar, drive and push vectors."""
-        return self.assembly.gather([bend, np.stack([-pull, pull], axis=1), drive, push])
+    def _gather(self, bend: Floats | None, pull: Floats, drive: Floats) -> Floats:
+        """The free coordinates of the sums at vertices of hinge, bar and drive vectors."""
+        return self.assembly.gather([bend, np.stack([-pull, pull], axis=1), drive])
 
     @cached_property
     def _solver(self) -> SymmetricSolver:

@@ -15,7 +15,8 @@ with mu after Levenberg and Marquardt. So it only ever lowers the energy.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import copy
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -34,7 +35,6 @@ from miurafab.origami.energy.hinges import hinge_angles, hinge_gradients
 from miurafab.origami.energy.touching import (
     NO_PAIRS,
     TouchPairs,
-    near_pairs,
     touch,
     touch_energy,
 )
@@ -76,19 +76,17 @@ class Ramped(Balance):
         """Count angles on from ``points`` (V, 3)."""
         self.last[:] = self.angles(points)
 
-    def touching_at(self, points: Floats) -> Ramped:
-        """The same model with the pairs that are near each other at ``points`` (V, 3).
+    def with_pairs(self, pairs: TouchPairs) -> Ramped:
+        """The same model with ``pairs``. It shares ``last``."""
+        made = copy.copy(self)  # with what is known of the sums
+        object.__setattr__(made, "pairs", pairs)
+        return made
 
-        It shares ``last``. Where nothing touches, now or before, it is this model itself.
-        """
-        pairs = near_pairs(points, self.model.triangles, self.pairs)
-        if not len(pairs.side) and not len(self.pairs.side):
-            return self
-        return replace(self, pairs=pairs)
-
-    def touch(self, points: Floats, *, definite: bool = False) -> Touch:
+    def touch(self, points: Floats, *, stiff: bool = True, definite: bool = False) -> Touch:
         """The springs of the pairs that touch."""
-        return touch(points, self.pairs, definite=definite) if len(self.pairs.side) else NO_TOUCH
+        if not len(self.pairs.side):
+            return NO_TOUCH
+        return touch(points, self.pairs, stiff=stiff, definite=definite)
 
     def state(self, points: Floats) -> EquilibriumState:
         """The state at ``points`` (V, 3) whose bars pull by their strain; all have a compliance."""
@@ -123,14 +121,16 @@ class Ramped(Balance):
         push = self.touch(points, definite=True)
         bend = moment[:, None, None] * turn
         pulls = np.stack([-pull, pull], axis=1)
-        gradient = self.assembly.gather([bend, pulls, np.zeros((0, 3)), push.forces])
+        gradient = self.assembly.gather([bend, pulls, np.zeros((0, 3))])
+        gradient += self.assembly.scattered(push.stencils, push.forces)
         outer = turn[:, :, None, :, None] * turn[:, None, :, None, :]
         block = bars[:, :, None] * bars[:, None, :] / model.compliance[:, None, None]
         block += (np.maximum(forces, 0.0) / model.lengths)[:, None, None] * np.eye(3)
         bent = slope[:, None, None, None, None] * outer
         stretched = stretch_blocks(block)
         none = np.zeros((1, 0, 0, 3, 3))
-        return gradient, self.assembly.matrix([bent, stretched, none, push.stiffness])
+        matrix = self.assembly.matrix([bent, stretched, none])
+        return gradient, self.assembly.joined(matrix, push.stencils, push.stiffness)
 
     def _counted_on(self, angle: Floats) -> Floats:
         """``angle`` (H,) in (-pi, pi], with the whole turns nearest to the last state."""

@@ -1,22 +1,23 @@
-"""Facets that must not pass through each other: one-sided springs between vertices and triangles.
+"""Facets that must not pass through each other: one-sided springs over two kinds of pairs.
 
-A vertex w stands over the plane of a triangle (a, b, c) at the height d, on the side s = +-1 that
-is remembered from the last accepted state. Nearer than h it is pushed off,
+A vertex w over a triangle (a, b, c), and an edge (p, q) over an edge (a, b), have a height d along
+the unit normal n to two directions e_1, e_2: two sides of the triangle, or the two edges. The pair
+has a side s = +-1. Nearer than h it is pushed off,
 
     E = 1/3 k g (h - s d)^3 / h   where s d < h,
 
-which sets in without a jump of the stiffness. With e_1 = b - a, e_2 = c - a, the unit normal n, the
-coordinates beta, gamma of the foot of w along e_1 and e_2, and m_1, m_2 the basis dual to e_1, e_2
-in the plane, over the vertices (w, a, b, c)
+which sets in without a jump of the stiffness. Two points stand over each other there, the vertex
+and its foot, or the nearest points of both lines. With u the difference of their displacements, as
+if both were fixed to their bodies, and m_1, m_2 the basis dual to e_1, e_2 in the plane,
 
-    d d   = n.u,     u = dw - (1 - beta - gamma) da - beta db - gamma dc
+    d d   = n.u
     d2 d  = -2 sum_i (n.de_i)(m_i.u) - d sum_ij (n.de_i)(n.de_j) m_i.m_j.
 
-Facets of origami lie exactly on each other, so that vertices come down on sides and corners. The
-triangle is therefore widened: g = 1 inside it, and falls to 0 at -``WIDENED`` in barycentric
-coordinates. Sides, pairs and g belong to the last accepted state and stay during an iteration, so
-the forces have an energy. A triangle and a vertex that sides join to two of its corners are kept
-apart by the limit of the fold angle between them instead.
+In d2 d^2 / 2 = (n.u)^2 + |v|^2 + 2 d n.(de_2 dt - de_1 ds) the points slide by ds, dt such that
+v = u + e_2 dt - e_1 ds has v.e_i = -d n.de_i; so both kinds have the same form.
+
+Which pairs there are, their sides and g: :mod:`miurafab.origami.energy.touch_pairs`. They belong to
+the last accepted state and stay during an iteration, so the forces have an energy.
 """
 
 from __future__ import annotations
@@ -24,7 +25,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 from miurafab.origami.energy.equilibrium import Touch
@@ -33,132 +33,123 @@ HEIGHT = 0.02
 """h, in mean edges."""
 STIFFNESS = 30.0
 """k, in k_f: 3,000 times that of a crease."""
-WIDENED = 0.1
-"""How far a triangle reaches beyond its sides, in barycentric coordinates."""
-REACH = 0.35
-"""Mean edges beyond its largest radius within which a triangle looks for vertices."""
+_LEGS = np.array(
+    [
+        [[0.0, -1.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]],
+        [[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]],
+    ]
+)
+"""e_i = sum _LEGS_ik x_k over the vertices of a pair of either kind."""
 
 
 class TouchPairs(NamedTuple):
-    """n pairs: their ``stencils`` (n, 4), vertex and triangle, ``side`` (n,) of +1 or -1, and the
-    ``weight`` (n,) g of their springs.
+    """n pairs: their ``stencils`` (n, 4), a vertex and a triangle or two ``edges`` (n,), their
+    ``side`` (n,) of +1 or -1, and the ``weight`` (n,) g of their springs.
     """
 
     stencils: Ints
+    edges: Bools
     side: Floats
     weight: Floats
 
+    def those(self, chosen: Bools | Ints) -> TouchPairs:
+        """The pairs ``chosen``, as a mask (n,) or by number."""
+        side, weight = self.side[chosen], self.weight[chosen]
+        return TouchPairs(self.stencils[chosen], self.edges[chosen], side, weight)
 
-NO_PAIRS = TouchPairs(np.empty((0, 4), dtype=np.int64), np.empty(0), np.empty(0))
+
+NO_PAIRS = TouchPairs(
+    np.empty((0, 4), dtype=np.int64), np.empty(0, dtype=bool), np.empty(0), np.empty(0)
+)
 
 
-def near_pairs(points: Floats, triangles: Ints, before: TouchPairs) -> TouchPairs:
-    """The pairs within reach at ``points`` (V, 3), of vertices and ``triangles`` (T, 3).
-
-    A pair that was known ``before`` keeps its side, and a new one has that on which it is: it came
-    from beside the triangle, or from afar.
+class Over(NamedTuple):
+    """How the points of n pairs stand over each other: the ``height`` (n,), the unit ``normal``
+    (n, 3), e_1 and e_2 ``legs`` (n, 2, 3), the size of their vector product squared ``size2`` (n,),
+    and the ``place`` (n, 2) of the points along e_1 and e_2, from 0 to 1.
     """
-    corners = points[triangles]
-    centre = corners.mean(axis=1)
-    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-    reach = float(radius.max(initial=0.0)) + REACH
-    found = cKDTree(points).sparse_distance_matrix(cKDTree(centre), reach, output_type="ndarray")
-    vertex, triangle = found["i"].astype(np.int64), found["j"].astype(np.int64)
-    order = np.lexsort((triangle, vertex))
-    vertex, triangle = vertex[order], triangle[order]
-    near = np.linalg.norm(points[vertex] - centre[triangle], axis=1) <= radius[triangle] + REACH
-    vertex, triangle = vertex[near], triangle[near]
-    apart = ~_neighbours(vertex, triangle, triangles, len(points))
-    stencils = np.column_stack([vertex[apart], triangles[triangle[apart]]])
-    height, inside = _place(points, stencils)
-    weight = np.clip(1 + np.minimum(inside.min(axis=1), 0.0) / WIDENED, 0.0, 1.0)
-    live = (weight > 0) & (np.abs(height) <= REACH)
-    stencils, height, weight = stencils[live], height[live], weight[live]
-    side = np.where(height < 0, -1.0, 1.0)
-    if len(before.side):
-        key, old = (_keys(each, len(points)) for each in (stencils, before.stencils))
-        order = np.argsort(old)
-        at = order[np.searchsorted(old, key, sorter=order).clip(max=len(old) - 1)]
-        side = np.where(old[at] == key, before.side[at], side)
-    return TouchPairs(stencils, side, weight)
+
+    height: Floats
+    normal: Floats
+    legs: Floats
+    size2: Floats
+    place: Floats
 
 
-def touch(points: Floats, pairs: TouchPairs, *, definite: bool = False) -> Touch:
-    """The forces and stiffness of ``pairs`` at ``points`` (V, 3).
+def over(points: Floats, stencils: Ints, edges: Bools) -> Over:
+    """The heights of pairs at ``points`` (V, 3).
+
+    Of a triangle the place is that of the foot, (beta, gamma); of two edges that on either edge.
+    Parallel edges have no height: it is NaN.
+    """
+    w, a, b, c = (points[stencils[:, corner]] for corner in range(4))
+    two = edges[:, None]
+    first = np.where(two, a - w, b - a)
+    second = np.where(two, c - b, c - a)
+    apart = np.where(two, b - w, w - a)
+    normal = vector_product(first, second)
+    size2 = np.einsum("nk,nk->n", normal, normal)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit = normal / np.sqrt(size2)[:, None]
+        along = np.einsum("nk,nk->n", vector_product(apart, second), normal) / size2
+        across = np.einsum("nk,nk->n", vector_product(first, apart), normal) / size2
+    across = np.where(edges, -across, across)
+    height = np.einsum("nk,nk->n", apart, unit)
+    legs = np.stack([first, second], axis=1)
+    return Over(height, unit, legs, size2, np.stack([along, across], axis=1))
+
+
+def touch(
+    points: Floats, pairs: TouchPairs, *, stiff: bool = True, definite: bool = False
+) -> Touch:
+    """The forces of those of ``pairs`` that touch at ``points`` (V, 3), and where ``stiff`` their
+    stiffness.
 
     With ``definite`` the stiffness leaves out the curvature of the heights.
     """
-    height, inside = _place(points, pairs.stencils)
-    over = np.maximum(HEIGHT - pairs.side * height, 0.0)
-    live = np.flatnonzero((over > 0) & (pairs.weight > 0))
-    forces = np.zeros((len(pairs.side), 4, 3))
-    stiffness = np.zeros((len(pairs.side), 4, 4, 3, 3))
-    gradient, hessian = _height_derivatives(
-        points, pairs.stencils[live], height[live], inside[live]
-    )
-    k = STIFFNESS / HEIGHT * pairs.weight[live] * over[live]
-    push = -(k * over[live] * pairs.side[live])
-    forces[live] = push[:, None, None] * gradient
+    it = over(points, pairs.stencils, pairs.edges)
+    near = HEIGHT - pairs.side * it.height
+    live = np.flatnonzero((near > 0) & (pairs.weight > 0))
+    it, pairs, near = Over(*(array[live] for array in it)), pairs.those(live), near[live]
+    part = _parts(it, pairs.edges)
+    gradient = part[:, :, None] * it.normal[:, None]
+    k = STIFFNESS / HEIGHT * pairs.weight * near
+    push = -(k * near * pairs.side)
+    forces = push[:, None, None] * gradient
+    if not stiff:
+        return Touch(pairs.stencils, forces, np.empty((0, 4, 4, 3, 3)))
     outer = gradient[:, :, None, :, None] * gradient[:, None, :, None, :]
-    stiffness[live] = 2 * k[:, None, None, None, None] * outer
+    stiffness = 2 * k[:, None, None, None, None] * outer
     if not definite:
-        stiffness[live] += push[:, None, None, None, None] * hessian
+        stiffness += push[:, None, None, None, None] * _curvature(it, pairs.edges, part)
     return Touch(pairs.stencils, forces, stiffness)
 
 
 def touch_energy(points: Floats, pairs: TouchPairs) -> float:
     """The energy of the springs of ``pairs`` at ``points`` (V, 3)."""
-    height, _ = _place(points, pairs.stencils)
-    over = np.maximum(HEIGHT - pairs.side * height, 0.0)
-    return STIFFNESS / (3 * HEIGHT) * float((pairs.weight * over**3).sum())
+    height = over(points, pairs.stencils, pairs.edges).height
+    near = np.maximum(HEIGHT - pairs.side * height, 0.0)
+    return STIFFNESS / (3 * HEIGHT) * float((pairs.weight * near**3).sum())
 
 
-def _keys(stencils: Ints, count: int) -> Ints:
-    """A number for each pair: a triangle is known by its first two corners."""
-    return (stencils[:, 0] * count + stencils[:, 1]) * count + stencils[:, 2]
+def _parts(it: Over, edges: Bools) -> Floats:
+    """(n, 4) the parts of the vertices in u = sum part_k dx_k."""
+    s, t = it.place.T
+    one = np.ones(len(s))
+    on_triangle = np.stack([one, s + t - 1, -s, -t], axis=1)
+    on_edges = np.stack([s - 1, -s, 1 - t, t], axis=1)
+    return np.where(edges[:, None], on_edges, on_triangle)
 
 
-def _neighbours(vertex: Ints, triangle: Ints, triangles: Ints, count: int) -> Bools:
-    """(n,) whether the vertex is a corner of the triangle, or joined to two of them."""
-    ends = np.stack([triangles, np.roll(triangles, 1, axis=1)]).reshape(2, -1)
-    pairs = np.unique(np.concatenate([ends[0] * count + ends[1], ends[1] * count + ends[0]]))
-    met = triangles[triangle] == vertex[:, None]
-    key = vertex[:, None] * count + triangles[triangle]
-    at = np.searchsorted(pairs, key).clip(max=len(pairs) - 1)
-    return np.asarray(met.any(axis=1) | ((pairs[at] == key).sum(axis=1) >= 2))
-
-
-def _place(points: Floats, stencils: Ints) -> tuple[Floats, Floats]:
-    """The heights (n,) of the vertices over their planes, and the barycentric coordinates (n, 3) of
-    their feet.
-    """
-    w, a, b, c = (points[stencils[:, corner]] for corner in range(4))
-    first, second, up = b - a, c - a, w - a
-    normal = vector_product(first, second)
-    size2 = np.einsum("nk,nk->n", normal, normal)
-    height = np.einsum("nk,nk->n", up, normal) / np.sqrt(size2)
-    beta = np.einsum("nk,nk->n", vector_product(up, second), normal) / size2
-    gamma = np.einsum("nk,nk->n", vector_product(first, up), normal) / size2
-    return height, np.stack([1 - beta - gamma, beta, gamma], axis=1)
-
-
-def _height_derivatives(
-    points: Floats, stencils: Ints, height: Floats, inside: Floats
-) -> tuple[Floats, Floats]:
-    """The gradient (n, 4, 3) and Hessian (n, 4, 4, 3, 3) of the heights."""
-    _, a, b, c = (points[stencils[:, corner]] for corner in range(4))
-    first, second = b - a, c - a
-    normal = vector_product(first, second)
-    size2 = np.einsum("nk,nk->n", normal, normal)
+def _curvature(it: Over, edges: Bools, part: Floats) -> Floats:
+    """(n, 4, 4, 3, 3) the Hessian of the heights, with m = sum_i e_i m_i by the vertices."""
+    n, first, second = it.normal, it.legs[:, 0], it.legs[:, 1]
+    normal = n * np.sqrt(it.size2)[:, None]
     dual = np.stack([vector_product(second, normal), vector_product(normal, first)], axis=1)
-    dual /= size2[:, None, None]
-    n = normal / np.sqrt(size2)[:, None]
-    part = np.concatenate([np.ones((len(n), 1)), -inside], axis=1)  # u = sum part_k dx_k
-    gradient = part[:, :, None] * n[:, None]
-    leg = np.array([[0.0, -1.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]])  # de_i = sum leg_ik dx_k
+    dual /= it.size2[:, None, None]
+    m = _LEGS[edges.astype(np.int64)].transpose(0, 2, 1) @ dual
     # -2 (n.de_i)(m_i.u) made symmetric, and -d (n.de_i)(n.de_j) m_i.m_j
-    mixed = np.einsum("ik,nx,nl,niy->nklxy", leg, n, part, dual)
-    hessian = -(mixed + mixed.transpose(0, 2, 1, 4, 3))
-    products = np.einsum("nix,njx->nij", dual, dual)
-    square = np.einsum("nij,ik,jl,nx,ny->nklxy", products, leg, leg, n, n, optimize=True)
-    return gradient, hessian - height[:, None, None, None, None] * square
+    mixed = m[:, :, None, None, :] * n[:, None, None, :, None] * part[:, None, :, None, None]
+    square = it.height[:, None, None] * (m @ m.transpose(0, 2, 1))
+    across = n[:, None, None, :, None] * n[:, None, None, None, :]
+    return -(mixed + mixed.transpose(0, 2, 1, 4, 3)) - square[..., None, None] * across

@@ -21,23 +21,38 @@ def split_facets(points: Floats, faces: Ints) -> tuple[Ints, Ints]:
 
     Triangles run round as their facets do; diagonals are in the order of the facets.
     """
+    triangles, _, diagonals = _split(points, faces)
+    return triangles, diagonals
+
+
+def facet_triangles(points: Floats, faces: Ints) -> tuple[Ints, Ints]:
+    """The triangles (T, 3) of :func:`split_facets`, and the facet (T,) of each."""
+    triangles, facets, _ = _split(points, faces)
+    return triangles, facets
+
+
+def _split(points: Floats, faces: Ints) -> tuple[Ints, Ints, Ints]:
     size = (faces >= 0).sum(axis=1)
     triangles, diagonals = [faces[size == 3][:, :3]], [np.empty((0, 2), dtype=np.int64)]
-    owners = [np.empty(0, dtype=np.int64)]
+    facets, owners = [np.flatnonzero(size == 3)], [np.empty(0, dtype=np.int64)]
     if (size == 4).any():
-        q = _turned(points, faces[size == 4][:, :4])
+        quads = np.flatnonzero(size == 4)
+        q = _turned(points, faces[quads][:, :4])
         triangles += [q[:, [0, 1, 2]], q[:, [0, 2, 3]]]
+        facets += [quads, quads]
         diagonals.append(q[:, [0, 2]])
-        owners.append(np.flatnonzero(size == 4))
+        owners.append(quads)
     for face in np.flatnonzero(size > 4).tolist():
         corners = faces[face, : size[face]].tolist()
         found = _best(points, corners)
         triangles.append(np.array(found))
+        facets.append(np.full(len(found), face))
         # the longest run is the whole facet, whose last side is no diagonal
         diagonals.append(np.array([[last, first] for first, _, last in found[1:]]))
         owners.append(np.full(len(found) - 1, face))
     order = np.argsort(np.concatenate(owners), kind="stable")
-    return np.concatenate(triangles), np.concatenate(diagonals)[order]
+    ordered = np.concatenate(diagonals)[order]
+    return np.concatenate(triangles), np.concatenate(facets), ordered
 
 
 def _turned(points: Floats, q: Ints) -> Ints:

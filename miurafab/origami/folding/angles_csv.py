@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from miurafab.origami.folding.contact import self_intersections
+from miurafab.origami.energy.triangles import facet_triangles
+from miurafab.origami.folding.contact import meeting_facets
 from miurafab.origami.folding.kinematics import FoldingMotion
 
 ON_EACH_OTHER = np.pi - 1e-3
@@ -28,17 +29,19 @@ def contacts(
 ) -> tuple[Contact, ...]:
     """The frames of ``motion`` in which facets pass through each other.
 
-    Frames in which a crease is folded past :data:`ON_EACH_OTHER` are left out: paper folded flat
-    lies on itself, and coordinates do not tell which layer is above.
+    Bent facets are the triangles of the bar-and-hinge model. Frames in which a crease is folded
+    past :data:`ON_EACH_OTHER` are left out: paper folded flat lies on itself, and coordinates do
+    not tell which layer is above.
     """
-    crossing = []
+    pattern, crossing = motion.pattern, []
+    flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
+    split = facet_triangles(flat, pattern.faces_vertices) if motion.mismatch is None else None
     for frame, (points, angles) in enumerate(zip(motion.frames, motion.fold_angles, strict=True)):
         if on_progress is not None:
             on_progress(frame / len(motion.frames), "self-contact")
         if np.abs(angles).max(initial=0.0) > ON_EACH_OTHER:
             continue
-        shape = replace(motion.pattern, folded_coords=points, edges_fold_angle=angles)
-        pairs = self_intersections(shape)
+        pairs = meeting_facets(pattern, points, split)
         if len(pairs):
             named = tuple((int(a), int(b)) for a, b in pairs)
             crossing.append(Contact(frame, float(motion.states[frame]), named))

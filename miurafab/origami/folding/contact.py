@@ -41,7 +41,7 @@ def self_intersections(pattern: CreasePattern) -> Ints:
     """
     if pattern.folded_coords is None:
         raise ValueError("the pattern has no folded form")
-    return _meeting_facets(pattern, pattern.folded_coords)
+    return meeting_facets(pattern, pattern.folded_coords)
 
 
 def overlaps(pattern: CreasePattern) -> Ints:
@@ -50,16 +50,22 @@ def overlaps(pattern: CreasePattern) -> Ints:
     A facet that is turned over overlaps its neighbours.
     """
     flat = pattern.vertices_coords
-    return _meeting_facets(pattern, np.pad(flat, ((0, 0), (0, 1))))
+    return meeting_facets(pattern, np.pad(flat, ((0, 0), (0, 1))))
 
 
-def _meeting_facets(pattern: CreasePattern, points: Floats) -> Ints:
+def meeting_facets(
+    pattern: CreasePattern, points: Floats, split: tuple[Ints, Ints] | None = None
+) -> Ints:
+    """(n, 2) the pairs of facets of ``pattern`` that meet with its vertices at ``points`` (V, 3).
+
+    ``split`` are the triangles (T, 3) of bent facets, and the facet (T,) of each.
+    """
     faces = pattern.faces_vertices
     real = (faces >= 0)[..., None]
     corners = points[faces]
     low = np.where(real, corners, np.inf).min(axis=1)
     high = np.where(real, corners, -np.inf).max(axis=1)
-    triangles, owner = triangulate(faces, pattern.vertices_coords)
+    triangles, owner = triangulate(faces, pattern.vertices_coords) if split is None else split
     shapes = _Triangles.of(points, triangles)
     order = np.argsort(owner, kind="stable")
     counts = np.bincount(owner, minlength=len(faces))

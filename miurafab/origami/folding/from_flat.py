@@ -27,10 +27,19 @@ from miurafab.geometry.sparse import negative_pivots
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import SOFTNESS, BarHingeModel, flat_model
 from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate, follow
-from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, Factored, solve
+from miurafab.origami.energy.equilibrium import (
+    Balance,
+    EquilibriumState,
+    Factored,
+    Solution,
+    solve,
+)
 from miurafab.origami.energy.ramp import LARGEST_TURN, Descent, Ramped, descend
 from miurafab.origami.energy.seed import linear_seed
-from miurafab.origami.energy.touching import REACH
+from miurafab.origami.energy.touch_pairs import ARMED, REACH, WIDENED, NearPairs
+from miurafab.origami.energy.touching import HEIGHT
+from miurafab.origami.energy.triangles import facet_triangles
+from miurafab.origami.folding.contact import meeting_facets
 
 Progress = Callable[[float, str], None]
 
@@ -40,14 +49,19 @@ ENOUGH = 1e-6
 """The force, in k_f, at which a descent hands over to Newton's iteration."""
 ROUNDS = 200
 """The most steps of a descent."""
-MOST_PIECES, PIECE_ROUNDS = 40, 30
-"""The most pieces of a descent with facets that touch, and the most steps of each."""
+MOST_ARMINGS = 5
+"""How often a step is solved anew with springs between what came to touch in it."""
+MOST_PIECES, PIECE_ROUNDS, LEASH = 80, 30, WIDENED / 2
+"""The most pieces of a descent with facets that touch, the most steps of each, and how far it may
+go, mean edges."""
 FIRST_PARTS = (1.0, 0.25, 1.0 / 16.0)
 """The first balance, in steps between two frames: nearer to flat if it is not found."""
 FIRST, LONGER, SHORTEST = 1.0 / 8.0, 1.6, 1.0 / 64.0
 """Of the step between two frames: the first step, the growth after one that holds, the least."""
 SHAKEN = 1e-3
 """Mean edges by which vertices are moved at random before a descent out of a snap."""
+SHAKES = 4
+"""How often facets that touch are shaken for one snap."""
 MAX_SNAPS = 20
 FIRMER = 100.0
 """The factor on the stiffness of facets in a frame."""
@@ -128,7 +142,10 @@ def fold_from_flat(
     :func:`~miurafab.origami.energy.bar_hinge.flat_model` raises. Failure is a result.
     """
     model = flat_model(pattern, softness=softness)
-    walk = _Walk(model, touching, np.random.default_rng(seed))
+    near = None
+    if touching:
+        near = NearPairs(model.triangles, pattern.edges_vertices, len(model.points))
+    walk = _Walk(pattern, model, near, np.random.default_rng(seed))
     start = linear_seed(model)
     frames: list[RampFrame] = []
     found = any(walk.leave_flat(start.heights, float(parts[1]) * first) for first in FIRST_PARTS)
@@ -150,7 +167,15 @@ def fold_from_flat(
 class _Walk:
     """The walk along the ramp: where it is, the last states, and the length of the next step."""
 
-    def __init__(self, model: BarHingeModel, touching: bool, random: np.random.Generator) -> None:
+    def __init__(
+        self,
+        pattern: CreasePattern,
+        model: BarHingeModel,
+        near: NearPairs | None,
+        random: np.random.Generator,
+    ) -> None:
+        self._pattern = pattern
+        self._split = facet_triangles(model.points, pattern.faces_vertices)
         self.ramped = Ramped(model)
         firmer = np.where(model.rest == 0, FIRMER, 1.0) * model.stiffness
         hard = replace(model, compliance=np.zeros_like(model.compliance), stiffness=firmer)
@@ -159,7 +184,8 @@ class _Walk:
         self._factored: Factored | None = None
         self.step = FIRST
         self.snaps = 0
-        self._touching = touching
+        self._near = near
+        self._armed = np.empty(0, dtype=bool)
         self._random = random
 
     def leave_flat(self, heights: Floats, part: float) -> bool:
@@ -167,32 +193,39 @@ class _Walk:
         raised = self.ramped.model.points.copy()
         raised[:, 2] += part * heights
         self.ramped.last[:] = 0.0
-        return self.land(raised @ self.ramped.axes, part)
+        return self.land(raised @ self.ramped.axes, part, beside=False)
 
-    def land(self, points: Floats, part: float) -> bool:
-        """Find a balance at ``part`` by descent from ``points``."""
-        ended = self._descend(points, part)
-        found = solve(self.ramped, self.ramped.state(ended.points), part)
+    def land(self, points: Floats, part: float, *, beside: bool = True) -> bool:
+        """Find a balance at ``part`` by descent from ``points``.
+
+        With ``beside`` what comes to touch from beside is held off as well: in a flat sheet, where
+        all lies beside each other, nothing touches.
+        """
+        ended = self._descend(points, part, beside)
+        found = self._solved(False, self.ramped.state(ended.points), part)
         turned = np.abs(self.ramped.angles(found.state.points) - self.ramped.last)
         if not found.converged or turned.max(initial=0.0) > LARGEST_TURN:
+            return False
+        if self._pierces(found.state.points):
             return False
         self.known, self._factored = [Known(part, found.state)], found.factored
         self._accept(found.state.points)
         self.step = FIRST
         return True
 
-    def _descend(self, points: Floats, part: float) -> Descent:
+    def _descend(self, points: Floats, part: float, beside: bool) -> Descent:
         """Where a descent from ``points`` ends. With facets that touch it goes in short pieces, and
         looks after each which facets are near each other.
         """
-        if not self._touching:
+        if self._near is None:
             return descend(self.ramped, points, part, ENOUGH, ROUNDS)
         ended = Descent(points, np.inf)
         for _ in range(MOST_PIECES):
-            ended = descend(self.ramped, ended.points, part, ENOUGH, PIECE_ROUNDS, REACH / 2)
+            self._arm(self._near.within(ended.points, np.inf))
+            ended = descend(self.ramped, ended.points, part, ENOUGH, PIECE_ROUNDS, LEASH)
             if ended.force <= ENOUGH:
                 break
-            self._accept(ended.points)
+            self._look(ended.points, beside=beside)
         return ended
 
     def reach(self, goal: float, nominal: float) -> bool:
@@ -200,14 +233,18 @@ class _Walk:
         while self.known[-1].drive < goal - 1e-12:
             here = self.known[-1].drive
             part = min(goal, here + nominal * self.step)
-            found = solve(self.ramped, extrapolate(self.known, part), part, self._factored)
+            found = self._solved(False, extrapolate(self.known, part), part, self._factored)
             self._factored = found.factored
-            if found.converged and self._is_short(found.state.points):
+            short = found.converged and self._is_short(found.state.points)
+            pierces = short and self._pierces(found.state.points)
+            if short and not pierces:
                 self._accept(found.state.points)
                 self.known = [*self.known[1 - HISTORY :], Known(part, found.state)]
                 self.step = min(1.0, self.step * LONGER)
             elif self.step > SHORTEST:
                 self.step /= 2
+                if pierces:
+                    self._look(self.known[-1].state.points, beside=True)
             elif not self._snap(min(goal, here + nominal * FIRST)):
                 return False
         return True
@@ -216,8 +253,8 @@ class _Walk:
         """The last state with stiff bars, if they find a stable balance near it, or as it is."""
         here, soft, stiff = self.known[-1], self.ramped, self.stiff
         stiff.last[:] = soft.last
-        found = solve(stiff, here.state, here.drive)
-        if found.converged:
+        found = self._solved(True, here.state, here.drive)
+        if found.converged and not self._pierces(found.state.points):
             turned = np.abs(stiff.angles(found.state.points) - soft.last).max(initial=0.0)
             hard = _frame(stiff, Known(here.drive, found.state), True)
             if turned <= NEAR and not hard.unstable:
@@ -254,30 +291,68 @@ class _Walk:
     def _is_short(self, points: Floats) -> bool:
         """Whether the way to ``points`` is short enough for one step.
 
-        Two facets that may touch come nearer by less than the reach, so that neither is overlooked.
+        Where facets may touch, all move as one affine motion but for the reach, so that no two
+        facets pass through each other between two looks.
         """
         turned = np.abs(self.ramped.angles(points) - self.ramped.last)
-        moved = np.abs(points - self.known[-1].state.points).max() if self._touching else 0.0
-        return bool(turned.max(initial=0.0) <= LARGEST_TURN and moved <= REACH / 2)
+        if turned.max(initial=0.0) > LARGEST_TURN:
+            return False
+        return self._near is None or _strayed(self.known[-1].state.points, points) <= REACH / 2
 
     def _accept(self, points: Floats) -> None:
         """Count angles on from ``points``, and look which facets are near each other there."""
         self.ramped.accept(points)
-        if self._touching:
-            now = self.ramped.touching_at(points)
-            if now is not self.ramped:
-                self.ramped, self._factored = now, None
-                self.stiff = replace(self.stiff, pairs=now.pairs)
+        self._look(points)
+
+    def _look(self, points: Floats, *, beside: bool = False) -> None:
+        if self._near is not None:
+            self._near.look(points, beside=beside)
+            self._arm(self._near.within(points, ARMED))
+
+    def _pierces(self, points: Floats) -> bool:
+        """Whether facets that shall not pass through each other do."""
+        if self._near is None:
+            return False
+        return len(meeting_facets(self._pattern, points, self._split)) > 0
+
+    def _arm(self, armed: Bools) -> None:
+        """Give the near pairs ``armed`` (n,) their springs."""
+        assert self._near is not None
+        self._armed = armed
+        pairs = self._near.pairs.those(armed)
+        self.ramped, self.stiff = self.ramped.with_pairs(pairs), self.stiff.with_pairs(pairs)
+
+    def _solved(
+        self, stiff: bool, guess: EquilibriumState, part: float, factored: Factored | None = None
+    ) -> Solution:
+        """The balance near ``guess``; pairs that come to touch get their springs on the way."""
+        for _ in range(MOST_ARMINGS):
+            found = solve(self.stiff if stiff else self.ramped, guess, part, factored)
+            if self._near is None or not found.converged:
+                return found
+            late = self._near.within(found.state.points, HEIGHT) & ~self._armed
+            if not late.any():
+                return found
+            self._arm(self._armed | late)
+        return found._replace(converged=False)
 
     def leave_saddle(self) -> bool:
         """Go down from an unstable state at the same part of the ramp."""
         return self._snap(self.known[-1].drive)
 
     def _snap(self, part: float) -> bool:
-        self.snaps += 1
-        shaken = self.known[-1].state.points
-        shaken = shaken + SHAKEN * self._random.normal(size=shaken.shape)
-        return self.snaps <= MAX_SNAPS and self.land(shaken, part)
+        """Find another balance at ``part`` by descent, shaken anew until there is one."""
+        here, last = self.known[-1].state.points, self.ramped.last.copy()
+        for _ in range(SHAKES if self._near is not None else 1):
+            self.snaps += 1
+            if self.snaps > MAX_SNAPS:
+                return False
+            self.ramped.last[:] = last
+            self._look(here, beside=True)
+            shaken = here + SHAKEN * self._random.normal(size=here.shape)
+            if self.land(shaken, part):
+                return True
+        return False
 
 
 def _frame(balance: Ramped, known: Known, stiff: bool) -> RampFrame:
@@ -288,6 +363,13 @@ def _frame(balance: Ramped, known: Known, stiff: bool) -> RampFrame:
         unstable_directions(balance, known.state, known.drive),
         stiff,
     )
+
+
+def _strayed(before: Floats, after: Floats) -> float:
+    """The farthest move of a point (V, 3) beyond the affine motion that fits best."""
+    one, other = before - before.mean(axis=0), after - after.mean(axis=0)
+    turn = np.linalg.lstsq(one, other, rcond=1e-6)[0]
+    return float(np.linalg.norm(other - one @ turn, axis=1).max())
 
 
 def unstable_directions(balance: Balance, state: EquilibriumState, target: float) -> int:

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 from miurafab.findings import Finding
 from miurafab.origami.folding.angles_csv import Contact
-from miurafab.origami.folding.certificate import MOVED, RigidCertificate
-from miurafab.origami.folding.kinematics import FROM_FLAT
+from miurafab.origami.folding.certificate import RigidCertificate
+from miurafab.origami.folding.kinematics import FROM_FLAT, RIGID
 from miurafab.origami.folding.motion import FoundMotion
 from miurafab.origami.folding.ramp_motion import HELD_BACK, RampVerdict
 
@@ -37,29 +37,30 @@ def _findings(found: FoundMotion, contacts: Sequence[Contact]) -> Iterator[Findi
 def _bends(certificate: RigidCertificate, from_flat: bool) -> Finding:
     state = certificate.state
     where = f"at {state:.0%} of its fold angles" if from_flat else f"at s = {state:.2g}"
-    if certificate.moved > MOVED:
+    if certificate.residual <= RIGID:  # flat facets, but perhaps on another motion
         turn = math.degrees(certificate.moved)
-        why = f"the nearest shape with flat facets has a crease turned by {turn:.2g} degrees more"
-    else:
-        left = certificate.residual
-        why = (
-            f"no shape with flat facets is near: sides stay off by up to {100 * left:.2g} %, or "
-            f"facets bent by up to {math.degrees(left):.2g} degrees"
+        return Finding(
+            "bent-facets",
+            f"It is not shown that the sheet folds rigidly: {where} its facets bend, and in the "
+            f"nearest shape with flat facets a crease is turned by {turn:.2g} degrees more.",
         )
-    rounding = ""
-    if certificate.residual <= DRAWN and certificate.moved <= MOVED:
-        rounding = "; so little may be the rounding of the drawing"
+    left = certificate.residual
+    rounding = "; so little may be the rounding of the drawing" if left <= DRAWN else ""
     return Finding(
         "bent-facets",
-        f"The sheet does not fold rigidly, so its facets bend: {where} {why}{rounding}.",
+        f"The sheet does not fold rigidly, so its facets bend: {where} no shape with flat facets "
+        f"is near: sides stay off by up to {100 * left:.2g} %, or facets bent by up to "
+        f"{math.degrees(left):.2g} degrees{rounding}.",
     )
 
 
 def _of_ramp(verdict: RampVerdict, last: float) -> Iterator[Finding]:
     if not verdict.complete:
+        why = "no balance was found"
+        if verdict.touching:
+            why += " in which no facet passes through another"
         yield Finding(
-            "way-lost",
-            f"The motion ends at {last:.0%} of the fold angles: beyond, no balance was found.",
+            "way-lost", f"The motion ends at {last:.0%} of the fold angles: beyond, {why}."
         )
     if len(verdict.wrong_edges):
         yield Finding(

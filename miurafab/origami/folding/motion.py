@@ -1,7 +1,8 @@
 """The motion of a pattern by whatever way applies to it, and what is known of it.
 
 1. *Closed form*: tangents of half fold angles keep their ratios. It is the motion if every loop
-   closes, as in sheets that are flat-foldable with vertices of degree four.
+   closes, as in sheets that are flat-foldable with vertices of degree four. Where a pattern of
+   others passes through itself so, the third way is tried.
 2. *From the folded form*, if the file holds one: one crease is driven, facets bend. A way that is
    lost before it is nearly flat is taken only if the third fails.
 3. *From flat*, by mountains and valleys alone: all creases together. This is for any pattern. If
@@ -87,7 +88,8 @@ def _find(pattern: CreasePattern, steps: int, on_progress: Progress | None) -> F
         assert motion.mismatch is not None
         mismatch = float(motion.mismatch.max())
         if motion.is_rigid:
-            return FoundMotion(motion, mismatch)
+            beside = _past_itself(pattern, steps, mismatch, motion, on_progress)
+            return beside or FoundMotion(motion, mismatch)
     bent = _bent(pattern, steps, on_progress)
     if bent is not None and len(bent.frames) == steps + 1:
         motion, certificate = certified(bent)
@@ -115,8 +117,33 @@ def _from_flat(
         )
     if verdict.wrong_signs > MOST_WRONG:
         raise _sequence(verdict)
-    motion, certificate = certified(motion)
+    rigid, certificate = certified(motion)
+    if not (verdict.touching and contacts(rigid)):  # flat facets may touch where bent ones do not
+        motion = rigid
     return FoundMotion(motion, mismatch, verdict, certificate)
+
+
+def _past_itself(
+    pattern: CreasePattern,
+    steps: int,
+    mismatch: float,
+    motion: FoldingMotion,
+    on_progress: Progress | None,
+) -> FoundMotion | None:
+    """The motion from flat for a pattern of others whose closed form passes through itself.
+
+    Where creases fold independently, as in a strip, there are other ways. None if the closed form
+    is free of piercings, and if no other way comes near the fold angles without them.
+    """
+    own = pattern.grid is not None or pattern.cells is not None
+    if own or not contacts(motion):
+        return None
+    try:
+        found = _from_flat(pattern, steps, mismatch, on_progress)
+    except PatternError:
+        return None
+    assert found.verdict is not None
+    return None if found.verdict.is_held_back or contacts(found.motion) else found
 
 
 def _has_closed_form(pattern: CreasePattern) -> bool:
