@@ -225,13 +225,13 @@ def _show_plates(console: Console, thick: dict[str, Any]) -> None:
     for seam in thick["seams"]:
         one, other = seam["between"]
         slits = ", ".join(map(str, seam["slits"]))
-        if seam["opens_mm"] is None:
+        if seam["patch"] is None:
             console.line(f"patches {one} and {other}: nothing joins them at edges {slits}")
         else:
             hinges = ", ".join(map(str, seam["hinges"])) or "none"
             console.line(
-                f"blocks {one} and {other}: hinges at edges {hinges}; slit along {slits}, which "
-                f"opens up to {seam['opens_mm']:.3g} mm"
+                f"patch {seam['patch']}, blocks {one} and {other}: hinges at edges {hinges}; slit "
+                f"along {slits}, which opens up to {seam['opens_mm']:.3g} mm"
             )
     for number, patch in enumerate(patches):
         if patch["collision"] is not None:

@@ -89,6 +89,7 @@ def thickness_report(panels: ThickPanels | ThickPlates) -> dict[str, Any]:
             "patches": [_patch_report(patch) for patch in panels.patches],
             "seams": [
                 {
+                    "patch": seam.patch,
                     "between": list(seam.blocks),
                     "hinges": list(seam.hinges),
                     "slits": list(seam.slits),

@@ -99,52 +99,59 @@ def thick_plates(
     for number, piece in enumerate(pieces):
         tell(number / len(pieces), f"piece {number + 1} of {len(pieces)}")
         made, between = _mechanisms(piece.pattern, thickness_mm)
-        first = len(patches)
-        for patch in made:
-            facets, edges = piece.facets[patch.facets], piece.edges[patch.edges]
-            hit = patch.collision
-            named = None if hit is None else (int(piece.facets[hit[0]]), int(piece.facets[hit[1]]))
-            patches.append(replace(patch, facets=facets, edges=edges, collision=named))
-        seams += [_renumbered(seam, piece, first if len(made) > 1 else 0) for seam in between]
+        seams += [_renumbered(seam, piece, len(patches)) for seam in between]
+        patches += [_of_whole(patch, piece) for patch in made]
     return ThickPlates(pattern, thickness_mm, tuple(patches), tuple(seams))
 
 
 def _mechanisms(
     pattern: CreasePattern, thickness: float
-) -> tuple[list[PlatePatch], tuple[PlateSeam, ...]]:
+) -> tuple[list[PlatePatch], list[PlateSeam]]:
     """The patches that one piece is made of, and its seams."""
-    cells, facets = facet_cells(pattern), np.arange(len(pattern.faces_vertices))
-    if len(facets) <= WHOLE:
-        whole = bennett_heights(pattern)
-        if whole.exists:
-            edges = np.arange(len(pattern.edges_vertices))
-            return [_patch(whole, facets, edges, thickness)], ()
-        for slit, edges, seams in slit_sheets(pattern, cells) if cells is not None else ():
-            heights = bennett_heights(slit)
-            if heights.exists:
-                patch = _patch(heights, facets, edges, thickness)
-                if patch.clear_state >= 1.0:
-                    return [patch], _measured(pattern, patch, seams)
+    cells, facets = facet_cells(pattern), len(pattern.faces_vertices)
+    found = _mechanism(pattern, thickness) if facets <= WHOLE else None
+    if found is not None:
+        return [found[0]], list(found[1])
     if cells is None:
         raise PatternError(
             "No plates of one thickness fit on shifted hinges for the whole sheet, and it has no "
             "grid of facets by which it could be slit or made in patches; use tapered panels."
         )
+    pattern = replace(pattern, grid=None, cells=cells)  # which parts keep
     for side in PATCHES:
         block = blocks_up_to(cells, side)
-        parts = [piece_of(pattern, np.flatnonzero(block == n)) for n in range(block.max() + 1)]
-        found = []
-        for part in parts:
-            heights = bennett_heights(part.pattern)
-            if not heights.exists:
+        patches: list[PlatePatch] = []
+        seams = list(seams_between(pattern, block))
+        for number in range(int(block.max()) + 1):
+            part = piece_of(pattern, np.flatnonzero(block == number))
+            found = _mechanism(part.pattern, thickness)
+            if found is None:
                 break
-            found.append(_patch(heights, part.facets, part.edges, thickness))
+            patches.append(_of_whole(found[0], part))
+            seams += [_renumbered(seam, part, number) for seam in found[1]]
         else:
-            return found, seams_between(pattern, block)
+            return patches, seams
     raise PatternError(
         "No plates of one thickness fit on shifted hinges, neither for the whole sheet, slit or "
         f"not, nor for patches of {PATCHES[-1]} x {PATCHES[-1]} facets; use tapered panels."
     )
+
+
+def _mechanism(
+    pattern: CreasePattern, thickness: float
+) -> tuple[PlatePatch, tuple[PlateSeam, ...]] | None:
+    """``pattern`` as one patch, whole or slit, and the seams of its slits."""
+    cells, facets = facet_cells(pattern), np.arange(len(pattern.faces_vertices))
+    whole = bennett_heights(pattern)
+    if whole.exists:
+        return _patch(whole, facets, np.arange(len(pattern.edges_vertices)), thickness), ()
+    for slit, edges, seams in slit_sheets(pattern, cells) if cells is not None else ():
+        heights = bennett_heights(slit)
+        if heights.exists:
+            patch = _patch(heights, facets, edges, thickness)
+            if patch.clear_state >= 1.0:
+                return patch, _measured(pattern, patch, seams)
+    return None
 
 
 def _patch(heights: BennettHeights, facets: Ints, edges: Ints, thickness: float) -> PlatePatch:
@@ -158,9 +165,20 @@ def _measured(
 ) -> tuple[PlateSeam, ...]:
     """``seams`` with how far their slits open in the motion of ``patch``."""
     middle = patch.bottom_mm + patch.thickness_mm / 2
+    widths = [opened_by(pattern, patch.pattern, patch.axis_mm, middle, seam) for seam in seams]
     return tuple(
-        replace(seam, opens_mm=opened_by(pattern, patch.pattern, patch.axis_mm, middle, seam))
-        for seam in seams
+        replace(seam, opens_mm=width, patch=0) for seam, width in zip(seams, widths, strict=True)
+    )
+
+
+def _of_whole(patch: PlatePatch, piece: Piece) -> PlatePatch:
+    """``patch`` of a piece with the facets and edges of the whole pattern."""
+    hit = patch.collision
+    return replace(
+        patch,
+        facets=piece.facets[patch.facets],
+        edges=piece.edges[patch.edges],
+        collision=None if hit is None else (int(piece.facets[hit[0]]), int(piece.facets[hit[1]])),
     )
 
 
@@ -169,7 +187,8 @@ def _renumbered(seam: PlateSeam, piece: Piece, first: int) -> PlateSeam:
     one, other = seam.blocks
     return replace(
         seam,
-        blocks=(one + first, other + first),
+        blocks=seam.blocks if seam.patch is not None else (one + first, other + first),
         hinges=tuple(piece.edges[list(seam.hinges)].tolist()),
         slits=tuple(piece.edges[list(seam.slits)].tolist()),
+        patch=None if seam.patch is None else seam.patch + first,
     )

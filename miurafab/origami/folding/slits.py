@@ -6,8 +6,8 @@ the other creases of the seams are slits. The vertex that keeps its four hinges 
 and ties the motions of the two blocks to each other, so that the sheet moves as one mechanism. A
 slit vertex closes no loop, and asks nothing of the heights.
 
-Where no slits help, blocks of up to six by six facets are made as mechanisms of their own. Nothing
-joins these: axes in common would close the loops that cannot be closed.
+Where no slits help, blocks of up to six by six facets are made as mechanisms of their own, whole or
+slit. Nothing joins these: axes in common would close the loops that cannot be closed.
 """
 
 from __future__ import annotations
@@ -37,8 +37,7 @@ class PlateSeam:
     Attributes
     ----------
     blocks : (int, int)
-        The two blocks. Of a slit sheet they are numbered row by row; of loose patches they are the
-        patches.
+        The two blocks: of a slit patch, numbered row by row, or two loose patches.
     hinges : tuple of int
         The edges of the whole pattern that keep their hinges; none between loose patches.
     slits : tuple of int
@@ -46,12 +45,15 @@ class PlateSeam:
     opens_mm : float or None
         How far the edges of two plates come from each other along the slits, at half their
         thickness, in the motion; None for loose patches.
+    patch : int or None
+        The patch that is slit; None between loose patches.
     """
 
     blocks: tuple[int, int]
     hinges: tuple[int, ...]
     slits: tuple[int, ...]
     opens_mm: float | None = None
+    patch: int | None = None
 
 
 def facet_cells(pattern: CreasePattern) -> Ints | None:

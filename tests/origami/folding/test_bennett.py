@@ -21,6 +21,7 @@ from scipy.spatial import ConvexHull
 from miurafab.errors import InputError, PatternError
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding import plates as plates_module
 from miurafab.origami.folding.bennett import bennett_heights, nearest_heights, thick_loop_gap
 from miurafab.origami.folding.kinematics import fold_angles_at, place, states_between
 from miurafab.origami.folding.plates import ThickPlates, thick_plates
@@ -190,13 +191,24 @@ def test_loose_patches_are_made_where_slits_do_not_help() -> None:
     facets = np.concatenate([patch.facets for patch in made.patches])
     assert sorted(facets.tolist()) == list(range(64))
     assert made.folds
-    assert [(seam.blocks, seam.hinges, seam.opens_mm) for seam in made.seams] == [
-        ((0, 1), (), None),
-        ((0, 2), (), None),
-        ((1, 3), (), None),
-        ((2, 3), (), None),
+    assert [(seam.patch, seam.blocks, seam.hinges, seam.opens_mm) for seam in made.seams] == [
+        (None, (0, 1), (), None),
+        (None, (0, 2), (), None),
+        (None, (1, 3), (), None),
+        (None, (2, 3), (), None),
     ]
     assert all(len(seam.slits) == 4 for seam in made.seams)
+
+
+def test_a_loose_patch_may_be_slit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sheet that is too large to be tried whole is one loose patch here, with its slit."""
+    whole = thick_plates(exact("hypar", 6), 2.0)
+    monkeypatch.setattr(plates_module, "WHOLE", 35)
+    (patch,) = thick_plates(exact("hypar", 6), 2.0).patches
+    assert np.array_equal(patch.axis_mm, whole.patches[0].axis_mm)
+    assert np.array_equal(patch.edges, whole.patches[0].edges)
+    assert thick_plates(exact("hypar", 6), 2.0).seams == whole.seams
+    assert [seam.patch for seam in whole.seams] == [0]
 
 
 def test_the_pieces_of_a_pattern_are_made_one_by_one() -> None:
