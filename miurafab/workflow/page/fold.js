@@ -110,7 +110,9 @@ class FoldView {
     };
     byId("look-kind").addEventListener("change", look);
     byId("look-number").addEventListener("input", look);
-    byId("fold").addEventListener("keydown", (event) => { if (event.key === "Escape") this.pick(NONE); });
+    byId("fold").addEventListener("keydown", ({ key, target }) => { // Escape would abort a machine, in the studio
+      if (key === "Delete" && target.tagName !== "INPUT") this.pick(NONE);
+    });
     byId("thickness").addEventListener("input", () => this.solid());
   }
 
@@ -322,11 +324,12 @@ class FoldView {
     if (byId("figures").textContent !== text) byId("figures").textContent = text;
   }
 
-  /** The fold angle of an edge at a moment, degrees, valleys positive; null at a border. */
+  /** By how much an edge is folded at a moment, degrees, to the side of its letter; null at a border. */
   angle(edge, frame = this.frame) {
     if (this.mesh.sidesOf[edge].length < 2 || !(this.form.angles || this.form.flat)) return null;
     if (this.form.flat) return 0;
-    return (this.blended(this.form.angles, this.mesh.edges.length / 2, edge, frame) / HALF_TURN) * 180;
+    const side = this.fold.assignments[this.mesh.kinds[edge]] === "M" ? -180 : 180;
+    return (this.blended(this.form.angles, this.mesh.edges.length / 2, edge, frame) / HALF_TURN) * side || 0;
   }
 
   figures({ facet, edge }) {
