@@ -35,7 +35,8 @@ _FLAGS = (
 class Browser:
     """One page in one browser; ``with Browser(folder) as page: page.open(path)``.
 
-    ``requests`` are the addresses of everything that the page asked for, itself included.
+    ``requests`` are the addresses of everything that the page asked for, itself included;
+    ``faults`` what its scripts threw, and the errors that it wrote to the console.
     """
 
     def __init__(self, profile: Path) -> None:
@@ -56,11 +57,12 @@ class Browser:
         self._number = 0
         self._session: str | None = None
         self.requests: list[str] = []
+        self.faults: list[str] = []
         targets = self.call("Target.getTargets")["targetInfos"]
         page = next(target["targetId"] for target in targets if target["type"] == "page")
         attached = self.call("Target.attachToTarget", targetId=page, flatten=True)
         self._session = attached["sessionId"]
-        for domain in ("Page", "Network", "Runtime"):
+        for domain in ("Page", "Network", "Runtime", "Log"):
             self.call(f"{domain}.enable")
 
     def __enter__(self) -> Browser:
@@ -110,4 +112,16 @@ class Browser:
         answer: dict[str, Any] = json.loads(message)
         if answer.get("method") == "Network.requestWillBeSent":
             self.requests.append(answer["params"]["request"]["url"])
+        self.faults += _fault(answer.get("method"), answer.get("params", {}))
         return answer
+
+
+def _fault(method: str | None, told: dict[str, Any]) -> list[str]:
+    """The fault that an event tells, if it tells one; a request that was refused is none."""
+    if method == "Runtime.exceptionThrown":
+        return [json.dumps(told["exceptionDetails"])]
+    if method == "Runtime.consoleAPICalled" and told["type"] in ("error", "assert"):
+        return [json.dumps(told["args"])]
+    entry = told.get("entry", {}) if method == "Log.entryAdded" else {}
+    is_error = entry.get("level") == "error" and entry.get("source") != "network"
+    return [json.dumps(entry)] if is_error else []
