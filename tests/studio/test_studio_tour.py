@@ -4,6 +4,7 @@
 """
 
 import base64
+import json
 import os
 import threading
 from pathlib import Path
@@ -138,11 +139,17 @@ def test_from_a_mesh_that_is_dropped_to_a_sheet_that_burns(studio, tmp_path):
             "{ const frame = document.getElementById('dry-run');"
             "frame.addEventListener('load', () => { frame.dataset.there = 'yes'; }); }"
         )
+        for words in ("Facets 6x6", "Size 90mm", "Rotate 20"):
+            assert words in studio.bench.pattern["subject"]
         page.ready("lay-out")
         page.rest(studio.bench)
         assert page.text("fault") == ""
         page.shown("job")
         page.until("document.getElementById('dry-run').dataset.there === 'yes'")
+        laid = json.loads((studio.bench.job_folder() / "layout.json").read_text())
+        fitted = json.loads(studio.bench.pattern_file().read_text())
+        facets = sum(len(patch["faces"]) for patch in laid["patches"])
+        assert facets == len(fitted["faces_vertices"]) < 60, studio.bench.pattern["subject"]
         page.look("sheets")
 
         # the practice machine: arm, burn, hold, resume, abort, the alarm, and out of it

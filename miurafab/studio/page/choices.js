@@ -169,8 +169,9 @@ export function layoutOrder() {
 
 function values(fieldset) {
   const found = {};
-  for (const field of byId(fieldset).querySelectorAll("input[name], select[name]")) {
-    const away = field.closest("[hidden]") !== null;
+  const box = byId(fieldset);
+  for (const field of box.querySelectorAll("input[name], select[name]")) {
+    const away = box.contains(field.closest("[hidden]")); // a tab that is not in front hides more
     const value = field.type === "checkbox" ? field.checked : field.value.trim();
     if (value && !away) found[field.name] = value;
   }
