@@ -39,10 +39,10 @@ from miurafab.machine.resume import resume
 from miurafab.marlin import replies as marlin
 from miurafab.options import read_options
 from miurafab.origami.fitting.request import FitOptions
+from miurafab.origami.formats.crease_lines import lines_of
 from miurafab.origami.formats.files import load
 from miurafab.origami.formats.fold import fold_text
 from miurafab.origami.formats.lines import opx_text
-from miurafab.origami.formats.planar_graph import lines_of
 from miurafab.origami.formats.svg import svg_text
 from miurafab.studio import orders
 from miurafab.surfaces.height_field import read_image

@@ -59,6 +59,13 @@ RULES = {
     "smaller-part": Rule("warning", "a sheet on a smaller part of the mesh's rectangle"),
     "whole-facets": Rule("note", "whole facets at the border, since a cut leaves short edges"),
     "far-from-target": Rule("warning", "a sheet that lies over 1 % of its size from the target"),
+    # A pattern, read from a file (miurafab.origami.formats)
+    "curved-lines": Rule("note", "curved lines of a drawing, which are straight lines here"),
+    "joined-ends": Rule("note", "a drawing whose lines were joined over gaps"),
+    "lost-lines": Rule("warning", "lines of a drawing that are not in the pattern"),
+    "holes": Rule("note", "parts of a drawing without paper, bounded by borders alone"),
+    "unfolded": Rule("note", "a flat pattern that is computed from the folded form of its file"),
+    "opened": Rule("note", "a sheet that is opened along cuts, or along seams where it closes"),
     # A pattern, checked (miurafab.origami.verify)
     "no-target": Rule("note", "distances left out, since the target is missing or has changed"),
     "degenerate-edge": Rule("refusal", "an edge too short to be creased or cut"),

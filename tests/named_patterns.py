@@ -12,7 +12,8 @@ from functools import cache
 import numpy as np
 
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.formats.planar_graph import CreaseLines, pattern_from_lines
+from miurafab.origami.formats.crease_lines import CreaseLines
+from miurafab.origami.formats.planar_graph import pattern_from_lines
 from miurafab.origami.miura import MiuraCell, regular_miura
 from miurafab.origami.unfold import unfold
 

@@ -10,16 +10,23 @@ from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option, takes
 from miurafab.cli.sheets import scale_options
 from miurafab.errors import DONE
-from miurafab.options import Choice, File, length
+from miurafab.options import Choice, File
 
 EXAMPLES = (
     "miurafab convert hypar.fold hypar.svg",
     "miurafab convert hypar.fold small.fold --scale 0.5",
+    "miurafab convert drawing.svg fine.fold --curve-tolerance 0.05mm",
     "miurafab convert flat.obj sheet.fold --folded folded.obj",
 )
 
 
-@takes(scale_options)
+def _reading_options() -> type:
+    from miurafab.origami.formats.files import ReadingOptions
+
+    return ReadingOptions
+
+
+@takes(scale_options, _reading_options)
 def convert(
     source: Annotated[Path, argument("IN", "A .fold, .svg, .dxf, .cp, .opx or flat .obj file.")],
     target: Annotated[
@@ -39,15 +46,6 @@ def convert(
             default_text="folded where it is known",
         ),
     ] = None,
-    tolerance: Annotated[
-        float | None,
-        option(
-            length(above=True),
-            "The largest gap between ends of lines in a drawing that count as one point; in a FOLD "
-            "or OBJ file shorter edges vanish, and their ends are one.",
-            default_text="1/10000 of the median line of a drawing",
-        ),
-    ] = None,
     console: Console = Console(),
     **given: str,
 ) -> int:
@@ -55,7 +53,7 @@ def convert(
 
     The endings of the files name the formats: FOLD, SVG, DXF, CP, OPX, OBJ, STL and GLB.
     """
-    done = miurafab.convert(source, target, folded=folded, form=form, tolerance=tolerance, **given)
+    done = miurafab.convert(source, target, folded=folded, form=form, **given)
     for finding in done.findings:
         console.note(finding.sentence)
     report = done.report()

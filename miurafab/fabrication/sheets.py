@@ -276,6 +276,7 @@ def lay_out(
         sheets=sheets,
         totals=_totals(pattern, outlined, patches, nesting, toolpaths + behind, usable),
         findings=(
+            *pattern.told,
             *beam_findings(machine, material),
             *strength_findings(pattern, material, options),
             *layout_findings(pattern, framed, nesting, lettering, rim, drawn, material, options),

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from miurafab.display import Shown
 from miurafab.errors import OptionError, PatternError
 from miurafab.files import AnyPath
+from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.options import Choice, read_value
 from miurafab.surfaces.frame import origin_in
@@ -72,6 +73,11 @@ class CreasePattern(Shown):
         where the file does not tell.
     angles_assumed : bool
         Whether the fold angles are not known, and taken as 180 degrees.
+    unfolded : float, optional
+        The residual to which the flat pattern fits, where it was computed from the folded form of a
+        file that has no flat one (:mod:`miurafab.origami.flattening`).
+    told : tuple of Finding
+        What the reader of its file changed, left out or assumed.
 
     Raises
     ------
@@ -93,6 +99,8 @@ class CreasePattern(Shown):
     target: dict[str, Any] = field(default_factory=dict)
     target_kept: bool | None = True
     angles_assumed: bool = False
+    unfolded: float | None = None
+    told: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         vertices, edges = len(self.vertices_coords), len(self.edges_vertices)

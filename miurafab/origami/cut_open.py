@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from miurafab.findings import Finding
 from miurafab.geometry.arrays import Ints
 from miurafab.geometry.polygons import connected_parts, next_corners
 from miurafab.origami.crease_pattern import CreasePattern
@@ -27,6 +28,7 @@ def cut_open(pattern: CreasePattern) -> CreasePattern:
     cut = inner & np.isin(pattern.edges_assignment, ("B", "C"))
     if not cut.any():
         return pattern
+    told = opened_cuts(pattern)
     faces, width = pattern.faces_vertices, pattern.faces_vertices.shape[1]
     face, slot = np.nonzero(faces >= 0)
     start, end = face * width + slot, face * width + next_corners(faces)[face, slot]
@@ -58,7 +60,27 @@ def cut_open(pattern: CreasePattern) -> CreasePattern:
         folded_coords=None if folded is None else folded[source],
         grid=None,
         pieces=piece if parts > 1 else None,
+        told=(*pattern.told, *told),
     )
+
+
+def opened_cuts(pattern: CreasePattern) -> tuple[Finding, ...]:
+    """What is told of the cuts within ``pattern``, along which the sheet opens; empty for none."""
+    inner = np.asarray((pattern.edges_faces >= 0).all(axis=1))
+    cuts = np.flatnonzero(inner & np.isin(pattern.edges_assignment, ("B", "C")))
+    if not len(cuts):
+        return ()
+    joined = pattern.edges_faces[np.setdiff1d(np.flatnonzero(inner), cuts)]
+    count = len(pattern.faces_vertices)
+    graph = coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(count, count))
+    before, after = pattern.pieces_count, connected_components(graph, directed=False)[0]
+    parts = f" and falls into {after} pieces" if after > before else ""
+    several = f"{len(cuts)} edges within the sheet are cuts"
+    says = (
+        f"{'An edge within the sheet is a cut' if len(cuts) == 1 else several} (C): when folded, "
+        f"the sheet opens there{parts}, and nothing holds the two sides together."
+    )
+    return (Finding("opened", says, tuple(cuts.tolist())),)
 
 
 def _fans(pattern: CreasePattern, one: Ints, other: Ints) -> Ints:

@@ -73,12 +73,13 @@ def exactness(pattern: CreasePattern) -> float:
     """The largest residual that counts as exact.
 
     It is ``EXACT``, and more where the sheet lies so far from the origin that its coordinates have
-    no digits left for that: at a distance D, a coordinate is rounded by D times 1.1e-16.
+    no digits left for that: at a distance D, a coordinate is rounded by D times 1.1e-16. A flat
+    pattern that was unfolded from a rounded folded form is as exact as that.
     """
     assert pattern.folded_coords is not None
     mean = float(edge_lengths(pattern.folded_coords, pattern.edges_vertices).mean())
     rounding = float(np.spacing(np.abs(pattern.folded_coords).max()))
-    return EXACT + ROUNDINGS * rounding / mean
+    return max(EXACT + ROUNDINGS * rounding / mean, 2 * (pattern.unfolded or 0.0))
 
 
 @dataclass(frozen=True, eq=False)

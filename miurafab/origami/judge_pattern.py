@@ -17,6 +17,7 @@ from miurafab.geometry.arrays import Ints
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami import invariants
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.cut_open import opened_cuts
 from miurafab.origami.flat_folding import judge_flat_folding
 from miurafab.origami.folding.contact import overlaps, self_intersections
 from miurafab.origami.invariants import DEGENERATE, EXACT, Residuals
@@ -122,6 +123,7 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
         )
     yield from _shapes(pattern)
     yield from _target(pattern)
+    yield from opened_cuts(pattern)
     yield from judge_creases(pattern, evidence.folds)
     if evidence.folds is None:
         yield from judge_flat_folding(pattern)

@@ -14,11 +14,18 @@ import numpy as np
 from miurafab.display import Shown
 from miurafab.files import AnyPath, as_path, new_file
 from miurafab.findings import Finding, findings_json
-from miurafab.options import read_options
+from miurafab.options import declared, read_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
-from miurafab.origami.formats.files import SOLIDS, WITHOUT_ANGLES, WRITTEN, load, write_pattern
+from miurafab.origami.formats.files import (
+    SOLIDS,
+    WITHOUT_ANGLES,
+    WRITTEN,
+    ReadingOptions,
+    load,
+    write_pattern,
+)
 from miurafab.workflow.patterns import require_consistent
 from miurafab.workflow.scaling import ScaleOptions, scaled
 
@@ -34,7 +41,7 @@ class Conversion(Shown):
     pattern : CreasePattern
         The pattern.
     findings : tuple of Finding
-        What the format could not hold.
+        What was changed or left out in reading, and what the format could not hold.
     """
 
     source: Path
@@ -70,7 +77,6 @@ def convert(
     *,
     folded: AnyPath | None = None,
     form: str | None = None,
-    tolerance: float | None = None,
     **options: Any,
 ) -> Conversion:
     """Read the pattern in ``source`` and write it to ``target``, in the formats of their endings.
@@ -86,15 +92,13 @@ def convert(
     form : {"folded", "flat"}, optional
         The form to write to an ``.obj``, ``.stl`` or ``.glb``. The default is folded where the
         pattern has a folded form.
-    tolerance : float, optional
-        How near the ends of lines in a drawing count as met, mm. In a FOLD or OBJ file shorter
-        edges vanish.
     {options}
 
     Returns
     -------
     Conversion
-        With ``findings`` on what the format could not hold.
+        With ``findings`` on what was changed or left out in reading, and what the format could not
+        hold.
 
     Raises
     ------
@@ -112,10 +116,13 @@ def convert(
     """
     source = as_path(source, "The pattern file")
     target = new_file(target, "The file to write", WRITTEN)
-    pattern = load(source, folded=folded, tolerance=tolerance)
+    reading = {name: options.pop(name) for name in declared(ReadingOptions) if name in options}
+    sizes = read_options(ScaleOptions, options)
+    pattern = load(source, folded=folded, **reading)
     require_consistent(pattern, str(source))
-    pattern = scaled(pattern, read_options(ScaleOptions, options))
-    findings = [] if source.suffix.lower() == ".fold" else _assumed(source, pattern)
+    pattern = scaled(pattern, sizes)
+    findings = list(pattern.told)
+    findings += [] if source.suffix.lower() == ".fold" else _assumed(source, pattern)
     write_pattern(pattern, target, title=source.stem, form=form)
     ending = target.suffix.lower()
     if ending in SOLIDS:
@@ -136,7 +143,7 @@ def convert(
     return Conversion(source, target, pattern, tuple(findings))
 
 
-described(convert, ScaleOptions)
+described(convert, ScaleOptions, ReadingOptions)
 
 
 def _loss(code: str, target: Path, says: str) -> Finding:

@@ -45,10 +45,13 @@ class Layers(Shown):
         The order in closed form. None for a pattern that does not fold rigidly.
     search : LayerSearch or None
         What a complete search found. None where none was asked for or needed.
+    told : tuple of Finding
+        What was changed or left out as the pattern was read.
     """
 
     closed: LayerOrder | None
     search: LayerSearch | None
+    told: tuple[Finding, ...] = ()
 
     @property
     def order(self) -> LayerOrder | None:
@@ -67,7 +70,7 @@ class Layers(Shown):
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What a person should know about the order."""
-        findings = () if self.closed is None else layer_findings(self.closed)
+        findings = self.told + (() if self.closed is None else layer_findings(self.closed))
         if self.search is not None and not self.search.orders:
             sentence = (
                 "The pattern cannot fold flat with these mountains and valleys: no order of its "
@@ -184,8 +187,8 @@ def layers(pattern: PatternLike, **options: Any) -> Layers:
     except PatternError:
         closed = None
     if closed is not None and closed.known and asked.orders is None:
-        return Layers(closed, None)
-    return Layers(closed, search_layer_orders(found, asked.orders or MOST))
+        return Layers(closed, None, found.told)
+    return Layers(closed, search_layer_orders(found, asked.orders or MOST), found.told)
 
 
 described(layers, LayerOptions)

@@ -154,7 +154,8 @@ def check(pattern: PatternLike) -> Audit:
     proved = checked.proved
     if frames and not states:
         proved += (f"Each of the {len(frames)} further frames is a state of the sheet.",)
-    return replace(checked, findings=missing + checked.findings + states, proved=proved)
+    findings = found.told + missing + checked.findings + states
+    return replace(checked, findings=findings, proved=proved)
 
 
 def _further_frames(pattern: PatternLike) -> tuple[FurtherFrame, ...]:

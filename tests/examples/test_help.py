@@ -20,6 +20,12 @@ PREPARED = [
 ]
 """What makes the files that the examples name."""
 
+DRAWING = (
+    '<svg><rect width="90" height="60" stroke="#000"/>'
+    '<path d="M0 30 Q 45 60 90 30" stroke="#f00" stroke-opacity="0.3"/></svg>'
+)
+"""A drawing with a curved crease."""
+
 NO_SWITCHES = "miurafab machine home"
 """The virtual machine has no homing switches: it refuses, exit code 3."""
 
@@ -32,6 +38,7 @@ def prepared(tmp_path_factory):
     folder = tmp_path_factory.mktemp("help") / "files"
     folder.mkdir()
     shutil.copy(ROOT / "patterns" / "saddle.stl", folder)
+    (folder / "drawing.svg").write_text(DRAWING)
     for line in PREPARED:
         run_line(line, folder)
     return folder

@@ -21,9 +21,9 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.kinematics import rigid_motion
 from miurafab.origami.folding.layers import layer_order
 from miurafab.origami.folding.laying import laid_on
+from miurafab.origami.formats.crease_lines import lines_of
 from miurafab.origami.formats.fold import read_fold, write_fold
 from miurafab.origami.formats.lines import opx_text
-from miurafab.origami.formats.planar_graph import lines_of
 from miurafab.origami.unfold import with_angles_of_the_folded_form
 
 HERE = Path(__file__).parent

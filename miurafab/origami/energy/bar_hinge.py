@@ -31,7 +31,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from miurafab.errors import PatternError
-from miurafab.geometry.arrays import Floats, Ints, vector_product
+from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.hinges import hinge_angles
@@ -47,6 +47,8 @@ CREASE_RATIO = 0.01
 SOFTNESS = 0.1
 """The compliance of a bar over its length, in k_f, so that a sheet does not lock on its way from
 flat: 1 / (1000 k_c). Ten times softer is too soft, a hundred times stiffer locks."""
+IN_LINE = 1e-3
+"""Radians; two folds that meet with a smaller turn are one straight crease."""
 FACET_BENDING = 0.55
 """C_B of Filipov et al. 2017, for quads whose sides do not stretch."""
 
@@ -62,6 +64,7 @@ class BarHingeModel:
     Creases of different ``mechanisms`` (C,) fold independently of each other, since no stiffness
     and no chain of interior vertices joins them.
     ``unit_joule`` is None without a material. ``triangles`` (T, 3) are the parts of the facets.
+    ``ruled`` (R,) are the hinges about which facets have to bend, beside a curved crease.
     """
 
     points: Floats
@@ -77,6 +80,7 @@ class BarHingeModel:
     unit_mm: float = 1.0
     unit_joule: float | None = None
     triangles: Ints = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
+    ruled: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def strains(self, points: Floats) -> Floats:
         """(B,) c = (|d|^2 - L^2) / (2 L) of each bar at ``points`` (V, 3)."""
@@ -236,6 +240,8 @@ def flat_model(
     creased = letter != "F"
     hinges = np.concatenate([bending, across[sprung]])
     weights = np.concatenate([np.ones(len(bending)), np.full(int(sprung.sum()), crease_ratio)])
+    ruled = len(diagonals) + np.flatnonzero(_is_ruling(pattern, inner[letter == "F"]))
+    weights[ruled] = crease_ratio
     goals = pattern.edges_fold_angle[inner[sprung]]
     bars = np.concatenate([pattern.edges_vertices, diagonals[:, :2]])
     lengths = edge_lengths(points, bars)
@@ -252,7 +258,26 @@ def flat_model(
         mechanisms=np.zeros(int(creased.sum()), dtype=np.int64),
         unit_mm=unit,
         triangles=triangles,
+        ruled=ruled,
     )
+
+
+def _is_ruling(pattern: CreasePattern, flat: Ints) -> Bools:
+    """(n,) which of the ``flat`` edges (n,) are rulings: they come to an interior vertex at which
+    two folds meet that are not in line. There the facets have to bend.
+    """
+    points, edges = pattern.vertices_coords, pattern.edges_vertices
+    letters = pattern.edges_assignment
+    count = np.bincount(edges[np.isin(letters, ("M", "V"))].ravel(), minlength=len(points))
+    free = np.bincount(edges[np.isin(letters, ("U", "B", "C", "J"))].ravel(), minlength=len(points))
+    total = np.zeros((len(points), 2))
+    folds = edges[np.isin(letters, ("M", "V"))]
+    along = points[folds[:, 1]] - points[folds[:, 0]]
+    along /= np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)[:, None]
+    np.add.at(total, folds[:, 0], along)
+    np.add.at(total, folds[:, 1], -along)
+    bent = (count == 2) & (free == 0) & (np.linalg.norm(total, axis=1) > IN_LINE)
+    return np.asarray(bent[edges[flat]].any(axis=1))
 
 
 def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:

@@ -178,6 +178,7 @@ class _Walk:
         self._split = facet_triangles(model.points, pattern.faces_vertices)
         self.ramped = Ramped(model)
         firmer = np.where(model.rest == 0, FIRMER, 1.0) * model.stiffness
+        firmer[model.ruled] = model.stiffness[model.ruled]
         hard = replace(model, compliance=np.zeros_like(model.compliance), stiffness=firmer)
         self.stiff = Ramped(hard)
         self.known: list[Known] = []

@@ -20,7 +20,7 @@ DRAWN = 1e-4
 
 def motion_findings(found: FoundMotion, contacts: Sequence[Contact]) -> tuple[Finding, ...]:
     """The findings of a motion and of the frames in which it meets itself."""
-    return tuple(_findings(found, contacts))
+    return (*found.motion.pattern.told, *_findings(found, contacts))
 
 
 def _findings(found: FoundMotion, contacts: Sequence[Contact]) -> Iterator[Finding]:

@@ -17,48 +17,67 @@ ending  holds                                           read    written
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from miurafab.errors import InputError, OptionError, PatternError
 from miurafab.files import AnyPath, Reading, as_path, new_file, read_bytes, write_bytes, write_text
-from miurafab.options import length, read_value
+from miurafab.options import length, option, read_options
+from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.folding.layers import known_layer_order
+from miurafab.origami.formats.crease_lines import CreaseLines, lines_of
+from miurafab.origami.formats.dxf_entities import parse_dxf
 from miurafab.origami.formats.fold import read_fold, write_fold
 from miurafab.origami.formats.lines import (
     cp_text,
     dxf_text,
     opx_text,
     parse_cp,
-    parse_dxf,
     parse_opx,
 )
 from miurafab.origami.formats.mesh import glb_bytes, obj_text, stl_bytes
 from miurafab.origami.formats.obj import pattern_from_obj_pair
-from miurafab.origami.formats.planar_graph import CreaseLines, lines_of, pattern_from_lines
+from miurafab.origami.formats.planar_graph import pattern_from_lines
 from miurafab.origami.formats.svg import parse_svg, svg_text
 from miurafab.origami.weld import welded
 
-DRAWINGS: dict[str, Callable[[str], CreaseLines]] = {
+CURVED: dict[str, Callable[[str, float | None], CreaseLines]] = {
     ".svg": parse_svg,
     ".dxf": parse_dxf,
-    ".cp": parse_cp,
-    ".opx": parse_opx,
 }
+DRAWINGS: dict[str, Callable[[str], CreaseLines]] = {".cp": parse_cp, ".opx": parse_opx}
 WITHOUT_ANGLES = (".dxf", ".cp", ".opx")
 SOLIDS = (".obj", ".stl", ".glb")
-READ = (".fold", *DRAWINGS, ".obj")
+READ = (".fold", *CURVED, *DRAWINGS, ".obj")
 WRITTEN = (*READ, ".stl", ".glb")
 
 
+@dataclass(frozen=True)
+class ReadingOptions:
+    """The options of reading a pattern from a file."""
+
+    tolerance_mm: float | None = option(
+        length(above=True),
+        "The largest gap between ends of lines in a drawing that count as one point; in a FOLD or "
+        "OBJ file shorter edges vanish, and their ends are one.",
+        default_text="1/10000 of the median line of a drawing, more where lines would be lost",
+    )
+    curve_tolerance_mm: float | None = option(
+        length(above=True),
+        "How far straight lines may lie from the curved lines of an .svg or .dxf drawing, for "
+        "which they stand.",
+        default_text="1/1000 of the drawing's longer side",
+    )
+
+
 @verb
-def load(
-    path: AnyPath, *, folded: AnyPath | None = None, tolerance: float | None = None
-) -> CreasePattern:
+def load(path: AnyPath, *, folded: AnyPath | None = None, **options: Any) -> CreasePattern:
     """Read a pattern from a file, in the format of its ending.
 
     Parameters
@@ -67,14 +86,12 @@ def load(
         A ``.fold``, ``.svg``, ``.dxf``, ``.cp``, ``.opx`` or flat ``.obj`` file.
     folded : str or os.PathLike, optional
         The OBJ file with the folded form of an OBJ ``path``.
-    tolerance : float, optional
-        How near the ends of lines in a drawing count as met, mm; the default is a ten-thousandth
-        of the median line. In a FOLD or OBJ file shorter edges vanish, and their ends are one; the
-        default keeps all.
+    {options}
 
     Returns
     -------
     CreasePattern
+        ``told`` says what was changed, left out or assumed in reading.
 
     Raises
     ------
@@ -94,8 +111,12 @@ def load(
     ending = path.suffix.lower()
     if folded is not None and ending != ".obj":
         raise OptionError("folded", f"goes with a flat .obj file, and {path} is none")
-    if tolerance is not None:
-        tolerance = read_value("tolerance", length(above=True), tolerance)
+    asked = read_options(ReadingOptions, options)
+    tolerance, curve_tolerance = asked.tolerance_mm, asked.curve_tolerance_mm
+    if curve_tolerance is not None and ending not in CURVED:
+        raise OptionError(
+            "curve_tolerance", f"is for {' and '.join(CURVED)} drawings, and {path} is none"
+        )
     if ending == ".fold":
         found = read_fold(path)
         return found if tolerance is None else welded(found, tolerance)
@@ -111,11 +132,18 @@ def load(
             f"{path} holds triangles and no crease pattern; fit it as a surface with "
             "'miurafab fit'."
         )
-    if ending not in DRAWINGS:
+    if ending not in READ:
         raise InputError(f"{path} does not end in one of {', '.join(READ)}.")
     text = read_bytes(path, PatternError).decode("utf-8", errors="replace")
     with Reading(path, f"a drawing that can be read ({ending})", PatternError):
-        return pattern_from_lines(DRAWINGS[ending](text), tolerance)
+        if ending in CURVED:
+            lines = CURVED[ending](text, curve_tolerance)
+        else:
+            lines = DRAWINGS[ending](text)
+        return pattern_from_lines(lines, tolerance)
+
+
+described(load, ReadingOptions)
 
 
 def write_pattern(

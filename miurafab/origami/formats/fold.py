@@ -9,8 +9,10 @@ frame, facets may run clockwise or be missing, and fold angles may have to come 
 A pattern of several pieces has the keys ``miurafab:pieces`` (the piece of each facet) and
 ``miurafab:seams`` (pairs of border edges that meet in the folded form). Without the first, the
 parts of the pattern that do not touch are its pieces. ``miurafab:cells`` has the column and row of
-each facet where they do not fill the grid of ``miurafab:grid``. ``miurafab:angles`` is
-``assumed`` where no fold angle is known and each fold is given as 180 degrees.
+each facet where they do not fill the grid of ``miurafab:grid``. ``miurafab:unfolded`` is the
+residual to which a flat pattern fits that was computed from a folded form alone.
+``miurafab:angles`` is ``assumed`` where no fold angle is known and each fold is given as 180
+degrees.
 
 Numbers have as many digits as are needed to read them back bit for bit. The same pattern gives the
 same bytes.
@@ -19,7 +21,6 @@ same bytes.
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -27,22 +28,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
 from miurafab.files import Reading, parse_json, read_text, write_text
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Ints
 from miurafab.geometry.polygons import (
     connected_parts,
 )
-from miurafab.origami.crease_pattern import ASSIGNMENTS, CreasePattern
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.flattening import ROUGHEST
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.folding.layers import LayerOrder
 from miurafab.origami.formats.fold_frames import written_frames
 from miurafab.origami.formats.fold_keys import (
+    assignments_in,
+    edges_in,
+    faces_in,
+    fold_angles_in,
     frames_in,
-    indices_at,
-    list_at,
     numbers_at,
     points_at,
     unit_mm,
@@ -50,10 +53,12 @@ from miurafab.origami.formats.fold_keys import (
 from miurafab.origami.formats.fold_states import (
     FurtherFrame,
     flat_frame,
+    folded_alone,
     folded_form,
     further_frames,
     origin_of,
 )
+from miurafab.origami.formats.folded_only import told_of_unfolding, unfolded_pattern
 from miurafab.origami.formats.planar_graph import enclosed_facets, oriented
 from miurafab.origami.formats.target_frame import (
     exact_frames,
@@ -109,6 +114,8 @@ def fold_text(
     ):
         if numbers is not None:
             keys[f"miurafab:{name}"] = numbers.tolist()
+    if pattern.unfolded is not None:
+        keys["miurafab:unfolded"] = pattern.unfolded
     if pattern.angles_assumed:
         keys["miurafab:angles"] = ASSUMED
     if pattern.target:
@@ -188,21 +195,25 @@ def parse_fold(document: Any) -> CreasePattern:
     if not isinstance(document, dict):
         raise PatternError("A FOLD file holds one JSON object.")
     frames = frames_in(document)
+    alone = folded_alone(frames)
+    if alone is not None:
+        return unfolded_pattern(alone, unit_mm(alone, 1.0))
     place, key = flat_frame(frames)
     factor = unit_mm(key, 1.0)
     flat = np.ascontiguousarray(points_at(key, "vertices_coords")[:, :2] * factor)
-    edges = indices_at(key, "edges_vertices", 2)
-    assignment = _assignments(key, len(edges))
+    edges = edges_in(key)
+    assignment = assignments_in(key, len(edges))
     given = "faces_vertices" in key
-    faces = _face_indices(key) if given else enclosed_facets(flat, edges, assignment)
+    faces = faces_in(key) if given else enclosed_facets(flat, edges, assignment)
     if faces.max() >= len(flat):  # before something is made as large as that number
         raise PatternError("'faces_vertices' refers to a vertex that does not exist.")
     others = frames[:place] + frames[place + 1 :]
+    unfolded = _unfolded(document)
     pattern = CreasePattern(
         vertices_coords=flat,
         edges_vertices=edges,
         edges_assignment=assignment,
-        edges_fold_angle=_fold_angles(key, assignment),
+        edges_fold_angle=fold_angles_in(key, assignment),
         faces_vertices=faces,
         folded_coords=folded_form(others, len(flat), factor, origin_of(document)),
         grid=_grid(document, len(flat)),
@@ -213,53 +224,14 @@ def parse_fold(document: Any) -> CreasePattern:
         target=target_in(document),
         target_kept=target_kept(document),
         angles_assumed=document.get("miurafab:angles") == ASSUMED,
+        unfolded=unfolded,
+        told=() if unfolded is None else (told_of_unfolding(unfolded),),
     )
     pattern = replace(pattern, faces_vertices=oriented(flat, faces))
     pattern.edges_faces  # noqa: B018 - facets that do not fit their edges are a fault of the file
     if pattern.folded_coords is not None and key.get("edges_foldAngle") is None:
         return with_angles_of_the_folded_form(pattern)
     return pattern
-
-
-def _face_indices(document: Mapping[str, Any]) -> Ints:
-    faces = list_at(document, "faces_vertices")
-    sizes = {len(face) if isinstance(face, list) else 0 for face in faces}
-    if min(sizes) < 3:
-        raise PatternError("'faces_vertices' holds a facet of fewer than three corners.")
-    width = max(sizes)
-    if len(sizes) == 1:
-        return indices_at(document, "faces_vertices", width)
-    numbers = all(type(v) is int and v >= 0 for face in faces for v in face)
-    if not numbers:
-        raise PatternError("'faces_vertices' holds something that is not a vertex number.")
-    return np.array([face + [-1] * (width - len(face)) for face in faces], dtype=np.int64)
-
-
-def _assignments(document: Mapping[str, Any], edges: int) -> NDArray[np.str_]:
-    given = document.get("edges_assignment", ["U"] * edges)
-    if not isinstance(given, list) or len(given) != edges:
-        raise PatternError("'edges_assignment' does not have one letter for each edge.")
-    unknown = {str(letter) for letter in given} - set(ASSIGNMENTS)
-    if unknown:
-        raise PatternError(
-            f"'edges_assignment' holds {sorted(unknown)[0]!r}; FOLD knows {', '.join(ASSIGNMENTS)}."
-        )
-    return np.array(given, dtype="U1")
-
-
-def _fold_angles(document: Mapping[str, Any], assignment: NDArray[np.str_]) -> Floats:
-    """The file's angles in radians; without angles a mountain has -pi and a valley pi."""
-    flat_folded = np.select([assignment == "M", assignment == "V"], [-180.0, 180.0], 0.0)
-    given = document.get("edges_foldAngle")
-    if given is None:
-        return np.asarray(np.radians(flat_folded))
-    if not isinstance(given, list) or len(given) != len(assignment):
-        raise PatternError("'edges_foldAngle' does not have one angle for each edge.")
-    try:
-        angles = np.array([math.nan if a is None else a for a in given], dtype=np.float64)
-    except (ValueError, TypeError):
-        raise PatternError("'edges_foldAngle' holds something that is not a number.") from None
-    return np.radians(np.where(np.isnan(angles), flat_folded, angles))
 
 
 def _grid(document: Mapping[str, Any], vertices: int) -> tuple[int, int] | None:
@@ -274,6 +246,17 @@ def _grid(document: Mapping[str, Any], vertices: int) -> tuple[int, int] | None:
     ):
         raise PatternError(f"'miurafab:grid' is {grid}, which does not give {vertices} vertices.")
     return grid[0], grid[1]
+
+
+def _unfolded(document: Mapping[str, Any]) -> float | None:
+    residual = document.get("miurafab:unfolded")
+    if residual is None:
+        return None
+    if isinstance(residual, bool) or not isinstance(residual, int | float):
+        raise PatternError("'miurafab:unfolded' is not a number.")
+    if not 0 <= residual <= ROUGHEST:
+        raise PatternError(f"'miurafab:unfolded' is {residual}; it is from 0 to {ROUGHEST}.")
+    return float(residual)
 
 
 def _pieces(document: Mapping[str, Any], faces: Ints) -> Ints | None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.origami.crease_pattern import ASSIGNMENTS
 
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "pt": 25.4 / 72, "um": 1e-3}
 
@@ -84,3 +87,62 @@ def numbers_at(document: Mapping[str, Any], key: str, width: int | None) -> Ints
         what = "whole numbers" if width is None else f"{width} whole numbers each"
         raise PatternError(f"'{key}' is not a list of {what}.")
     return numbers.astype(np.int64)
+
+
+def faces_in(document: Mapping[str, Any]) -> Ints:
+    faces = list_at(document, "faces_vertices")
+    sizes = {len(face) if isinstance(face, list) else 0 for face in faces}
+    if min(sizes) < 3:
+        raise PatternError("'faces_vertices' holds a facet of fewer than three corners.")
+    width = max(sizes)
+    if len(sizes) == 1:
+        return indices_at(document, "faces_vertices", width)
+    numbers = all(type(v) is int and v >= 0 for face in faces for v in face)
+    if not numbers:
+        raise PatternError("'faces_vertices' holds something that is not a vertex number.")
+    return np.array([face + [-1] * (width - len(face)) for face in faces], dtype=np.int64)
+
+
+def assignments_in(document: Mapping[str, Any], edges: int) -> NDArray[np.str_]:
+    given = document.get("edges_assignment", ["U"] * edges)
+    if not isinstance(given, list) or len(given) != edges:
+        raise PatternError("'edges_assignment' does not have one letter for each edge.")
+    unknown = {str(letter) for letter in given} - set(ASSIGNMENTS)
+    if unknown:
+        raise PatternError(
+            f"'edges_assignment' holds {sorted(unknown)[0]!r}; FOLD knows {', '.join(ASSIGNMENTS)}."
+        )
+    return np.array(given, dtype="U1")
+
+
+def fold_angles_in(
+    document: Mapping[str, Any], assignment: NDArray[np.str_], missing: float | None = None
+) -> Floats:
+    """The file's angles in radians. An angle that the file lacks is ``missing``, and without that
+    -pi for a mountain, pi for a valley and 0 for others.
+    """
+    flat_folded = np.select([assignment == "M", assignment == "V"], [-180.0, 180.0], 0.0)
+    if missing is not None:
+        flat_folded[:] = missing
+    given = document.get("edges_foldAngle")
+    if given is None:
+        return np.asarray(np.radians(flat_folded))
+    if not isinstance(given, list) or len(given) != len(assignment):
+        raise PatternError("'edges_foldAngle' does not have one angle for each edge.")
+    try:
+        angles = np.array([math.nan if a is None else a for a in given], dtype=np.float64)
+    except (ValueError, TypeError):
+        raise PatternError("'edges_foldAngle' holds something that is not a number.") from None
+    return np.radians(np.where(np.isnan(angles), flat_folded, angles))
+
+
+def edges_in(document: Mapping[str, Any]) -> Ints:
+    """(E, 2) the edges of the file, or else the sides of its facets, each once."""
+    if "edges_vertices" in document or "faces_vertices" not in document:
+        return indices_at(document, "edges_vertices", 2)
+    faces = faces_in(document)
+    size = (faces >= 0).sum(axis=1)
+    face, corner = np.nonzero(faces >= 0)
+    head = faces[face, (corner + 1) % size[face]]
+    pairs = np.sort(np.stack([faces[face, corner], head], axis=1), axis=1)
+    return np.unique(pairs, axis=0)

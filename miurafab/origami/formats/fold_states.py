@@ -22,6 +22,7 @@ from miurafab.origami.formats.fold_keys import (
     points_at,
     unit_mm,
 )
+from miurafab.origami.formats.folded_only import is_folded
 from miurafab.origami.formats.target_frame import relative, scale_in, target_in
 from miurafab.surfaces.frame import origin_in
 
@@ -62,6 +63,18 @@ def flat_frame(frames: list[Mapping[str, Any]]) -> tuple[int, Mapping[str, Any]]
     raise PatternError("No frame of the file holds a flat crease pattern in 'vertices_coords'.")
 
 
+def folded_alone(frames: list[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """The frame with the folded form of a file that holds no flat pattern; None if it holds one."""
+    try:
+        place, key = flat_frame(frames)
+    except PatternError:
+        for frame in frames:
+            if isinstance(frame.get("vertices_coords"), list) and frame["vertices_coords"]:
+                return frame
+        raise
+    return frames[place] if is_folded(key) else None
+
+
 def folded_form(
     frames: list[Mapping[str, Any]], vertices: int, factor: float, origin: Floats
 ) -> Floats | None:
@@ -75,6 +88,8 @@ def further_frames(document: Mapping[str, Any]) -> tuple[FurtherFrame, ...]:
     form.
     """
     frames = frames_in(document)
+    if folded_alone(frames) is not None:
+        return ()
     place, key = flat_frame(frames)
     flat = points_at(key, "vertices_coords")
     factor, origin = unit_mm(key, 1.0), origin_of(document)

@@ -11,7 +11,6 @@ None of the three formats stores fold angles: mountains and valleys are read as 
 
 from __future__ import annotations
 
-import itertools
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -19,7 +18,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from miurafab.errors import PatternError, shown
-from miurafab.origami.formats.planar_graph import CreaseLines
+from miurafab.origami.formats.crease_lines import CreaseLines
 
 _TYPE_OF_LETTER = {"B": 1, "C": 1, "M": 2, "V": 3, "F": 0, "U": 0, "J": 0}
 _LETTER_OF_TYPE = {0: "F", 1: "B", 2: "M", 3: "V"}
@@ -105,7 +104,7 @@ def parse_opx(text: str) -> CreaseLines:
         for void in line.findall("void"):
             name = void.get("property")
             if name in values and len(void):
-                values[name] = _number(void[0].text or "", f"'{name}' of a line")
+                values[name] = finite_number(void[0].text or "", f"'{name}' of a line")
         letter = _LETTER_OF_TYPE.get(int(values["type"]), "F")
         rows.append((letter, values["x0"], -values["y0"], values["x1"], -values["y1"]))
     return _lines(rows)
@@ -142,87 +141,8 @@ def dxf_text(lines: CreaseLines) -> str:
     return "".join(parts)
 
 
-def parse_dxf(text: str) -> CreaseLines:
-    """The LINE, LWPOLYLINE and POLYLINE entities of a DXF file, by layer, else by colour.
-
-    Raises ``PatternError`` naming the line at fault, or for a curved polyline.
-    """
-    rows: list[tuple[str, float, float, float, float]] = []
-    for kind, tags in _entities(text):
-        letter = _dxf_letter(tags)
-        if kind == "LINE":
-            x0, y0, x1, y1 = (_first(tags, code) for code in (10, 20, 11, 21))
-            rows.append((letter, x0, y0, x1, y1))
-        elif kind in ("LWPOLYLINE", "POLYLINE"):
-            if any(code == 42 and _number(value, "a bulge") != 0 for code, value in tags):
-                raise PatternError("a polyline is curved; a crease pattern holds straight lines.")
-            xs = [_number(value, "an x") for code, value in tags if code == 10]
-            ys = [_number(value, "a y") for code, value in tags if code == 20]
-            if kind == "POLYLINE":  # a polyline has a dummy point of its own
-                xs, ys = xs[-_vertex_count(tags) :], ys[-_vertex_count(tags) :]
-            if int(_first(tags, 70)) & 1:
-                xs, ys = xs + xs[:1], ys + ys[:1]
-            if len(xs) != len(ys):
-                raise PatternError(f"a polyline has {len(xs)} x and {len(ys)} y coordinates.")
-            ends = list(zip(xs, ys, strict=True))
-            rows.extend((letter, *p, *q) for p, q in itertools.pairwise(ends))
-    return _lines(rows)
-
-
-def _entities(text: str) -> Iterator[tuple[str, list[tuple[int, str]]]]:
-    """The kind and the (group code, value) pairs of each entity of the ENTITIES section.
-
-    The pairs of a POLYLINE include those of its vertices.
-    """
-    rows = text.splitlines()
-    if len(rows) < 4 or rows[0].strip() != "0" or rows[1].strip() != "SECTION":
-        raise PatternError("it is not a DXF file in text form.")
-    section, kind, tags = "", "", list[tuple[int, str]]()
-    for number in range(0, len(rows) - 1, 2):
-        value = rows[number + 1].strip()
-        try:
-            code = int(rows[number])
-        except ValueError:
-            raise PatternError(
-                f"line {number + 1} is '{rows[number].strip()[:40]}', not a DXF group code."
-            ) from None
-        if code != 0:
-            if code == 2 and kind == "SECTION":
-                section = value
-            tags.append((code, value))
-            continue
-        if kind == "POLYLINE" and value == "VERTEX":
-            tags.append((code, value))
-            continue
-        if section == "ENTITIES" and kind not in ("", "SECTION"):
-            yield kind, tags
-        kind, tags = value, []
-
-
-def _vertex_count(tags: list[tuple[int, str]]) -> int:
-    return sum(tag == (0, "VERTEX") for tag in tags)
-
-
-def _dxf_letter(tags: list[tuple[int, str]]) -> str:
-    """The assignment by the layer's name, else by the colour, else unassigned."""
-    first = dict(reversed(tags))  # the first tag of each code
-    layer = first.get(8, "").lower()
-    for part, letter in (
-        ("mountain", "M"), ("valley", "V"), ("cut", "B"), ("border", "B"), ("boundary", "B"),
-        ("aux", "F"), ("flat", "F"),
-    ):  # fmt: skip
-        if part in layer:
-            return letter
-    colour = int(_number(first.get(62, "0"), "a colour"))
-    return {1: "M", 5: "V", 3: "B"}.get(colour, "U")
-
-
-def _first(tags: list[tuple[int, str]], code: int) -> float:
-    value = next((value for group, value in tags if group == code), "0")
-    return _number(value, f"group {code}")
-
-
-def _number(text: str, what: str) -> float:
+def finite_number(text: str, what: str) -> float:
+    """The finite number in ``text``. Raises ``PatternError`` naming ``what`` it is."""
     try:
         value = float(text)
     except ValueError:

@@ -1,104 +1,155 @@
 """From lines to a crease pattern: lines are joined where they meet and split where they cross.
 
 Drawings (SVG, CP, OPX, DXF) hold only lines. Two lines meet where their ends are within a tolerance
-of each other. Facets come from the plane graph: at the end of a side, the next side clockwise
-follows, so that the walk around each facet is counter-clockwise.
+of each other. A line that ends on a curve misses the straight lines that stand for the curve by a
+little; they are led through its end. Facets come from the plane graph: at the end of a side, the
+next side clockwise follows, so that the walk around each facet is counter-clockwise.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from miurafab.errors import PatternError
+from miurafab.findings import Finding
 from miurafab.geometry.arrays import Bools, Floats, Ints
-from miurafab.geometry.boxes import meeting_pairs
 from miurafab.geometry.polygons import (
     connected_parts,
+    edge_lengths,
     filled,
     next_corners,
     reversed_faces,
     signed_areas,
 )
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.formats.crease_lines import CreaseLines, corners_at_ends, with_flat_lines
+from miurafab.origami.formats.line_crossings import split_lines
+from miurafab.origami.formats.rulings import rulings
+from miurafab.origami.formats.told import (
+    lost_lines,
+    told_of_joining,
+    told_of_lines,
+    told_of_rulings,
+)
 
-TOLERANCE = 1e-4
-"""The distance within which ends meet, as a part of the median line."""
+TOLERANCES = (1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
+"""The distances within which ends meet, as parts of the median line. The first is the usual one;
+of a drawing of few digits, whose lines would not quite meet, that which leaves the fewest lines out
+and the fewest edges short."""
+SHORT = 1e-3
+"""Shorter edges, as parts of the median line, may be left where lines were to meet."""
 
 _FAR = 1e9
-_SAMPLE, _MEETINGS, _FEW_MEETINGS = 200, 100, 1_000_000
 # Of two lines on each other, the line of the higher rank is kept.
 _RANK = {"B": 6, "C": 5, "M": 4, "V": 4, "J": 2, "F": 1, "U": 0}
-
-
-@dataclass(frozen=True, eq=False)
-class CreaseLines:
-    """n straight lines of a drawing, y upwards.
-
-    ``ends`` (n, 2, 2) float64, mm; ``assignment`` (n,) letters of FOLD; ``fold_angle`` (n,)
-    float64, radians, NaN if unknown.
-    """
-
-    ends: Floats
-    assignment: NDArray[np.str_]
-    fold_angle: Floats
-
-
-def lines_of(pattern: CreasePattern) -> CreaseLines:
-    """The edges of the flat ``pattern`` as lines."""
-    return CreaseLines(
-        pattern.vertices_coords[pattern.edges_vertices],
-        pattern.edges_assignment,
-        pattern.edges_fold_angle,
-    )
 
 
 def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> CreasePattern:
     """The pattern that ``lines`` draw.
 
-    Ends within ``tolerance`` (mm; default :data:`TOLERANCE` of the median line) of each other are
-    one vertex, an end within ``tolerance`` of a line lies on the line, and crossing lines get a
-    vertex. A mountain or valley of unknown angle is folded flat. Lines that bound no facet are left
-    out. The parts of a drawing that lie apart are the pieces of the pattern.
+    Ends within ``tolerance`` (mm) of each other are one vertex, an end within ``tolerance`` of a
+    line lies on the line, and crossing lines get a vertex. The default is the first of
+    :data:`TOLERANCES` with which the fewest lines are left out. A mountain or valley of unknown
+    angle is folded flat. Lines that bound no facet are left out, which
+    :attr:`CreasePattern.told` tells. The parts of a drawing that lie apart are the pieces of the
+    pattern.
 
     Raises :class:`~miurafab.errors.PatternError` if the lines enclose no facet, or if a part of
     the drawing lies loose inside a facet of another.
     """
     if not len(lines.ends):
-        raise PatternError("The drawing holds no straight line.")
+        raise PatternError("The drawing holds no line.")
     if not (np.abs(lines.ends) < _FAR).all():
         raise PatternError("The drawing holds a coordinate that is not a number or is beyond 1e9.")
-    lengths = np.linalg.norm(lines.ends[:, 1] - lines.ends[:, 0], axis=1)
-    near = TOLERANCE * float(np.median(lengths)) if tolerance is None else tolerance
-    points, sides, source = _split(lines.ends, near)
-    sides, source = _without_doubles(sides, source, lines.assignment)
-    points, sides, source = _without_loose_ends(points, sides, source)
+    lines = corners_at_ends(lines)
+    near, told = tolerance, tuple[Finding, ...]()
+    if near is None:
+        near, told = _nearness(lines)
+    drawn = _joined(lines, near)
+    if lines.curve is None:
+        return replace(drawn.pattern, told=drawn.pattern.told + told)
+    bent = rulings(drawn.pattern, lines.curve[drawn.source] >= 0)
+    if len(bent):
+        ruled = _joined(with_flat_lines(lines, bent + drawn.origin), near).pattern
+        told += (told_of_rulings(len(bent)),)
+        drawn = replace(drawn, pattern=replace(ruled, told=drawn.pattern.told))
+    return replace(drawn.pattern, told=drawn.pattern.told + told)
+
+
+def _nearness(lines: CreaseLines) -> tuple[float, tuple[Finding, ...]]:
+    """The distance within which ends meet, mm, and what is told of it."""
+    median = float(np.median(_lengths(lines)))
+    chosen, least, refused = None, len(lines.ends) + 1, None
+    for share in TOLERANCES:
+        try:
+            drawn = _joined(lines, share * median)
+        except PatternError as fault:
+            refused = refused or fault
+            continue
+        lost = drawn.lost + int((drawn.lengths < SHORT * median).sum())
+        if lost < least:
+            chosen, least = share, lost
+        if not least:
+            break
+    if chosen is None:
+        assert refused is not None
+        raise refused
+    near = chosen * median
+    return near, (() if chosen == TOLERANCES[0] else (told_of_joining(near),))
+
+
+@dataclass(frozen=True, eq=False)
+class _Joined:
+    """A ``pattern`` that lines draw, of whose edges ``source`` (E,) are the lines; ``origin`` (2,)
+    is where its corner lies in the drawing, and ``lost`` the number of lines that are left out.
+    """
+
+    pattern: CreasePattern
+    source: Ints
+    origin: Floats
+    lost: int
+
+    @property
+    def lengths(self) -> Floats:
+        """(E,) the lengths of the edges."""
+        return edge_lengths(self.pattern.vertices_coords, self.pattern.edges_vertices)
+
+
+def _joined(lines: CreaseLines, near: float) -> _Joined:
+    """The pattern that ``lines`` draw with ends within ``near`` joined."""
+    points, every, line = split_lines(lines, near)
+    stands_for = _without_doubles(every, line, lines.assignment)
+    points, sides, rows = _without_loose_ends(points, every, np.unique(stands_for))
     if not len(sides):
         raise PatternError("The lines of the drawing enclose no facet; is the border there?")
     faces = faces_of_plane_graph(points, sides)
-    letter = lines.assignment[source]
+    letter = lines.assignment[line[rows]]
     pieces, piece = connected_parts(faces)
     whole = without_holes(faces, piece, sides, letter, len(points))
+    holes = int((~whole).sum())
     faces, piece = faces[whole], piece[whole]
     if pieces > 1:
         _refuse_loose(points, faces, piece)
     count = _sides_of_faces(faces, sides, len(points))
     keep = count > 0
-    sides, source, letter, count = sides[keep], source[keep], letter[keep], count[keep]
+    sides, rows, letter, count = sides[keep], rows[keep], letter[keep], count[keep]
+    source = line[rows]
     used = np.unique(sides)
+    origin = points[used].min(axis=0)
     renumber = np.full(len(points) + 1, -1, dtype=np.int64)  # the last entry maps -1 to -1
     renumber[used] = np.arange(len(used))
     letter = np.where(count == 1, "B", np.where(letter == "B", "C", letter))
     flat_folded = np.select([letter == "M", letter == "V"], [-np.pi, np.pi], 0.0)
     angle = lines.fold_angle[source]
     angle = np.where(np.isnan(angle) | (count == 1), flat_folded, angle)
-    return CreasePattern(
-        vertices_coords=points[used] - points[used].min(axis=0),
+    stands_for = np.where(np.isin(stands_for, rows), stands_for, -1)
+    pattern = CreasePattern(
+        vertices_coords=points[used] - origin,
         edges_vertices=renumber[sides],
         edges_assignment=letter,
         edges_fold_angle=angle,
@@ -107,7 +158,10 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
         angles_assumed=bool(
             (np.isnan(lines.fold_angle[source]) & np.isin(letter, ("M", "V"))).any()
         ),
+        told=told_of_lines(lines, line, stands_for, holes),
     )
+    lost = int(lost_lines(lines, line, stands_for).sum())
+    return _Joined(pattern, source, origin, lost)
 
 
 def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
@@ -179,96 +233,43 @@ def oriented(flat: Floats, faces: Ints) -> Ints:
     return np.where((areas < 0)[:, None], reversed_faces(faces), faces)
 
 
-def _split(ends: Floats, near: float) -> tuple[Floats, Ints, Ints]:
-    """Vertices (V, 2), sides (m, 2) between them, and the line (m,) that each side is part of."""
-    low, high = ends.min(axis=1) - near, ends.max(axis=1)
-    _refuse_tangle(low, high)
-    first, second = meeting_pairs(*(np.pad(corner, ((0, 0), (0, 1))) for corner in (low, high)))
-    a, b = ends[first], ends[second]
-    along, across = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0]
-    offset = b[:, 0] - a[:, 0]
-    turn = _cross(along, across)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        t, u = _cross(offset, across) / turn, _cross(offset, along) / turn
-    sharp = np.abs(turn) > 1e-9 * np.linalg.norm(along, axis=1) * np.linalg.norm(across, axis=1)
-    crossing = sharp & (t > 0) & (t < 1) & (u > 0) & (u < 1)
-    meet = a[crossing, 0] + t[crossing, None] * along[crossing]
-
-    count = len(ends)
-    loose = np.concatenate([ends.reshape(-1, 2), meet])
-    vertex, points = _merged(loose, near)
-    end = vertex[: 2 * count].reshape(count, 2)
-    cut = vertex[2 * count :]
-    # every line is cut at its ends, at its crossings, and at other lines' ends that lie on it
-    line = [np.arange(count), np.arange(count), first[crossing], second[crossing]]
-    at = [end[:, 0], end[:, 1], cut, cut]
-    for one, other in ((first, second), (second, first)):
-        for which in (0, 1):
-            on = _lies_on(points[end[other, which]], ends[one], near)
-            line.append(one[on])
-            at.append(end[other[on], which])
-    lines, cuts = np.concatenate(line), np.concatenate(at)
-    start = ends[lines, 0]
-    place = np.einsum("nk,nk->n", points[cuts] - start, ends[lines, 1] - start)
-    order = np.lexsort((place, lines))
-    lines, cuts = lines[order], cuts[order]
-    joined = (lines[1:] == lines[:-1]) & (cuts[1:] != cuts[:-1])
-    return points, np.stack([cuts[:-1], cuts[1:]], axis=1)[joined], lines[1:][joined]
+def _lengths(lines: CreaseLines) -> Floats:
+    """The lengths of the lines of the drawing, a curve being one."""
+    lengths = np.linalg.norm(lines.ends[:, 1] - lines.ends[:, 0], axis=1)
+    if lines.curve is None:
+        return np.asarray(lengths)
+    straight = lines.curve < 0
+    whole = np.bincount(lines.curve[~straight], lengths[~straight])
+    return np.concatenate([lengths[straight], whole])
 
 
-def _refuse_tangle(low: Floats, high: Floats) -> None:
-    """Refuse lines of which so many cross that they are no crease pattern: in one, few lines meet
-    each line. The boxes ``low`` to ``high`` (n, 2) of some lines tell for all.
-    """
-    count = len(low)
-    some = np.arange(0, count, max(count // _SAMPLE, 1))
-    meet = sum(int(((low[i] <= high) & (low <= high[i])).all(axis=1).sum()) for i in some)
-    if meet / len(some) * count / 2 > max(_FEW_MEETINGS, _MEETINGS * count):
-        raise PatternError("Too many lines of the drawing cross each other for a crease pattern.")
-
-
-def _merged(loose: Floats, near: float) -> tuple[Ints, Floats]:
-    """The vertex of each loose point, and the vertices: the first point of each that met."""
-    pairs = cKDTree(loose).query_pairs(near, output_type="ndarray")
-    _, label = connected_components(_graph(pairs, len(loose)), directed=False)
-    _, first, vertex = np.unique(label, return_index=True, return_inverse=True)
-    return np.asarray(vertex, dtype=np.int64), loose[first]
-
-
-def _lies_on(points: Floats, ends: Floats, near: float) -> Bools:
-    """Whether each point lies within ``near`` of its line, between the line's ends."""
-    along = ends[:, 1] - ends[:, 0]
-    length = np.linalg.norm(along, axis=1)
-    offset = points - ends[:, 0]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        place = np.einsum("nk,nk->n", offset, along) / length
-        away = np.abs(_cross(along, offset)) / length
-    return np.asarray((away <= near) & (place > near) & (place < length - near))
-
-
-def _without_doubles(sides: Ints, source: Ints, assignment: NDArray[np.str_]) -> tuple[Ints, Ints]:
-    """One side between two vertices, the side of the highest rank."""
+def _without_doubles(sides: Ints, source: Ints, assignment: NDArray[np.str_]) -> Ints:
+    """(m,) of each side the side that stands for it: that of the highest rank between its ends."""
     rank = np.array([_RANK[letter] for letter in assignment.tolist()])
     key = np.sort(sides, axis=1)
     order = np.lexsort((source, -rank[source], key[:, 1], key[:, 0]))
     different = np.ones(len(order), dtype=bool)
     different[1:] = (np.diff(key[order], axis=0) != 0).any(axis=1)
-    kept = np.sort(order[different])
-    return sides[kept], source[kept]
+    found = np.empty(len(order), dtype=np.int64)
+    found[order] = order[different][np.cumsum(different) - 1]
+    return found
 
 
-def _without_loose_ends(points: Floats, sides: Ints, source: Ints) -> tuple[Floats, Ints, Ints]:
-    """Without the sides that end at a vertex of no other side, and without unused points."""
+def _without_loose_ends(points: Floats, every: Ints, rows: Ints) -> tuple[Floats, Ints, Ints]:
+    """Vertices, sides and their ``rows`` in ``every`` side, without the sides that end at a vertex
+    of no other side, and without unused points.
+    """
     while True:
+        sides = every[rows]
         degree = np.bincount(sides.ravel(), minlength=len(points))
         firm = (degree[sides] > 1).all(axis=1)
         if firm.all():
             break
-        sides, source = sides[firm], source[firm]
+        rows = rows[firm]
     used = np.unique(sides)
     renumber = np.zeros(len(points), dtype=np.int64)
     renumber[used] = np.arange(len(used))
-    return points[used], renumber[sides], source
+    return points[used], renumber[sides], rows
 
 
 def without_holes(
@@ -315,11 +316,3 @@ def _face_sides(faces: Ints, sides: Ints, vertices: int) -> tuple[Ints, Ints]:
     keys = sides.min(axis=1) * vertices + sides.max(axis=1)
     order = np.argsort(keys)
     return face, order[np.searchsorted(keys, key, sorter=order)]
-
-
-def _graph(pairs: Ints, nodes: int) -> coo_array:
-    return coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(nodes, nodes))
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

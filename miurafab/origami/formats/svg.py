@@ -22,9 +22,10 @@ import numpy as np
 from miurafab.errors import PatternError, shown
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import ASSIGNMENTS
+from miurafab.origami.formats.crease_lines import CreaseLines, DrawnLine, straightened
 from miurafab.origami.formats.lines import xml_root
-from miurafab.origami.formats.planar_graph import CreaseLines
-from miurafab.units import DECIMAL, parse_length
+from miurafab.origami.formats.svg_shapes import NUMBER, shapes, tag_of, value_of
+from miurafab.units import parse_length
 
 _STROKES = {
     "B": "#000000", "M": "#ff0000", "V": "#0000ff", "C": "#00ff00", "F": "#ffff00",
@@ -39,9 +40,8 @@ _NAMES = {
 }  # fmt: skip
 _SHORTEST = 10.0
 """User units of the shortest line."""
-_NUMBER = re.compile(rf"[-+]?{DECIMAL}(?:[eE][-+]?\d+)?")
-_PATH = re.compile(r"([MmLlHhVvZzCcSsQqTtAa])|(" + _NUMBER.pattern + ")")
-
+_UNKNOWN = frozenset({"use", "image", "foreignObject"})
+"""Elements that may hold lines, which are not read."""
 Matrix = Floats
 
 
@@ -92,46 +92,39 @@ class _Look:
         return min(self.stroke_opacity * self.group_opacity, 1.0)
 
 
-def parse_svg(text: str) -> CreaseLines:
-    """The straight lines of an SVG drawing, in millimetres if it has a size, else 1 unit = 1 mm.
+def parse_svg(text: str, curve_tolerance: float | None = None) -> CreaseLines:
+    """The lines of an SVG drawing, in millimetres if it has a size, else 1 unit = 1 mm.
 
-    Lines without a stroke are left out. Raises ``PatternError`` for a curve.
+    Curves become straight lines within ``curve_tolerance``, mm
+    (:func:`~miurafab.origami.formats.crease_lines.straightened`). Lines without a stroke are left
+    out.
     """
     root = xml_root(text, "an SVG drawing")
-    if _tag(root) != "svg":
+    if tag_of(root) != "svg":
         raise PatternError("it is not an SVG drawing.")
     rules = _style_rules(root)
-    letters: list[str] = []
-    angles: list[float] = []
-    ends: list[Matrix] = []
+    drawn: list[DrawnLine] = []
+    left_out: dict[str, int] = {}
     for element, look in _walk(root, _Look("none", 1.0, 1.0, _millimetres(root)), rules):
+        tag = tag_of(element)
+        if tag in _UNKNOWN:
+            left_out[tag] = left_out.get(tag, 0) + 1
         letter = _assignment(element, look)
         if letter is None:
             continue
         angle = _fold_angle(element, look, letter)
-        for piece in _pieces(element):
-            with np.errstate(invalid="ignore", over="ignore"):
-                points = piece @ look.matrix[:, :2].T + look.matrix[:, 2]
-            ends.append(np.stack([points[:-1], points[1:]], axis=1))
-            letters += [letter] * (len(points) - 1)
-            angles += [angle] * (len(points) - 1)
-    joined = np.concatenate(ends) if ends else np.empty((0, 2, 2))
-    return CreaseLines(
-        joined * np.array([1.0, -1.0]), np.array(letters, dtype="U1"), np.array(angles, dtype=float)
-    )
-
-
-def _tag(element: Element) -> str:
-    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+        upwards = look.matrix * np.array([[1.0], [-1.0]])
+        drawn += [DrawnLine(shape.moved(upwards), letter, angle) for shape in shapes(element)]
+    return straightened(drawn, curve_tolerance, left_out)
 
 
 def _walk(
     element: Element, look: _Look, rules: dict[str, dict[str, str]]
 ) -> Iterator[tuple[Element, _Look]]:
     """Every drawn element with its look; definitions are not drawn."""
-    if _tag(element) in ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "style"):
+    if tag_of(element) in ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "style"):
         return
-    style: dict[str, str] = dict(rules.get(_tag(element), {}))
+    style: dict[str, str] = dict(rules.get(tag_of(element), {}))
     for name in (element.get("class") or "").split():
         style |= rules.get("." + name, {})
     style |= _declarations(element.get("style") or "")
@@ -154,14 +147,14 @@ def _walk(
 def _opacity(text: str | None, default: float) -> float:
     if text is None:
         return default
-    return _value(text.strip().rstrip("%"), "an opacity") / (100 if "%" in text else 1)
+    return value_of(text.strip().rstrip("%"), "an opacity") / (100 if "%" in text else 1)
 
 
 def _style_rules(root: Element) -> dict[str, dict[str, str]]:
     """Declarations of the style sheets by their selector, a tag or a ``.class``."""
     rules: dict[str, dict[str, str]] = {}
     for element in root.iter():
-        if _tag(element) == "style":
+        if tag_of(element) == "style":
             for selectors, body in re.findall(r"([^{}]+)\{([^{}]*)\}", element.text or ""):
                 for selector in selectors.split(","):
                     rules.setdefault(selector.strip(), {}).update(_declarations(body))
@@ -195,7 +188,7 @@ def _colour(text: str) -> tuple[int, int, int] | None:
         return red, green, blue
     match = re.fullmatch(r"rgba?\(([^)]*)\)", text)
     if match:
-        numbers = _NUMBER.findall(match[1])
+        numbers = NUMBER.findall(match[1])
         if len(numbers) >= 3:
             full = 2.55 if "%" in match[1] else 1.0
             red, green, blue = (round(float(number) * full) for number in numbers[:3])
@@ -208,85 +201,15 @@ def _colour(text: str) -> tuple[int, int, int] | None:
 def _fold_angle(element: Element, look: _Look, letter: str) -> float:
     angle = element.get("data-foldAngle")
     if angle is not None:
-        return math.radians(_value(angle, "data-foldAngle"))
+        return math.radians(value_of(angle, "data-foldAngle"))
     if letter in "MV":
         return math.copysign(math.pi * look.opacity, 1.0 if letter == "V" else -1.0)
     return 0.0
 
 
-def _pieces(element: Element) -> Iterator[Matrix]:
-    """The polylines (n, 2) that an element draws, in its own units."""
-    tag = _tag(element)
-
-    def number(name: str) -> float:
-        return _value(element.get(name) or "0", name)
-
-    if tag == "line":
-        yield np.array([[number("x1"), number("y1")], [number("x2"), number("y2")]])
-    elif tag in ("polyline", "polygon"):
-        numbers = [float(text) for text in _NUMBER.findall(element.get("points") or "")]
-        points = np.array(numbers[: len(numbers) // 2 * 2]).reshape(-1, 2)
-        if len(points) > 1:
-            yield np.concatenate([points, points[:1]]) if tag == "polygon" else points
-    elif tag == "rect":
-        x, y, width, height = (number(name) for name in ("x", "y", "width", "height"))
-        corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height], [x, y]]
-        yield np.array(corners)
-    elif tag == "path":
-        yield from _path_pieces(element.get("d") or "")
-    elif tag in ("circle", "ellipse"):
-        raise PatternError(f"a <{tag}> is curved; a crease pattern holds straight lines.")
-
-
-def _path_pieces(text: str) -> Iterator[Matrix]:
-    tokens = [(match[1], match[2]) for match in _PATH.finditer(text)]
-    command, at, start = "", np.zeros(2), np.zeros(2)
-    points: list[Matrix] = []
-    index = 0
-
-    def number() -> float:
-        nonlocal index
-        if index >= len(tokens) or tokens[index][0]:
-            raise PatternError(f"the path '{text[:40]}' lacks a number.")
-        index += 1
-        return float(tokens[index - 1][1])
-
-    while index < len(tokens):
-        if tokens[index][0]:
-            command = tokens[index][0]
-            index += 1
-        elif not command:
-            raise PatternError(f"the path '{text[:40]}' begins with a number.")
-        kind, relative = command.upper(), command.islower()
-        if kind == "Z":
-            points.append(start)
-            at, command = start, ""
-            continue
-        if kind in "ML":
-            to = np.array([number(), number()]) + (at if relative else 0.0)
-        elif kind == "H":
-            to = np.array([number() + (at[0] if relative else 0.0), at[1]])
-        elif kind == "V":
-            to = np.array([at[0], number() + (at[1] if relative else 0.0)])
-        else:
-            raise PatternError(
-                f"the path '{text[:40]}' is curved; a crease pattern holds straight lines."
-            )
-        if kind == "M":
-            if len(points) > 1:
-                yield np.array(points)
-            points, start = [to], to
-            command = "l" if relative else "L"
-        else:
-            points.append(to)
-        at = to
-    if len(points) > 1:
-        yield np.array(points)
-
-
 def _millimetres(root: Element) -> Matrix:
     """(2, 3) from user units to millimetres, by width, height and viewBox, else one to one."""
-    box = [float(text) for text in _NUMBER.findall(root.get("viewBox") or "")]
+    box = [float(text) for text in NUMBER.findall(root.get("viewBox") or "")]
     width = root.get("width") or ""
     if len(box) == 4 and box[2] > 0 and re.search(r"(mm|cm|in|m)\s*$", width):
         scale = parse_length(width) / box[2]
@@ -298,7 +221,7 @@ def _transform(text: str) -> Matrix:
     """(2, 3) of an SVG transform list."""
     whole = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     for name, inside in re.findall(r"(\w+)\s*\(([^)]*)\)", text):
-        n = [float(number) for number in _NUMBER.findall(inside)]
+        n = [float(number) for number in NUMBER.findall(inside)]
         try:
             whole = _composed(whole, _one_transform(name, n))
         except IndexError:
@@ -329,10 +252,3 @@ def _composed(outer: Matrix, inner: Matrix) -> Matrix:
         linear = outer[:, :2] @ inner[:, :2]
         shift = outer[:, :2] @ inner[:, 2] + outer[:, 2]
     return np.concatenate([linear, shift[:, None]], axis=1)
-
-
-def _value(text: str, name: str) -> float:
-    match = re.fullmatch(rf"\s*({_NUMBER.pattern})\s*(?:px)?\s*", text)
-    if match is None:
-        raise PatternError(f"{name} is '{text[:40]}', not a number.")
-    return float(match[1])

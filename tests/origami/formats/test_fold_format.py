@@ -206,7 +206,7 @@ def test_mixed_polygons_are_padded() -> None:
         ({"edges_assignment": ["B"]}, "one letter for each edge"),
         ({"edges_assignment": ["Q"] * 17}, "'Q'"),
         ({"edges_foldAngle": ["x"] * 17}, "not a number"),
-        ({"vertices_coords": [[0, 0, 1], [1, 2, 3]]}, "No frame"),
+        ({"vertices_coords": [[0, 0, 1], [1, 2, 3]]}, "does not exist"),
         ({"vertices_coords": [[0, 0], [1]]}, "equal dimension"),
         ({"faces_vertices": [[0, 1]]}, "fewer than three"),
         ({"faces_vertices": [[0, 1, 99]]}, "does not exist"),

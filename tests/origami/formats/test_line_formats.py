@@ -15,15 +15,16 @@ from problems import fitted, regular
 
 from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.formats.crease_lines import CreaseLines, lines_of
+from miurafab.origami.formats.dxf_entities import parse_dxf
 from miurafab.origami.formats.lines import (
     cp_text,
     dxf_text,
     opx_text,
     parse_cp,
-    parse_dxf,
     parse_opx,
 )
-from miurafab.origami.formats.planar_graph import CreaseLines, lines_of, pattern_from_lines
+from miurafab.origami.formats.planar_graph import pattern_from_lines
 from miurafab.origami.formats.svg import parse_svg, svg_text
 
 FORMATS: dict[str, tuple[Callable[[CreaseLines], str], Callable[[str], CreaseLines]]] = {
@@ -136,8 +137,8 @@ def test_an_svg_of_another_hand() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("<svg><path d='M0 0 C1 1 2 2 3 3' stroke='red'/></svg>", "curved"),
-        ("<svg><circle r='3' stroke='red'/></svg>", "curved"),
+        ("<svg><path d='M0 0 Q1 1 k' stroke='red'/></svg>", "lacks a number"),
+        ("<svg><path d='M0 0 A1 1 0 2 0 1 1' stroke='red'/></svg>", "flag"),
         ("<svg><line stroke='redish'/></svg>", "not a colour"),
         ("<svg><line stroke='red' x1='a'/></svg>", "x1 is 'a'"),
         ("<svg><g transform='warp(3)'/></svg>", "not a transform"),
@@ -170,8 +171,13 @@ def test_cp_and_opx_have_their_y_axis_downwards() -> None:
         (parse_dxf, "0\nSECTION\n2\nENTITIES\n0\nLINE\n10\nabc\n0\nEOF\n", "group 10 is 'abc'"),
         (
             parse_dxf,
-            "0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n42\n1\n0\nENDSEC\n0\nEOF\n",
-            "curved",
+            "0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n10\n1\n42\n1\n0\nENDSEC\n0\nEOF\n",
+            "without an x or a y",
+        ),
+        (
+            parse_dxf,
+            "0\nSECTION\n2\nENTITIES\n0\nSPLINE\n71\n3\n10\n1\n20\n1\n0\nENDSEC\n0\nEOF\n",
+            "do not go together",
         ),
     ],
 )

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from problems import regular
 
 from miurafab.errors import PatternError
+from miurafab.origami.formats.crease_lines import CreaseLines, lines_of
 from miurafab.origami.formats.planar_graph import (
-    CreaseLines,
     faces_of_plane_graph,
-    lines_of,
     pattern_from_lines,
 )
 
@@ -52,9 +51,13 @@ def test_an_end_on_a_line_splits_it() -> None:
 def test_ends_within_the_tolerance_are_one() -> None:
     crooked = drawn(*SQUARE[:3], ("B", 0.01, 2, 0, 0.012), ("V", 1, 0.009, 1, 1.992))
     with pytest.raises(PatternError, match="enclose no facet"):
-        pattern_from_lines(crooked)
+        pattern_from_lines(crooked, tolerance=0.001)
     found = pattern_from_lines(crooked, tolerance=0.02)
     assert found.faces_vertices.shape == (2, 4)
+    assert found.told == ()
+    joined = pattern_from_lines(crooked)  # as the least tolerance that loses no line
+    assert joined.faces_vertices.shape == (2, 4)
+    assert [finding.code for finding in joined.told] == ["joined-ends"]
 
 
 def test_doubled_lines_count_once_and_dangling_ones_not_at_all() -> None:
@@ -82,7 +85,7 @@ def test_an_inner_border_is_a_cut_and_a_hole_is_no_facet() -> None:
 
 
 def test_what_is_no_pattern_is_refused() -> None:
-    with pytest.raises(PatternError, match="no straight line"):
+    with pytest.raises(PatternError, match="no line"):
         pattern_from_lines(drawn())
     with pytest.raises(PatternError, match="enclose no facet"):
         pattern_from_lines(drawn(("M", 0, 0, 1, 0)))
@@ -154,3 +157,22 @@ def test_a_sheet_is_found_again_from_its_whole_fold_lines() -> None:
 def test_a_single_sheet_without_creases_stays() -> None:
     found = pattern_from_lines(drawn(*SQUARE))
     assert found.faces_vertices.shape == (1, 4)
+
+
+def test_what_is_not_in_the_pattern_is_told() -> None:
+    stray = drawn(*SQUARE, ("V", 1, 0, 1, 2), ("M", 1, 0, 1, 2), ("V", 5, 5, 6, 6))
+    found = pattern_from_lines(stray)
+    assert [finding.code for finding in found.told] == ["lost-lines", "lost-lines"]
+    doubled, lost = (finding.sentence for finding in found.told)
+    assert "first being V and not M at (1, 1)" in doubled
+    assert lost == (
+        "1 line of the drawing is left out, being no side of a facet, the first V at (5.5, 5.5)."
+    )
+    again = pattern_from_lines(drawn(*SQUARE, *SQUARE, ("V", 1, 0, 1, 2), ("V", 1, 0, 1, 1.5)))
+    assert again.told == ()  # what lies on itself is there
+
+
+def test_a_part_without_paper_is_told() -> None:
+    inner = (("B", 0.5, 0.5, 1, 0.5), ("B", 1, 0.5, 1, 1), ("B", 1, 1, 0.5, 0.5))
+    found = pattern_from_lines(drawn(*SQUARE, *inner, ("V", 0, 0, 0.5, 0.5), ("M", 1, 1, 2, 2)))
+    assert [finding.code for finding in found.told] == ["holes"]

@@ -1,0 +1,100 @@
+"""What the reading of a drawing changed and left out, in findings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from miurafab.findings import Finding
+from miurafab.geometry.arrays import Bools, Ints
+from miurafab.origami.formats.crease_lines import CreaseLines
+
+
+def told_of_lines(
+    lines: CreaseLines, source: Ints, stands_for: Ints, holes: int
+) -> tuple[Finding, ...]:
+    """What became of ``lines``, of which m sides were made: ``source`` (m,) is the line of each
+    side, ``stands_for`` (m,) the side of the pattern in its place, -1 for none, and ``holes`` the
+    number of holes.
+    """
+    return tuple(_told(lines, source, stands_for, holes))
+
+
+def _told(lines: CreaseLines, source: Ints, stands_for: Ints, holes: int) -> Iterator[Finding]:
+    if lines.curve is not None:
+        count = int((lines.curve >= 0).sum())
+        yield Finding(
+            "curved-lines",
+            f"{_many(lines.curves, 'curved line')} of the drawing became "
+            f"{_many(count, 'straight line')} within {lines.curve_tolerance:.3g} mm; "
+            "'miurafab convert' takes another `curve_tolerance`.",
+        )
+    kept = stands_for >= 0
+    pairs = np.stack([source[stands_for[kept]], source[kept]], axis=1)
+    letters = lines.assignment[pairs]
+    clash = (letters[:, 0] != letters[:, 1]) & np.isin(letters, ("M", "V")).all(axis=1)
+    if clash.any():
+        (one, lost), (letter, other) = pairs[clash][0].tolist(), letters[clash][0].tolist()
+        yield Finding(
+            "lost-lines",
+            f"A mountain and a valley lie on each other in {_many(int(clash.sum()), 'place')}, and "
+            f"one is kept, the first being {letter} and not {other} at {_at(lines, lost)}.",
+            (one, lost),
+        )
+    away = lost_lines(lines, source, stands_for)
+    if away.any():
+        first, count = int(np.argmax(away)), int(away.sum())
+        yield Finding(
+            "lost-lines",
+            f"{_many(count, 'line')} of the drawing {_are(count)} left out, being no side of a "
+            f"facet, the first {lines.assignment[first]} at {_at(lines, first)}.",
+            tuple(np.flatnonzero(away).tolist()),
+        )
+    if lines.left_out:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(lines.left_out.items()))
+        yield Finding("lost-lines", f"Parts of the drawing are not read: {kinds}.")
+    if holes:
+        says = (
+            f"{_many(holes, 'part')} of the drawing, with borders alone around, "
+            f"{'holds' if holes == 1 else 'hold'} no paper."
+        )
+        yield Finding("holes", says)
+
+
+def lost_lines(lines: CreaseLines, source: Ints, stands_for: Ints) -> Bools:
+    """(n,) the ``lines`` of which nothing is in the pattern; those without length do not count."""
+    away = np.asarray((lines.ends[:, 0] != lines.ends[:, 1]).any(axis=1))
+    away[source[stands_for >= 0]] = False
+    return away
+
+
+def told_of_joining(near: float) -> Finding:
+    """What is told of a drawing whose ends are joined farther than usual."""
+    return Finding(
+        "joined-ends",
+        f"Lines of the drawing do not quite meet: ends within {near:.2g} mm of each other are "
+        "joined; 'miurafab convert' takes another `tolerance`.",
+    )
+
+
+def told_of_rulings(count: int) -> Finding:
+    """What is told of the lines along which paper bends beside curved creases."""
+    return Finding(
+        "curved-lines",
+        f"{_many(count, 'ruling')} (F) across the facets beside curved creases {_are(count)} "
+        "added: there the paper bends.",
+    )
+
+
+def _are(count: int) -> str:
+    return "is" if count == 1 else "are"
+
+
+def _many(count: int, noun: str) -> str:
+    return f"{count} {noun}" + ("" if count == 1 else "s")
+
+
+def _at(lines: CreaseLines, line: int) -> str:
+    x, y = lines.ends[line].mean(axis=0).tolist()
+    return f"({x:.6g}, {y:.6g})"
