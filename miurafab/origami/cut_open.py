@@ -1,8 +1,9 @@
 """A pattern with cuts, opened along them: each side of a cut has vertices and edges of its own.
 
-Two corners of facets are one vertex if facets around it join them across edges that are not cut.
-Facets and edges keep their numbers. One fan of facets keeps the vertex, and the left side of a cut
-keeps the edge; what is new comes behind.
+Facets that touch at a vertex alone are parted there, since nothing holds them. Two corners of
+facets are one vertex if facets around it join them across edges that are not cut. Facets and edges
+keep their numbers. One fan of facets keeps the vertex, and the left side of a cut keeps the edge;
+what is new comes behind.
 """
 
 from __future__ import annotations
@@ -20,14 +21,13 @@ from miurafab.origami.crease_pattern import CreasePattern
 
 
 def cut_open(pattern: CreasePattern) -> CreasePattern:
-    """``pattern`` with its inner cuts as borders; the pattern itself if it has none.
+    """``pattern`` with its inner cuts as borders, parted where it touches at a vertex alone; the
+    pattern itself if there is neither.
 
     Edges of letter B or C with a facet on both sides are cuts.
     """
     inner = np.asarray((pattern.edges_faces >= 0).all(axis=1))
     cut = inner & np.isin(pattern.edges_assignment, ("B", "C"))
-    if not cut.any():
-        return pattern
     told = opened_cuts(pattern)
     faces, width = pattern.faces_vertices, pattern.faces_vertices.shape[1]
     face, slot = np.nonzero(faces >= 0)
@@ -40,6 +40,8 @@ def cut_open(pattern: CreasePattern) -> CreasePattern:
     corners[edge, side, 1 - side] = end
     joined = corners[inner & ~cut]
     vertex = _fans(pattern, joined[:, 0].ravel(), joined[:, 1].ravel())
+    if not cut.any() and np.array_equal(vertex[start], faces[face, slot]):
+        return pattern
     own = np.where(corners[:, :1, 0] >= 0, corners[:, 0], corners[:, 1])
     edges = np.where(own >= 0, vertex[own], pattern.edges_vertices)
     other = vertex[corners[cut, 1]]

@@ -39,6 +39,9 @@ with six decimals of millimetres and degrees to 1e-7."""
 ROUGH = 0.01
 """Radians; what drawings with few digits leave open at a vertex that was meant to close."""
 
+_SPREAD = 20.0
+"""So many times the median residual are still the rounding of the same digits."""
+
 SAME = 1e-4
 """Radians; sectors that differ by less are equal."""
 
@@ -84,9 +87,10 @@ class VertexFolds:
             return f"{count} creases meet there, and a flat fold needs an even number"
         if self.kawasaki > within:
             one, other = (math.degrees(self.sectors[start::2].sum()) for start in (0, 1))
+            digits = max(4, 4 - math.floor(math.log10(self.kawasaki)))
             return (
-                f"the sums of alternate sectors are {one:.4g} and {other:.4g} degrees, and must be "
-                "equal (Kawasaki)"
+                f"the sums of alternate sectors are {one:.{digits}g} and {other:.{digits}g} "
+                "degrees, and must be equal (Kawasaki)"
             )
         mountains = int((self.angles < 0).sum())
         if abs(2 * mountains - count) != 2:
@@ -177,10 +181,9 @@ def judge_flat_folding(pattern: CreasePattern) -> Iterator[Finding]:
     folded_flat = bool((np.abs(sizes - math.pi) <= CLOSED).all())
     if not folded_flat:
         yield from _loops(folds)
-    exact = float(np.median([each.kawasaki for each in folds])) <= CLOSED
-    faults = {
-        each.vertex: why for each in folds if (why := each.why_not_flat(CLOSED if exact else ROUGH))
-    }
+    median = float(np.median([each.kawasaki for each in folds]))
+    within = max(CLOSED, _SPREAD * median) if median <= CLOSED else ROUGH
+    faults = {each.vertex: why for each in folds if (why := each.why_not_flat(within))}
     if not faults:
         return
     first = min(faults)

@@ -264,7 +264,9 @@ def _inexact(found: Residuals) -> Iterator[Finding]:
         ("developability", "developable", "vertex", found.interior, found.developability),
         ("isometry", "the same flat and folded", "facet", facets, found.isometry),
     )
-    for code, virtue, noun, names, values in checks:
+    for code, virtue, noun, names, values in sorted(
+        checks, key=lambda check: -check[-1].max(initial=0.0)
+    ):
         over = ~(values <= found.exact)
         if over.any():
             where = names[over]

@@ -26,7 +26,7 @@ from miurafab.origami.formats.files import (
     load,
     write_pattern,
 )
-from miurafab.workflow.patterns import require_consistent
+from miurafab.workflow.patterns import require_consistent, wishes_of
 from miurafab.workflow.scaling import ScaleOptions, scaled
 
 
@@ -119,7 +119,7 @@ def convert(
     reading = {name: options.pop(name) for name in declared(ReadingOptions) if name in options}
     sizes = read_options(ScaleOptions, options)
     pattern = load(source, folded=folded, **reading)
-    require_consistent(pattern, str(source))
+    require_consistent(pattern, str(source), wishes_of(pattern))
     pattern = scaled(pattern, sizes)
     findings = list(pattern.told)
     findings += [] if source.suffix.lower() == ".fold" else _assumed(source, pattern)

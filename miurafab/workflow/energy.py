@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from miurafab.errors import InputError, OptionError
+import numpy as np
+
+from miurafab.errors import InputError, OptionError, PatternError
 from miurafab.files import AnyPath
 from miurafab.options import Choice, Either, Pair, Whole, number, option, read_options
 from miurafab.options.documented import described
@@ -17,11 +19,20 @@ from miurafab.origami.energy.curve import EnergyCurve, energy_curve
 from miurafab.origami.energy.path import Progress
 from miurafab.origami.energy.pieces import PieceEnergies, energies_of_pieces
 from miurafab.origami.energy.pull import CORNERS, PullCurve, pull
+from miurafab.origami.folding.motion import find_motion
+from miurafab.origami.unfold import FLAT_ANGLE
 from miurafab.profiles import Material, read_material
-from miurafab.workflow.patterns import PatternLike, consistent_pattern
+from miurafab.workflow.patterns import (
+    PatternLike,
+    as_pattern,
+    consistent_pattern,
+    movable_pattern,
+)
 from miurafab.workflow.uncut import uncut_shares
 
 STRAIN, CYCLES = 0.2, 3
+STEPS_FROM_FLAT = 20
+"""The steps of the motion that finds the folded form of a pattern without one."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +85,8 @@ def energy(
     Parameters
     ----------
     pattern : CreasePattern, FitResult, str or os.PathLike
-        The pattern, or a file that :func:`load` reads. It needs a folded form.
+        The pattern, or a file that :func:`load` reads. Without a folded form, the last shape of its
+        motion from flat is taken, if its facets stay flat on the way.
     material : Material, str or os.PathLike, optional
         A profile with a modulus, its shipped name or its TOML file: energies are then in joules.
         Without it their unit is k_f times the mean edge. A force needs a material, by default the
@@ -96,7 +108,7 @@ def energy(
         For a material without a modulus, and with ``pull`` for one without the stiffness of its
         creases.
     PatternError
-        For a pattern without a folded form.
+        For a pattern without a folded form whose facets bend on the way from flat.
     OptionError
         For a name that is no option, and for a value that cannot be taken.
 
@@ -117,7 +129,7 @@ def energy(
     """
     asked = read_options(EnergyOptions, options | {"steps": steps})
     _check(asked)
-    found = consistent_pattern(pattern)
+    found = _with_folded_form(pattern)
     if asked.pull is not None:
         return _pulled(found, asked, read_material(material), on_progress)
     paper = None if material is None else _paper(read_material(material))
@@ -133,6 +145,32 @@ def energy(
     model = sheet_model(found, paper=paper, crease_ratio=asked.crease_ratio)
     return energy_curve(
         found, asked.steps, crease=asked.crease, model=model, on_progress=on_progress
+    )
+
+
+def _with_folded_form(pattern: PatternLike) -> CreasePattern:
+    """The pattern, with the last shape of its motion from flat where it has no folded form."""
+    found = as_pattern(pattern)
+    if found.folded_coords is not None:
+        return consistent_pattern(pattern)
+    found = movable_pattern(pattern)
+    motion = find_motion(found, STEPS_FROM_FLAT).motion
+    if not motion.is_rigid:
+        raise PatternError(
+            "The pattern has no folded form, and on its way from flat its facets bend: energy is "
+            "measured from a form in which they are flat. Give a file that holds that form."
+        )
+    last = int(np.flatnonzero(np.isfinite(motion.states))[-1])
+    angles = motion.fold_angles[last]
+    letters = motion.pattern.edges_assignment
+    free = np.isin(letters, ("M", "V", "F", "U"))
+    lettered = np.where(angles > FLAT_ANGLE, "V", np.where(angles < -FLAT_ANGLE, "M", "F"))
+    inner = (motion.pattern.edges_faces >= 0).all(axis=1)
+    return replace(
+        motion.pattern,
+        folded_coords=motion.frames[last],
+        edges_fold_angle=np.where(inner, angles, 0.0),
+        edges_assignment=np.where(inner & free, lettered, letters),
     )
 
 

@@ -18,6 +18,7 @@ from miurafab.findings import Finding, findings_json
 from miurafab.options import Whole, option, read_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
+from miurafab.origami.cut_open import cut_open
 from miurafab.origami.folding.layers import LayerOrder, layer_order
 from miurafab.origami.folding.order_search import MOST, LayerSearch, search_layer_orders
 from miurafab.origami.formats.fold import write_fold
@@ -167,8 +168,7 @@ def layers(pattern: PatternLike, **options: Any) -> Layers:
     Raises
     ------
     PatternError
-        For a file that holds no pattern, and for a pattern that does not reach the flat-folded
-        state.
+        For a file that holds no pattern, and for a pattern that contradicts itself.
     InputError
         For a search where python-sat is not installed.
     OptionError
@@ -181,14 +181,18 @@ def layers(pattern: PatternLike, **options: Any) -> Layers:
     <Layers 120 pairs of facets, orders found: 1>
     """
     asked = read_options(LayerOptions, options)
-    found = consistent_pattern(pattern)
+    found = cut_open(consistent_pattern(pattern))
     try:
         closed = layer_order(found)
     except PatternError:
         closed = None
     if closed is not None and closed.known and asked.orders is None:
         return Layers(closed, None, found.told)
-    return Layers(closed, search_layer_orders(found, asked.orders or MOST), found.told)
+    try:
+        search = search_layer_orders(found, asked.orders or MOST)
+    except PatternError as fault:
+        return Layers(closed, None, (*found.told, Finding("cannot-fold-flat", str(fault))))
+    return Layers(closed, search, found.told)
 
 
 described(layers, LayerOptions)

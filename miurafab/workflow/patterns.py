@@ -85,9 +85,15 @@ def movable_pattern(pattern: object) -> CreasePattern:
     leave vertices open. Raises what :func:`consistent_pattern` raises otherwise.
     """
     found = as_pattern(pattern)
-    allowed = _WISHES if found.folded_coords is None else frozenset()
-    require_consistent(found, _called(pattern), allowed)
+    require_consistent(found, _called(pattern), wishes_of(found))
     return found
+
+
+def wishes_of(pattern: CreasePattern) -> frozenset[str]:
+    """The codes of findings that are no contradiction of ``pattern``: without a folded form its
+    fold angles are a wish.
+    """
+    return _WISHES if pattern.folded_coords is None else frozenset()
 
 
 def require_consistent(

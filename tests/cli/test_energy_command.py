@@ -173,8 +173,15 @@ def test_what_cannot_be_done_is_one_sentence(run, saved, arguments, part):
     assert part in sentence(run("energy", saved, *arguments), 2)
 
 
-def test_a_pattern_without_a_folded_form_is_refused(run, tmp_path):
+def test_a_pattern_without_a_folded_form_takes_the_end_of_its_motion(run, tmp_path):
     replace(regular(5, 5), folded_coords=None).save(tmp_path / "flat.fold")
+    assert json.loads(run("energy", tmp_path / "flat.fold", "--steps", "4", "--json").stdout)[
+        "rigid"
+    ]
+
+
+def test_a_pattern_that_bends_on_its_way_from_flat_needs_a_folded_form(run, tmp_path, hypar):
+    replace(hypar, folded_coords=None).save(tmp_path / "flat.fold")
     assert "no folded form" in sentence(run("energy", tmp_path / "flat.fold"), 2)
 
 

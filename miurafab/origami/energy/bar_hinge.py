@@ -240,7 +240,7 @@ def flat_model(
     creased = letter != "F"
     hinges = np.concatenate([bending, across[sprung]])
     weights = np.concatenate([np.ones(len(bending)), np.full(int(sprung.sum()), crease_ratio)])
-    ruled = len(diagonals) + np.flatnonzero(_is_ruling(pattern, inner[letter == "F"]))
+    ruled = len(diagonals) + np.flatnonzero(rulings_among(pattern, inner[letter == "F"]))
     weights[ruled] = crease_ratio
     goals = pattern.edges_fold_angle[inner[sprung]]
     bars = np.concatenate([pattern.edges_vertices, diagonals[:, :2]])
@@ -262,7 +262,7 @@ def flat_model(
     )
 
 
-def _is_ruling(pattern: CreasePattern, flat: Ints) -> Bools:
+def rulings_among(pattern: CreasePattern, flat: Ints) -> Bools:
     """(n,) which of the ``flat`` edges (n,) are rulings: they come to an interior vertex at which
     two folds meet that are not in line. There the facets have to bend.
     """

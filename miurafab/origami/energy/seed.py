@@ -48,7 +48,10 @@ def linear_seed(model: BarHingeModel) -> LinearSeed:
     rows = np.repeat(np.arange(len(gradient)), 4)
     entries = (gradient[:, :, 2].ravel(), (rows, model.hinges.ravel()))
     lean = sparse.coo_array(entries, shape=(len(gradient), count)).tocsc()
-    normal = (lean.T * weight) @ lean + RIGID_MOTION * sparse.eye_array(count)
+    normal = (lean.T * weight) @ lean
+    # beside facets without width the entries are so large that a smaller one is lost in rounding
+    least = RIGID_MOTION + float(np.finfo(np.float64).eps * normal.diagonal().max())
+    normal = normal + least * sparse.eye_array(count)
     factor = factor_symmetric(sparse.csc_array(normal))
     heights = factor.solve(lean.T @ (weight * model.rest))
     turned = np.asarray(lean @ heights)

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.bar_hinge import rulings_among
 from miurafab.origami.energy.triangles import split_facets
 from miurafab.origami.folding.kinematics import FoldingMotion
 
@@ -83,10 +84,13 @@ def _parts(pattern: CreasePattern) -> Ints:
 
 
 def _flat_edges(pattern: CreasePattern) -> Bools:
-    """(E,) whether an edge between two facets is not folded, by its letter and its angle."""
+    """(E,) whether an edge between two facets is not folded, by its letter and its angle, and is no
+    ruling, about which the paper beside a curved crease bends.
+    """
     inner = (pattern.edges_faces >= 0).all(axis=1)
-    flat = (pattern.edges_assignment == "F") & (pattern.edges_fold_angle == 0)
-    return np.asarray(inner & flat)
+    flat = inner & (pattern.edges_assignment == "F") & (pattern.edges_fold_angle == 0)
+    flat[np.flatnonzero(flat)] = ~rulings_among(pattern, np.flatnonzero(flat))
+    return np.asarray(flat)
 
 
 def _loop(pattern: CreasePattern, own: Bools) -> list[int] | None:

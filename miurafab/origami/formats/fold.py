@@ -39,6 +39,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.flattening import ROUGHEST
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.folding.layers import LayerOrder
+from miurafab.origami.formats.crease_lines import CreaseLines
 from miurafab.origami.formats.fold_frames import written_frames
 from miurafab.origami.formats.fold_keys import (
     assignments_in,
@@ -59,7 +60,8 @@ from miurafab.origami.formats.fold_states import (
     origin_of,
 )
 from miurafab.origami.formats.folded_only import told_of_unfolding, unfolded_pattern
-from miurafab.origami.formats.planar_graph import enclosed_facets, oriented
+from miurafab.origami.formats.line_crossings import lines_cross
+from miurafab.origami.formats.planar_graph import enclosed_facets, oriented, pattern_from_lines
 from miurafab.origami.formats.target_frame import (
     exact_frames,
     in_own_frame,
@@ -204,6 +206,9 @@ def parse_fold(document: Any) -> CreasePattern:
     edges = edges_in(key)
     assignment = assignments_in(key, len(edges))
     given = "faces_vertices" in key
+    if not given and len(frames) == 1 and lines_cross(flat, edges):
+        angles = fold_angles_in(key, assignment, np.nan)
+        return pattern_from_lines(CreaseLines(flat[edges], assignment, angles))
     faces = faces_in(key) if given else enclosed_facets(flat, edges, assignment)
     if faces.max() >= len(flat):  # before something is made as large as that number
         raise PatternError("'faces_vertices' refers to a vertex that does not exist.")

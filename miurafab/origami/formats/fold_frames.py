@@ -39,12 +39,16 @@ def written_frames(
                 }
             )
         return frames
-    for state, points, angles in zip(
-        motion.states.tolist(), motion.frames, motion.fold_angles, strict=True
+    for title, state, points, angles in zip(
+        frame_titles(motion),
+        motion.states.tolist(),
+        motion.frames,
+        motion.fold_angles,
+        strict=True,
     ):
         frames.append(
             {
-                "frame_title": f"s = {state:.6g}",
+                "frame_title": title,
                 **_folded(points),
                 "edges_foldAngle": np.degrees(angles).tolist(),
             }
@@ -52,6 +56,26 @@ def written_frames(
         if order is not None and math.isinf(state):
             frames[-1]["faceOrders"] = order.face_orders().tolist()
     return frames
+
+
+def frame_titles(motion: FoldingMotion) -> list[str]:
+    """The frames of ``motion`` by the fold angle of the crease that folds farthest before all is
+    folded flat, such as ``edge 7 folded by 45.2 degrees``.
+    """
+    angles = np.degrees(motion.fold_angles)
+    open_ = np.isfinite(motion.states)
+    if not open_.any():
+        return ["folded flat"] * len(angles)
+    edge = int(np.abs(angles[open_]).max(axis=0).argmax())
+    titles = []
+    for state, angle in zip(motion.states.tolist(), np.abs(angles[:, edge]).tolist(), strict=True):
+        if math.isinf(state):
+            titles.append("folded flat")
+        elif state == 0.0:
+            titles.append("flat")
+        else:
+            titles.append(f"edge {edge} folded by {angle:.4g} degrees")
+    return titles
 
 
 def _folded(points: Floats) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from miurafab.origami.formats.any_plane import laid_in_plane
 from miurafab.origami.formats.fold_keys import (
     classes_of,
     frames_in,
+    list_at,
     numbers_at,
     points_at,
     unit_mm,
@@ -97,7 +98,10 @@ def further_frames(document: Mapping[str, Any]) -> tuple[FurtherFrame, ...]:
     return tuple(
         FurtherFrame(n, _points_of(frame, len(flat), factor, origin), _orders(frame, flat))
         for n, frame in enumerate(frames)
-        if n != place and frame is not chosen and "foldedForm" in classes_of(frame)
+        if n != place
+        and frame is not chosen
+        and "foldedForm" in classes_of(frame)
+        and len(list_at(frame, "vertices_coords")) == len(flat)  # else it is of another sheet
     )
 
 

@@ -97,3 +97,23 @@ def _graph(pairs: Ints, nodes: int) -> coo_array:
 
 def _cross(a: Floats, b: Floats) -> Floats:
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def lines_cross(points: Floats, edges: Ints) -> bool:
+    """Whether two of ``edges`` (E, 2) at ``points`` (V, 2) cross each other between their ends, or
+    one ends on the other.
+    """
+    if edges.max() >= len(points) or not np.isfinite(points).all():
+        return False  # what reads them next says so
+    ends = points[edges]
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    first, second = meeting_pairs(*(np.pad(corner, ((0, 0), (0, 1))) for corner in (low, high)))
+    apart = (edges[first][:, :, None] != edges[second][:, None, :]).all(axis=(1, 2))
+    a, b = ends[first[apart]], ends[second[apart]]
+    along, across = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0]
+    scale = 1e-9 * np.linalg.norm(along, axis=1) * np.linalg.norm(across, axis=1)
+    one = _cross(along, b[:, 0] - a[:, 0]), _cross(along, b[:, 1] - a[:, 0])
+    other = _cross(across, a[:, 0] - b[:, 0]), _cross(across, a[:, 1] - b[:, 0])
+    parts = [(np.minimum(*pair) <= scale) & (np.maximum(*pair) >= -scale) for pair in (one, other)]
+    level = np.abs(_cross(along, across)) <= scale
+    return bool((parts[0] & parts[1] & ~level).any())

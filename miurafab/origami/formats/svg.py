@@ -10,6 +10,7 @@ and ``viewBox`` keep its size in millimetres. Rabbit Ear's ``data-assignment`` a
 
 from __future__ import annotations
 
+import colorsys
 import math
 import re
 from collections.abc import Iterator
@@ -36,7 +37,9 @@ _LETTERS |= {(255, 255, 0): "F", (255, 0, 255): "U"}
 _NAMES = {
     "black": "#000000", "red": "#ff0000", "blue": "#0000ff", "lime": "#00ff00",
     "green": "#008000", "yellow": "#ffff00", "magenta": "#ff00ff", "fuchsia": "#ff00ff",
-    "gray": "#808080", "grey": "#808080",
+    "gray": "#808080", "grey": "#808080", "silver": "#c0c0c0", "white": "#ffffff",
+    "maroon": "#800000", "navy": "#000080", "purple": "#800080", "olive": "#808000",
+    "teal": "#008080", "aqua": "#00ffff", "cyan": "#00ffff", "orange": "#ffa500",
 }  # fmt: skip
 _SHORTEST = 10.0
 """User units of the shortest line."""
@@ -193,6 +196,12 @@ def _colour(text: str) -> tuple[int, int, int] | None:
             full = 2.55 if "%" in match[1] else 1.0
             red, green, blue = (round(float(number) * full) for number in numbers[:3])
             return red, green, blue
+    match = re.fullmatch(r"hsla?\(([^)]*)\)", text)
+    if match and len(numbers := NUMBER.findall(match[1])) >= 3:
+        hue, full, light = (float(number) for number in numbers[:3])
+        parts = colorsys.hls_to_rgb(hue / 360 % 1, light / 100, full / 100)
+        red, green, blue = (round(255 * part) for part in parts)
+        return red, green, blue
     if text in ("none", "", "transparent"):
         return None
     raise PatternError(f"the stroke '{text[:40]}' is not a colour; write it as #rrggbb.")
