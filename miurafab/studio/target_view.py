@@ -41,8 +41,6 @@ LATTICE = 72
 """Cells to a side of a surface that is a map; 10,000 triangles."""
 MOST_SHOWN = 60_000
 """A mesh of more triangles is shown by fewer."""
-AT_ONCE = 4 * 2**20
-"""A mesh file of so many bytes is read while the page waits: 80,000 triangles, 0.05 s."""
 _NEAR = 6
 """Facets over whose deviations the colour of a place is a mean."""
 

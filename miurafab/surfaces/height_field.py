@@ -137,6 +137,15 @@ def read_image(path: Path, height: float | None = None) -> Floats:
     return upright * (height / (_WHITE_16 if mode[0] == "I" else _WHITE_8))
 
 
+def pixels_in(path: Path) -> int:
+    """How many pixels an image has, as its file says; 0 for a file that is no image."""
+    try:
+        with Image.open(path) as image:
+            return image.width * image.height
+    except (*_IMAGE_FAULTS, Image.DecompressionBombError):
+        return 0
+
+
 def _averaged(heights: Floats, down: int, across: int) -> Floats:
     """The means of blocks of ``down`` x ``across``; a rest at the far edges is left out."""
     rows, columns = heights.shape[0] // down, heights.shape[1] // across

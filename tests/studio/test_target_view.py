@@ -1,6 +1,7 @@
 """The target before and after its fit: what the page is sent, judged against the fit itself."""
 
 import base64
+import gzip
 import io
 import json
 import math
@@ -233,6 +234,28 @@ def test_a_large_mesh_is_read_by_the_process(asked, monkeypatch):
     assert asked.get(address).json() == {"wait": True}
     running.coming = told
     assert asked.get(address).json()["kind"] == "disk"
+
+
+@pytest.mark.parametrize("name", ["dem.png", "saddle.obj.gz", "box.3mf"])
+def test_a_file_that_may_unpack_to_much_is_left_to_the_process(asked, name, monkeypatch):
+    """Of an image the pixels count, as its first bytes tell; of a packed mesh nothing is read."""
+    content = {"dem.png": heights_png(), "saddle.obj.gz": gzip.compress(saddle_obj())}.get(name)
+    monkeypatch.setattr("miurafab.studio.first_sight.PIXELS", 100)
+    source = asked.upload(name, content or b"PK").json()["source"]
+    first = asked.post("target", {"target": {"source": source}, "options": {}}).json()
+    assert first["picture"] is None
+    assert [each.order.do for each in asked.orders] == ["place"]
+
+
+def test_a_design_is_shown_as_what_it_names(asked, tmp_path):
+    (tmp_path / "cap.stl").write_bytes(stl("cap-40"))
+    for text, kind in (('surface = "vase"', "map"), ('mesh = "cap.stl"', "file")):
+        file = tmp_path / f"{kind}.toml"
+        file.write_text(f"[target]\n{text}\n")
+        source = asked.studio.bench.add_own(file, "design").id
+        said = asked.post("target", {"target": {"source": source}, "options": {}}).json()
+        assert said["picture"]["kind"] == kind
+        assert (said["more"] is None) == (kind == "map")
 
 
 def test_a_refused_mesh_has_its_buttons_in_the_words_of_the_page(done):

@@ -104,6 +104,7 @@ async function laid(number, now) {
 
 function take(found, keep = false) {
   pictures = { ...found, fitted: fitted.picture && fitted.key === key ? fitted.picture : null };
+  if (key === JSON.stringify(null)) pictures.laid = pictures.fitted; // a pattern that was opened
   byId("target-panel").hidden = !top() && byId("target-refused").hidden;
   const { laid: picture } = pictures;
   byId("target-findings").replaceChildren(...(picture?.findings ?? []).map(({ sentence }) => element("li", { textContent: sentence })));
@@ -284,6 +285,7 @@ function tapped(spot) {
 
 /** After each answer of the studio: the colours of a fit, once they are there. */
 export async function followTarget({ pattern }) {
+  if (JSON.stringify(question()) !== key) seeTarget(); // a file was opened
   const file = pattern?.files.target ?? "";
   if (file === fitted.file) return;
   fitted = { file, key: "" };
@@ -294,9 +296,7 @@ export async function followTarget({ pattern }) {
   try {
     const picture = unpack(await ask(file));
     if (fitted.file !== file) return;
-    const opened = !pattern.form.target;
-    fitted = { file, picture, key: opened ? JSON.stringify(null) : keyOfForm(pattern.form) };
-    if (opened && question() === null) pictures.laid = picture;
+    fitted = { file, picture, key: pattern.form.target ? keyOfForm(pattern.form) : JSON.stringify(null) };
     take(pictures, true);
   } catch {
     fitted = { file: "", key: "" }; // a newer result has taken its place
