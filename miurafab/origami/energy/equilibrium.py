@@ -291,9 +291,9 @@ def solve(
     for _ in range(MAX_ITERATIONS):
         if size <= TOLERANCE:
             if factored is not None and size > ROUNDING:
-                better = state.plus(driven.step(factored, residual), 1.0)
-                if driven.size(driven.residual(better, target)) < size:
-                    state = better
+                nearer = state.plus(driven.step(factored, residual), 1.0)
+                if driven.size(driven.residual(nearer, target)) < size:
+                    state = nearer
             return Solution(state, factored, True)
         if not np.isfinite(size):
             break

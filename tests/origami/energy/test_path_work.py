@@ -1,4 +1,4 @@
-"""What a path costs, in factorisations and solutions: no clock, so that it is the same everywhere."""
+"""What a path costs, in factorisations and solutions, which are the same everywhere."""
 
 from collections import Counter
 
