@@ -271,7 +271,7 @@ class FoldView {
     if (moves) {
       if (Number(byId("motion").value) !== Math.round(frame)) byId("motion").value = Math.round(frame);
       const name = this.fold.names[whole];
-      const apart = stacked && this.gap ? `, layers ${lengthText(this.gap)} apart` : "";
+      const apart = stacked && this.gap ? `, layers ${this.gap < 1 ? Number(this.gap.toPrecision(2)) : this.gap.toFixed(1)} mm apart` : "";
       const text = `${whole + 1} of ${this.form.frames}${name ? `, ${name}` : ""}${apart}`;
       byId("motion-frame").value = text;
       byId("motion").setAttribute("aria-valuetext", text);
