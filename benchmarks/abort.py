@@ -1,11 +1,12 @@
 """From a click on Abort to 0x18 on the wire, in the studio, while a job burns.
 
-    python benchmarks/abort.py [--runs 50] [--http]
+    python benchmarks/abort.py [--runs 50] [--http] [--live]
 
 The virtual controller is on a pseudo-terminal and notes when each byte came. In a headless
 Chromium the page shows the job and is busy: it computes for 40 of every 50 ms. A run is a mouse
 click on the button, from the moment in which it is handed to the browser. With ``--http`` a run is
-the request alone, while two other pages ask for the state fifty times a second.
+the request alone, while two other pages ask for the state fifty times a second. With ``--live`` a
+third page drags a slider all the time, so that one coarse fit follows the other.
 """
 
 from __future__ import annotations
@@ -69,12 +70,14 @@ class Rig:
         server = _Server(0, lambda: None)
         self.guard = Guard(server.server_port, "k" * 32)
         self.asked_at = 0.0
+        self.answers = 0
         desk = Noting(lambda: setattr(self, "asked_at", time.monotonic()))
         server.studio = Studio(Bench(folder, None), self.guard, desk=desk, own_job=job)
         serving = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
         serving.start()
         self._at_end.callback(server.server_close)
         self._at_end.callback(server.shutdown)
+        self._at_end.callback(server.studio.live.stop)
         self._at_end.callback(server.studio.desk.leave)
         self.page = Page(self.guard.address)
         port = self.bench.wire.address
@@ -142,6 +145,31 @@ class Rig:
             for thread in threads:
                 thread.join()
 
+    @contextlib.contextmanager
+    def dragged(self) -> Iterator[None]:
+        """A page that asks for one coarse fit after the other."""
+        over = threading.Event()
+        layout = {"machine": MACHINE, "material": "card-250", "options": {}}
+
+        def drag() -> None:
+            page, size = Page(self.guard.address), 100
+            while not over.is_set():
+                options = {"facets": "20x20", "size": f"{size}mm"}
+                form = {"target": {"surface": "hypar"}, "options": options, "layout": layout}
+                said = page.post("live", form)
+                while "wait" in said["said"] and not over.is_set():
+                    said = json.loads(page.get(f"live/{said['number']}"))
+                self.answers += 1
+                size = 100 + (size - 99) % 200
+
+        thread = threading.Thread(target=drag)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
 
 def in_browser(rig: Rig, folder: Path, runs: int) -> list[tuple[float, float]]:
     """Clicks on the button of a busy page."""
@@ -173,13 +201,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--runs", type=int, default=50)
     parser.add_argument("--http", action="store_true", help="the request alone, without a browser")
+    parser.add_argument("--live", action="store_true", help="while a slider is dragged")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name, Rig(Path(name)) as rig:
+    with contextlib.ExitStack() as stack:
+        name = stack.enter_context(tempfile.TemporaryDirectory())
+        rig = stack.enter_context(Rig(Path(name)))
+        if options.live:
+            stack.enter_context(rig.dragged())
         found = (
             over_http(rig, options.runs)
             if options.http
             else in_browser(rig, Path(name), options.runs)
         )
+    if options.live:
+        print(f"{rig.answers} coarse fits were answered meanwhile")
     for what, at in (("click to 0x18", 0), ("of that from the server on", 1)):
         taken = sorted(1000 * each[at] for each in found)
         print(

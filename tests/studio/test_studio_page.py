@@ -5,7 +5,7 @@ import threading
 import time
 
 import pytest
-from axe import needs_axe, serious_faults
+from axe import AXE, needs_axe, serious_faults
 from browser import CHROMIUM, Browser
 from studios import saddle_obj
 
@@ -210,6 +210,7 @@ def test_a_slider_refits_coarsely_then_wholly_and_is_undone(page):
     page.run(DRAG % ("size", 120))
     page.until("document.getElementById('coarse-subject').textContent.endsWith('Size 120mm')")
     assert "linear" in page.text("coarse-note")
+    assert not AXE.is_file() or serious_faults(page) == []
     assert not page.run(shown("pattern"))
     page.run("document.activeElement.dispatchEvent(new KeyboardEvent('keydown', "
              "{ key: 'z', ctrlKey: true, bubbles: true, cancelable: true }))")  # fmt: skip
@@ -227,6 +228,7 @@ def test_a_slider_refits_coarsely_then_wholly_and_is_undone(page):
     assert page.run("document.getElementById('pattern').classList.contains('old')")
     assert "Facets 6x6 · Size 120mm" in page.text("stale-words")
     assert page.run("document.getElementById('go-on').disabled")
+    assert not AXE.is_file() or serious_faults(page) == []
     page.run("document.getElementById('back-to').click()")
     assert page.run("document.getElementById('facets').value") == "6x6"
     assert not page.run("document.getElementById('pattern').classList.contains('old')")
