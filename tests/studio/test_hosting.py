@@ -13,9 +13,12 @@ import stat
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
+from axe import AXE, serious_faults
+from browser import CHROMIUM, Browser
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -220,6 +223,42 @@ def test_the_whole_way_in_and_what_is_kept_out(studio, capfd):
     assert errors.count("a wrong password was given from 127.0.0.1") == 3
     assert "wrong guess" not in errors
     assert len(errors.splitlines()) == 3
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
+def test_a_browser_enters_by_the_password(studio, tmp_path):
+    with Browser(tmp_path / "profile") as page:
+        page.call("Security.setIgnoreCertificateErrors", ignore=True)
+        page.open(studio.address)
+        assert page.run("document.documentElement.dataset.ready") == "yes"
+        assert page.run("document.activeElement.id") == "password"
+        for width in (1280, 390):
+            page.call(
+                "Emulation.setDeviceMetricsOverride",
+                width=width, height=800, deviceScaleFactor=1, mobile=width < 600,
+            )  # fmt: skip
+            assert page.run("document.documentElement.scrollWidth") <= width
+            if AXE.is_file():
+                assert serious_faults(page) == []
+        for word, there in (("no password", "'That is not the password.'"), (PASSWORD, None)):
+            page.run("document.getElementById('password').select()")
+            page.call("Input.insertText", text=word)
+            page.run("document.getElementById('enter').click()")
+            wanted = f"document.getElementById('fault').textContent === {there}"
+            wait_for(page, wanted if there else "document.getElementById('shape') !== null")
+        wait_for(page, "document.documentElement.dataset.ready === 'yes'")
+        assert page.run("location.href").startswith(studio.address)
+        assert page.run("document.cookie") == ""
+        assert page.run("history.length") <= 2  # the entrance is not gone back to
+        assert page.faults == []
+        assert all(asked.startswith((studio.address, "data:", "blob:")) for asked in page.requests)
+
+
+def wait_for(page, expression):
+    end = time.monotonic() + 60
+    while not page.run(expression):
+        assert time.monotonic() < end, expression
+        time.sleep(0.05)
 
 
 def test_a_connection_that_dawdles_is_shut(monkeypatch):

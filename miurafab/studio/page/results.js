@@ -65,6 +65,10 @@ export function showJob(job, pattern) {
     ? layout.hint_ready : layout.hint_none;
   byId("job").hidden = job === null;
   if (job === null) return;
+  const fresh = byId("job").dataset.id !== job.id;
+  byId("job").dataset.id = job.id;
+  // where the results stand below the form, and somebody waits for them
+  if (fresh && matchMedia("(max-width: 760px)").matches) byId("job").scrollIntoView({ block: "start" });
   const { files } = job;
   byId("totals").replaceChildren(...terms(job.lines));
   byId("job-downloads").replaceChildren(

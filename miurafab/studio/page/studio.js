@@ -93,6 +93,7 @@ async function open(file) {
 
 function turnTo(tab) {
   fault("");
+  if (byId(tab).hidden) scrollTo(0, 0);
   for (const each of TABS) {
     const chosen = each === tab;
     byId(each).hidden = !chosen;
