@@ -224,6 +224,21 @@ def test_a_click_keeps_a_facet_and_less_motion_is_a_few_stills(page: Browser) ->
     assert shown == [0, 4, 8]  # of 20 frames and 10 steps in which the layers part
 
 
+@needs_browser
+def test_the_picture_can_take_the_whole_screen(page: Browser) -> None:
+    click = 'document.getElementById("fold-full").click()'
+    for whole, name in (("fold", "Leave full screen"), (None, "Full screen")):
+        changed = 'document.addEventListener("fullscreenchange", done, { once: true })'
+        page.call(
+            "Runtime.evaluate",
+            expression=f"new Promise((done) => {{ {changed}; {click}; }})",
+            userGesture=True,
+            awaitPromise=True,
+        )
+        assert page.run("document.fullscreenElement?.id ?? null") == whole
+        assert text(page, "fold-full") == name
+
+
 NODE = shutil.which("node")
 TELL = """
 const given = JSON.parse(require("fs").readFileSync(0, "utf8"));
