@@ -271,6 +271,7 @@ def _verdict(verdict: RampVerdict) -> dict[str, Any]:
         "wrong_signs": verdict.wrong_signs,
         "wrong_edges": verdict.wrong_edges.tolist(),
         "seed_signs": verdict.seed_signs,
+        "waiting_edges": verdict.waiting_edges.tolist(),
         "angle_error_deg": math.degrees(verdict.angle_error),
         "snaps": verdict.snaps,
         "contact": verdict.touching,

@@ -62,7 +62,8 @@ SHAKEN = 1e-3
 """Mean edges by which vertices are moved at random before a descent out of a snap."""
 SHAKES = 4
 """How often facets that touch are shaken for one snap."""
-MAX_SNAPS = 20
+MAX_SNAPS, MAX_SNAPS_TOUCHING = 20, 8
+"""A path that snaps more often is lost; with facets that touch, each snap takes long."""
 FIRMER = 100.0
 """The factor on the stiffness of facets in a frame."""
 NEAR = np.radians(15.0)
@@ -344,9 +345,10 @@ class _Walk:
     def _snap(self, part: float) -> bool:
         """Find another balance at ``part`` by descent, shaken anew until there is one."""
         here, last = self.known[-1].state.points, self.ramped.last.copy()
-        for _ in range(SHAKES if self._near is not None else 1):
+        shakes, most = (1, MAX_SNAPS) if self._near is None else (SHAKES, MAX_SNAPS_TOUCHING)
+        for _ in range(shakes):
             self.snaps += 1
-            if self.snaps > MAX_SNAPS:
+            if self.snaps > most:
                 return False
             self.ramped.last[:] = last
             self._look(here, beside=True)

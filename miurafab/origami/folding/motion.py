@@ -14,6 +14,7 @@ certified whether all facets can stay flat (:mod:`miurafab.origami.folding.certi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -77,7 +78,11 @@ def find_motion(
     found = _find(lean.pattern, steps, on_progress)
     verdict = found.verdict
     if verdict is not None:
-        verdict = replace(verdict, wrong_edges=lean.edges[verdict.wrong_edges])
+        verdict = replace(
+            verdict,
+            wrong_edges=lean.edges[verdict.wrong_edges],
+            waiting_edges=lean.edges[verdict.waiting_edges],
+        )
     return replace(found, motion=lean.lifted(found.motion), verdict=verdict)
 
 
@@ -115,7 +120,7 @@ def _from_flat(
         motion, verdict = ramp_motion(
             pattern, steps, touching=True, softness=softness, on_progress=on_progress
         )
-    if verdict.wrong_signs > MOST_WRONG:
+    if verdict.wrong_signs > MOST_WRONG or (verdict.is_held_back and len(verdict.waiting_edges)):
         raise _sequence(verdict)
     rigid, certificate = certified(motion)
     if not (verdict.touching and contacts(rigid)):  # flat facets may touch where bent ones do not
@@ -165,13 +170,23 @@ def _bent(pattern: CreasePattern, steps: int, on_progress: Progress | None) -> F
 
 
 def _sequence(verdict: RampVerdict) -> PatternError:
-    edge = int(verdict.wrong_edges[0])
-    early = ""
-    if verdict.seed_signs < 1:
-        early = f" ({1 - verdict.seed_signs:.0%} of them already as they leave the plane)"
+    wrong, waiting = verdict.wrong_edges, verdict.waiting_edges
+    how = (
+        f"creases stay {math.degrees(verdict.angle_error):.0f} degrees away from their fold angles"
+    )
+    if len(wrong):
+        how = (
+            f"{verdict.wrong_signs:.0%} of its folds end on the other side than their letter "
+            f"tells, the first being edge {wrong[0]}"
+        )
+    begin = "All of them could begin together"
+    if len(waiting):
+        begin = (
+            f"With flat facets {len(waiting)} of its {verdict.folds} folds cannot begin from flat "
+            f"if none shall turn to its wrong side, the first being edge {waiting[0]}"
+        )
     return PatternError(
-        f"The pattern does not fold in one motion: with all creases turning together, "
-        f"{verdict.wrong_signs:.0%} of its folds end on the other side than their letter "
-        f"tells{early}, the first being edge {edge}. Either letters are wrong, or it folds in a "
-        "sequence, crease after crease, like a crane; fold its steps as patterns of their own."
+        f"The pattern does not fold in one motion: with all creases turning together, {how}. "
+        f"{begin}. Either letters are wrong, or it folds in a sequence, crease after crease, like "
+        "a crane; fold its steps as patterns of their own."
     )

@@ -16,6 +16,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import SOFTNESS, has_folds
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.pieces import part_of
+from miurafab.origami.folding.first_order import waiting_folds
 from miurafab.origami.folding.from_flat import RampPath, fold_from_flat, ramp_parts
 from miurafab.origami.folding.kinematics import FROM_FLAT, FoldingMotion
 from miurafab.origami.folding.laying import laid_on_each_other
@@ -32,7 +33,9 @@ class RampVerdict:
     """What the motion from flat says of a pattern.
 
     ``wrong_edges`` end folded to the other side than their letter tells, the part ``wrong_signs``
-    of all folds; the part ``seed_signs`` of them follow their letter as they leave flat.
+    of all ``folds``; the part ``seed_signs`` of them follow their letter as they leave flat. The
+    ``waiting_edges`` cannot begin with flat facets while the others do
+    (:mod:`miurafab.origami.folding.first_order`).
     ``unstable`` (T,) is the number of directions in which each frame is no minimum of the energy,
     ``strain`` (T,) the largest relative change of a side, ``angle_error`` the mean distance from
     the fold angles asked for in the last frame, radians, and ``snaps`` the number of jumps. If
@@ -41,6 +44,8 @@ class RampVerdict:
     """
 
     wrong_edges: Ints
+    waiting_edges: Ints
+    folds: int
     wrong_signs: float
     seed_signs: float
     unstable: Ints
@@ -98,7 +103,7 @@ def ramp_motion(
         paths.append(path)
     count = min(len(path.frames) for path in paths)
     if not count:
-        raise _stuck(paths)
+        raise _stuck(paths, waiting_folds(pattern))
     flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
     frames = np.repeat(flat[None], count + 1, axis=0)
     angles = np.zeros((count + 1, len(pattern.edges_vertices)))
@@ -107,7 +112,7 @@ def ramp_motion(
     states = parts[: count + 1]
     frames = laid_on_each_other(pattern, states, frames)
     motion = FoldingMotion(pattern, states, frames, angles, mismatch=None, method=FROM_FLAT)
-    return motion, _verdict(folding, paths, count, touching)
+    return motion, _verdict(folding, paths, count, touching, waiting_folds(pattern))
 
 
 def _enter(frames: Floats, angles: Floats, piece: Piece, path: RampPath) -> None:
@@ -122,7 +127,7 @@ def _enter(frames: Floats, angles: Floats, piece: Piece, path: RampPath) -> None
 
 
 def _verdict(
-    folding: list[Piece], paths: list[RampPath], count: int, touching: bool
+    folding: list[Piece], paths: list[RampPath], count: int, touching: bool, waiting: Ints
 ) -> RampVerdict:
     wrong = [_wrong_edges(*pair) for pair in zip(folding, paths, strict=True)]
     folds = sum(len(path.sprung) for path in paths)
@@ -136,6 +141,8 @@ def _verdict(
             strain[number] = max(strain[number], stretch)
     return RampVerdict(
         wrong_edges=np.concatenate(wrong),
+        waiting_edges=waiting,
+        folds=folds,
         wrong_signs=sum(len(edges) for edges in wrong) / folds,
         seed_signs=sum(int(path.follow.sum()) for path in paths) / folds,
         unstable=unstable,
@@ -155,17 +162,18 @@ def _wrong_edges(piece: Piece, path: RampPath) -> Ints:
     return np.asarray(piece.edges[sprung[path.wrong]])
 
 
-def _stuck(paths: list[RampPath]) -> PatternError:
+def _stuck(paths: list[RampPath], waiting: Ints) -> PatternError:
     """The error for a pattern that does not leave the plane."""
-    follow = np.concatenate([path.follow for path in paths])
-    if follow.all():
+    if not len(waiting):
         return PatternError(
             "The pattern could not be brought out of the plane, though every fold can start to the "
             "side that its letter tells. Very thin facets can be the cause: convert the file with "
             "a larger `tolerance`, which joins lines that nearly meet."
         )
+    folds = sum(len(path.sprung) for path in paths)
     return PatternError(
-        f"The pattern could not be brought out of the plane: {1 - follow.mean():.1%} of its folds "
-        "cannot start to the side that their letter tells. Either letters are wrong, or it folds "
-        "in a sequence, crease after crease, which one motion of all creases cannot show."
+        f"The pattern could not be brought out of the plane: with flat facets {len(waiting)} of "
+        f"its {folds} folds cannot begin from flat if none shall turn to its wrong side, the first "
+        f"being edge {waiting[0]}. Either letters are wrong, or it folds in a sequence, crease "
+        "after crease, which one motion of all creases cannot show."
     )

@@ -10,9 +10,13 @@ import pytest
 
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.continuation import follow
+from miurafab.origami.energy.equilibrium import solve
+from miurafab.origami.energy.ramp import Ramped
 from miurafab.origami.energy.touch_pairs import REACH, NearPairs
 from miurafab.origami.energy.touching import HEIGHT, TouchPairs, over, touch, touch_energy
 from miurafab.origami.folding.angles_csv import contacts
+from miurafab.origami.folding.from_flat import fold_from_flat, ramp_parts
 from miurafab.origami.folding.kinematics import CLOSED_FORM, FROM_FLAT, rigid_motion
 from miurafab.origami.folding.motion import find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
@@ -160,3 +164,46 @@ def test_a_strip_whose_closed_form_passes_through_itself_goes_another_way() -> N
     assert found.motion.method == FROM_FLAT
     assert contacts(found.motion) == ()
     assert find_motion(named_patterns.roll(2, 80.0), 4).motion.method == CLOSED_FORM
+
+
+def touching_spiral() -> tuple[Ramped, list[Floats], Floats]:
+    """A spiral that comes to lie on itself, with its springs as they are remembered; the shapes of
+    its path, and their parts of the ramp.
+    """
+    pattern = named_patterns.roll(10, 105.0, 0.93)
+    path = fold_from_flat(pattern, ramp_parts(pattern, 20), touching=True)
+    model = path.model
+    near = NearPairs(model.triangles, pattern.edges_vertices, len(model.points))
+    ramped = Ramped(model)
+    shapes = [frame.points @ ramped.axes for frame in path.frames]
+    for points in shapes:
+        near.look(points)
+        ramped.accept(points)
+    ramped = ramped.with_pairs(near.pairs)
+    return ramped, shapes, np.array([frame.part for frame in path.frames])
+
+
+def test_the_work_of_the_ramp_is_the_energy_to_second_order_with_contact() -> None:
+    """dE / dt = -sum k rho_0 (rho - t rho_0) in balance; and the way back leads to the start."""
+    ramped, shapes, parts = touching_spiral()
+    rest, k = ramped.model.rest, ramped.model.stiffness
+
+    def energy_and_slope(points: Floats, part: float) -> tuple[float, float]:
+        turned = ramped.angles(points) - part * rest
+        return ramped.energy(points, part), -float((k * rest) @ turned)
+
+    last = solve(ramped, ramped.state(shapes[-1]), parts[-1]).state
+    ends = [parts[-1], parts[-1] - 0.03]
+    errors = []
+    for steps in (5, 10, 20):
+        goals = np.linspace(*ends, steps + 1)
+        there = follow(ramped, last, goals)
+        assert len(there) == len(goals)
+        told = np.array([energy_and_slope(s.points, t) for s, t in zip(there, goals, strict=True)])
+        change = np.trapezoid(told[:, 1], goals)
+        errors.append(abs(told[-1, 0] - told[0, 0] - change) / np.ptp(told[:, 0]))
+    assert touch_energy(last.points, ramped.pairs) > 1e-3 * told[0, 0]
+    assert errors[-1] <= 2e-4
+    assert errors[0] >= 3 * errors[1] >= 9 * errors[2]
+    back = follow(ramped, there[-1], goals[::-1])
+    assert ramped.energy(back[-1].points, ends[0]) == pytest.approx(told[0, 0], rel=1e-10)
