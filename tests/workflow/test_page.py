@@ -96,6 +96,12 @@ def test_nothing_on_the_page_points_elsewhere(job):
         assert not any(name.startswith("on") for name in attrs)
 
 
+def test_a_page_of_something_without_a_name_has_a_heading():
+    text = page_text("", None, regular())
+    assert "<title>Origami</title>" in text
+    assert '<h1 id="title">Origami</h1>' in text
+
+
 def test_every_control_has_a_name(job):
     text = page_text("job", job, job.pattern)
     parts = Parts(text)

@@ -225,6 +225,19 @@ def test_a_click_keeps_a_facet_and_less_motion_is_a_few_stills(page: Browser) ->
 
 
 @needs_browser
+def test_a_finger_chooses_what_it_taps(page: Browser) -> None:
+    choose(page, "facet", 0)
+    for name in ("fold-canvas", "flat-pattern"):
+        page.run('document.getElementById("look-number").value = ""')
+        x, y, width, height = box(page, name)
+        finger = [{"x": x + width / 2, "y": y + height / 2}]
+        page.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=finger)
+        page.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+        number = page.run('document.getElementById("look-number").value')
+        assert re.match(rf"(Crease|Facet) {number}: ", text(page, "fold-said")), name
+
+
+@needs_browser
 def test_the_picture_can_take_the_whole_screen(page: Browser) -> None:
     click = 'document.getElementById("fold-full").click()'
     for whole, name in (("fold", "Leave full screen"), (None, "Full screen")):

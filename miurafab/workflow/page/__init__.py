@@ -135,7 +135,7 @@ def page_text(
             f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; "
             "base-uri 'none'; form-action 'none'"
         ),
-        "title": html.escape(shown(title)),
+        "title": html.escape(shown(title)) or "Origami",
         "style": style,
         "data": _json(_data(preview, pattern, motion, slider or Slider())),
         "script": script,
