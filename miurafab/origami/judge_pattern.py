@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Ints
-from miurafab.geometry.polygons import edge_lengths
+from miurafab.geometry.arrays import Bools, Ints, vector_product
+from miurafab.geometry.polygons import edge_lengths, facet_means, facet_normals
 from miurafab.origami import invariants
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cut_open import opened_cuts
 from miurafab.origami.flat_folding import judge_flat_folding
 from miurafab.origami.folding.contact import overlaps, self_intersections
-from miurafab.origami.invariants import DEGENERATE, EXACT, Residuals
+from miurafab.origami.invariants import DEGENERATE, EXACT, ROUNDINGS, Residuals
 from miurafab.origami.judge_creases import (
     MeasuredFolds,
     judge_creases,
@@ -37,6 +37,9 @@ STEEP_FOLD = math.radians(165)
 
 MUCH_PAPER = 4.0
 """From this area ratio on, the paper lies in more than four layers on average."""
+
+TOGETHER = 1e-6
+"""Radians, and mean edges: facets nearer to one plane lie on each other."""
 
 LITTLE_COVERED, MUCH_OVERHANG = 0.95, 0.01
 
@@ -151,6 +154,16 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
     if found is not None:
         yield from _inexact(found)
     pairs = evidence.crossings
+    if len(pairs) and pattern.unfolded is not None:
+        lying = _lie_together(pattern, pairs)
+        if lying.any():
+            one, other = pairs[lying][0].tolist()
+            yield Finding(
+                "not-proven",
+                f"{int(lying.sum())} pairs of facets lie on each other in the folded form, the "
+                f"first being facets {one} and {other}; the order of such layers is not judged.",
+            )
+        pairs = pairs[~lying]
     if len(pairs):
         yield Finding(
             "self-intersection",
@@ -158,6 +171,19 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
             f"form, the first being facets {pairs[0][0]} and {pairs[0][1]}.",
             tuple(np.unique(pairs).tolist()),
         )
+
+
+def _lie_together(pattern: CreasePattern, pairs: Ints) -> Bools:
+    """(n,) whether the two facets of each of ``pairs`` lie in one plane of the folded form."""
+    points, faces = pattern.folded_coords, pattern.faces_vertices
+    assert points is not None
+    normals, middles = facet_normals(points, faces), facet_means(points, faces)
+    one, other = pairs.T
+    near = TOGETHER + ROUNDINGS * (pattern.unfolded or 0.0)
+    level = np.linalg.norm(vector_product(normals[one], normals[other]), axis=1) <= near
+    apart = np.abs(np.einsum("nk,nk->n", middles[other] - middles[one], normals[one]))
+    mean = float(edge_lengths(points, pattern.edges_vertices).mean())
+    return np.asarray(level & (apart <= near * mean))
 
 
 def proved(
@@ -189,7 +215,11 @@ def proved(
                 {"planarity", "isometry", "developability"},
                 f"The {facets} facets are flat, and the same in both forms.",
             ),
-            ({"self-intersection"}, "No facets meet in the folded form."),
+            *(
+                [({"self-intersection"}, "No facets meet in the folded form.")]
+                if not len(evidence.crossings)
+                else []
+            ),
         ]
     if pattern.seams is not None:
         claims.append(({"seam"}, f"The two edges of each of {len(pattern.seams)} seams fit."))

@@ -181,3 +181,19 @@ def test_energy_takes_the_shape_to_which_a_pattern_folds_from_flat(run, tmp_path
     assert answer["rigid"]
     assert answer["folded_angle_deg"] > 90
     assert answer["barrier"] == 0
+
+
+def test_a_vertex_of_no_facet_is_left_out_and_told(run, tmp_path) -> None:
+    path = written(
+        tmp_path,
+        vertices_coords=[[9, 9], *SQUARE, [6, 6]],
+        edges_vertices=[[1, 2], [2, 3], [3, 4], [4, 1], [1, 3], [0, 5]],
+        edges_assignment=list("BBBBVM"),
+        faces_vertices=[[1, 2, 3], [1, 3, 4]],
+    )
+    done = run("convert", path, tmp_path / "a.fold", "--json")
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert (answer["vertices"], answer["edges"]) == (4, {"B": 4, "V": 1})
+    assert codes(answer) == ["lost-lines"]
+    assert "2 vertices of no facet, with 1 edge" in answer["findings"][0]["sentence"]

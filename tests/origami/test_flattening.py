@@ -107,6 +107,10 @@ def test_a_sheet_that_is_folded_flat_takes_its_signs_from_the_file() -> None:
     assert read.edges_assignment[-1] == "M"
     assert read.edges_fold_angle[-1] == -math.pi
     assert apart(read.vertices_coords).max() == pytest.approx(math.sqrt(2))
+    audit = mf.check(read)
+    assert audit.valid
+    assert any("lie on each other" in finding.sentence for finding in audit.findings)
+    assert not any("No facets meet" in sentence for sentence in audit.proved)
     for side, letter in ((1, "V"), (-1, "M")):
         orders = {"faceOrders": [[1, 0, side]], "edges_vertices": edges}
         assert parse_fold(form(points, faces, **orders)).edges_assignment[-1] == letter

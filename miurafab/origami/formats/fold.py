@@ -31,6 +31,7 @@ import numpy as np
 
 from miurafab.errors import PatternError
 from miurafab.files import Reading, parse_json, read_text, write_text
+from miurafab.findings import Finding
 from miurafab.geometry.arrays import Ints
 from miurafab.geometry.polygons import (
     connected_parts,
@@ -43,6 +44,7 @@ from miurafab.origami.formats.crease_lines import CreaseLines
 from miurafab.origami.formats.fold_frames import written_frames
 from miurafab.origami.formats.fold_keys import (
     assignments_in,
+    classes_of,
     edges_in,
     faces_in,
     fold_angles_in,
@@ -235,8 +237,38 @@ def parse_fold(document: Any) -> CreasePattern:
     pattern = replace(pattern, faces_vertices=oriented(flat, faces))
     pattern.edges_faces  # noqa: B018 - facets that do not fit their edges are a fault of the file
     if pattern.folded_coords is not None and key.get("edges_foldAngle") is None:
-        return with_angles_of_the_folded_form(pattern)
-    return pattern
+        pattern = with_angles_of_the_folded_form(pattern)
+    further = sum("foldedForm" in classes_of(frame) for frame in frames) > 1
+    return pattern if further else _without_loose_vertices(pattern)
+
+
+def _without_loose_vertices(pattern: CreasePattern) -> CreasePattern:
+    """``pattern`` without the vertices of no facet, and without the edges that end there."""
+    faces = pattern.faces_vertices
+    used = np.zeros(len(pattern.vertices_coords), dtype=bool)
+    used[faces[faces >= 0]] = True
+    if used.all() or pattern.grid is not None or pattern.seams is not None:
+        return pattern
+    number = np.full(len(used) + 1, -1, dtype=np.int64)  # the last entry maps -1 to -1
+    number[:-1][used] = np.arange(int(used.sum()))
+    kept = used[pattern.edges_vertices].all(axis=1)
+    loose, edges = int((~used).sum()), int((~kept).sum())
+    says = (
+        f"{loose} {'vertex' if loose == 1 else 'vertices'} of no facet, with {edges} "
+        f"{'edge' if edges == 1 else 'edges'} there, {'is' if loose == 1 else 'are'} left out, the "
+        f"first being vertex {int(np.argmin(used))}."
+    )
+    folded = pattern.folded_coords
+    return replace(
+        pattern,
+        vertices_coords=pattern.vertices_coords[used],
+        edges_vertices=number[pattern.edges_vertices[kept]],
+        edges_assignment=pattern.edges_assignment[kept],
+        edges_fold_angle=pattern.edges_fold_angle[kept],
+        faces_vertices=number[faces],
+        folded_coords=None if folded is None else folded[used],
+        told=(*pattern.told, Finding("lost-lines", says)),
+    )
 
 
 def _grid(document: Mapping[str, Any], vertices: int) -> tuple[int, int] | None:
