@@ -310,7 +310,7 @@ def test_the_libraries_that_the_package_imports_are_its_dependencies():
         if name not in sys.stdlib_module_names and name != "miurafab"
     }
     assert imported - {"distributed"} <= declared  # for tradeoff --cluster alone: an extra
-    assert declared - imported == {"networkx"}  # trimesh turns facets the same way with it
+    assert declared - imported == set()
 
 
 def _imports(module):
