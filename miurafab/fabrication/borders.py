@@ -21,7 +21,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.spatial.distance
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -176,4 +175,6 @@ def _across(pattern: CreasePattern, edges: Ints) -> float | None:
     if pattern.folded_coords is None:
         return None
     points = pattern.folded_coords[np.unique(pattern.edges_vertices[edges])]
-    return float(scipy.spatial.distance.pdist(points).max())
+    from scipy.spatial.distance import pdist
+
+    return float(pdist(points).max())

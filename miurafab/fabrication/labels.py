@@ -25,7 +25,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from miurafab.fabrication.lettering import text_strokes, text_width
 from miurafab.fabrication.options import LayoutOptions
@@ -261,6 +260,8 @@ def _convex(points: Floats, count: Ints) -> tuple[Floats, Ints]:
         turn = side[:, 0] * side[after, 1] - side[:, 1] * side[after, 0]
         if corners == 0 or turn.min() >= -1e-9 * np.abs(turn).max():
             continue
+        from scipy.spatial import ConvexHull
+
         around = np.flatnonzero(np.isin(np.arange(corners), ConvexHull(outline).vertices))
         part = outline[around][None], np.array([len(around)])
         for start, end in zip(around, np.roll(around, -1), strict=True):

@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.nearest import tree_of
 
 _CHUNK = 50_000
 
@@ -88,7 +88,7 @@ def _nearer_in_class(
     found: _Nearest,
 ) -> None:
     """Enter in ``found`` what is nearer among the ``members`` of this class."""
-    tree = cKDTree(centres)
+    tree = tree_of(centres)
     largest = float(radii.max())
     active = np.arange(len(points))
     few = 1

@@ -17,10 +17,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from miurafab.geometry.arrays import Floats
 from miurafab.geometry.distances import closest_on_triangle, closest_triangles
+from miurafab.geometry.nearest import tree_of
 
 WITHIN = 0.005
 """The part by which the largest distance may be larger than the answer."""
@@ -78,7 +78,7 @@ def _farthest(triangles: Floats, nearest: Nearest, reach: Reach, best: float) ->
         some = triangles[:: -(-len(triangles) // max(_MANY, len(triangles) // 16))].mean(axis=1)
         feet, witnesses = nearest(some)
         best = max(best, float(_lengths(feet - some).max()))
-        lender = cKDTree(some).query(triangles.mean(axis=1))[1]
+        lender = tree_of(some).query(triangles.mean(axis=1))[1]
         triangles = triangles[bounds(triangles, witnesses[lender]) > (1 + WITHIN) * best]
     for _ in range(_DIVISIONS):
         centres = triangles.mean(axis=1)

@@ -23,11 +23,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 from miurafab.geometry.distances import closest_triangles
 from miurafab.geometry.hausdorff import in_four
+from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.polygons import facet_means, next_corners
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -216,7 +216,7 @@ def _glued(pattern: CreasePattern, points: Floats) -> Ints:
 def _welded(points: Floats, tolerance: float) -> Ints:
     """(n,) for each point the first point in the same place."""
     places, first, place = np.unique(points, axis=0, return_index=True, return_inverse=True)
-    pairs = cKDTree(places).query_pairs(tolerance, output_type="ndarray")
+    pairs = tree_of(places).query_pairs(tolerance, output_type="ndarray")
     least = first.copy()
     np.minimum.at(least, pairs[:, 0], first[pairs[:, 1]])
     np.minimum.at(least, pairs[:, 1], first[pairs[:, 0]])

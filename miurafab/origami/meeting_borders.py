@@ -15,10 +15,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import scipy.spatial
 
 from miurafab.geometry.angles import fold_angles
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.polygons import edge_lengths, facet_normals
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -64,7 +64,7 @@ def _coinciding(pattern: CreasePattern) -> Ints:
     ends = with_facet_on_the_left(pattern, border)
     folded = pattern.folded_coords[ends]
     near = COINCIDENT * float(np.linalg.norm(np.ptp(pattern.folded_coords, axis=0)))
-    middles = scipy.spatial.KDTree(folded.mean(axis=1))
+    middles = tree_of(folded.mean(axis=1))
     pairs = middles.query_pairs(near, output_type="ndarray").astype(np.int64).reshape(-1, 2)
     pairs = np.sort(pairs, axis=1)
     one, other = folded[pairs[:, 0]], folded[pairs[:, 1]][:, ::-1]

@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 import miurafab
 from miurafab.findings import findings_json
 from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 from miurafab.geometry.distances import closest_triangles
+from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.polygons import facet_means
 from miurafab.origami.coverage import uncovered
 from miurafab.origami.crease_pattern import CreasePattern
@@ -171,7 +171,7 @@ def compared(pattern: CreasePattern, surface: TargetSurface) -> dict[str, Any]:
     side = np.sign(np.einsum("nk,nk->n", means - feet, vector_product(b - a, c - a)))
     deviation = side * np.linalg.norm(means - feet, axis=1) * pattern.scale
     near = min(_NEAR, len(means))
-    apart, nearest = cKDTree(feet).query(found.vertices, k=range(1, near + 1))
+    apart, nearest = tree_of(feet).query(found.vertices, k=range(1, near + 1))
     weight = 1 / np.maximum(apart, 1e-9 * float(np.ptp(means, axis=0).max())) ** 2
     there = (weight * deviation[nearest]).sum(axis=1) / weight.sum(axis=1)
     missed = uncovered(pattern, surface.tiles(), corners.mean(axis=1))

@@ -13,7 +13,6 @@ import struct
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from miurafab.errors import TargetError
 from miurafab.files import read_bytes
@@ -116,6 +115,8 @@ def read_image(path: Path, height: float | None = None) -> Floats:
     TargetError
         For a file that is no image, and for a ``height`` that is missing or of no use.
     """
+    from PIL import Image
+
     content = read_bytes(path, TargetError)
     try:
         with Image.open(io.BytesIO(content)) as image:
@@ -139,6 +140,8 @@ def read_image(path: Path, height: float | None = None) -> Floats:
 
 def pixels_in(path: Path) -> int:
     """How many pixels an image has, as its file says; 0 for a file that is no image."""
+    from PIL import Image
+
     try:
         with Image.open(path) as image:
             return image.width * image.height

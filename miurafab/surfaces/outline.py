@@ -24,11 +24,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from miurafab.errors import TargetError
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.distances import closest_on_mesh
+from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.outline import Outline
 from miurafab.surfaces.mesh import MeshChart, median_edge, spans
 from miurafab.surfaces.mesh_repair import even_triangles
@@ -39,6 +39,7 @@ from miurafab.surfaces.surface import Domain, gauss_newton, normal_to, unit
 
 if TYPE_CHECKING:
     from scipy.interpolate import NdBSpline
+    from scipy.spatial import cKDTree
 
 LEAST_SHARE = 0.05
 """A cell with a smaller part inside the outline is not kept."""
@@ -157,7 +158,7 @@ class WholeMesh:
     def _samples(self) -> tuple[cKDTree, Floats]:
         lattice = self.domain.lattice(_SAMPLES, _SAMPLES).reshape(-1, 2)
         near = self.outline.signed_distance(lattice) > -2 * self._cell
-        return cKDTree(self.point(lattice[near])), lattice[near]
+        return tree_of(self.point(lattice[near])), lattice[near]
 
     @property
     def _cell(self) -> float:

@@ -20,9 +20,9 @@ from typing import Literal
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
+from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.rays import first_hits
 from miurafab.surfaces.topology import classify, neighbours, one_sheet, used_alone
 
@@ -146,7 +146,7 @@ def _thickness(vertices: Floats, faces: Ints, normal: Floats) -> tuple[Floats, I
         return t, hit
     # near in place and in direction: the other side of a thin plate is far in direction
     key = np.concatenate([middle, size * normal], axis=1)
-    nearest = cKDTree(key[chosen]).query(key)[1]
+    nearest = tree_of(key[chosen]).query(key)[1]
     return t[nearest], hit[nearest]
 
 

@@ -18,9 +18,9 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from miurafab.geometry.arrays import Bools, Floats, vector_product
+from miurafab.geometry.nearest import tree_of
 
 CHORD = 2e-4
 """Tiles leave the target by no more than this part of its diagonal. The distances that are reported
@@ -276,7 +276,7 @@ def _nearest_lattice_point(
 ) -> tuple[Floats, Floats]:
     """(n, 2) the start of the iterations, and (2,) the longest step: two cells of the lattice."""
     lattice = domain.lattice(samples, samples).reshape(-1, 2)
-    start = cKDTree(surface.point(lattice)).query(points)[1]
+    start = tree_of(surface.point(lattice)).query(points)[1]
     return lattice[start], 2 * np.array([domain.width, domain.height]) / (samples - 1)
 
 

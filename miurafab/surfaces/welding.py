@@ -16,9 +16,9 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.nearest import tree_of
 from miurafab.surfaces.topology import edges_of
 
 WELD = 1e-5
@@ -57,7 +57,7 @@ def _joined(vertices: Floats, faces: Ints, reach: float) -> tuple[Floats, Ints, 
     lengths = np.linalg.norm(vertices[border[:, 1]] - vertices[border[:, 0]], axis=1)
     shortest = np.full(len(vertices), np.inf)
     np.minimum.at(shortest, border, lengths[:, None])
-    a, b = rim[cKDTree(vertices[rim]).query_pairs(reach, output_type="ndarray")].T
+    a, b = rim[tree_of(vertices[rim]).query_pairs(reach, output_type="ndarray")].T
     gap = np.linalg.norm(vertices[b] - vertices[a], axis=1)
     close = gap <= SHORT * np.minimum(shortest[a], shortest[b])
     a, b, gap = a[close], b[close], gap[close]
@@ -88,7 +88,7 @@ def _split(vertices: Floats, faces: Ints, reach: float) -> tuple[Ints, int, floa
     start, end = vertices[sides[open_sides, 0]], vertices[sides[open_sides, 1]]
     along = end - start
     length = np.linalg.norm(along, axis=1)
-    near = cKDTree(vertices[rim]).query_ball_point((start + end) / 2, length / 2 + reach)
+    near = tree_of(vertices[rim]).query_ball_point((start + end) / 2, length / 2 + reach)
     counts = np.array([len(found) for found in near])
     side = np.repeat(np.arange(len(open_sides)), counts)
     vertex = rim[np.concatenate([np.asarray(found, dtype=np.int64) for found in near])]

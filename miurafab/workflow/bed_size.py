@@ -15,7 +15,6 @@ from pathlib import Path
 from miurafab.display import Shown
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.plan_size import Sizing
 from miurafab.files import AnyPath
 from miurafab.options import File, Whole, check_options, option
 from miurafab.origami.fitting.fit import fit as fit_request
@@ -72,6 +71,8 @@ def fit_to_bed(
 
     Raises :class:`~miurafab.errors.LayoutError` if no size can be found.
     """
+    from miurafab.fabrication.plan_size import Sizing  # only now: it loads the whole layout
+
     profile, card = read_machine(machine), read_material(material)
     options = with_stock(layout, wanted)
     size = DEFAULT_SIZE_MM

@@ -12,6 +12,9 @@ tiled-a4     sheet-01-a4.pdf              ordinary printers, likewise -a0 to -a6
                                           mountains and valleys in their colours
 picture      pattern.svg                  people: the flat pattern with its patches
 ============ ============================ ======================================================
+
+The libraries that draw are loaded when something is drawn: commands that only read a job, or name
+the formats, begin a quarter of a second of processor time earlier.
 """
 
 from __future__ import annotations
@@ -19,41 +22,60 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import InputError
-from miurafab.fabrication.drawing.assembly_guide import assembly_guide
-from miurafab.fabrication.drawing.dxf import sheet_dxf
-from miurafab.fabrication.drawing.hpgl import sheet_hpgl
-from miurafab.fabrication.drawing.jig_svg import jig_svg
-from miurafab.fabrication.drawing.pdf import sheets_pdf
-from miurafab.fabrication.drawing.svg import layout_svg
-from miurafab.fabrication.drawing.tiles import PAGES_MM, Tiling, page_size, tiled_pdf
-from miurafab.fabrication.drawing.views import edge_letters
-from miurafab.fabrication.sheets import DrawnLayout
-from miurafab.fabrication.toolpath import Toolpath
-from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.profiles import MachineProfile, Material
+from miurafab.fabrication.drawing.page_sizes import PAGES_MM, page_size
+
+if TYPE_CHECKING:
+    from miurafab.fabrication.sheets import DrawnLayout
+    from miurafab.fabrication.toolpath import Toolpath
+    from miurafab.origami.crease_pattern import CreasePattern
+    from miurafab.profiles import MachineProfile, Material
 
 PICTURE = "pattern.svg"
 GUIDE, GUIDE_PAGE, JIG = "assembly.pdf", "assembly.html", "jig.svg"
-Draw = Callable[[Toolpath, NDArray[np.str_], str], bytes]
+Draw = Callable[["Toolpath", NDArray[np.str_], str], bytes]
 
 
 def _tiled(page: str) -> Draw:
+    from miurafab.fabrication.drawing.tiles import Tiling, tiled_pdf
+
     return lambda path, letters, title: tiled_pdf((path,), letters, title, Tiling(page))
 
 
+def _dxf(path: Toolpath, letters: NDArray[np.str_], title: str) -> bytes:
+    from miurafab.fabrication.drawing.dxf import sheet_dxf
+
+    return sheet_dxf(path, letters=letters).encode("ascii")
+
+
+def _dxf_r2010(path: Toolpath, letters: NDArray[np.str_], title: str) -> bytes:
+    from miurafab.fabrication.drawing.dxf import sheet_dxf
+
+    return sheet_dxf(path, "R2010", letters).encode("utf-8")
+
+
+def _pdf(path: Toolpath, letters: NDArray[np.str_], title: str) -> bytes:
+    from miurafab.fabrication.drawing.pdf import sheets_pdf
+
+    return sheets_pdf((path,), path.sheet, letters)
+
+
+def _hpgl(path: Toolpath, letters: NDArray[np.str_], title: str) -> bytes:
+    from miurafab.fabrication.drawing.hpgl import sheet_hpgl
+
+    return sheet_hpgl(path, letters).encode("ascii")
+
+
 _SHEETS: Mapping[str, tuple[str, Draw]] = {
-    "dxf": (".dxf", lambda path, letters, title: sheet_dxf(path, letters=letters).encode("ascii")),
-    "dxf-r2010": (
-        "-r2010.dxf",
-        lambda path, letters, title: sheet_dxf(path, "R2010", letters).encode("utf-8"),
-    ),
-    "pdf": (".pdf", lambda path, letters, title: sheets_pdf((path,), path.sheet, letters)),
-    "hpgl": (".hpgl", lambda path, letters, title: sheet_hpgl(path, letters).encode("ascii")),
+    "dxf": (".dxf", _dxf),
+    "dxf-r2010": ("-r2010.dxf", _dxf_r2010),
+    "pdf": (".pdf", _pdf),
+    "hpgl": (".hpgl", _hpgl),
 }
 _TILED = "tiled-"
 FORMATS = (*_SHEETS, *(f"{_TILED}{page}" for page in PAGES_MM), "picture")
@@ -92,6 +114,9 @@ def drawings(
     """The name and content of each drawing of ``layout`` in the ``formats`` of
     :func:`read_formats`.
     """
+    from miurafab.fabrication.drawing.svg import layout_svg
+    from miurafab.fabrication.drawing.views import edge_letters
+
     letters = edge_letters(layout, pattern)
     for name in formats:
         if name == "picture":
@@ -109,6 +134,9 @@ def guides(
     """The file names and contents of what explains the job with this ``title``: the guide in both
     forms, and the jig if there is one.
     """
+    from miurafab.fabrication.drawing.assembly_guide import assembly_guide
+    from miurafab.fabrication.drawing.jig_svg import jig_svg
+
     guide = assembly_guide(layout, layout.pattern, machine, material, title)
     yield GUIDE, guide.pdf
     yield GUIDE_PAGE, guide.page

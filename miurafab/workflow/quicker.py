@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.perforation import MIN_STROKE_MM, perforate
 from miurafab.fabrication.route.order import StrokeSet, corner_of, order_strokes
 from miurafab.fabrication.sheets import DrawnLayout
@@ -114,6 +113,8 @@ def _sample(layout: DrawnLayout) -> _Sample:
     tail = _on_sheet(layout, path, edge, patch)
     away = np.linalg.norm(ends - tail[:, None], axis=2)
     ends = np.where((away[:, 0] > away[:, 1])[:, None, None], ends[:, ::-1], ends)
+    from miurafab.fabrication.drawing.views import edge_letters
+
     letters = edge_letters(layout, layout.pattern)
     return _Sample(path, ends, edge, patch, letters[edge] == "V")
 

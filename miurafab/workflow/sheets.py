@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError, ProfileError
-from miurafab.fabrication.drawing.svg import sheet_svg
-from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.layout import write_layout
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.plan_advice import SizeAdvice, advised_size
@@ -143,6 +141,9 @@ class SheetJob(Shown):
             Where the directory holds something else than a job, or cannot be written, and for an
             unknown format.
         """
+        from miurafab.fabrication.drawing.svg import sheet_svg
+        from miurafab.fabrication.drawing.views import edge_letters
+
         folder = as_path(directory, "The job directory")
         wanted = read_formats((formats,) if isinstance(formats, str) else formats)
         if self.machine.dialect == "hpgl":  # whose programs are HPGL

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from miurafab.fabrication.knife import with_aligning_cut
 from miurafab.fabrication.knife_tip import overcuts, tip_moves
@@ -23,6 +22,7 @@ from miurafab.fabrication.toolpath import Toolpath
 from miurafab.findings import Finding
 from miurafab.gcode.program import Program
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.nearest import tree_of
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.posting.dialects import made_by_knife
 from miurafab.posting.make_job import without_operations
@@ -141,7 +141,7 @@ def _compared(
     count = len(wanted.ends)
     # A segment may be burnt either way.
     both = np.concatenate([wanted.ends, wanted.ends[:, [2, 3, 0, 1]]])
-    away, found = KDTree(both).query(burnt.ends)
+    away, found = tree_of(both).query(burnt.ends)
     found = np.asarray(found) % max(count, 1)
     told = np.flatnonzero(away <= near * 2)
     as_told = burnt.operation[told]

@@ -22,10 +22,11 @@ from miurafab.fabrication.drawing.callouts import Callout, Taken, draw_callouts
 from miurafab.fabrication.drawing.dxf import VERSIONS, sheet_dxf
 from miurafab.fabrication.drawing.hpgl import POINTS_A_LINE, UNITS_PER_MM, sheet_hpgl
 from miurafab.fabrication.drawing.page import INK, tint
+from miurafab.fabrication.drawing.page_sizes import PAGES_MM
 from miurafab.fabrication.drawing.pdf import sheets_pdf
 from miurafab.fabrication.drawing.sheet_pages import _clear_place
 from miurafab.fabrication.drawing.svg import sheet_svg
-from miurafab.fabrication.drawing.tiles import EDGE_MM, PAGES_MM, Tiling, tiled_pdf
+from miurafab.fabrication.drawing.tiles import EDGE_MM, Tiling, tiled_pdf
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.options import LayoutOptions, NestingOptions
 from miurafab.fabrication.sheets import lay_out

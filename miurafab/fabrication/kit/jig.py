@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from shapely.geometry.base import BaseGeometry
 
 from miurafab.errors import OptionError
@@ -132,6 +131,8 @@ def _edge(triangles: Floats, axis: int, place: float, window: float) -> tuple[Fl
     at, lowest = lower_side(triangles, axis, place)
     cubic = np.polynomial.Polynomial.fit(at, lowest, 3)(at)
     size = max(int(window / STEP_MM) | 1, 3)
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     opened = maximum_filter1d(minimum_filter1d(lowest - cubic, size), size)
     return at, np.asarray(cubic + np.minimum(opened, lowest - cubic))
 

@@ -23,7 +23,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-import scipy.fft
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
@@ -91,6 +90,8 @@ class Raster:
         self.gap, self.parts, self.rim, self.work = gap, parts, rim, 0
         size = np.array([kind.width + gap, kind.height + gap])
         least = [max(math.ceil(along * side / size.max()), 16) for side in size]
+        import scipy.fft
+
         self.whole = [int(scipy.fft.next_fast_len(n + 2 * rim, real=True)) for n in least]
         self.cells = [n - 2 * rim for n in self.whole]
         self.cell = size / self.cells
@@ -131,6 +132,8 @@ class Raster:
     def transformed(self, cells: NDArray[np.float32]) -> NDArray[np.complex64]:
         """The Fourier transform of cells of a sheet."""
         self.work += math.prod(self.whole)
+        import scipy.fft
+
         return np.asarray(scipy.fft.rfft2(cells, self.whole))
 
     def correlated(
@@ -138,6 +141,8 @@ class Raster:
     ) -> NDArray[np.float32]:
         """The correlation of two masks from their transforms, the second conjugate."""
         self.work += math.prod(self.whole)
+        import scipy.fft
+
         return np.asarray(scipy.fft.irfft2(one * other, self.whole))
 
     def _grown(self, number: int, rotation: int, more: int) -> Bools:

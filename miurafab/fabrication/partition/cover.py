@@ -21,10 +21,10 @@ the facets between them, so unused room moves to where room is missing.
 from __future__ import annotations
 
 import numpy as np
-import scipy.spatial
 
 from miurafab.fabrication.partition.fit_box import boxes_at
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.polygons import principal_axes
 
 _NEAR = 4
@@ -94,7 +94,7 @@ def brickwork(shapes: Floats, size: tuple[float, float]) -> list[Floats]:
             x = start + (np.arange(count) + 0.5) * (end - start) / count
             spots.append(np.column_stack([x, np.full(count, base + apart / 2)]))
         spot = np.concatenate(spots)
-        near, _ = scipy.spatial.KDTree(placed.mean(axis=1)).query(spot)
+        near, _ = tree_of(placed.mean(axis=1)).query(spot)
         spot = spot[near < pitch.max() / 2]
         turned = np.full(len(spot), angle + along * np.pi / 2)
         found.append(np.column_stack([spot @ turn + middle, turned]))
@@ -121,9 +121,7 @@ def nearest(
     """(N, m) the ``most`` rectangles in which the points ``centres`` (N, 2) lie deepest, unsorted,
     and the excess of the points over them in mm.
     """
-    _, near = scipy.spatial.KDTree(rectangles[:, :2]).query(
-        centres, k=min(2 * most, len(rectangles))
-    )
+    _, near = tree_of(rectangles[:, :2]).query(centres, k=min(2 * most, len(rectangles)))
     near = near.reshape(len(centres), -1)
     apart = np.stack(
         [excess(centres[:, None], rectangles[column], width, height) for column in near.T], axis=1

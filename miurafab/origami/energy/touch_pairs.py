@@ -15,9 +15,9 @@ angle between them instead.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.nearest import tree_of
 from miurafab.origami.energy.touching import HEIGHT, NO_PAIRS, Over, TouchPairs, over
 
 WIDENED = 0.1
@@ -91,8 +91,8 @@ class NearPairs:
         centre = corners.mean(axis=1)
         radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
         reach = float(radius.max(initial=0.0)) + REACH
-        found = cKDTree(points).sparse_distance_matrix(
-            cKDTree(centre), reach, output_type="ndarray"
+        found = tree_of(points).sparse_distance_matrix(
+            tree_of(centre), reach, output_type="ndarray"
         )
         vertex, triangle = found["i"].astype(np.int64), found["j"].astype(np.int64)
         near = found["v"] <= radius[triangle] + REACH
@@ -106,7 +106,7 @@ class NearPairs:
         middle = ends.mean(axis=1)
         half = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2
         reach = 2 * float(half.max(initial=0.0)) + REACH
-        pairs = cKDTree(middle).query_pairs(reach, output_type="ndarray").astype(np.int64)
+        pairs = tree_of(middle).query_pairs(reach, output_type="ndarray").astype(np.int64)
         one, other = pairs.T
         apart = np.linalg.norm(middle[one] - middle[other], axis=1)
         near = apart <= half[one] + half[other] + REACH

@@ -16,7 +16,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
 
 from miurafab.geometry.arrays import Bools, Ints
 from miurafab.geometry.polygons import edge_lengths
@@ -101,7 +100,9 @@ def with_border(
 
 def _in_one_piece(kept: Bools) -> Bools:
     """The largest part of the cells ``kept`` that hangs together across sides."""
-    parts, count = ndimage.label(kept)
+    from scipy.ndimage import label
+
+    parts, count = label(kept)
     if count < 2:
         return kept
     return np.asarray(parts == 1 + np.argmax(np.bincount(parts.ravel())[1:]))

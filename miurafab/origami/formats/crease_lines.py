@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.nearest import tree_of
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.curves import Curve, Polyline, default_tolerance
 
@@ -113,7 +113,7 @@ def corners_at_ends(lines: CreaseLines) -> CreaseLines:
     if not open_.any():
         return lines
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    near, which = cKDTree(ends[open_]).query(ends[after, 1])
+    near, which = tree_of(ends[open_]).query(ends[after, 1])
     close = np.asarray(near) < _CORNER * np.minimum(length[after], length[after + 1])
     moved = ends[open_][np.asarray(which)[close]]
     ends[after[close], 1] = moved

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.boxes import meeting_pairs
+from miurafab.geometry.nearest import tree_of
 from miurafab.origami.formats.crease_lines import CreaseLines
 
 _SAMPLE, _MEETINGS, _FEW_MEETINGS = 200, 100, 1_000_000
@@ -74,7 +74,7 @@ def _refuse_tangle(low: Floats, high: Floats) -> None:
 
 def _merged(loose: Floats, near: float) -> tuple[Ints, Floats]:
     """The vertex of each loose point, and the vertices: the first point of each that met."""
-    pairs = cKDTree(loose).query_pairs(near, output_type="ndarray")
+    pairs = tree_of(loose).query_pairs(near, output_type="ndarray")
     _, label = connected_components(_graph(pairs, len(loose)), directed=False)
     _, first, vertex = np.unique(label, return_index=True, return_inverse=True)
     return np.asarray(vertex, dtype=np.int64), loose[first]

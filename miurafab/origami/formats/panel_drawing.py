@@ -7,7 +7,7 @@ group for each layer and y downwards.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from xml.sax.saxutils import escape
+from html import escape
 
 import numpy as np
 
@@ -83,7 +83,7 @@ def panels_svg(drawing: PanelDrawing, title: str = "") -> str:
     parts = [
         '<?xml version="1.0" encoding="UTF-8"?>\n'
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.3f}mm" height="{height:.3f}mm" '
-        f'viewBox="0 0 {width:.3f} {height:.3f}">\n<title>{escape(title)}</title>\n'
+        f'viewBox="0 0 {width:.3f} {height:.3f}">\n<title>{escape(title, quote=False)}</title>\n'
     ]
     for layer, kind in drawing.layers.items():
         colour = COLOURS[kind][1]
@@ -99,7 +99,7 @@ def panels_svg(drawing: PanelDrawing, title: str = "") -> str:
                     f'<text x="{label.x - low[0]:.3f}" y="{high[1] - label.y:.3f}" '
                     f'font-size="{label.height:.3f}" font-family="sans-serif" fill="{colour}" '
                     'stroke="none" text-anchor="middle" dominant-baseline="central">'
-                    f"{escape(label.text)}</text>\n"
+                    f"{escape(label.text, quote=False)}</text>\n"
                 )
         parts.append("</g>\n")
     parts.append("</svg>\n")

@@ -15,8 +15,8 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from html import escape
 from xml.etree.ElementTree import Element
-from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def svg_text(lines: CreaseLines, title: str = "") -> str:
         f'height="{height / scale!r}mm" viewBox="0 0 {width!r} {height!r}">\n'
     ]
     if title:
-        parts.append(f"<title>{escape(shown(title))}</title>\n")
+        parts.append(f"<title>{escape(shown(title), quote=False)}</title>\n")
     parts.append(f'<g fill="none" stroke-width="{0.15 * _SHORTEST!r}" stroke-linecap="round">\n')
     degrees = np.degrees(lines.fold_angle).tolist()
     for letter, angle, (x0, x1), (y0, y1) in zip(

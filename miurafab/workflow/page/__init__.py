@@ -29,10 +29,10 @@ from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.folding.layers_apart import CLOSED
 from miurafab.version import __version__
 from miurafab.workflow.dry_run import LAYERS, SheetPreview, at_work, clock_text, length_text
-from miurafab.workflow.preview import Preview
 
 if TYPE_CHECKING:
     from miurafab.fabrication.mates import SeamTab
+    from miurafab.workflow.preview import Preview
 
 SCENE = ("viewer.js", "space.js", "shaders.js", "scene.js")
 """The scripts that draw a sheet in space, in their order; they know nothing of the rest."""

@@ -1,0 +1,74 @@
+"""What a command may load before its work begins: so a start costs no more than it must.
+
+Each library here takes from 20 to 200 ms of processor time. ``benchmarks/start.py`` has the times.
+"""
+
+import subprocess
+import sys
+
+import pytest
+
+LIBRARIES = [
+    "PIL",
+    "matplotlib",
+    "numpy",
+    "reportlab",
+    "scipy.fft",
+    "scipy.interpolate",
+    "scipy.linalg",
+    "scipy.ndimage",
+    "scipy.optimize",
+    "scipy.sparse",
+    "scipy.spatial",
+    "scipy.special",
+    "shapely",
+    "svgwrite",
+    "trimesh",
+    "http.client",
+]
+NOTHING = set()
+PATTERN = {"numpy", "scipy.sparse", "scipy.linalg", "shapely"}
+"""What a pattern is computed with."""
+
+STARTS = {
+    "--help": NOTHING,
+    "check --help": NOTHING,
+    "calibrate --help": NOTHING,
+    "studio --help": NOTHING,
+    "machine status --port gone": NOTHING,
+    "profiles show gone": NOTHING,
+    "use --machine gone": NOTHING,
+    "fit --help": PATTERN,
+    "cut --help": PATTERN,
+    "fit gone.toml -o x.fold": PATTERN,
+    "check gone.fold": PATTERN,
+    "layers gone.fold": PATTERN,
+    "energy gone.fold": PATTERN,
+    "convert gone.fold x.svg": PATTERN,
+    "sheets gone.fold -o x": PATTERN,
+    "preview gone": PATTERN,
+    "cut gone --port virtual": PATTERN,
+    "fold gone.fold": PATTERN | {"PIL"},
+}
+STARTED = """
+import sys
+sys.argv = ["miurafab", *sys.argv[1:]]
+from miurafab.__main__ import main
+try:
+    main()
+except SystemExit:
+    print(*sorted(sys.modules), file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize("words", STARTS)
+def test_a_command_starts_with_what_its_work_begins_with(words, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", STARTED, *words.split()],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    loaded = set(done.stderr.splitlines()[-1].split())
+    assert "miurafab.cli.program" in loaded
+    assert set(LIBRARIES) & loaded <= STARTS[words]
