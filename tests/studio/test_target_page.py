@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from axe import AXE, serious_faults
 from browser import CHROMIUM, Browser
 from PIL import Image
 from test_target_view import stl
@@ -194,6 +195,9 @@ def test_a_target_is_drawn_dropped_placed_mended_and_compared(page):
     page.until("document.getElementById('target-findings').innerText.includes('was filled')")
     assert page.value("holes") == "all"
     assert "fills a hole" in page.text("target-key")
+
+    if AXE.is_file():
+        assert serious_faults(page) == []
 
     page.drop("egg.stl", stl("egg"))
     page.shown("target-open")

@@ -12,6 +12,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from mesh_shapes import kept, mesh, sheet
 from PIL import Image
 from studios import Asked, Done, saddle_obj, sentence
@@ -19,6 +21,8 @@ from studios import Asked, Done, saddle_obj, sentence
 import miurafab
 from miurafab.errors import TargetError
 from miurafab.studio.mends import mends
+from miurafab.studio.server import _put_on
+from miurafab.studio.session import Bench
 from miurafab.studio.target_view import MOST_SHOWN, compared, file_shown, shown, thinned
 from miurafab.surfaces.catalogue import CATALOGUE
 
@@ -247,6 +251,57 @@ def test_a_file_that_may_unpack_to_much_is_left_to_the_process(asked, name, monk
     assert [each.order.do for each in asked.orders] == ["place"]
 
 
+def test_the_command_line_names_an_image_or_a_profile(tmp_path):
+    """What the page starts with has the height of the image, and the points of the profile."""
+    bench = Bench(tmp_path, None)
+    (tmp_path / "dem.png").write_bytes(heights_png())
+    (tmp_path / "cup.csv").write_text("r,z\n0.5,0\n0.8,1\n")
+    image = _put_on(bench, f"{tmp_path / 'dem.png'}:height=4")
+    assert image == {"source": "1", "parameters": {"height": "4"}}
+    assert bench.sources["1"].kind == "image"
+    drawn = _put_on(bench, f"revolution:profile={tmp_path / 'cup.csv'},angle=90")
+    assert drawn["profile"] == [[0.5, 0.0], [0.8, 1.0]]
+    assert drawn["parameters"] == {"angle": "90"}
+    formula = _put_on(bench, "formula:z=min(x,y)")
+    assert formula == {"surface": "formula", "parameters": {"z": "min(x,y)"}}
+    with pytest.raises(TargetError, match="height=20"):
+        _put_on(bench, str(tmp_path / "dem.png"))
+
+
+@given(
+    st.sampled_from([*CATALOGUE, "source"]),
+    st.dictionaries(
+        st.sampled_from(["z", "x", "u0", "angle", "height", "width"]),
+        st.sampled_from(
+            ["", "1", "-1", "2*pi", "x*y", "1/0", "x^99", "80deg", "nan", "(" * 99, "é"]
+        ),
+        max_size=3,
+    ),
+    st.none() | st.lists(st.lists(st.floats() | st.integers(), max_size=3), max_size=4),
+    st.dictionaries(
+        st.sampled_from(
+            ["close", "side", "holes", "poles", "pieces", "region", "rotate", "facets"]
+        ),
+        st.sampled_from(["", "seam", "all", "1,2,3,4,5,6", "3", "0.1,0.9,0.1,0.9", "1e9", "8x8"]),
+        max_size=3,
+    ),
+)
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_whatever_is_asked_has_a_picture_or_one_sentence(asked, name, parameters, profile, options):
+    target = {"source": "1"} if name == "source" else {"surface": name}
+    target |= {"parameters": parameters} | ({} if profile is None else {"profile": profile})
+    response = asked.post("target", {"target": target, "options": options})
+    assert response.status == 200
+    said = response.json()
+    if "refused" in said:
+        assert said["refused"].endswith(".")
+        assert "`" not in said["refused"]
+    else:
+        assert np.isfinite(unpacked(said["picture"])["points"]).all()
+
+
 def test_a_design_is_shown_as_what_it_names(asked, tmp_path):
     (tmp_path / "cap.stl").write_bytes(stl("cap-40"))
     for text, kind in (('surface = "vase"', "map"), ('mesh = "cap.stl"', "file")):
@@ -296,11 +351,11 @@ def test_a_drawn_profile_is_fitted_and_kept_in_the_design(done, tmp_path):
     picture = done.post("target", {"target": target, "options": {}}).json()["picture"]
     drawn = unpacked(picture)["points"][:, 2] + picture["middle"][2]
     assert (drawn.min(), drawn.max()) == pytest.approx((0, 1.4), abs=1e-6)
-    done.post("fit", {"target": target, "options": {"facets": "6x6"}})
+    done.post("fit", {"target": target, "options": {"facets": "4x4"}})
     pattern = done.state()["pattern"]
     assert pattern["command"] == "miurafab fit revolution.toml -o revolution.fold"
     assert pattern["form"]["target"] == target
-    assert pattern["subject"] == "revolution, angle 100 · Facets 6x6 · profile of 3 points"
+    assert pattern["subject"] == "revolution, angle 100 · Facets 4x4 · profile of 3 points"
     file = tmp_path / "revolution.toml"
     file.write_bytes(done.get("design.toml").body)
     again = miurafab.fit(file).pattern

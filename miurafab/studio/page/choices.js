@@ -57,14 +57,14 @@ function showStocks(sources, chosen) {
 }
 
 /** The list of targets: the built-in ones, and files that can be fitted or opened. */
-export function showSources(all, chosen) {
+export function showSources(all, chosen, parameters) {
   const stocks = all.filter(({ kind }) => kind === "stock");
   const stock = stocks.find(({ id }) => id === chosen);
   showStocks(stocks, stock?.id);
-  showTargets(all.filter(({ kind }) => kind !== "stock"), stock ? undefined : chosen);
+  showTargets(all.filter(({ kind }) => kind !== "stock"), stock ? undefined : chosen, parameters);
 }
 
-function showTargets(sources, chosen) {
+function showTargets(sources, chosen, parameters) {
   const select = byId("target");
   const before = chosen ? `source:${chosen}` : select.value;
   select.replaceChildren(
@@ -78,7 +78,7 @@ function showTargets(sources, chosen) {
   sourcesNow = sources;
   select.value = before || "surface:hypar";
   if (select.selectedIndex < 0) select.value = "surface:hypar";
-  if (select.value !== before || chosen) showTarget();
+  if (select.value !== before || chosen) showTarget("", parameters);
 }
 
 function chosenTarget() {

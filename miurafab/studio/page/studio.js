@@ -174,7 +174,7 @@ async function begin() {
     if (ownJob) turnTo("desk");
     const { sources, pattern } = await ask("state");
     told = JSON.stringify(sources);
-    showSources(sources, catalogue.first?.source);
+    showSources(sources, catalogue.first?.source, catalogue.first?.parameters);
     if (pattern) restoreForm(pattern.form);
     beginProfile(changed);
     beginLive(catalogue, { asks: order });
