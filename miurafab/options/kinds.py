@@ -23,6 +23,9 @@ from miurafab.units import (
     parse_pressure,
 )
 
+_TRUTHS = ("bool", "bool_")
+"""Types of yes and no, of Python and NumPy: neither is taken as 1 or 0."""
+
 
 class Kind:
     """How values of an option are written and read; ``unit`` follows a number that is shown."""
@@ -69,7 +72,9 @@ class Quantity(Kind):
     above: bool = False
 
     def read(self, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, str | int | float):
+        if type(value).__name__ in _TRUTHS:
+            raise ValueError(f"is {value!r}, not {self.noun}")
+        if not isinstance(value, str | int | float):
             if not hasattr(value, "__float__"):
                 raise ValueError(f"is {value!r}, not {self.noun}")
             value = float(value)
@@ -81,14 +86,13 @@ class Quantity(Kind):
         return inside
 
     def check(self, inside: float) -> None:
-        written = inside / self.factor
-        written = round(written, 9)  # a limit in degrees has no exact value in radians
+        written = _written(inside / self.factor)
         too_low = written <= self.low if self.above else written < self.low
         if too_low or written > self.high or not math.isfinite(written):
             raise ValueError(f"is {self.show(inside)}; it must be {self.accepts}")
 
     def show(self, inside: float) -> str:
-        return f"{round(inside / self.factor, 9):.10g}{self.unit}"
+        return f"{_written(inside / self.factor):.10g}{self.unit}"
 
     @property
     def accepts(self) -> str:
@@ -100,6 +104,13 @@ class Quantity(Kind):
         return (
             f"greater than {low} and at most {high}" if self.above else f"between {low} and {high}"
         )
+
+
+def _written(value: float) -> float:
+    """``value`` to nine decimals, since a limit in degrees has no exact value in radians; one that
+    would then be nothing is as it is.
+    """
+    return round(value, 9) or value
 
 
 def length(low: float = 0.0, high: float = math.inf, *, above: bool = False) -> Quantity:
@@ -162,7 +173,7 @@ class Whole(Kind):
         text = value.strip() if isinstance(value, str) else None
         if text is not None and text.lstrip("+-").isascii() and text.lstrip("+-").isdigit():
             value = int(text) if len(text) < 20 else self.high + 1
-        elif isinstance(value, bool) or not hasattr(value, "__index__"):
+        elif type(value).__name__ in _TRUTHS or not hasattr(value, "__index__"):
             raise ValueError(f"is {value!r}, not a whole number")
         inside = int(value)
         self.check(inside)

@@ -1,11 +1,12 @@
-"""A sheet with the barrier that is asked for: its Kawasaki residuals are scaled until it has it.
+"""A sheet with the barrier that is asked for: its fairness and Kawasaki residuals are tuned.
 
-The residuals of a fitted sheet are all multiplied by one factor f, and the rest of the sheet moves
-as little as possible (:mod:`~miurafab.origami.fitting.scaling`). The barrier is measured along the
-folding path of each such sheet. It goes from 0 at f = 0 up, at first with f^2, so sqrt(asked /
-measured) is the step, and regula falsi on logarithms closes in on the answer. Where the sheets end
-before they have it (they cannot be found, cross themselves, or break a limit), the answer says how
-far they go.
+Sheets are fitted with the usual weight of fairness and with larger ones, which fold more softly at
+the same distance. The residuals of a fitted sheet are all multiplied by one factor f, and the rest
+of the sheet moves as little as possible (:mod:`~miurafab.origami.fitting.scaling`). The barrier is
+measured along the folding path of each such sheet. It goes from 0 at f = 0 up, at first with f^2,
+so sqrt(asked / measured) is the step, and regula falsi on logarithms closes in on the answer. Of
+the sheets with the barrier, the closest to the target is taken. Where the sheets end before they
+have it (they cannot be found, cross themselves, or break a limit), the answer says how far they go.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +34,8 @@ CLOSE = 0.01
 """A barrier is what was asked within this part."""
 STEPS = 24
 """Steps of the folding path."""
+FAIRNESS = (1.0, 10.0, 100.0)
+"""The weights of fairness that are tried, over the usual one."""
 TRIALS = 30
 SHRINKS = 5
 WIDEST = (0.25, 2.0)
@@ -48,11 +52,14 @@ class Tried(NamedTuple):
 
 
 def tuned(
-    request: FitRequest, result: FitResult, on_progress: Callable[[float, str], None] | None = None
+    request: FitRequest,
+    result: FitResult,
+    fit: Callable[[FitRequest], FitResult],
+    on_progress: Callable[[float, str], None] | None = None,
 ) -> FitResult:
     """``result`` brought to the barrier of ``request``, in k_f L; or ``infeasible``, with the
-    nearest sheet and how far the barrier goes. Ctrl-C ends the search: the result is the nearest
-    sheet up to then, ``interrupted``.
+    nearest sheet and how far the barrier goes. ``fit`` makes the sheet of another request. Ctrl-C
+    ends the search: the result is the nearest sheet up to then, ``interrupted``.
 
     Raises :class:`~miurafab.errors.OptionError` for a sheet that is not one full grid.
     """
@@ -70,26 +77,39 @@ def tuned(
         return _missed(result, "The sheet folds rigidly, so it has no barrier to change.")
     found: list[Tried] = []
 
-    def at(factor: float) -> Tried | None:
-        sheet = _tried(request, pattern, factor)
+    def at(fairness: float, fitted: CreasePattern, factor: float) -> Tried | None:
+        sheet = _tried(request, fitted, factor)
         if sheet is not None:
             found.append(sheet)
         if on_progress is not None:
             said = "no sheet" if sheet is None else f"barrier {sheet.barrier:.3g}"
-            on_progress(1 - 0.8 ** len(found), f"residuals times {factor:.3g}: {said}")
+            on_progress(
+                1 - 0.9 ** len(found),
+                f"fairness times {fairness:g}, residuals times {factor:.3g}: {said}",
+            )
         return sheet
 
     interrupted = False
     try:
-        _search(asked, at)
+        for fairness in FAIRNESS:
+            fitted: CreasePattern | None = pattern
+            if fairness != 1.0:
+                fairer = fit(replace(request, fairness=fairness, barrier=None))
+                if fairer.status == "interrupted":
+                    raise KeyboardInterrupt
+                fitted = fairer.pattern if fairer.is_valid else None
+            if fitted is not None and fitted.grid is not None and worst_residual(fitted) > EXACT:
+                _search(asked, partial(at, fairness, fitted))
     except KeyboardInterrupt:
         interrupted = True
         if not found:
             raise
     if not found:
         return _missed(result, "The way to flat of the fitted sheet was lost.")
-    best = min(found, key=lambda sheet: _miss(sheet, asked))
-    measured = with_distances(best.measurements, best.pattern, request.surface)
+    held = [_placed(sheet, request) for sheet in found if _miss(sheet, asked) <= CLOSE]
+    best = _placed(min(found, key=lambda sheet: _miss(sheet, asked)), request)
+    best = min(held, key=_distance, default=best)
+    measured = best.measurements
     answer = replace(
         result,
         pattern=best.pattern,
@@ -107,8 +127,9 @@ def tuned(
     high = max(found, key=lambda sheet: sheet.barrier)
     return _missed(
         answer,
-        f"No sheet with a barrier of {asked:.3g} k_f L was found: with its residuals scaled, it "
-        f"has barriers from {low.barrier:.3g} (residual {worst_residual(low.pattern):.2g} rad) to "
+        f"No sheet with a barrier of {asked:.3g} k_f L was found: with fairness times "
+        f"{', '.join(f'{each:g}' for each in FAIRNESS)} and residuals scaled, it has barriers from "
+        f"{low.barrier:.3g} (residual {worst_residual(low.pattern):.2g} rad) to "
         f"{high.barrier:.3g} (residual {worst_residual(high.pattern):.2g} rad), and beyond them no "
         "sheet without faults. Ask for other `facets`.",
     )
@@ -188,6 +209,17 @@ def _tried(request: FitRequest, fitted: CreasePattern, factor: float) -> Tried |
     except PatternError:  # no balance is found at its folded form
         return None
     return Tried(factor, pattern, measured, curve.barrier) if curve.converged else None
+
+
+def _placed(sheet: Tried, request: FitRequest) -> Tried:
+    """``sheet`` with its distances from the target."""
+    found = with_distances(sheet.measurements, sheet.pattern, request.surface)
+    return sheet._replace(measurements=found)
+
+
+def _distance(sheet: Tried) -> float:
+    away = sheet.measurements.hausdorff_midsurface_mm
+    return math.inf if away is None else away
 
 
 def _missed(result: FitResult, sentence: str) -> FitResult:

@@ -87,7 +87,7 @@ def fit(
         return result
     from miurafab.origami.energy.tuning import tuned
 
-    return tuned(request, result, on_progress)
+    return tuned(request, result, fit, on_progress)
 
 
 def coarse(

@@ -144,6 +144,7 @@ def _objective(
 ) -> FairObjective:
     """The fair objective with the limits ``bounds`` as hinges, and ``reach`` on the distance."""
     weights = Weights.of(start.pieces, start.all_round)
+    weights = replace(weights, fairness=request.fairness * weights.fairness)
     if bounds.min_edge is not None:
         shortest = max(weights.shortest_edge, bounds.min_edge / start.unknowns.length)
         weights = replace(weights, shortest_edge=shortest)

@@ -101,8 +101,8 @@ class FitOptions(Shown):
     )
     barrier: float | None = option(
         number(0, 1e3, above=True),
-        "The energy barrier that holds the folded form, in k_f L, within 1 %: the residuals of the "
-        "fitted sheet are scaled until it is that.",
+        "The energy barrier that holds the folded form, in k_f L, within 1 %: fairness and "
+        "residuals are tuned, and the closest such sheet is taken.",
         group="Limits",
         default_text="as it comes",
     )
@@ -307,10 +307,13 @@ class FitRequest(FitOptions):
         The surface that the sheet follows.
     target : dict
         The description of the surface in the file of the pattern.
+    fairness : float
+        The weight of fairness in the objective, over the usual one.
     """
 
     surface: TargetSurface = field(kw_only=True)
     target: dict[str, Any] = field(default_factory=dict, kw_only=True)
+    fairness: float = field(default=1.0, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -2,12 +2,15 @@
 
 from functools import cache
 
+import numpy as np
 import pytest
 
 from miurafab.errors import OptionError
+from miurafab.origami.energy import tuning
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.formats.files import load
 from miurafab.origami.verify import measure
+from miurafab.workflow.design import design
 from miurafab.workflow.fit import fit
 
 
@@ -62,7 +65,7 @@ def test_a_sheet_that_folds_rigidly_has_no_barrier_to_change():
 
 def test_an_interruption_gives_the_nearest_sheet_up_to_then():
     def stop(part, note):
-        if note.startswith("residuals times") and not note.startswith("residuals times 1:"):
+        if "residuals times" in note and "residuals times 1:" not in note:
             raise KeyboardInterrupt
 
     result = fit("hypar", facets=(4, 4), barrier=1.0, on_progress=stop)
@@ -83,3 +86,24 @@ def test_an_interruption_gives_the_nearest_sheet_up_to_then():
 def test_what_does_not_go_with_a_barrier_is_said(options, part):
     with pytest.raises(OptionError, match=part):
         fit("hypar", facets=(6, 6), **({"barrier": 1e-4} | options))
+
+
+def test_fairness_gives_a_closer_sheet_with_the_same_barrier(monkeypatch):
+    found = asked(1e-3, "sphere")
+    monkeypatch.setattr(tuning, "FAIRNESS", (1.0,))
+    scaled = asked.__wrapped__(1e-3, "sphere")
+    assert (found.status, scaled.status) == ("converged", "converged")
+    assert found.barrier == pytest.approx(scaled.barrier, rel=0.02)
+    assert found.deviation_mm < 0.9 * scaled.deviation_mm
+
+
+@pytest.mark.parametrize("name", ["barrier", "size", "amplitude", "min_edge", "seed"])
+@pytest.mark.parametrize("truth", [True, np.True_])
+def test_yes_is_no_number(name, truth):
+    with pytest.raises(OptionError, match=f"'{name}' is True, not a"):
+        design("hypar", **{name: truth})
+
+
+def test_a_small_barrier_is_shown_as_it_is():
+    with pytest.raises(OptionError, match="'barrier' is -1e-12; it must be greater than 0"):
+        design("hypar", barrier=-1e-12)
