@@ -23,7 +23,7 @@ import numpy as np
 from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cut_open import cut_open
-from miurafab.origami.energy.bar_hinge import SOFTNESS
+from miurafab.origami.energy.bar_hinge import SOFTNESS, rulings_among
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.certificate import RigidCertificate, certified
@@ -120,7 +120,10 @@ def _from_flat(
         motion, verdict = ramp_motion(
             pattern, steps, touching=True, softness=softness, on_progress=on_progress
         )
-    if verdict.wrong_signs > MOST_WRONG or (verdict.is_held_back and len(verdict.waiting_edges)):
+    # beside a curved crease facets bend, so that what flat ones could not do says nothing
+    bends = rulings_among(pattern, np.flatnonzero(pattern.edges_assignment == "F")).any()
+    waits = verdict.is_held_back and len(verdict.waiting_edges) and not bends
+    if verdict.wrong_signs > MOST_WRONG or waits:
         raise _sequence(verdict)
     rigid, certificate = certified(motion)
     if not (verdict.touching and contacts(rigid)):  # flat facets may touch where bent ones do not

@@ -220,3 +220,10 @@ def test_the_tolerance_of_curves_is_for_drawings_that_have_some(tmp_path) -> Non
         mf.load(tmp_path / "a.cp", curve_tolerance=1)
     with pytest.raises(OptionError, match="curve_tolerance"):
         mf.load(tmp_path / "a.svg", curve_tolerance=0)
+
+
+def test_a_crease_that_cannot_reach_half_a_turn_moves_as_far_as_it_goes() -> None:
+    found = find_motion(pattern_from_lines(parse_svg(arc(1.0), 0.4)), 6)
+    assert found.verdict is not None
+    assert found.verdict.wrong_signs == 0
+    assert np.degrees(np.abs(found.motion.fold_angles[-1]).max()) > 45
