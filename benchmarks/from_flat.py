@@ -2,10 +2,12 @@
 
     python benchmarks/from_flat.py [NAME ...]
     python benchmarks/from_flat.py contact [NAME ...]
+    python benchmarks/from_flat.py kresling-storey
 
 Without names all patterns of tests/named_patterns.py but the largest are folded; ``miura-60`` has
 3,600 facets. With ``contact``, sheets that come to touch themselves are folded without contact and
-with it: processor time, pairs of facets that pass through each other, and how far they get.
+with it: processor time, pairs of facets that pass through each other, and how far they get. With
+``kresling-storey``, a closed storey with elastic creases shows its two stable heights.
 """
 
 from __future__ import annotations
@@ -17,11 +19,18 @@ from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "origami" / "energy"))
 
+import energy_problems
 import named_patterns
+import numpy as np
 
+from miurafab.origami.energy.continuation import follow
+from miurafab.origami.energy.driven import Driven
+from miurafab.origami.energy.equilibrium import Balance, solve
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.certificate import certified
+from miurafab.origami.folding.from_flat import unstable_directions
 from miurafab.origami.folding.kinematics import facet_strain
 from miurafab.origami.folding.ramp_motion import ramp_motion
 
@@ -67,6 +76,26 @@ def contact_row(name: str) -> str:
     return "| " + " | ".join([*cells, str(verdict.snaps)]) + " |"
 
 
+def storey() -> None:
+    """Print the balances of a closed Kresling storey, and in how many directions each falls."""
+    model = energy_problems.kresling(1e-3)
+    tips = np.array([2 * energy_problems.SIDES, 2 * energy_problems.SIDES + 1])
+    driven, free = Driven(model, tips), Balance(model)
+    ends = (energy_problems.HEIGHT, energy_problems.kresling_other_state()[0])
+    heights = np.linspace(*ends, 31) + 2 * energy_problems.APEX
+    way = follow(driven, driven.rest, heights)
+    top = way[int(np.argmax([model.energy(state.points) for state in way]))]
+    print("| balance | height | closed form | energy | unstable directions |")
+    print("| --- | --- | --- | --- | --- |")
+    balances = (("high", way[0], ends[0]), ("saddle", top, None), ("low", way[-1], ends[1]))
+    for name, state, wanted in balances:
+        found = solve(free, state._replace(mu=0.0), 0.0).state
+        height = driven.value(found.points) - 2 * energy_problems.APEX
+        told = "" if wanted is None else f"{wanted:.6f}"
+        energy, falls = model.energy(found.points), unstable_directions(free, found, 0.0)
+        print(f"| {name} | {height:.6f} | {told} | {energy:.3g} | {falls} |")
+
+
 def row(name: str) -> str:
     """What the motion of one pattern takes and shows."""
     pattern = PATTERNS[name]()
@@ -98,6 +127,9 @@ def main(names: list[str]) -> None:
         print("| --- " * 11 + "|")
         for name in names[1:] or TOUCHING:
             print(contact_row(name), flush=True)
+        return
+    if names == ["kresling-storey"]:
+        storey()
         return
     print(
         "| pattern | facets | s | strain | rigid | residual | wrong | stable | error deg | pairs |"
