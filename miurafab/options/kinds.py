@@ -72,10 +72,9 @@ class Quantity(Kind):
     above: bool = False
 
     def read(self, value: object) -> float:
-        if type(value).__name__ in _TRUTHS:
-            raise ValueError(f"is {value!r}, not {self.noun}")
-        if not isinstance(value, str | int | float):
-            if not hasattr(value, "__float__"):
+        truth = type(value).__name__ in _TRUTHS
+        if truth or not isinstance(value, str | int | float):
+            if truth or not hasattr(value, "__float__"):
                 raise ValueError(f"is {value!r}, not {self.noun}")
             value = float(value)
         try:
@@ -107,9 +106,7 @@ class Quantity(Kind):
 
 
 def _written(value: float) -> float:
-    """``value`` to nine decimals, since a limit in degrees has no exact value in radians; one that
-    would then be nothing is as it is.
-    """
+    """To nine decimals: a limit in degrees has no exact value in radians. Never to nothing."""
     return round(value, 9) or value
 
 
