@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import re
+import re._parser as regular  # the parser of `re`: only it tells what a repeat is
 from collections import defaultdict
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -185,3 +187,36 @@ def test_modules_that_tests_share_have_names_of_their_own():
     files = [*(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]
     names = sorted(path.stem for path in files if path.stem != "conftest")
     assert names == sorted(set(names))
+
+
+UNAMBIGUOUS = {
+    r"(?:[ \t/+0]|\([^)\r\n]*\))*",  # a comment begins with a bracket, which stands nowhere else
+    r"\[(G5[4-9](?:\.[1-3])?|G28|G30|G92|TLO):(-?[\d.]+(?:,-?[\d.]+)*)\]",  # no comma in a number
+}
+"""Regular expressions with a repeat within a repeat that can read no text in two ways."""
+
+
+def _repeats_within_repeats(tree: Any, within: bool = False) -> bool:
+    for operation, found in tree:
+        kind = str(operation)
+        if kind in ("MAX_REPEAT", "MIN_REPEAT"):
+            often = found[1] > 20
+            if (often and within) or _repeats_within_repeats(found[2], within or often):
+                return True
+        parts = found[1] if kind == "BRANCH" else [found[3]] if kind == "SUBPATTERN" else []
+        if any(_repeats_within_repeats(part, within) for part in parts):
+            return True
+    return False
+
+
+def test_no_regular_expression_takes_a_time_without_end():
+    """A status report without its end was read in a time that doubled with each comma."""
+    forms = {
+        call.args[0].value
+        for module in MODULES
+        for call in called(module).get("re.compile", [])
+        if isinstance(call.args[0], ast.Constant)
+    }
+    assert len(forms) > 40
+    assert {form for form in forms if _repeats_within_repeats(regular.parse(form))} <= UNAMBIGUOUS
+    assert _repeats_within_repeats(regular.parse("(?:[|,][^|<>]*)*"))

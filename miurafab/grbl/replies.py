@@ -33,7 +33,7 @@ from miurafab.grbl.events import (
 
 _BANNER = re.compile(r"(grbl\w*) (\S+) \[.*\]", re.IGNORECASE)
 _ANSWER = re.compile(r"(error|ALARM): ?(.+)")
-_STATUS = re.compile(r"<([A-Z][A-Za-z]*)(?::(\d+))?((?:[|,][^|<>]*)*)>")
+_STATUS = re.compile(r"<([A-Z][A-Za-z]*)(?::(\d+))?((?:[|,][^<>]*)?)>")
 _BRACKET = re.compile(r"\[(\w[\w.]*):(.*)\]")
 _MODES = re.compile(r"\[(?:GC:)?([GM]\d[\dGMTFS. -]*)\]")
 _PARAMETER = re.compile(r"\[(G5[4-9](?:\.[1-3])?|G28|G30|G92|TLO):(-?[\d.]+(?:,-?[\d.]+)*)\]")

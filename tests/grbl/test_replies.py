@@ -138,3 +138,11 @@ def test_beam_off_is_claimed_only_when_said(text: str, off: bool) -> None:
     report = parse_reply(text)
     assert isinstance(report, StatusReport)
     assert report.beam_off is off
+
+
+@pytest.mark.parametrize("lost", [">", "<"])
+def test_a_long_report_that_lost_its_end_is_read_at_once(lost: str) -> None:
+    """The time doubled with each comma: a report that ran into the next hung the sender."""
+    whole = "<Idle" + "|MPos:0.000,1.5,-2" * 100 + ">"
+    assert isinstance(parse_reply(whole), StatusReport)
+    assert parse_reply(whole.replace(lost, "")) == Unknown(whole.replace(lost, ""))
