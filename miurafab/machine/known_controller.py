@@ -241,6 +241,15 @@ class KnownController:
         self._told = True
         return findings
 
+    def disarm(self) -> None:
+        """Disarm the beam, unless the controller says that it is: a jog burns with an armed one as
+        a cut does (gnea/grbl 1.1, ``gcode.c``).
+        """
+        self.refresh(MODES)
+        if MODES in self._unknown or "M5" not in self.modes.modes:
+            self._session.command("M5")
+            self._unknown.add(MODES)
+
     def set_position(self, x: float, y: float) -> None:
         """State where the head stands in work coordinates (G92), in known modes."""
         self._session.command(f"G92X{x:.3f}Y{y:.3f}")

@@ -212,6 +212,7 @@ class MachineSession:
 
     def _run_jog(self, line: str) -> None:
         session = self.conversation
+        self.known.disarm()
         session.command(line)
         while (state := session.wait_status().state) != "Idle":
             if state != "Jog":
@@ -219,10 +220,7 @@ class MachineSession:
             session.pause(_POLL_S)
 
     def nudge(self, dx: float, dy: float) -> None:
-        """One press of a jog key: a step, unless the last ones are still to be made.
-
-        The rest is done by :meth:`watch`.
-        """
+        """One press of a jog key: a step, unless :meth:`watch` has some still to make."""
         self.open()
         self._pad.press(dx, dy, self.conversation.now())
         self._tend_pad()
@@ -244,6 +242,7 @@ class MachineSession:
             self.realtime(order)
             return
         try:
+            self.known.disarm()
             session.command(order.decode("ascii"))
         except MachineError:
             self._pad.forget()

@@ -4,11 +4,14 @@ Without laser mode (``$32=0``) GRBL sets the beam at ``M3`` and ``M4`` whether a
 not. With it, ``M3`` keeps the beam on at rest in ``G1``, ``G2`` and ``G3``, and ``M4`` never
 (gnea/grbl 1.1, ``gcode.c``, ``spindle_control.c``). So after each such line the beam burns one spot
 until somebody ends that. Some want it, to focus; nobody wants it by mistake.
+
+A startup block (``$N0=``) runs when it is stored, and after each reset (``system.c``).
 """
 
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Iterable
 
 from miurafab.errors import GcodeError
@@ -18,6 +21,7 @@ from miurafab.machine.known_controller import MODES, KnownController
 
 _LASER_MODE = 32
 _BURNING = (1.0, 2.0, 3.0)
+_STARTUP = re.compile(r"\$N\d=(.*)", re.IGNORECASE)
 
 
 def resting_power(words: Iterable[tuple[str, float]], *, laser_mode: bool) -> float:
@@ -44,30 +48,51 @@ def resting_power(words: Iterable[tuple[str, float]], *, laser_mode: bool) -> fl
 
 
 class RestingBeam:
-    """Knows which line was held back last, for the controller that is ``known``; mutable."""
+    """Knows which line was held back last, for the controller that is ``known``, and which were
+    sent since that told its modes; mutable.
+    """
 
     def __init__(self, known: KnownController) -> None:
         self._known = known
         self._held = ""
+        self._since: list[str] = []
 
     def sure_of(self, line: str) -> str:
         """``line`` as it is to be sent. Raises :class:`~miurafab.errors.GcodeError` for one that
         would put the resting beam on, or its power up, unless it is the same as the last.
         """
         held, self._held = self._held, ""
-        if line == held or line.startswith("$"):
+        block = _STARTUP.fullmatch(line.replace(" ", ""))
+        if block is None and line.startswith("$"):
             return line
+        if line != held:
+            self._refuse(line, line if block is None else block[1], starts=block is not None)
+        self._since.append(line if block is None else block[1])
+        return line
+
+    def _refuse(self, line: str, text: str, *, starts: bool) -> None:
+        """Hold ``line`` back if its ``text`` would light the resting beam; ``starts``: after each
+        reset, too.
+        """
         self._known.refresh(MODES)
+        state = self._known.state
+        if state.modes:
+            self._since.clear()  # else the controller does not tell them while it moves
         laser_mode = bool(self._known.settings.values.get(_LASER_MODE))
-        before = [word for mode in self._known.modes.modes for word in _words(mode)]
-        power = resting_power([*before, *_words(line)], laser_mode=laser_mode)
-        if power <= resting_power(before, laser_mode=laser_mode):
-            return line
+        before = [
+            word for mode in (*self._known.modes.modes, *self._since) for word in _words(mode)
+        ]
+        power = resting_power([*before, *_words(text)], laser_mode=laser_mode)
+        if starts:
+            power = max(power, resting_power(_words(text), laser_mode=laser_mode))
+        if power <= (0.0 if state.beam_off else resting_power(before, laser_mode=laser_mode)):
+            return
         self._held = line
+        end = "M5, and again after each reset" if starts else "M5 or a reset"
         raise GcodeError(
             f"After {line} the beam would be on, with S{power:g}, while the head rests "
-            f"(${_LASER_MODE}={laser_mode:d}): it burns one spot until M5 or a reset. Send the "
-            "same line again if you want that."
+            f"(${_LASER_MODE}={laser_mode:d}): it burns one spot until {end}. Send the same line "
+            "again if you want that."
         )
 
 

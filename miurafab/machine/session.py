@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from miurafab.errors import ControllerError, PortError
+from miurafab.errors import ControllerError, MachineError, PortError
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.connection import FEED_HOLD, SOFT_RESET, STATUS_QUERY, Connection
 from miurafab.grbl.events import Alarm, Banner, Error, Event, Ok, Setting, StatusReport
@@ -320,9 +320,11 @@ class Session:
                     report = self.fresh_status(ANSWER_S)
                     if report is None or not report.beam_on:  # it rests: it may have missed that
                         return report is not None and report.beam_off
-        except PortError:
-            pass
-        return False
+            self.command("M5")  # a startup block, which runs after each reset, arms the beam
+            report = self.fresh_status(ANSWER_S)
+        except MachineError:
+            return False
+        return report is not None and report.beam_off
 
     def hold_and_stop(self) -> bool:
         """Let the motion come to rest before the reset, so that the position is not lost.

@@ -66,6 +66,12 @@ def light(here: MachineSession) -> None:
     here.say("M3 S500")
 
 
+def rest(here: MachineSession) -> None:
+    """Wait for the end of a motion, dark or not."""
+    while here.look().moves:
+        here.conversation.pause(0.02)
+
+
 def test_unlock_home_and_cut_in_one_session_on_a_board_that_locks() -> None:
     here, wire = session(**{f"s{number}": value for number, value in HOMING.items()})
     assert here.open().state == "Alarm"
@@ -205,7 +211,8 @@ def test_a_second_press_does_not_end_a_stop_that_the_controller_has_not_heard() 
 
 TYPED = st.sampled_from(
     ["M3 S500", "M3", "M4", "M4S20", "M5", "S300", "S0", "S9", "G1 X1 F6000", "G0 X0", "G80",
-     "G1 F6000 S40", "G0 M3 S5", "G1 X2 F6000 M3 S60", "(M3) S7", "$32=0", "$32=1", "M30"]
+     "G1 F6000 S40", "G0 M3 S5", "G1 X2 F6000 M3 S60", "(M3) S7", "$32=0", "$32=1", "M30",
+     "$N0=M3S30", "$N1=G1F600M3"]
 )  # fmt: skip
 
 
@@ -224,14 +231,64 @@ def test_no_line_of_a_person_lights_a_resting_beam_unless_it_is_sent_twice(
         except GcodeError:
             assert wire.sent.replace(sent, b"").strip() in (b"", b"$G")  # it was not sent
             here.say(line)
-            here.settle()
+            rest(here)
             assert wire.device.beam_on, line  # and would indeed have done that
             wanted = True
-        here.settle()
+        rest(here)
         wanted &= wire.device.beam_on
         assert wanted or not wire.device.beam_on, line
     assert here.close()
     assert not wire.device.beam_on
+
+
+@pytest.mark.parametrize(
+    ("laser_mode", "before", "lights"),
+    [
+        (True, ["S900", "G1 X30 F600"], "M3"),  # it moves, and does not tell its modes
+        (False, ["S900", "G1 X30 F600"], "M3"),
+        (True, ["M3 S900", "$32=0"], "G1 X1 F600"),  # what is armed and dark
+        (False, [], "$N0=M3S900"),
+    ],
+)
+def test_a_beam_that_would_rest_is_asked_for_whatever_came_before(
+    laser_mode: bool, before: list[str], lights: str
+) -> None:
+    here, wire = session(s32=laser_mode)
+    for line in before:
+        here.say(line)
+    with pytest.raises(GcodeError, match=r"would be on, with S900"):
+        here.say(lights)
+    here.settle()
+    assert not wire.device.beam_log
+    assert not wire.device.beam_on
+
+
+def test_an_abort_ends_what_a_startup_block_lights_after_each_reset() -> None:
+    here, wire = session(s32=0)
+    with pytest.raises(GcodeError, match="M5, and again after each reset"):
+        here.say("$N0=M3S500")
+    here.say("$N0=M3S500")
+    assert wire.device.beam_on
+    assert here.abort()
+    assert not wire.device.beam_on
+    light(here)
+    assert here.close()
+    assert not wire.device.beam_on
+
+
+@pytest.mark.parametrize("armed", ["M3 S900", "M4 S900"])
+def test_a_jog_with_an_armed_beam_is_dark(armed: str) -> None:
+    """GRBL moves a jog with the beam that is armed, as a cut."""
+    here, wire = session(s32=1)
+    here.say(armed)
+    here.jog(x=10.0)
+    here.say(armed)
+    here.nudge(1.0, 0.0)
+    here.watch(1.0)
+    here.say(armed)
+    here.go_to_origin()
+    assert not wire.device.beam_log
+    assert here.state.position == (0.0, 0.0, 0.0)
 
 
 def test_a_session_that_is_left_with_the_beam_on_goes_dark() -> None:
