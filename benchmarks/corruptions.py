@@ -239,8 +239,9 @@ def rewritten(file: Document, random: np.random.Generator) -> Document:
     order = random.permutation(len(file["edges_vertices"])).tolist()
     ends = [file["edges_vertices"][edge] for edge in order]
     file["edges_vertices"] = [pair[:: int(random.choice([-1, 1]))] for pair in ends]
-    for key in ("edges_assignment", "edges_foldAngle"):
-        file[key] = [file[key][edge] for edge in order]
+    for frame in (file, *file.get("file_frames", [])):
+        for key in {"edges_assignment", "edges_foldAngle"} & set(frame):
+            frame[key] = [frame[key][edge] for edge in order]
     if "miurafab:seams" in file:
         place = {edge: number for number, edge in enumerate(order)}
         file["miurafab:seams"] = [[place[edge] for edge in pair] for pair in file["miurafab:seams"]]

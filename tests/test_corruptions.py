@@ -38,6 +38,17 @@ def test_changes_of_every_kind_are_found_and_whole_files_are_not_blamed(name, tm
             assert refused, change[1]
 
 
+def test_a_frame_folded_flat_follows_its_facets_however_they_are_written(tmp_path):
+    """The facet that keeps its place, and so the side on which the sheet lies, depend on that."""
+    mf.fit("cylinder", facets=(4, 6), size=120, close="seam").pattern.save(tmp_path / "whole.fold")
+    whole = json.loads((tmp_path / "whole.fold").read_text())
+    assert whole["file_frames"][-1]["frame_title"] == "folded flat"
+    for start in range(4):
+        again = whole | {"faces_vertices": [f[start:] + f[:start] for f in whole["faces_vertices"]]}
+        refused, said = verdict(again, tmp_path / "again.fold")
+        assert not refused, said
+
+
 def test_a_drawing_that_can_be_folded_flat_is_not_blamed_for_the_frame_that_says_so(tmp_path):
     """Its file has a frame folded flat, which is not the folded form that its angles tell."""
     pattern = replace(regular(), folded_coords=None)

@@ -80,12 +80,16 @@ def _signs(orders: Ints) -> set[tuple[int, int, int]]:
 
 def _apart(pattern: CreasePattern, points: Floats, order: LayerOrder) -> float:
     """How far ``points`` (V, 3) are from the sheet folded flat, in mean edges, each piece moved to
-    it as a rigid body.
+    it as a rigid body, which may turn it over.
     """
     there = np.column_stack([order.folded.vertices, np.zeros(len(points))])
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
+    sides = (points, points * [1.0, -1.0, -1.0])  # what lies in a plane is moved within it
     off = [
-        np.linalg.norm(laid_on(points[own], there[own]) - there[own], axis=1).max()
+        min(
+            np.linalg.norm(laid_on(side[own], there[own]) - there[own], axis=1).max()
+            for side in sides
+        )
         for own in (piece.vertices for piece in pieces_of(pattern))
     ]
     return float(max(off)) / mean
