@@ -28,7 +28,7 @@ from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
 from miurafab.origami.folding.certificate import RigidCertificate
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.folding.facet_energy import facet_energies
-from miurafab.origami.folding.judge_motion import motion_findings
+from miurafab.origami.folding.judge_motion import median_fold, motion_findings
 from miurafab.origami.folding.kinematics import (
     CLOSED_FORM,
     FROM_FLAT,
@@ -374,5 +374,6 @@ def _names(motion: FoldingMotion) -> tuple[str, ...]:
         elif math.isinf(state):
             names.append("folded flat")
         else:
-            names.append("the folded form" if frame == target else f"s = {state:.3g}")
+            turned = f"median fold angle {median_fold(motion, frame):.0f}°"
+            names.append("the folded form" if frame == target else turned)
     return tuple(names)

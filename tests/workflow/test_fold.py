@@ -274,8 +274,16 @@ def test_the_last_pictures_part_the_layers(tmp_path: Path) -> None:
 
 
 def test_a_sheet_that_does_not_fold_flat_is_given_no_order() -> None:
-    told = fold(developable("hypar"), 4).report()
+    folding = fold(developable("hypar"), 4)
+    told = folding.report()
     assert told["layers"] is None
+    motion = folding.motion
+    worst = motion.states.tolist().index(told["certificate"]["state"])
+    creases = np.isin(motion.pattern.edges_assignment, ["M", "V"])
+    middle = np.degrees(np.median(np.abs(motion.fold_angles[worst, creases])))
+    sentence = told["findings"][0]["sentence"]
+    assert f"where its median fold angle is {middle:.0f} degrees," in sentence
+    assert "s = " not in sentence
     codes = [finding["code"] for finding in told["findings"]]
     assert codes == ["bent-facets", "no-layer-order"]
     exactly = fold(exact("hypar"), 4).report()

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from miurafab.findings import Finding
 from miurafab.origami.folding.angles_csv import Contact
 from miurafab.origami.folding.certificate import RigidCertificate
-from miurafab.origami.folding.kinematics import FROM_FLAT, RIGID
+from miurafab.origami.folding.kinematics import FROM_FLAT, RIGID, FoldingMotion
 from miurafab.origami.folding.motion import FoundMotion
 from miurafab.origami.folding.ramp_motion import HELD_BACK, RampVerdict
 
@@ -23,10 +25,16 @@ def motion_findings(found: FoundMotion, contacts: Sequence[Contact]) -> tuple[Fi
     return (*found.motion.pattern.told, *_findings(found, contacts))
 
 
+def median_fold(motion: FoldingMotion, frame: int) -> float:
+    """The median of the fold angles of the mountains and valleys in a frame, degrees."""
+    folds = np.isin(motion.pattern.edges_assignment, ["M", "V"])
+    return float(np.degrees(np.median(np.abs(motion.fold_angles[frame, folds]))))
+
+
 def _findings(found: FoundMotion, contacts: Sequence[Contact]) -> Iterator[Finding]:
     motion, verdict = found.motion, found.verdict
     if found.certificate is not None and not found.certificate.rigid:
-        yield _bends(found.certificate, motion.method == FROM_FLAT)
+        yield _bends(found.certificate, motion)
     if verdict is not None:
         yield from _of_ramp(verdict, float(motion.states[-1]))
     if contacts:
@@ -34,9 +42,12 @@ def _findings(found: FoundMotion, contacts: Sequence[Contact]) -> Iterator[Findi
         yield Finding("contacts", f"On the way facets pass through each other in {frames}.")
 
 
-def _bends(certificate: RigidCertificate, from_flat: bool) -> Finding:
-    state = certificate.state
-    where = f"at {state:.0%} of its fold angles" if from_flat else f"at s = {state:.2g}"
+def _bends(certificate: RigidCertificate, motion: FoldingMotion) -> Finding:
+    if motion.method == FROM_FLAT:
+        where = f"at {certificate.state:.0%} of its fold angles"
+    else:
+        frame = int(np.argmin(np.abs(motion.states - certificate.state)))
+        where = f"where its median fold angle is {median_fold(motion, frame):.0f} degrees,"
     if certificate.residual <= RIGID:  # flat facets, but perhaps on another motion
         turn = math.degrees(certificate.moved)
         return Finding(
