@@ -54,10 +54,22 @@ class OnTour(AtDesk):
             dress(self, theme)
             for width in WIDTHS:
                 self.width(width)
-                self.run("new Promise((done) => setTimeout(done, 400))")
-                shot = self.call("Page.captureScreenshot", format="png")["data"]
+                shot = self.still()
                 file = Path(SHOTS) / f"{name}-{width}-{theme}.png"
                 file.write_bytes(base64.b64decode(shot))
+
+    def still(self):
+        """A picture of the page at rest. A frame is laid out and drawn after the page around it,
+        and cannot be asked whether it is: so the picture has to stay the same for a while.
+        """
+        last, same = "", 0
+        for _ in range(30):
+            self.run("new Promise((done) => setTimeout(done, 400))")
+            shot = self.call("Page.captureScreenshot", format="png")["data"]
+            last, same = shot, same + 1 if shot == last else 0
+            if same == 3:
+                break
+        return last
 
     def drop(self, name, content):
         """Drop a file onto the page, as a person drags it out of a folder."""
