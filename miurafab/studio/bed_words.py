@@ -89,8 +89,11 @@ def _words(title: str, remark: str, largest: float, *, good: bool | None) -> dic
 def _on_bed(sizing: Sizing, scale: float) -> dict[str, Any]:
     """The flat pattern over one sheet, both in mm about their middles: the ``sheet`` [width,
     height] that can be used, and the ``border`` [x, y, x, y] of each edge, turned as it lies on the
-    sheet at the largest ``scale``.
+    sheet at the largest ``scale``. ``sheet`` is None for several pieces: a plan says where they
+    lie.
     """
+    if len(sizing.pieces) > 1:
+        return {"sheet": None, "border": []}
     room, flat = sizing.room, sizing.pattern.vertices_coords
     fitting = scale * flat
     turn = room.turn(fitting) or 0.0

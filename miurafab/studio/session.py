@@ -267,6 +267,7 @@ class Bench:
                 "seconds": round(time.monotonic() - task.began, 1),
                 "error": task.error,
                 "cancelled": task.cancelled,
+                "form": self._coming and self._coming.form,
             },
             "pattern": self.pattern,
             "job": self.job,

@@ -36,6 +36,8 @@ from miurafab.workflow.preview import Preview
 Tell = Callable[[dict[str, Any]], None]
 
 PAGE, MOTION, PICTURE, TARGET = "still.html", "folding.html", "pattern.svg", "target.json"
+_FLAT = 400.0
+"""The width of the flat picture, about that on the page: its lines are made for it."""
 _FITTING = 0.6
 """The share of the progress bar for the fit; the rest is for the folding."""
 
@@ -146,7 +148,7 @@ def _show(
 ) -> None:
     """Report the pattern as a drawing and in space, first still, then folding; and its target."""
     folder = order.folder
-    write_text(folder / PICTURE, flat_svg(pattern, 640.0))
+    write_text(folder / PICTURE, flat_svg(pattern, _FLAT))
     write_page(folder / PAGE, title=order.name, pattern=pattern)
     files = {**part["files"], "picture": PICTURE, "page": PAGE}
     if surface is not None and pattern.folded_coords is not None:

@@ -2,12 +2,13 @@
 
 import json
 import os
+import re
 import time
 
 import numpy as np
 import pytest
 from rigs import until
-from studios import Asked, Done, saddle_obj, sentence
+from studios import Asked, Done, Waiting, saddle_obj, sentence
 
 import miurafab
 from miurafab.fabrication.sheets import lay_out
@@ -271,12 +272,31 @@ def test_the_drawing_on_the_bed_lies_within_the_sheet_just_as_long_as_it_fits():
         assert lengths == pytest.approx(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), abs=0.2)
 
 
+def test_several_pieces_are_not_drawn_on_a_sheet_where_they_will_not_lie():
+    bed = coarsely("hypar", facets="8x8", pieces="3")["bed"]
+    assert (bed["sheet"], bed["border"]) == (None, [])
+    assert bed["largest_mm"] > 0
+
+
+def test_the_lines_of_the_flat_picture_are_wide_enough_for_its_place_on_the_page(studio):
+    studio.fit("plane", "8x8")
+    picture = studio.get(studio.state()["pattern"]["files"]["picture"]).body.read_text()
+    width = float(re.search(r'width="([0-9.]+)"', picture).group(1))
+    lines = [float(each) for each in re.findall(r'stroke-width="([0-9.]+)"', picture)]
+    assert min(lines) * 285 / width > 0.5  # pixels, beside the folding at 1280
+
+
 def test_a_result_says_what_it_is_a_result_of(studio):
     studio.fit("plane", "4x4", size="120mm")
     pattern = studio.state()["pattern"]
     assert pattern["subject"] == "plane · Facets 4x4 · Size 120mm"
     form = {"target": {"surface": "plane", "parameters": {}}}
     assert pattern["form"] == form | {"options": {"facets": "4x4", "size": "120mm"}}
+    studio.running = Waiting  # the next one does not end
+    studio.fit("plane", "6x6")
+    state = studio.state()
+    assert state["pattern"]["form"]["options"]["facets"] == "4x4"
+    assert state["task"]["form"]["options"]["facets"] == "6x6"
 
 
 def test_a_fit_takes_the_place_of_the_one_that_it_replaces_and_of_no_other(tmp_path):

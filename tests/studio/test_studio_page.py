@@ -72,7 +72,7 @@ def page(tmp_path, address):
         assert all(asked.startswith((address, "data:", "blob:")) for asked in seen.requests)
 
 
-def test_from_a_surface_to_sheets_by_keyboard(page):
+def test_from_a_surface_to_sheets_by_keyboard(page, address):
     assert page.run("document.getElementById('pattern').hidden")
     page.run("document.getElementById('target').focus()")
     page.run(
@@ -127,6 +127,35 @@ def test_from_a_surface_to_sheets_by_keyboard(page):
         for tab in ("shape", "fold", "layout"):
             page.run(f"document.getElementById('{tab}-tab').click()")
             assert page.run("document.documentElement.scrollWidth") <= width
+
+    # the last result cannot be laid out for a form that asks for something else
+    can = "!document.getElementById('lay-out').disabled"
+    assert page.run(can)
+    page.run("document.getElementById('follow').click()")
+    page.run("document.getElementById('shape-tab').click()")
+    page.type("size", "150mm")
+    assert not page.run(can)
+    said = "document.getElementById('layout-of').textContent"
+    assert "Size 200mm. The tab Shape asks for something else" in page.run(said)
+    page.run("document.getElementById('back-to').click()")
+    assert page.run(can)
+    page.run("document.getElementById('follow').click()")
+
+    # what is refused has no refit on the way
+    page.type("facets", "14x14")
+    page.until("!document.getElementById('coarse').hidden")
+    page.type("facets", "14x")
+    page.until("document.getElementById('coming').textContent.includes('cannot be made')")
+
+    # a page that is loaded again in the middle of a fit has the values of that fit
+    page.type("facets", "40x40")
+    page.press("Enter")
+    page.until("!document.getElementById('task').hidden")
+    page.open(address)
+    page.until("document.documentElement.dataset.ready === 'yes'")
+    assert page.run("document.getElementById('facets').value") == "40x40"
+    page.run("document.getElementById('cancel').click()")
+    page.idle()
 
 
 @needs_axe

@@ -10,7 +10,7 @@ import { seeTarget } from "./target.js";
 import { texts } from "./texts.js";
 import { ask, byId, element, say } from "./tools.js";
 
-const { live } = texts;
+const { layout, live } = texts;
 const REST_MS = 700;
 const AGAIN_MS = 400;
 const MOST_ALONE = 1600; // facets of a whole fit that begins by itself
@@ -140,6 +140,12 @@ function showCoarse() {
   showTerms("coarse-figures", said.lines);
 }
 
+/** Which pattern would be laid out, or why it cannot be. */
+function showLayoutOf(pattern, whole) {
+  const words = whole ? layout.for_pattern : layout.for_other;
+  byId("layout-of").textContent = pattern?.files.fold ? say(words, pattern) : "";
+}
+
 /** What is on show, and what is said of it. */
 function show() {
   const form = present();
@@ -161,10 +167,13 @@ function show() {
   byId("refused").textContent = refused;
   byId("subject").textContent = pattern?.subject ?? "";
   byId("go-on").disabled = stale;
+  showLayoutOf(pattern, whole);
   byId("fit").disabled = false;
   const runs = Boolean(task?.running);
+  byId("lay-out").disabled = runs || !whole || !pattern.files.fold;
   const comes = runs && task.kind === "fit" && quick ? live.coming : "";
-  byId("coming").textContent = useCoarse && !quick ? live.behind : comes;
+  const instead = refused ? live.refused : live.behind;
+  byId("coming").textContent = useCoarse && !quick ? instead : comes;
   byId("shape-empty").hidden = useCoarse || Boolean(pattern);
   byId("undo").disabled = past.at < 1;
   byId("redo").disabled = past.at >= past.forms.length - 1;

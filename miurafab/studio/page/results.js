@@ -58,8 +58,6 @@ byId("flat").addEventListener("load", ({ target }) => {
 
 export function showJob(job, pattern) {
   const ready = Boolean(pattern?.files.fold);
-  byId("layout-of").textContent = ready ? say(layout.for_pattern, { name: pattern.name }) : "";
-  byId("lay-out").disabled = !ready;
   byId("layout-empty").hidden = job !== null;
   byId("layout-hint").textContent = ready
     ? layout.hint_ready : layout.hint_none;

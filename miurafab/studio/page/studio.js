@@ -34,7 +34,6 @@ function show(state) {
     else byId("task-bar").removeAttribute("value");
   }
   byId("job").classList.toggle("old", running && task.id !== pattern?.id);
-  byId("lay-out").disabled ||= running;
   const names = JSON.stringify(sources);
   if (names !== told) showSources(sources);
   told = names;
@@ -172,10 +171,11 @@ async function begin() {
     ownJob = catalogue.own_job;
     await beginMachine(catalogue, fault);
     if (ownJob) turnTo("desk");
-    const { sources, pattern } = await ask("state");
+    const { sources, pattern, task } = await ask("state");
+    const form = task?.running ? task.form : pattern?.form; // of what is to be shown next
     told = JSON.stringify(sources);
     showSources(sources, catalogue.first?.source, catalogue.first?.parameters);
-    if (pattern) restoreForm(pattern.form);
+    if (form) restoreForm(form);
     beginProfile(changed);
     beginLive(catalogue, { asks: order });
     beginTarget();

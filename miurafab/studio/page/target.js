@@ -193,7 +193,8 @@ function showWords(picture, { pieces, part, colours }) {
     words.push(element("span", { className: "ramp-key" }, `−${most} mm`, element("i", { className: "ramp" }), `+${most} mm`));
     words.push(swatch("left-out", say(target.not_covered, { share: (100 * missedOf(shown)).toFixed(1) })));
   } else if (picture) {
-    words.push(swatch("paper", pieces > 1 ? say(target.pieces, { count: pieces }) : target.covered));
+    const given = field("pieces").value || picture.kind !== "tube"; // else a fit may find that it needs more
+    words.push(swatch("paper", pieces > 1 ? say(given ? target.pieces : target.fewest, { count: pieces }) : target.covered));
     const cut = part.some((value, at) => Math.abs(value - [0, 1, 0, 1][at]) > 1e-9);
     if (cut || (pictures.file && areaOf(pictures.file) > (1 + OUTER) * areaOf(picture))) words.push(swatch("left-out", target.left_out));
     if (picture.filled.some(Boolean)) words.push(swatch("filled", target.filled));
