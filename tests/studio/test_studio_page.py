@@ -135,8 +135,9 @@ def test_from_a_surface_to_sheets_by_keyboard(page, address):
     page.run("document.getElementById('shape-tab').click()")
     page.type("size", "150mm")
     assert not page.run(can)
-    said = "document.getElementById('layout-of').textContent"
-    assert "Size 200mm. The tab Shape asks for something else" in page.run(said)
+    for tab in ("fold", "layout"):
+        said = page.run(f"document.getElementById('{tab}-of').textContent")
+        assert "Size 200mm. The tab Shape asks for something else" in said
     page.run("document.getElementById('back-to').click()")
     assert page.run(can)
     page.run("document.getElementById('follow').click()")

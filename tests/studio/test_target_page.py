@@ -214,6 +214,11 @@ def test_a_target_is_drawn_dropped_placed_mended_and_compared(page):
     page.shown("target-colours")
     assert "not covered" in page.text("target-key")
     assert page.share("#target-canvas", PAPER) < 0.02  # all is coloured by its deviation
+    page.put("facets", "8x8")  # the colours are those of another sheet
+    page.until("document.getElementById('target-colours').hidden")
+    assert page.share("#target-canvas", PAPER) > 0.1
+    page.put("facets", "6x6")
+    page.shown("target-colours")
     page.put("target-colours", "charts")
     assert page.share("#target-canvas", PAPER) > 0.1
     page.put("parameter-height", "0.7")  # the colours belong to another target

@@ -6,7 +6,7 @@ import { fitOrder, layoutOrder, restoreForm } from "./choices.js";
 import { showTerms } from "./results.js";
 import { beginSketch, sketch } from "./sketch.js";
 import { beginSliders, placeSliders } from "./sliders.js";
-import { seeTarget } from "./target.js";
+import { seeTarget, takeFit } from "./target.js";
 import { texts } from "./texts.js";
 import { ask, byId, element, say } from "./tools.js";
 
@@ -140,10 +140,11 @@ function showCoarse() {
   showTerms("coarse-figures", said.lines);
 }
 
-/** Which pattern would be laid out, or why it cannot be. */
-function showLayoutOf(pattern, whole) {
-  const words = whole ? layout.for_pattern : layout.for_other;
-  byId("layout-of").textContent = pattern?.files.fold ? say(words, pattern) : "";
+/** Which pattern the tabs Fold and Layout have, and whether the form asks for another. */
+function showResultOf(pattern, whole) {
+  const words = !pattern?.files.fold ? "" : say(whole ? layout.for_pattern : layout.for_other, pattern);
+  byId("layout-of").textContent = words;
+  byId("fold-of").textContent = words;
 }
 
 /** What is on show, and what is said of it. */
@@ -167,7 +168,8 @@ function show() {
   byId("refused").textContent = refused;
   byId("subject").textContent = pattern?.subject ?? "";
   byId("go-on").disabled = stale;
-  showLayoutOf(pattern, whole);
+  showResultOf(pattern, whole);
+  takeFit(Boolean(whole));
   byId("fit").disabled = false;
   const runs = Boolean(task?.running);
   byId("lay-out").disabled = runs || !whole || !pattern.files.fold;

@@ -31,6 +31,7 @@ let again = false;
 let resting = null;
 let poles = null; // those that were picked so far, while they are picked
 let fitted = { file: "", key: "" };
+let isOfForm = false; // the last fit is one of the form as it is now
 
 const field = (name) => byId(name);
 const top = () => pictures.laid ?? pictures.file;
@@ -103,7 +104,7 @@ async function laid(number, now) {
 }
 
 function take(found, keep = false) {
-  pictures = { ...found, fitted: fitted.picture && fitted.key === key ? fitted.picture : null };
+  pictures = { ...found, fitted: isOfForm && fitted.picture && fitted.key === key ? fitted.picture : null };
   if (key === JSON.stringify(null)) pictures.laid = pictures.fitted; // a pattern that was opened
   byId("target-panel").hidden = !top() && byId("target-refused").hidden;
   const { laid: picture } = pictures;
@@ -282,6 +283,13 @@ function tapped(spot) {
   if (poles.length < 2) return;
   put("poles", poles.flat().map((value) => Number(value.toPrecision(6))).join(","));
   poles = null;
+}
+
+/** Whether the last fit is one of the form as it is: of another the colours would be stale. */
+export function takeFit(is) {
+  if (is === isOfForm) return;
+  isOfForm = is;
+  take(pictures, true);
 }
 
 /** After each answer of the studio: the colours of a fit, once they are there. */

@@ -173,7 +173,7 @@ export const texts = {
     "cut_it": "Cut it",
     "cut_how": "The tab <b>Machine</b> frames and cuts it here. Somebody has to stand beside the laser, with an extinguisher at hand. For another computer: unpack the job there and paste this into a terminal, with its port (<code>miurafab doctor</code> lists them; <code>--port virtual</code> is for practice).",
     "cut_command": "Command that cuts",
-    "for_pattern": "For {subject}.",
+    "for_pattern": "This is {subject}.",
     "for_other": "The last result is {subject}. The tab Shape asks for something else: fit that, or go back to the values of the result.",
     "hint_ready": "Choose a machine and a material, and lay the pattern out.",
     "hint_none": "Fit or open a pattern first.",
