@@ -16,7 +16,10 @@ DECIMAL = r"(?:\d++(?:\.\d*+)?|\.\d++)"
 n digits of which each may stand before or after a point that is missing, an expression that fails
 behind them tries n ways, and n^2 with two such numbers."""
 
-_QUANTITY = re.compile(rf"\s*([-+]?{DECIMAL}(?:[eE][-+]?\d+)?)\s*([^\d\s].*?)?\s*")
+_QUANTITY = re.compile(rf"([-+]?{DECIMAL}(?:[eE][-+]?\d+)?)\s*+([^\d\s].*)?")
+
+_SHOWN = 60
+"""Letters of a text that a sentence repeats."""
 
 # The inch is exactly 25.4 mm (international yard and pound agreement, 1959).
 _LENGTHS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, '"': 25.4}
@@ -32,12 +35,14 @@ def _parse(text: str | float, units: dict[str, float], bare: str, what: str) -> 
     if isinstance(text, int | float):
         value, unit = as_float(text), bare
     else:
-        match = _QUANTITY.fullmatch(text)
+        match = _QUANTITY.fullmatch(text.strip())
         if match is None:
             raise UnitError(
-                f"{text!r} is not {what}; write a number with one of the units {_list(units)}."
+                f"{text[:_SHOWN]!r} is not {what}; write a number with one of the units "
+                f"{_list(units)}."
             )
         value, unit = float(match.group(1)), (match.group(2) or bare)
+        text, unit = text[:_SHOWN], unit[:_SHOWN]
     factor = units.get(unit) if unit in units else units.get(unit.lower())
     if factor is None:
         raise UnitError(f"{text!r} is not {what}: the unit {unit!r} is not one of {_list(units)}.")

@@ -8,12 +8,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.nearest import tree_of
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.curves import Curve, Polyline, default_tolerance
 
+FARTHEST = 1e9
+"""A coordinate beyond this is refused, mm."""
 _CORNER = 0.2
+_MOST = 100_000
+"""All curves of a drawing may become so many straight lines together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +63,12 @@ def straightened(
 ) -> CreaseLines:
     """``drawn`` as straight lines, which lie within ``curve_tolerance`` (mm) of those that curve;
     None is a thousandth of the longer side of the drawing. ``left_out`` is kept.
+
+    Raises :class:`~miurafab.errors.PatternError` for a coordinate beyond :data:`FARTHEST` or that
+    is no number, and for curves that would become too many lines.
     """
+    if not all((np.abs(line.course.hull()) < FARTHEST).all() for line in drawn):
+        raise too_far()
     near = curve_tolerance
     if near is None:
         near = default_tolerance([line.course for line in drawn])
@@ -68,6 +78,11 @@ def straightened(
         points = line.course.points(near)
         count = len(points) - 1
         curved = not isinstance(line.course, Polyline)
+        if curved and len(curve) + count > _MOST:
+            raise PatternError(
+                f"The curved lines would become more than {_MOST} straight lines; give a larger "
+                "`curve_tolerance`."
+            )
         number += curved
         ends.append(np.stack([points[:-1], points[1:]], axis=1))
         letters += [line.letter] * count
@@ -81,6 +96,11 @@ def straightened(
         near if number >= 0 else 0.0,
         left_out or {},
     )
+
+
+def too_far() -> PatternError:
+    """For a drawing with a coordinate that is not below :data:`FARTHEST`."""
+    return PatternError("The drawing holds a coordinate that is not a number or is beyond 1e9.")
 
 
 def with_flat_lines(lines: CreaseLines, ends: Floats) -> CreaseLines:

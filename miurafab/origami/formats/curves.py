@@ -30,6 +30,7 @@ MOST = 10_000
 """A curve of more straight lines is refused: its tolerance is too fine."""
 
 _LEAST_FLAT = 1e-12
+_STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +93,13 @@ class Arc:
         return Arc(_moved(self.centre, matrix), matrix[:, :2] @ self.axes, self.start, self.sweep)
 
     def hull(self) -> Floats:
-        """(n, 2) points whose box holds the ellipse."""
-        reach = np.linalg.norm(self.axes, axis=1)
-        return np.stack([self.centre - reach, self.centre + reach])
+        """(n, 2) points whose box holds the arc: its ends, and where it turns back in x or y."""
+        low = min(self.start, self.start + self.sweep)
+        peak = np.arctan2(self.axes[:, 1], self.axes[:, 0])
+        turns = low + (np.concatenate([peak, peak + math.pi]) - low) % (2 * math.pi)
+        ends = np.array([self.start, self.start + self.sweep])
+        t = np.concatenate([ends, turns[turns < low + abs(self.sweep)]])
+        return np.asarray(self.centre + np.stack([np.cos(t), np.sin(t)], axis=1) @ self.axes.T)
 
     def points(self, tolerance: float) -> Floats:
         """(n, 2) points on it whose straight lines lie within ``tolerance`` of it.
@@ -142,11 +147,11 @@ class Spline:
             at = np.asarray(curve(t), dtype=np.float64)
             return np.asarray(at[:, :2] / at[:, 2:])
 
-        found = [on(breaks[:1])]
+        found, whole = [on(breaks[:1])], 0
         for low, high in zip(breaks[:-1].tolist(), breaks[1:].tolist(), strict=True):
             count = 1
             while True:
-                if count > MOST:
+                if whole + count > MOST:
                     raise _too_fine()
                 t = np.linspace(low, high, 4 * count + 1)
                 p = on(t)
@@ -155,6 +160,7 @@ class Spline:
                 if _distances(inner, ends).max() <= tolerance:
                     break
                 count *= 2
+            whole += count
             found.append(p[4::4])
         return np.concatenate(found)
 
@@ -174,11 +180,12 @@ def default_tolerance(curves: Sequence[Curve]) -> float:
 
 def bulged(start: Floats, end: Floats, bulge: float) -> Curve:
     """The arc from ``start`` to ``end`` whose ``bulge`` is the tangent of a quarter of its angle,
-    positive where it turns left (DXF reference, LWPOLYLINE, group 42); a straight line for 0.
+    positive where it turns left (DXF reference, LWPOLYLINE, group 42); a straight line where it
+    rises by less than a millionth of its chord.
     """
     chord = end - start
     length = float(np.linalg.norm(chord))
-    if bulge == 0 or length == 0:
+    if abs(bulge) < 2 * _STRAIGHT or length == 0:
         return Polyline(np.stack([start, end]))
     sweep = 4 * math.atan(bulge)
     radius = length / (2 * math.sin(sweep / 2))

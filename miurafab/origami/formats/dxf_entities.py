@@ -22,6 +22,8 @@ from miurafab.origami.formats.lines import finite_number
 Tags = list[tuple[int, str]]
 
 _CLOSED, _FRAME = 1, 16
+_HIGHEST_DEGREE = 25
+"""Of a spline; programs draw up to 11, and each point takes the square of it in time."""
 _MIRRORED = np.array([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _WITHOUT_LINES = frozenset(
@@ -29,6 +31,7 @@ _WITHOUT_LINES = frozenset(
 )
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def parse_dxf(text: str, curve_tolerance: float | None = None) -> CreaseLines:
     """The lines of a DXF file, lettered by layer, else by colour.
 
@@ -88,6 +91,10 @@ def _spline(tags: Tags) -> Iterator[Curve]:
         )
     if not len(weights):
         weights = np.ones(len(control))
+    if degree > _HIGHEST_DEGREE:
+        raise PatternError(
+            f"a SPLINE is of degree {degree:.4g}; {_HIGHEST_DEGREE} is the highest that is read."
+        )
     sound = 1 <= degree < len(control) and len(knots) == len(control) + degree + 1
     if not sound or len(weights) != len(control):
         raise PatternError(

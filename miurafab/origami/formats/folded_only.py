@@ -97,7 +97,7 @@ def unfolded_pattern(frame: Mapping[str, Any], factor: float) -> CreasePattern:
         faces_vertices=sheet.faces,
         folded_coords=points,
     )
-    signs = _signs(frame, sheet)
+    signs = _signs(frame, sheet, pattern.edges_faces)
     if _is_seen_from_below(pattern, signs):
         pattern = replace(pattern, faces_vertices=reversed_faces(pattern.faces_vertices))
     laid = flattened(pattern)
@@ -113,8 +113,10 @@ def told_of_unfolding(residual: float, more: str = "") -> Finding:
     )
 
 
-def _signs(frame: Mapping[str, Any], sheet: _Sheet) -> Ints:
-    """(E,) 1 for a valley, -1 for a mountain and 0 where the file does not tell."""
+def _signs(frame: Mapping[str, Any], sheet: _Sheet, beside: Ints) -> Ints:
+    """(E,) 1 for a valley, -1 for a mountain and 0 where the file does not tell; ``beside`` (E, 2)
+    are the facets at the edges, -1 for none.
+    """
     signs = np.select([sheet.letters == "V", sheet.letters == "M"], [1, -1], 0)
     free = signs == 0
     signs[free] = np.sign(np.nan_to_num(sheet.angles[free])).astype(np.int64)
@@ -124,18 +126,11 @@ def _signs(frame: Mapping[str, Any], sheet: _Sheet) -> Ints:
     # a facet that lies on the front of its neighbour is folded over as a valley
     above = {(f, g): s for f, g, s in orders.tolist()}
     for edge in np.flatnonzero(signs == 0).tolist():
-        one, other = _beside(sheet, edge)
+        one, other = beside[edge].tolist()
         if one >= 0 and other >= 0:
             side = above.get((one, other), 0) or above.get((other, one), 0)
             signs[edge] = side
     return np.asarray(signs)
-
-
-def _beside(sheet: _Sheet, edge: int) -> tuple[int, int]:
-    """The two facets at an edge, -1 for none."""
-    ends = sheet.edges[edge]
-    has = np.flatnonzero(np.isin(sheet.faces, ends).sum(axis=1) == 2)
-    return (int(has[0]), int(has[1])) if len(has) == 2 else (-1, -1)
 
 
 def _is_seen_from_below(pattern: CreasePattern, signs: Ints) -> bool:

@@ -12,7 +12,7 @@ from miurafab.geometry.boxes import meeting_pairs
 from miurafab.geometry.nearest import tree_of
 from miurafab.origami.formats.crease_lines import CreaseLines
 
-_SAMPLE, _MEETINGS, _FEW_MEETINGS = 200, 100, 1_000_000
+_SAMPLE, _MEETINGS, _FEW_MEETINGS = 200, 20, 1_000_000
 
 
 def split_lines(lines: CreaseLines, near: float) -> tuple[Floats, Ints, Ints]:

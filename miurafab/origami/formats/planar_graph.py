@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 from miurafab.errors import PatternError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.boxes import meeting_pairs
 from miurafab.geometry.polygons import (
     connected_parts,
     edge_lengths,
@@ -27,7 +28,13 @@ from miurafab.geometry.polygons import (
     signed_areas,
 )
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.formats.crease_lines import CreaseLines, corners_at_ends, with_flat_lines
+from miurafab.origami.formats.crease_lines import (
+    FARTHEST,
+    CreaseLines,
+    corners_at_ends,
+    too_far,
+    with_flat_lines,
+)
 from miurafab.origami.formats.line_crossings import split_lines
 from miurafab.origami.formats.rulings import rulings
 from miurafab.origami.formats.told import (
@@ -44,7 +51,10 @@ and the fewest edges short."""
 SHORT = 1e-3
 """Shorter edges, as parts of the median line, may be left where lines were to meet."""
 
-_FAR = 1e9
+_AT_ONCE = 1_000_000
+"""Corners of facets that are compared with a point in one step."""
+_MOST_CORNERS = 20_000_000
+"""Of all facets, were each as large as the largest: 160 MB."""
 # Of two lines on each other, the line of the higher rank is kept.
 _RANK = {"B": 6, "C": 5, "M": 4, "V": 4, "J": 2, "F": 1, "U": 0}
 
@@ -64,8 +74,8 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
     """
     if not len(lines.ends):
         raise PatternError("The drawing holds no line.")
-    if not (np.abs(lines.ends) < _FAR).all():
-        raise PatternError("The drawing holds a coordinate that is not a number or is beyond 1e9.")
+    if not (np.abs(lines.ends) < FARTHEST).all():
+        raise too_far()
     lines = corners_at_ends(lines)
     near, told = tolerance, tuple[Finding, ...]()
     if near is None:
@@ -200,6 +210,11 @@ def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
         if not open_.any():
             break
         corners.append(np.where(open_, tail[at], -1))
+        if len(corners) * len(at) > _MOST_CORNERS:
+            raise PatternError(
+                f"A facet has more than {len(corners)} corners, too many beside {len(at)} others; "
+                "draw its border by longer lines."
+            )
     return np.stack(corners, axis=1)
 
 
@@ -285,15 +300,28 @@ def without_holes(
 
 def _refuse_loose(points: Floats, faces: Ints, piece: Ints) -> None:
     """Refuse a piece that lies inside a facet of another: its first corner shows it."""
-    start, end = points[filled(faces)], np.roll(points[filled(faces)], -1, axis=1)
-    for number in range(int(piece.max()) + 1):
-        x, y = points[faces[np.argmax(piece == number), 0]]
-        over = (start[..., 1] > y) != (end[..., 1] > y)
+    start = points[filled(faces)]
+    end = np.roll(start, -1, axis=1)
+    corner = points[faces[np.unique(piece, return_index=True)[1], 0]]
+    low, high = (
+        np.pad(np.concatenate([ends, corner]), ((0, 0), (0, 1)))
+        for ends in (start.min(axis=1), start.max(axis=1))
+    )
+    facet, other = meeting_pairs(low, high)
+    other = other - len(faces)
+    near = (facet < len(faces)) & (other >= 0)
+    near[near] = piece[facet[near]] != other[near]
+    facet, other = facet[near], other[near]
+    for at in np.array_split(np.arange(len(facet)), 1 + facet.size * faces.shape[1] // _AT_ONCE):
+        a, b = start[facet[at]], end[facet[at]]
+        x, y = corner[other[at], 0, None], corner[other[at], 1, None]
+        over = (a[..., 1] > y) != (b[..., 1] > y)
         with np.errstate(invalid="ignore", divide="ignore"):
-            part = (y - start[..., 1]) / (end[..., 1] - start[..., 1])
-            right = over & (start[..., 0] + part * (end[..., 0] - start[..., 0]) > x)
-        inside = (right.sum(axis=1) % 2 == 1) & (piece != number)
-        if inside.any():
+            part = (y - a[..., 1]) / (b[..., 1] - a[..., 1])
+            right = over & (a[..., 0] + part * (b[..., 0] - a[..., 0]) > x)
+        inside = np.flatnonzero(right.sum(axis=1) % 2 == 1)
+        if len(inside):
+            x, y = corner[other[at][inside[0]]]
             raise PatternError(
                 f"A part of the drawing, at ({x:.6g}, {y:.6g}), lies loose inside a facet of "
                 "another; join them by a crease, or give a larger `tolerance`."

@@ -24,7 +24,7 @@ from miurafab.errors import PatternError, shown
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import ASSIGNMENTS
 from miurafab.origami.formats.crease_lines import CreaseLines, DrawnLine, straightened
-from miurafab.origami.formats.lines import xml_root
+from miurafab.origami.formats.lines import finite_number, xml_root
 from miurafab.origami.formats.svg_shapes import NUMBER, shapes, tag_of, value_of
 from miurafab.units import parse_length
 
@@ -43,6 +43,7 @@ _NAMES = {
 }  # fmt: skip
 _SHORTEST = 10.0
 """User units of the shortest line."""
+_BETWEEN = " \t\r\n,"
 _UNKNOWN = frozenset({"use", "image", "foreignObject"})
 """Elements that may hold lines, which are not read."""
 Matrix = Floats
@@ -95,6 +96,7 @@ class _Look:
         return min(self.stroke_opacity * self.group_opacity, 1.0)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def parse_svg(text: str, curve_tolerance: float | None = None) -> CreaseLines:
     """The lines of an SVG drawing, in millimetres if it has a size, else 1 unit = 1 mm.
 
@@ -158,8 +160,9 @@ def _style_rules(root: Element) -> dict[str, dict[str, str]]:
     rules: dict[str, dict[str, str]] = {}
     for element in root.iter():
         if tag_of(element) == "style":
-            for selectors, body in re.findall(r"([^{}]+)\{([^{}]*)\}", element.text or ""):
-                for selector in selectors.split(","):
+            for rule in (element.text or "").split("}"):
+                selectors, _, body = rule.rpartition("{")
+                for selector in selectors.rpartition("{")[2].split(","):
                     rules.setdefault(selector.strip(), {}).update(_declarations(body))
     return rules
 
@@ -194,11 +197,11 @@ def _colour(text: str) -> tuple[int, int, int] | None:
         numbers = NUMBER.findall(match[1])
         if len(numbers) >= 3:
             full = 2.55 if "%" in match[1] else 1.0
-            red, green, blue = (round(float(number) * full) for number in numbers[:3])
+            red, green, blue = (round(finite_number(n, "a colour") * full) for n in numbers[:3])
             return red, green, blue
     match = re.fullmatch(r"hsla?\(([^)]*)\)", text)
     if match and len(numbers := NUMBER.findall(match[1])) >= 3:
-        hue, full, light = (float(number) for number in numbers[:3])
+        hue, full, light = (finite_number(number, "a colour") for number in numbers[:3])
         parts = colorsys.hls_to_rgb(hue / 360 % 1, light / 100, full / 100)
         red, green, blue = (round(255 * part) for part in parts)
         return red, green, blue
@@ -229,12 +232,14 @@ def _millimetres(root: Element) -> Matrix:
 def _transform(text: str) -> Matrix:
     """(2, 3) of an SVG transform list."""
     whole = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    for name, inside in re.findall(r"(\w+)\s*\(([^)]*)\)", text):
-        n = [float(number) for number in NUMBER.findall(inside)]
+    for part in text.split(")")[:-1]:
+        name, _, inside = part.rpartition("(")
+        name = name.strip(_BETWEEN)
+        n = [finite_number(number, f"'{name[:40]}'") for number in NUMBER.findall(inside)]
         try:
             whole = _composed(whole, _one_transform(name, n))
         except IndexError:
-            raise PatternError(f"the transform '{name}({inside})' lacks a number.") from None
+            raise PatternError(f"the transform '{name}' lacks a number.") from None
     return whole
 
 
@@ -253,7 +258,7 @@ def _one_transform(name: str, n: list[float]) -> Matrix:
         c, s = math.cos(math.radians(n[0])), math.sin(math.radians(n[0]))
         x, y = (n[1], n[2]) if len(n) > 1 else (0.0, 0.0)
         return np.array([[c, -s, x - c * x + s * y], [s, c, y - s * x - c * y]])
-    raise PatternError(f"'{name}' is not a transform of SVG.")
+    raise PatternError(f"'{name[:40]}' is not a transform of SVG.")
 
 
 def _composed(outer: Matrix, inner: Matrix) -> Matrix:

@@ -12,6 +12,7 @@ import numpy as np
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.formats.curves import Arc, Bezier, Curve, Polyline, svg_arc
+from miurafab.origami.formats.lines import finite_number
 from miurafab.units import DECIMAL
 
 NUMBER = re.compile(rf"[-+]?{DECIMAL}(?:[eE][-+]?\d+)?")
@@ -56,10 +57,10 @@ def shapes(element: Element) -> Iterator[Curve]:
 
 def value_of(text: str, name: str) -> float:
     """The number in ``text``. Raises ``PatternError`` naming the attribute ``name``."""
-    match = re.fullmatch(rf"\s*({NUMBER.pattern})\s*(?:px)?\s*", text)
-    if match is None:
+    number = text.strip().removesuffix("px").rstrip()
+    if NUMBER.fullmatch(number) is None:
         raise PatternError(f"{name} is '{text[:40]}', not a number.")
-    return float(match[1])
+    return finite_number(number, name)
 
 
 def _rectangle(element: Element) -> Iterator[Curve]:
@@ -170,7 +171,7 @@ class _PathReader:
         if token is None or not token[2]:
             raise PatternError(f"the path '{self.text[:40]}' lacks a number.")
         self.place = token.end()
-        return float(token[2])
+        return finite_number(token[2], "a number of a path")
 
     def _point(self, base: Floats) -> Floats:
         return np.array([self._number(), self._number()]) + base
