@@ -26,7 +26,7 @@ from typing import Any
 
 from miurafab.errors import InputError, PatternError, PortError, TargetError
 from miurafab.machine.signals import StopSignals
-from miurafab.profiles import find_file
+from miurafab.profiles import find_file, read_toml
 from miurafab.studio.certificate import tls_of
 from miurafab.studio.connections import (
     ANSWER_S,
@@ -38,6 +38,7 @@ from miurafab.studio.connections import (
 from miurafab.studio.core import Studio
 from miurafab.studio.door import Door
 from miurafab.studio.entrance import Entrance
+from miurafab.studio.form import LAYOUT
 from miurafab.studio.guard import ADDRESS, BodyRoom, Guard, new_key
 from miurafab.studio.hosting import Hosting, ServingPlace, place_of
 from miurafab.studio.messages import HttpRequest, Response, refusal
@@ -129,7 +130,10 @@ def _put_on(bench: Bench, thing: str) -> dict[str, Any]:
         wanted = design(thing)
         found = find_file("patterns", thing, error=TargetError)
         source = bench.add_own(found, "design")
-        return {"source": source.id, "machine": wanted.machine, "material": wanted.material}
+        laid = read_toml(found, TargetError).get("layout", {})
+        given = {name: value for name, value in laid.items() if name in LAYOUT}
+        on = {"machine": wanted.machine, "material": wanted.material, "layout": given}
+        return {"source": source.id, **on}
     if suffix == PATTERN_SUFFIX or mesh_suffix(path):
         if not path.is_file():
             error = PatternError if suffix == PATTERN_SUFFIX else TargetError

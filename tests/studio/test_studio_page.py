@@ -52,7 +52,9 @@ def address(tmp_path_factory):
     server = _Server(0, lambda: None)
     guard = Guard(server.server_port, "k" * 32)
     bench = Bench(tmp_path_factory.mktemp("bench"), Process)
-    server.studio = Studio(bench, guard)
+    laid = {"gap": "3mm", "full_facet": True}
+    first = {"surface": "hypar", "parameters": {}, "layout": laid}
+    server.studio = Studio(bench, guard, first)
     serving = threading.Thread(target=server.serve_forever, args=(0.05,))
     serving.start()
     yield guard.address
@@ -74,6 +76,8 @@ def page(tmp_path, address):
 
 def test_from_a_surface_to_sheets_by_keyboard(page, address):
     assert page.run("document.getElementById('pattern').hidden")
+    laid = page.run("import('./choices.js').then((all) => all.layoutOrder().options)")
+    assert laid == {"gap": "3mm", "full_facet": True}  # of the design that was named
     page.run("document.getElementById('target').focus()")
     page.run(
         "{ const target = document.getElementById('target'); target.value = 'surface:vase';"
@@ -112,7 +116,7 @@ def test_from_a_surface_to_sheets_by_keyboard(page, address):
     page.idle()
     assert "Machine time" in page.text("totals")
     assert page.text("cut-command") == "miurafab cut vase-job --port /dev/ttyUSB0"
-    assert page.text("job-command").endswith("--gap 4mm")
+    assert page.text("job-command").endswith("--gap 4mm --full-facet")
     links = "[...document.querySelectorAll('#job-downloads a')].map((a) => a.href)"
     for link in page.run(links):
         assert page.run(f"fetch({link!r}).then((answer) => answer.status)") == 200

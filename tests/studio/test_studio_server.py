@@ -294,10 +294,12 @@ def test_a_design_named_on_the_command_line_is_fitted(start, tmp_path):
     (tmp_path / "my.toml").write_text(
         'facets = "6x4"\nsize = "90mm"\n[target]\nsurface = "plane"\n'
         '[layout]\nmachine = "grbl-co2-k40"\nmaterial = "paper-100"\n'
+        'gap = "4mm"\nfull_facet = true\n'
     )
     page = Page(start("my.toml").address)
     first = json.loads(page.get("catalogue"))["first"]
     assert (first["machine"], first["material"]) == ("grbl-co2-k40", "paper-100")
+    assert first["layout"] == {"gap": "4mm", "full_facet": True}
     page.post("fit", {"target": {"source": first["source"]}, "options": {"size": "120mm"}})
     pattern = page.finished()["pattern"]
     assert pattern["command"] == "miurafab fit my.toml --size 120mm -o my.fold"

@@ -21,6 +21,12 @@ export function fillForms(given) {
   profileOptions(byId("machine"), given.machines, first?.machine ?? given.machine);
   profileOptions(byId("material"), given.materials, first?.material ?? given.material);
   byId("profile-faults").replaceChildren(...given.faults.map((text) => element("li", { textContent: text })));
+  for (const [name, value] of Object.entries(first?.layout ?? {})) {
+    const field = byId("layout-options").querySelector(`[name="${name}"]`);
+    if (field.type === "checkbox") field.checked = value;
+    else field.value = value;
+    if (field.selectedIndex < 0) field.value = ""; // the default
+  }
   byId("formats").append(...given.formats.map((name) => element(
     "label", { className: "check" }, element("input", { type: "checkbox", value: name }), name,
   )));
