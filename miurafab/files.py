@@ -236,19 +236,21 @@ def new_folder(value: object, what: str) -> Path:
     return path
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str, *, private: bool = False) -> None:
     """Write ``text`` as UTF-8, with the same bytes on every system (:func:`write_bytes`)."""
     with Reading(path, "a text that can be written", InputError):
         content = text.encode("utf-8")
-    write_bytes(path, content)
+    write_bytes(path, content, private=private)
 
 
-def write_bytes(path: Path, content: bytes) -> None:
+def write_bytes(path: Path, content: bytes, *, private: bool = False) -> None:
     """Write ``content`` in place of the file ``path``, whole or not at all.
 
     It goes to a temporary file beside ``path``, onto the disk, and takes the name of ``path`` in
-    one step. A link is followed, and the permissions of an earlier file are kept. A pipe or device
-    is written as it is. Raises :class:`~miurafab.errors.InputError`.
+    one step. A link is followed, and the permissions of an earlier file are kept, but those of a
+    ``private`` file are its owner's alone. A pipe or device is written as it is.
+
+    Raises :class:`~miurafab.errors.InputError`.
     """
     as_path(path, "A file")
     try:
@@ -256,7 +258,7 @@ def write_bytes(path: Path, content: bytes) -> None:
         if there.exists() and not there.is_file() and not there.is_dir():
             _put(os.open(there, os.O_WRONLY), content)
             return
-        _replace(there, content)
+        _replace(there, content, private=private)
     except OSError as fault:
         raise InputError(f"{path} cannot be written: {fault.strerror}.") from None
 
@@ -277,12 +279,13 @@ _BINARY = getattr(os, "O_BINARY", 0)
 """Windows would write other line ends without it."""
 
 
-def _replace(path: Path, content: bytes) -> None:
+def _replace(path: Path, content: bytes, *, private: bool) -> None:
     new = path.with_name(_TEMPORARY.format(secrets.token_hex(6)))
-    opened = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY, 0o666)
+    mode = 0o600 if private else 0o666
+    opened = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY, mode)
     try:
         _put(opened, content, sync=True)
-        if path.exists():
+        if path.exists() and not private:
             new.chmod(stat.S_IMODE(path.stat().st_mode))
         new.replace(path)
     except BaseException:

@@ -12,13 +12,12 @@ import datetime
 import hashlib
 import importlib
 import ipaddress
-import os
 import ssl
 from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError
-from miurafab.files import as_file_name, new_folder, read_text, state_folder, write_text
+from miurafab.files import as_file_name, new_folder, read_bytes, read_text, state_folder, write_text
 from miurafab.studio.hosting import Hosting
 
 _DAYS, _RENEWED_DAYS = 365, 30
@@ -80,7 +79,7 @@ def _made(host: str) -> Path:
     file = folder / f"{as_file_name(host.replace(':', '-'))}.pem"
     now = datetime.datetime.now(datetime.UTC)
     with contextlib.suppress(ValueError, InputError):
-        there = x509.load_pem_x509_certificate(file.read_bytes() if file.is_file() else b"")
+        there = x509.load_pem_x509_certificate(read_bytes(file, InputError))
         if there.not_valid_after_utc - now > datetime.timedelta(days=_RENEWED_DAYS):
             return file
     ec: Any = importlib.import_module("cryptography.hazmat.primitives.asymmetric.ec")
@@ -90,10 +89,7 @@ def _made(host: str) -> Path:
         serialization.PrivateFormat.PKCS8,
         serialization.NoEncryption(),
     ) + _signed(x509, host, key, now).public_bytes(serialization.Encoding.PEM)
-    with contextlib.suppress(FileExistsError):  # what is written takes over its permissions
-        os.close(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
-    file.chmod(0o600)
-    write_text(file, text.decode("ascii"))
+    write_text(file, text.decode("ascii"), private=True)
     return file
 
 

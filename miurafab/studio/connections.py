@@ -33,6 +33,7 @@ class _OpenWire:
     wire: socket.socket
     address: str
     due: float
+    stranger: bool = True
 
 
 class Connections:
@@ -44,10 +45,24 @@ class Connections:
         self._open: dict[int, _OpenWire] = {}
 
     def has_room(self, address: str) -> bool:
-        """Whether one more from ``address`` is taken."""
+        """Whether one more from ``address`` is taken.
+
+        Where there are too many, the one that has waited longest to be let in is shut for it: no
+        silent ones may keep Abort out.
+        """
         with self._lock:
-            of_it = sum(each.address == address for each in self._open.values())
-            return not self._bounded or (len(self._open) < MOST and of_it < MOST_OF_ONE)
+            every = list(self._open.values())
+            full = [each for each in every if each.address == address]
+            if len(full) < MOST_OF_ONE:
+                full = every if len(every) >= MOST else []
+            if not (self._bounded and full):
+                return True
+            oldest = next((each for each in full if each.stranger), None)
+            if oldest is None:
+                return False
+            del self._open[id(oldest.wire)]
+            _shut(oldest.wire)
+            return True
 
     def add(self, wire: socket.socket, address: str) -> None:
         """``wire`` is open, and has to have sent the head of a request soon."""
@@ -56,10 +71,11 @@ class Connections:
             self._open[id(wire)] = _OpenWire(wire, address, due)
 
     def more_time(self, wire: socket.socket, seconds: float) -> None:
-        """``wire`` has ``seconds`` for what comes next."""
+        """``wire``, which was let in, has ``seconds`` for what comes next."""
         with self._lock:
             if id(wire) in self._open:
-                self._open[id(wire)].due = self._clock() + seconds
+                known = self._open[id(wire)]
+                known.due, known.stranger = self._clock() + seconds, False
 
     def remove(self, wire: socket.socket) -> None:
         """``wire`` is shut."""
@@ -73,8 +89,12 @@ class Connections:
             for each in self._open.values():
                 if now > each.due:
                     each.due = now + IDLE_S
-                    with contextlib.suppress(OSError):  # not SSLSocket's, which waits for the peer
-                        socket.socket.shutdown(each.wire, socket.SHUT_RDWR)
+                    _shut(each.wire)
+
+
+def _shut(wire: socket.socket) -> None:
+    with contextlib.suppress(OSError):  # not SSLSocket's, which waits for the peer
+        socket.socket.shutdown(wire, socket.SHUT_RDWR)
 
 
 class LimitedHead(io.BufferedIOBase):

@@ -314,15 +314,38 @@ def test_connections_have_a_number_and_a_time():
     for number, wire in enumerate(wires[:MOST_OF_ONE]):
         assert book.has_room("10.0.0.1"), number
         book.add(wire, "10.0.0.1")
+        book.more_time(wire, IDLE_S)
     assert not book.has_room("10.0.0.1")
     for number, wire in enumerate(wires[MOST_OF_ONE:MOST]):
         assert book.has_room(f"10.0.1.{number}")
         book.add(wire, f"10.0.1.{number}")
+        book.more_time(wire, IDLE_S)
     assert not book.has_room("10.0.2.1")
+    book.remove(wires[0])
+    assert book.has_room("10.0.2.1")
     own = Connections(bounded=False)
     for wire in wires:
         own.add(wire, "127.0.0.1")
     assert own.has_room("127.0.0.1")
+
+
+@pytest.mark.parametrize("spread", [False, True])
+def test_silent_connections_keep_nobody_out(spread):
+    """A further one, which may bring Abort, takes the place of the oldest that was not let in."""
+    book = Connections(bounded=True, clock=Clock())
+    pairs = [socket.socketpair() for _ in range(MOST if spread else MOST_OF_ONE)]
+    for number, (wire, _) in enumerate(pairs):
+        book.add(wire, f"10.0.0.{number}" if spread else "10.0.0.1")
+    book.more_time(pairs[0][0], IDLE_S)
+    assert book.has_room("10.0.0.1")
+    assert pairs[1][1].recv(1) == b""
+    for _, far in (pairs[0], pairs[2]):
+        far.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            far.recv(1)
+    for pair in pairs:
+        for end in pair:
+            end.close()
 
 
 class CheapLock(PasswordLock):
