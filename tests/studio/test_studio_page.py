@@ -190,16 +190,35 @@ def test_what_is_shown_within_draws_and_can_ask_for_nothing(page, address):
     page.until("!document.getElementById('pattern').hidden")  # a page that is loaded again goes on
 
 
-def test_a_file_is_chosen_and_a_fit_is_cancelled(page):
-    content = base64.b64encode(saddle_obj()).decode()
+def choose_file(page, name, content):
+    text = base64.b64encode(content).decode()
     page.run(
-        "{ const held = new DataTransfer(); const bytes = atob('" + content + "');"
-        "held.items.add(new File([bytes], 'my saddle.obj'));"
+        "{ const held = new DataTransfer(); const bytes = atob('" + text + "');"
+        f"held.items.add(new File([bytes], '{name}'));"
         "const field = document.getElementById('file'); field.files = held.files;"
         "field.dispatchEvent(new Event('change')); }"
     )
-    page.until("document.getElementById('target').value.startsWith('source:')")
-    assert page.run("document.getElementById('target').selectedOptions[0].text") == "my-saddle.obj"
+
+
+def test_a_file_is_chosen_and_a_fit_is_cancelled(page):
+    choose_file(page, "bad.fold", b'{"vertices_coords": [[0, 0]]}')
+    page.until("!document.getElementById('fault').hidden")
+    assert "bad.fold" in page.text("fault")
+    page.run("document.getElementById('fold-tab').click()")
+    page.run("document.getElementById('shape-tab').click()")
+    # the error of a task is told once, and not again when somebody comes back to the page
+    state = (
+        "performance.getEntriesByType('resource')"
+        ".filter(({ name }) => name.endsWith('state')).length"
+    )
+    asked = page.run(state)
+    page.run("document.dispatchEvent(new Event('visibilitychange'))")
+    page.until(f"{state} > {asked}")
+    page.run("new Promise((done) => setTimeout(done, 300))")
+    assert page.run("document.getElementById('fault').hidden")
+
+    choose_file(page, "my saddle.obj", saddle_obj())
+    page.until("document.getElementById('target').selectedOptions[0].text === 'my-saddle.obj'")
     assert page.run("document.getElementById('size').value") == ""
     page.type("facets", "200x200")
     page.press("Enter")

@@ -14,6 +14,7 @@ const TABS = ["shape", "fold", "layout", "desk"];
 const DOING = { fit: texts.frame.fitting, open: texts.frame.opening, sheets: texts.frame.laying_out };
 let following = 0;
 let told = "";
+let failed = ""; // the last task whose error was told
 let ownJob = null;
 
 function show(state) {
@@ -37,7 +38,10 @@ function show(state) {
   const names = JSON.stringify(sources);
   if (names !== told) showSources(sources);
   told = names;
-  if (!running && task?.error) fault(task.error);
+  if (!running && task?.error && task.id !== failed) {
+    failed = task.id;
+    fault(task.error);
+  }
   followLive(state);
   followTarget(state);
 }

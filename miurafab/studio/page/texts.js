@@ -105,7 +105,7 @@ export const texts = {
     "degrees": "{degrees} degrees",
     "whole": "Cover all of it",
     "choose_part": "Choose a part",
-    "whole_help": "All of the mesh is covered, along its own outline. The fit chooses the direction of the facets, unless you turn it here or drag the drawing round.",
+    "whole_help": "All of the mesh is asked for, up to its own outline. The fit chooses the direction of the facets, unless you turn it here or drag the drawing round.",
     "part_help": "Drag the rectangle or its corners; drag beside it to turn. Keys: arrows move it, shift-arrows size it.",
     "beyond": "The rectangle reaches beyond the mesh.",
     "open_here": "Choose where it opens",
