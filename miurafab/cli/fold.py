@@ -13,6 +13,7 @@ from miurafab.files import new_file
 from miurafab.options import File, read_options
 
 if TYPE_CHECKING:
+    from miurafab.origami.folding.kinematics import FoldingMotion
     from miurafab.workflow.fold import Folding
 
 EXAMPLES = (
@@ -127,8 +128,10 @@ def _show(console: Console, folding: Folding, answer: dict[str, Any]) -> None:
         "stretch",
         "findings",
     }
-    hidden |= {"wrong_edges", "unstable_directions"}
+    hidden |= {"wrong_edges", "waiting_edges", "unstable_directions"}
     facts = {key: value for key, value in answer.items() if key not in hidden and value is not None}
+    if answer.get("waiting_edges"):
+        facts["waiting_edges"] = len(answer["waiting_edges"])
     facts["self_contacts"] = f"in {len(contacts)} frames" if contacts else "none"
     if answer["layers"] is not None:
         facts["overlapping_pairs"] = answer["layers"]["pairs"]
@@ -136,7 +139,7 @@ def _show(console: Console, folding: Folding, answer: dict[str, Any]) -> None:
     console.facts(facts)
     console.findings(folding.findings)
     for run in _runs(contacts):
-        console.line(_sentence(run))
+        console.line(_sentence(run, folding.motion))
     if thick is not None and thick["method"] == "bennett":
         _show_plates(console, thick)
     elif thick is not None:
@@ -154,16 +157,19 @@ def _runs(contacts: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
     return runs
 
 
-def _sentence(run: list[dict[str, Any]]) -> str:
+def _sentence(run: list[dict[str, Any]], motion: FoldingMotion) -> str:
+    from miurafab.origami.folding.judge_motion import median_fold
+
     first, last = run[0], run[-1]
-    frames, states = f"frame {first['frame']}", f"s = {first['state']:.4g}"
+    frames, angles = f"frame {first['frame']}", f"{median_fold(motion, first['frame']):.0f}"
     if len(run) > 1:
         frames = f"frames {first['frame']} to {last['frame']}"
-        states += f" to {last['state']:.4g}"
+        angles += f" to {median_fold(motion, last['frame']):.0f}"
     most = max(len(contact["facets"]) for contact in run)
     a, b = first["facets"][0]
     pairs = "1 pair of facets passes" if most == 1 else f"up to {most} pairs of facets pass"
-    return f"{frames}, {states}: {pairs} through each other, the first being {a} and {b}"
+    where = f"{frames}, median fold angle {angles} degrees"
+    return f"{where}: {pairs} through each other, the first being {a} and {b}"
 
 
 def _show_thickness(console: Console, thick: dict[str, Any]) -> None:
@@ -200,7 +206,8 @@ def _show_thickness(console: Console, thick: dict[str, Any]) -> None:
     _show_too_small(console, thick)
     for collision in thick["collisions"][:8]:
         a, b = collision["facets"]
-        console.line(f"at s = {collision['state']:.3g} panels {a} and {b} collide")
+        angle = f"{collision['median_fold_deg']:.3g} degrees"
+        console.line(f"at a median fold angle of {angle} panels {a} and {b} collide")
 
 
 def _show_too_small(console: Console, thick: dict[str, Any]) -> None:

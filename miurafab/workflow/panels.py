@@ -103,6 +103,8 @@ def thickness_report(panels: ThickPanels | ThickPlates) -> dict[str, Any]:
     creases = np.flatnonzero(panels.closing_side != "")
     finite = panels.offset_mm[creases][np.isfinite(panels.offset_mm[creases])]
     useful = panels.useful
+    folding = np.abs(pattern.edges_fold_angle[pattern.edges_fold_angle != 0])
+    median = float(np.median(folding)) if len(folding) else 0.0
     return {
         "method": "tapered",
         "thickness_mm": panels.thickness_mm,
@@ -115,7 +117,12 @@ def thickness_report(panels: ThickPanels | ThickPlates) -> dict[str, Any]:
         "max_offset_mm": float(finite.max(initial=0.0)),
         "facets_too_small": _too_small(panels),
         "collisions": [
-            {"state": state, "facets": [one, other]} for state, one, other in panels.collisions
+            {
+                "state": state,
+                "median_fold_deg": math.degrees(2 * math.atan(state * math.tan(median / 2))),
+                "facets": [one, other],
+            }
+            for state, one, other in panels.collisions
         ],
         "creases": [
             {

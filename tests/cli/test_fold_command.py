@@ -41,6 +41,8 @@ def test_a_sheet_that_bends_says_so(run, stiff, tmp_path):
     done = run("fold", stiff, "-o", tmp_path / "a.html", "--steps", "6", "--colour", "strain")
     assert done.returncode == 0
     assert "does not fold rigidly" in done.stdout
+    assert "where its median fold angle is " in done.stdout
+    assert "s = " not in done.stdout
     assert "bending" in done.stdout
     quiet = run("fold", stiff, "--steps", "6", "--quiet")
     assert quiet.stderr == ""
@@ -71,6 +73,7 @@ def test_frames_in_which_paper_meets_paper_are_told_in_runs(run, tmp_path):
     shown = run("fold", tube, "--steps", "12").stdout
     lines = [line for line in shown.splitlines() if line.startswith("frame")]
     assert [line.split(",")[0] for line in lines] == [f"frames {frames[0]} to {frames[-1]}"]
+    assert "median fold angle " in lines[0]
     assert f"the first being {' and '.join(map(str, contacts[0]['facets'][0]))}" in lines[0]
 
 

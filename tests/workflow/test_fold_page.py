@@ -73,7 +73,7 @@ def test_the_slider_moves_the_sheet(tmp_path: Path, cells: int, most_bytes: int)
         assert at_first.endswith("the folded form")
         assert move(page, 0) == "1 of 41, flat"
         flat, boxes = covered(page), [told_size(page)]
-        assert move(page, 20).startswith("21 of 41, s = ")
+        assert move(page, 20).startswith("21 of 41, median fold angle ")
         halfway = covered(page)
         boxes.append(told_size(page))
         assert move(page, 40) == "41 of 41, folded flat"

@@ -280,6 +280,12 @@ def rulings_among(pattern: CreasePattern, flat: Ints) -> Bools:
     return np.asarray(bent[edges[flat]].any(axis=1))
 
 
+def is_ruled(pattern: CreasePattern) -> bool:
+    """Whether flat edges of ``pattern`` are rulings, so that its facets have to bend."""
+    flat = (pattern.edges_assignment == "F") & (pattern.edges_faces >= 0).all(axis=1)
+    return bool(rulings_among(pattern, np.flatnonzero(flat)).any())
+
+
 def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:
     short = np.flatnonzero(edge_lengths(points, edges) < DEGENERATE)
     if len(short):

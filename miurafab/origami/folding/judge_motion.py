@@ -26,8 +26,12 @@ def motion_findings(found: FoundMotion, contacts: Sequence[Contact]) -> tuple[Fi
 
 
 def median_fold(motion: FoldingMotion, frame: int) -> float:
-    """The median of the fold angles of the mountains and valleys in a frame, degrees."""
+    """The median of the fold angles in a frame, degrees: of the mountains and valleys, or without
+    any of the other creases that turn.
+    """
     folds = np.isin(motion.pattern.edges_assignment, ["M", "V"])
+    if not folds.any():
+        folds = (motion.fold_angles != 0).any(axis=0)
     return float(np.degrees(np.median(np.abs(motion.fold_angles[frame, folds]))))
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +24,7 @@ import numpy as np
 from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cut_open import cut_open
-from miurafab.origami.energy.bar_hinge import SOFTNESS, rulings_among
+from miurafab.origami.energy.bar_hinge import SOFTNESS, is_ruled
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.certificate import RigidCertificate, certified
@@ -117,12 +118,13 @@ def _from_flat(
         if its_verdict.is_better_than(verdict):
             softness, motion, verdict = SOFTER, soft, its_verdict
     if verdict.wrong_signs <= MOST_WRONG and contacts(motion):
-        motion, verdict = ramp_motion(
-            pattern, steps, touching=True, softness=softness, on_progress=on_progress
-        )
+        # where it ends before its first frame, the contacts of the way without it are told
+        with suppress(PatternError):
+            motion, verdict = ramp_motion(
+                pattern, steps, touching=True, softness=softness, on_progress=on_progress
+            )
     # beside a curved crease facets bend, so that what flat ones could not do says nothing
-    bends = rulings_among(pattern, np.flatnonzero(pattern.edges_assignment == "F")).any()
-    waits = verdict.is_held_back and len(verdict.waiting_edges) and not bends
+    waits = verdict.is_held_back and len(verdict.waiting_edges) and not is_ruled(pattern)
     if verdict.wrong_signs > MOST_WRONG or waits:
         raise _sequence(verdict)
     rigid, certificate = certified(motion)
@@ -190,6 +192,7 @@ def _sequence(verdict: RampVerdict) -> PatternError:
         )
     return PatternError(
         f"The pattern does not fold in one motion: with all creases turning together, {how}. "
-        f"{begin}. Either letters are wrong, or it folds in a sequence, crease after crease, like "
-        "a crane; fold its steps as patterns of their own."
+        f"{begin}. Either letters are wrong, or its facets have to bend from the start, as in some "
+        "twists, or it folds in a sequence, crease after crease, like a crane; fold its steps as "
+        "patterns of their own."
     )

@@ -5,6 +5,7 @@ Each piece goes its own way along the same ramp (:mod:`miurafab.origami.folding.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ import numpy as np
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.energy.bar_hinge import SOFTNESS, has_folds
+from miurafab.origami.energy.bar_hinge import SOFTNESS, has_folds, is_ruled
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.pieces import part_of
 from miurafab.origami.folding.first_order import waiting_folds
@@ -103,6 +104,8 @@ def ramp_motion(
         paths.append(path)
     count = min(len(path.frames) for path in paths)
     if not count:
+        if is_ruled(pattern):
+            raise _unfollowed(pattern, float(parts[1]))
         raise _stuck(paths, waiting_folds(pattern))
     flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
     frames = np.repeat(flat[None], count + 1, axis=0)
@@ -162,6 +165,17 @@ def _wrong_edges(piece: Piece, path: RampPath) -> Ints:
     return np.asarray(piece.edges[sprung[path.wrong]])
 
 
+def _unfollowed(pattern: CreasePattern, part: float) -> PatternError:
+    """The error for a pattern of curved creases that does not come to its first frame."""
+    angle = part * math.degrees(float(np.abs(pattern.edges_fold_angle).max()))
+    return PatternError(
+        f"The sheet could not be followed to its first position, where its creases fold by up to "
+        f"{angle:.0f} degrees: beside curved creases facets have to bend, and no balance was found "
+        "in which they do. Ask for more `steps`, so that it is nearer to flat, or give the creases "
+        "smaller fold angles."
+    )
+
+
 def _stuck(paths: list[RampPath], waiting: Ints) -> PatternError:
     """The error for a pattern that does not leave the plane."""
     if not len(waiting):
@@ -174,6 +188,7 @@ def _stuck(paths: list[RampPath], waiting: Ints) -> PatternError:
     return PatternError(
         f"The pattern could not be brought out of the plane: with flat facets {len(waiting)} of "
         f"its {folds} folds cannot begin from flat if none shall turn to its wrong side, the first "
-        f"being edge {waiting[0]}. Either letters are wrong, or it folds in a sequence, crease "
-        "after crease, which one motion of all creases cannot show."
+        f"being edge {waiting[0]}. Either letters are wrong, or its facets have to bend from "
+        "the start, as in some twists, or it folds in a sequence, crease after crease, which one "
+        "motion of all creases cannot show."
     )

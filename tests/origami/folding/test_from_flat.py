@@ -15,9 +15,10 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import flat_model
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.seed import linear_seed
+from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.certificate import certified
 from miurafab.origami.folding.from_flat import FIRMER, fold_from_flat, ramp_parts
-from miurafab.origami.folding.judge_motion import motion_findings
+from miurafab.origami.folding.judge_motion import median_fold, motion_findings
 from miurafab.origami.folding.kinematics import CLOSED_FORM, FROM_FLAT, facet_strain
 from miurafab.origami.folding.motion import find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
@@ -126,6 +127,21 @@ def test_a_sheet_that_is_held_back_is_folded_with_softer_sides() -> None:
     assert not found.motion.is_rigid
     assert found.verdict.strain.max() > 0.02
     assert "stretched" in {finding.code for finding in motion_findings(found, ())}
+
+
+def test_a_way_with_contact_that_is_lost_at_once_leaves_the_way_without_it(monkeypatch) -> None:
+    """It is not refused: facets pass through each other, and that is told."""
+
+    def lost(pattern, steps, *, touching=False, **more):
+        if touching:
+            raise PatternError("no balance was found")
+        return ramp_motion(pattern, steps, **more)
+
+    monkeypatch.setattr("miurafab.origami.folding.motion.ramp_motion", lost)
+    found = find_motion(named_patterns.yoshimura(8, 8), 6)
+    assert found.verdict is not None
+    assert not found.verdict.touching
+    assert contacts(found.motion)
 
 
 def test_a_pleated_hypar_leaves_the_plane_by_stretching_a_little() -> None:
@@ -241,3 +257,11 @@ def test_large_miuras_fold_from_flat(facets: int) -> None:
     assert certificate.residual <= 1e-12
     assert not verdict.unstable.any()
     assert not len(verdict.wrong_edges)
+
+
+def test_free_creases_have_a_median_fold_angle_too() -> None:
+    motion = find_motion(named_patterns.waterbomb_base(), 4).motion
+    free = np.full(len(motion.pattern.edges_assignment), "U")
+    freed = replace(motion, pattern=replace(motion.pattern, edges_assignment=free))
+    assert median_fold(motion, 0) == median_fold(freed, 0) == 0
+    assert median_fold(freed, 4) == pytest.approx(median_fold(motion, 4))

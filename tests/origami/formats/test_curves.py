@@ -28,6 +28,10 @@ PATHS = (
     "M0 0 A 30 50 20 0 1 100 50 a 25 25 -30 01 50-25",
     "M0 0 a 5 5 0 1 0 60 20 L 3 7 c 1 2 30 40 50 -60 z m 5 5 q 40 0 40 40",
 )
+WAVE = (
+    '<svg><rect width="100" height="100" fill="none" stroke="#000"/>'
+    '<path d="M0 50 C 30 20 70 80 100 50" stroke="#f00" fill="none"/></svg>'
+)
 
 
 def distances(points: np.ndarray, lines: CreaseLines) -> np.ndarray:
@@ -227,3 +231,13 @@ def test_a_crease_that_cannot_reach_half_a_turn_moves_as_far_as_it_goes() -> Non
     assert found.verdict is not None
     assert found.verdict.wrong_signs == 0
     assert np.degrees(np.abs(found.motion.fold_angles[-1]).max()) > 45
+
+
+def test_a_curved_crease_that_is_lost_at_once_is_not_blamed_for_its_flat_facets() -> None:
+    """Flat facets could not begin to fold there; those of a ruled sheet bend."""
+    pattern = pattern_from_lines(parse_svg(WAVE, 0.1))
+    with pytest.raises(PatternError, match="up to 54 degrees: beside curved creases") as lost:
+        find_motion(pattern, 3)
+    assert "cannot begin" not in str(lost.value)
+    assert "more 'steps'" in str(lost.value)
+    assert len(find_motion(pattern, 12).motion.frames) > 1
