@@ -45,6 +45,7 @@ from miurafab.origami.formats.fold import fold_text
 from miurafab.origami.formats.lines import opx_text
 from miurafab.origami.formats.svg import svg_text
 from miurafab.studio import orders
+from miurafab.surfaces.formula import computed, formula_surface
 from miurafab.surfaces.height_field import read_image
 from miurafab.surfaces.mesh_files import read_mesh
 from miurafab.surfaces.profile_files import read_profile
@@ -173,8 +174,21 @@ def _order(path: Path) -> None:
         raise InputError(f"{path} is no order.")
 
 
+def _formula(text: str) -> None:
+    for read in (
+        computed,
+        lambda text: formula_surface((-1.0, 1.0, -1.0, 1.0), z=text),
+        lambda text: formula_surface((0.0, 1.0, 0.0, 1.0), x="u", y="v", z=text),
+    ):
+        try:
+            read(text)
+        except MiurafabError as fault:
+            _check_sentence(str(fault), None)
+
+
 def _quantities(path: Path) -> None:
     for line in path.read_bytes().decode("utf-8", "replace").splitlines():
+        _formula(line)
         for parse in (parse_length, parse_angle, parse_feed):
             try:
                 parse(line)

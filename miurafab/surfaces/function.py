@@ -44,6 +44,7 @@ MARGIN = 0.1
 """A function is also sampled this part of the domain beyond it, where it has values there."""
 
 _DIGITS = 12
+_LARGEST = 1e100
 _DEGENERATE = 1e-7
 
 
@@ -274,6 +275,7 @@ def _evaluator(function: Callable[..., Any], domain: Domain) -> Callable[[Floats
         if bad.any():
             u, v = uv[bad][0].tolist()
             raise TargetError(f"The function has no finite value at u = {u:g}, v = {v:g}.")
+        _refuse_large(points, "somewhere")
         return points
 
     probe = domain.lattice(5, 7)
@@ -305,6 +307,7 @@ def _point(function: Callable[..., Any], u: float, v: float) -> Floats:
         ) from None
     if not np.isfinite(point).all():
         raise TargetError(f"The function has no finite value {where}.")
+    _refuse_large(point, where)
     return point
 
 
@@ -324,3 +327,9 @@ def _points(value: Any, uv: Floats) -> Floats:
     if array.shape == (*shape, 3):
         return array
     raise ValueError
+
+
+def _refuse_large(points: Floats, where: str) -> None:
+    """Refuse values whose squares are beyond all floats."""
+    if np.abs(points).max(initial=0.0) > _LARGEST:
+        raise TargetError(f"The function has a value beyond {_LARGEST:g} {where}; scale it down.")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import math
 import struct
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,8 @@ from miurafab.surfaces.surface import Domain
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp")
 
+MOST_PIXELS = 40_000_000
+"""An image may have so many: 320 MB of heights."""
 _MOST = 256
 """Heights to a side beyond which blocks of them are averaged before they are smoothed."""
 _SPANS = 40
@@ -119,7 +122,15 @@ def read_image(path: Path, height: float | None = None) -> Floats:
 
     content = read_bytes(path, TargetError)
     try:
-        with Image.open(io.BytesIO(content)) as image:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # its limit is higher
+            image = Image.open(io.BytesIO(content))
+        with image:
+            if image.width * image.height > MOST_PIXELS:
+                raise TargetError(
+                    f"{path} is an image of {image.width} x {image.height} pixels; scale it to "
+                    f"{MOST_PIXELS:,} pixels or fewer."
+                )
             mode = image.mode
             shades = np.asarray(image if mode[0] in "IF" else image.convert("L"), dtype=np.float64)
     except (*_IMAGE_FAULTS, Image.DecompressionBombError) as fault:

@@ -85,6 +85,7 @@ def test_signs_and_powers_bind_as_in_mathematics(text, value):
         ("z=x" + "+x" * LONGEST, "at most 500 characters"),
         ("x=u,y=v", "The formula of z is missing"),
         ("z=1/x", "no finite value at u = 0"),
+        ("z=1e300*x", "a value beyond 1e.100 .*; scale it down"),
         ("x=u,y=u,z=u", "no tangent plane"),
         ("z=x,u0=1", "each start under its end"),
         ("z=x,u1=2*x", "'x' is not known"),

@@ -122,6 +122,14 @@ def test_heights_are_met_and_noise_is_smoothed_and_told():
     assert "was smoothed" in finding.sentence
 
 
+def test_an_image_of_too_many_pixels_is_not_unpacked(tmp_path: Path):
+    """A file of 40 kB that would become 3 GB of heights."""
+    file = tmp_path / "bomb.png"
+    Image.new("1", (16_000, 10_000)).save(file)
+    with pytest.raises(TargetError, match="16000 x 10000 pixels; scale it to 40,000,000"):
+        read_image(file, 1.0)
+
+
 def test_an_image_is_heights_with_its_lowest_row_first(tmp_path: Path):
     shades = np.zeros((40, 30), dtype=np.uint8)
     shades[0] = 255
