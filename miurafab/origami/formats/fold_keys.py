@@ -89,12 +89,21 @@ def numbers_at(document: Mapping[str, Any], key: str, width: int | None) -> Ints
     return numbers.astype(np.int64)
 
 
+_MOST_CORNERS = 20_000_000
+"""Of all facets, were each as large as the largest: 160 MB; more where all of them are large."""
+
+
 def faces_in(document: Mapping[str, Any]) -> Ints:
     faces = list_at(document, "faces_vertices")
     sizes = {len(face) if isinstance(face, list) else 0 for face in faces}
     if min(sizes) < 3:
         raise PatternError("'faces_vertices' holds a facet of fewer than three corners.")
     width = max(sizes)
+    if width * len(faces) > max(_MOST_CORNERS, 10 * sum(map(len, faces))):
+        raise PatternError(
+            f"'faces_vertices' holds a facet of {width} corners, too many beside {len(faces)} "
+            "facets; divide it."
+        )
     if len(sizes) == 1:
         return indices_at(document, "faces_vertices", width)
     numbers = all(type(v) is int and v >= 0 for face in faces for v in face)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 import warnings
@@ -83,6 +84,24 @@ def test_it_ends_soon_and_in_a_sentence(
             mf.load(file)
     assert time.process_time() - begun < LONGEST_S
     assert "\n" not in refused.value.sentence
+
+
+def test_one_huge_facet_beside_many_small_ones_is_refused(tmp_path: Path) -> None:
+    """Facets are rows of one array: this file of 1 MB would be one of 3 GB."""
+    count = 20_000
+    at = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    ring = np.stack([np.cos(at), np.sin(at)], axis=1)
+    after = np.roll(np.arange(count), -1)
+    quads = np.stack([np.arange(count), np.arange(count) + count, after + count, after], axis=1)
+    document = {
+        "vertices_coords": np.concatenate([ring, 2 * ring]).tolist(),
+        "faces_vertices": [list(range(count)), *quads.tolist()],
+        "edges_vertices": np.concatenate([quads[:, [0, 3]], quads[:, :2], quads[:, 1:3]]).tolist(),
+    }
+    file = tmp_path / "a.fold"
+    file.write_text(json.dumps(document))
+    with pytest.raises(PatternError, match="a facet of 20000 corners, too many beside 20001"):
+        mf.load(file)
 
 
 def test_an_almost_straight_arc_does_not_make_the_drawing_large() -> None:
