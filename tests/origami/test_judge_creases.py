@@ -17,6 +17,8 @@ from miurafab.findings import refusals
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.flat_folding import judge_flat_folding, vertex_folds
 from miurafab.origami.formats.fold import fold_text, parse_fold
+from miurafab.origami.formats.lines import parse_cp
+from miurafab.origami.formats.planar_graph import pattern_from_lines
 from miurafab.origami.verify import audit
 
 WHOLE = {"grid": regular(), "trimmed": trimmed(), "gores": gores(), "both": two_trimmed_pieces()}
@@ -260,3 +262,14 @@ def test_a_drawing_without_angles_says_so_when_it_is_read_again(tmp_path):
     mf.convert(tmp_path / "a.dxf", tmp_path / "b.fold")
     assert mf.load(tmp_path / "b.fold").angles_assumed
     assert mf.load(tmp_path / "a.dxf").scaled(2).angles_assumed is not False
+
+
+def test_a_sector_of_more_than_half_a_turn_is_told_as_such() -> None:
+    """Two folds that bend at a vertex: the facet on one side has a corner of 270 degrees there."""
+    border = ["0", "0", "8", "0", "8", "4", "8", "8", "4", "8", "0", "8", "0", "0"]
+    rim = [" ".join(border[at : at + 4]) for at in range(0, len(border) - 2, 2)]
+    text = "\n".join([*(f"1 {line}" for line in rim), "2 4 4 8 4", "3 4 4 4 8"])
+    pattern = pattern_from_lines(parse_cp(text))
+    (found,), _ = vertex_folds(pattern)
+    assert sorted(np.degrees(found.sectors)) == pytest.approx([90, 270])
+    assert "90 and 270" in found.why_not_flat(1e-6) or "270 and 90" in found.why_not_flat(1e-6)
