@@ -22,7 +22,7 @@ from miurafab.origami.cut_open import cut_open
 from miurafab.origami.folding.layers import LayerOrder, layer_order
 from miurafab.origami.folding.order_search import MOST, LayerSearch, search_layer_orders
 from miurafab.origami.formats.fold import write_fold
-from miurafab.workflow.patterns import PatternLike, consistent_pattern
+from miurafab.workflow.patterns import PatternLike, movable_pattern
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def layers(pattern: PatternLike, **options: Any) -> Layers:
     <Layers 120 pairs of facets, orders found: 1>
     """
     asked = read_options(LayerOptions, options)
-    found = cut_open(consistent_pattern(pattern))
+    found = cut_open(movable_pattern(pattern))
     try:
         closed = layer_order(found)
     except PatternError:

@@ -25,14 +25,15 @@ def codes(answer) -> list[str]:
     return [finding["code"] for finding in answer["findings"]]
 
 
-def test_a_sheet_that_does_not_fold_flat_is_answered_with_no(run, tmp_path) -> None:
+@pytest.mark.parametrize("degrees", [90, 180])
+def test_a_sheet_that_does_not_fold_flat_is_answered_with_no(run, tmp_path, degrees) -> None:
     """Four valleys across a square meet in its middle."""
     path = written(
         tmp_path,
         vertices_coords=[*SQUARE, [1.5, 2]],
         edges_vertices=[*BORDER, [0, 4], [1, 4], [2, 4], [3, 4]],
         edges_assignment=list("BBBBVVVV"),
-        edges_foldAngle=[0, 0, 0, 0, 90, 90, 90, 90],
+        edges_foldAngle=[0, 0, 0, 0, *[degrees] * 4],
     )
     done = run("layers", path, "--json")
     assert done.returncode == 1
