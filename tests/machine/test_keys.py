@@ -302,7 +302,7 @@ def test_more_than_the_material_takes_is_refused() -> None:
 
 def test_the_console_tells_what_is_answered_and_goes_on_after_a_refusal() -> None:
     said: list[str] = []
-    talk("virtual", ["?\n", "G1 X5\n", "G0 X3 (there)\n", "oh!\n", "M3 S10\n"], said.append)
+    talk("virtual", ["?\n", "G1 X5\n", "G0 X3 (there)\n", "oh!\n", *["M3 S10\n"] * 2], said.append)
     assert said[0] == "Modes in force: G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0"
     assert said[1].startswith("<Idle|")
     assert "error:22" in said
