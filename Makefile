@@ -12,7 +12,7 @@ TOOLS := .venv/tools
 COMPILE = $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --upgrade
 AUDIT = $(TOOLS)/bin/pip-audit --strict --disable-pip --require-hashes
 
-.PHONY: demo test test-large lint gallery docs lock audit sbom clean
+.PHONY: demo test test-large lint gallery docs benchmark lock audit sbom clean
 
 demo: .venv/installed
 	$(BIN)/miurafab cut patterns/hypar.toml --port virtual
@@ -35,6 +35,10 @@ lint: .venv/installed-dev
 gallery: .venv/installed-dev
 	$(BIN)/python benchmarks/gallery.py
 	$(BIN)/python benchmarks/gallery.py --front
+
+# Runs all benchmarks, in some 20 minutes, and writes docs/benchmarks.md. Rivals are in the extra bench.
+benchmark: .venv/installed-dev
+	$(BIN)/python benchmarks/table.py
 
 # Makes a site of docs/ in site/, and fails on any warning.
 docs: .venv/installed-dev

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+import time
 
 from miurafab.origami.fitting.fit import FitRequest, fit
 from miurafab.origami.folding.kinematics import rigid_motion, states_between
@@ -35,7 +36,9 @@ def main() -> int:
     for name in options.targets:
         surface, _ = make_surface(name, {})
         request = FitRequest(surface=surface, facets=(side, side), size_mm=200.0, flat_foldable=0.0)
+        started = time.process_time()
         result = fit(request)
+        seconds = time.process_time() - started
         without = fit(FitRequest(surface=surface, facets=(side, side), size_mm=200.0)).measurements
         m = result.measurements
         if m is None or without is None or result.pattern is None:
@@ -47,7 +50,7 @@ def main() -> int:
         print(
             f"{name:<12} {m.facets:>6} {m.max_flat_foldability:>9.1e} {mismatch:>9.1e} "
             f"{m.hausdorff_midsurface_mm:>8.3f} {without.hausdorff_midsurface_mm:>8.3f} "
-            f"{m.self_intersections:>5} {result.seconds:>8.2f}",
+            f"{m.self_intersections:>5} {seconds:>8.2f}",
             flush=True,
         )
         failed |= not (m.max_flat_foldability or 0) <= 1e-10 or mismatch > 1e-9

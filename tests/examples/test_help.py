@@ -29,7 +29,7 @@ DRAWING = (
 NO_SWITCHES = "miurafab machine home"
 """The virtual machine has no homing switches: it refuses, exit code 3."""
 
-OF_OTHERS = {"--best", "--no-package-lock", "--round", "--glue", "--largest"}
+OF_OTHERS = {"--best", "--no-package-lock", "--round", "--glue", "--largest", "--meshes"}
 """Options of other programs, and of benchmarks, that pages name."""
 
 
