@@ -29,7 +29,7 @@ DRAWING = (
 NO_SWITCHES = "miurafab machine home"
 """The virtual machine has no homing switches: it refuses, exit code 3."""
 
-OF_OTHERS = {"--best", "--no-package-lock", "--round", "--glue", "--largest", "--meshes"}
+OF_OTHERS = {"--best", "--no-package-lock", "--round", "--glue", "--largest", "--live"}
 """Options of other programs, and of benchmarks, that pages name."""
 
 
@@ -63,6 +63,11 @@ def _options():
 def test_the_page_names_commands_and_options_that_exist(page):
     known = {*_options(), "--help", "--version", *OF_OTHERS}
     for code in re.findall(r"`([^`]+)`", prose_of(page)):
-        assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", code)) <= known, code
+        named = set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", code))
+        if script := re.match(r"python (benchmarks/\w+\.py)", code):
+            text = (ROOT / script[1]).read_text(encoding="utf-8")
+            assert {option for option in named if f'"{option}"' not in text} == set(), code
+            continue
+        assert named <= known, code
         if named := re.match(r"miurafab (\w+)", code):
             assert named[1] in COMMANDS, code
