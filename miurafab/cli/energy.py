@@ -63,15 +63,14 @@ def energy(
         from miurafab.origami.plotting import RESULTS
 
         new_file(out, "The energy", (*RESULTS, ".html"))
-    pattern = miurafab.load(file)
     with console.progress("pulling" if "pull" in given else "unfolding") as progress:
-        curve = miurafab.energy(pattern, material=material, on_progress=progress, **given)
+        curve = miurafab.energy(file, material=material, on_progress=progress, **given)
     answer = curve.report()
     if out is not None:
         if out.suffix.lower() == ".html":
             from miurafab.workflow.energy_page import write_energy_page
 
-            write_energy_page(curve, pattern, out, title=file.stem)
+            write_energy_page(curve, miurafab.load(file), out, title=file.stem)
         else:
             curve.save(out, title=file.stem)
         answer["file"] = str(out)

@@ -87,7 +87,7 @@ def read_formula(text: str, variables: tuple[str, ...] = ()) -> Formula:
 
     Examples
     --------
-    >>> read_formula("2*x^2 - y", ("x", "y"))({"x": 3.0, "y": 1.0})
+    >>> float(read_formula("2*x^2 - y", ("x", "y"))({"x": 3.0, "y": 1.0}))
     17.0
     """
     if len(text) > LONGEST:

@@ -231,7 +231,7 @@ def test_a_browser_enters_by_the_password(studio, tmp_path):
         page.call("Security.setIgnoreCertificateErrors", ignore=True)
         page.open(studio.address)
         assert page.run("document.documentElement.dataset.ready") == "yes"
-        assert page.run("document.activeElement.id") == "password"
+        wait_for(page, "document.activeElement.id === 'password'")
         for width in (1280, 390):
             page.call(
                 "Emulation.setDeviceMetricsOverride",

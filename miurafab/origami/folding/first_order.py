@@ -18,7 +18,6 @@ facets: it is not enough for a motion, but without it there is none.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linprog
 from scipy.sparse import coo_array, hstack
 
 from miurafab.geometry.arrays import Ints
@@ -53,6 +52,8 @@ def waiting_folds(pattern: CreasePattern) -> Ints:
     # r = m + more, so that m <= r
     system = hstack([signed, signed, loose, -loose])
     count, rest = len(folds), len(folds) + 2 * len(free)
+    from scipy.optimize import linprog  # takes a tenth of a second to load
+
     best = linprog(
         np.concatenate([-np.ones(count), np.zeros(rest)]),
         A_eq=system,
