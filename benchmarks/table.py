@@ -3,10 +3,11 @@
     python benchmarks/table.py                # runs all, under 20 minutes, and writes the page
     python benchmarks/table.py fit rivals     # these, printed; nothing is written
 
-Each is run as its own command says, at a size that takes a minute or two. The page has the machine,
-the versions, and for each benchmark its command, its exit code and processor time, and the whole
-output, rivals beside us where there are any. A benchmark whose program is not installed (Chromium,
-IPOPT) is listed as not run, with the reason.
+Each is run as its own command says, at a size that takes a minute or two. Those that write pages of
+their own (gallery, energy_study, notebooks, pictures) have commands of their own. The page has the
+machine, the versions, and for each benchmark its command, its exit code and processor time, and the
+whole output, rivals beside us where there are any. A benchmark whose program is not installed
+(Chromium, IPOPT) is listed as not run, with the reason.
 """
 
 from __future__ import annotations
@@ -79,9 +80,11 @@ ENTRIES = (
     Entry("fuzz", "--count 100", "damaged files of every format"),
     Entry("session_hour", "--commands 300", "random actions in one session"),
     Entry("stream", "--seconds 4 --lines 50000", "the wire, beside other senders"),
+    Entry("start", "--runs 1", "how soon commands begin their work"),
     Entry("live", "", "the studio's coarse answers"),
-    Entry("abort", "--runs 20", "from a click on Abort to the wire", "chromium"),
-    Entry("fold_page", "30x30 20", "the slider of the page of a motion", "chromium"),
+    Entry("first_picture", "", "the studio's first picture of a target", "chromium"),
+    Entry("abort", "--runs 50", "from a click on Abort to the wire", "chromium"),
+    Entry("fold_page", "60x60 30", "the slider of the page of a motion", "chromium"),
 )
 
 
@@ -142,7 +145,7 @@ def page(runs: list[Run]) -> str:
     ]
     for made in runs:
         if made.code is not None:
-            text = "\n".join(line.rstrip() for line in made.text.strip().splitlines())
+            text = "\n".join(line.rstrip() for line in made.text.strip("\n").splitlines())
             parts.append(
                 f"## {made.entry.program}\n\n`{made.entry.command}`\n\n```console\n{text}\n```\n"
             )
