@@ -321,6 +321,27 @@ class CreasePattern(Shown):
         return faces_edges, edges_faces
 
 
+def restricted(
+    pattern: CreasePattern, vertices: Ints, edges: Ints, faces: Ints, **others: Any
+) -> CreasePattern:
+    """``pattern`` with these ``vertices`` and ``edges`` alone, by their numbers in ascending order,
+    and with ``faces`` (F, k), whose corners have the old numbers. ``others`` are further fields.
+    """
+    number = np.full(len(pattern.vertices_coords) + 1, -1, dtype=np.int64)  # the last maps -1
+    number[vertices] = np.arange(len(vertices))
+    folded = pattern.folded_coords
+    return replace(
+        pattern,
+        vertices_coords=pattern.vertices_coords[vertices],
+        edges_vertices=number[pattern.edges_vertices[edges]],
+        edges_assignment=pattern.edges_assignment[edges],
+        edges_fold_angle=pattern.edges_fold_angle[edges],
+        faces_vertices=number[faces],
+        folded_coords=None if folded is None else folded[vertices],
+        **others,
+    )
+
+
 def _check_pieces(pieces: Ints, faces: Ints, vertices: int) -> None:
     if pieces.shape != (len(faces),):
         raise PatternError("The pieces do not have one number for each facet.")

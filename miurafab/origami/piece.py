@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.crease_pattern import CreasePattern, restricted
 
 SHELF = 3.0
 """The width at which things go on above, in sides of the square that holds their boxes."""
@@ -46,22 +46,17 @@ def piece_of(pattern: CreasePattern, facets: Ints) -> Piece:
     faces = pattern.faces_vertices[facets]
     vertices = np.unique(faces[faces >= 0])
     edges = np.unique(pattern.faces_edges[facets][faces >= 0])
-    vertex = np.full(len(pattern.vertices_coords) + 1, -1, dtype=np.int64)  # the last maps -1
-    vertex[vertices] = np.arange(len(vertices))
     edge = np.full(len(pattern.edges_vertices), -1, dtype=np.int64)
     edge[edges] = np.arange(len(edges))
-    folded, cells = pattern.folded_coords, pattern.cells
+    cells = pattern.cells
     seams = None if pattern.seams is None else edge[pattern.seams]
     if seams is not None:
         seams = seams[(seams >= 0).all(axis=1)]
-    alone = replace(
+    alone = restricted(
         pattern,
-        vertices_coords=pattern.vertices_coords[vertices],
-        edges_vertices=vertex[pattern.edges_vertices[edges]],
-        edges_assignment=pattern.edges_assignment[edges],
-        edges_fold_angle=pattern.edges_fold_angle[edges],
-        faces_vertices=vertex[faces],
-        folded_coords=None if folded is None else folded[vertices],
+        vertices,
+        edges,
+        faces,
         grid=None,
         pieces=None,
         seams=seams,

@@ -44,6 +44,20 @@ def self_intersections(pattern: CreasePattern) -> Ints:
     return meeting_facets(pattern, pattern.folded_coords)
 
 
+def crossing_triangles(points: Floats, triangles: Ints) -> Ints:
+    """(n, 2) the pairs of ``triangles`` (T, 3) over ``points`` (V, 3) that pass through or lie on
+    each other, sorted.
+    """
+    mesh = CreasePattern(
+        vertices_coords=np.zeros((len(points), 2)),
+        edges_vertices=np.empty((0, 2), dtype=np.int64),
+        edges_assignment=np.empty(0, dtype="U1"),
+        edges_fold_angle=np.empty(0),
+        faces_vertices=triangles,
+    )
+    return meeting_facets(mesh, points)
+
+
 def overlaps(pattern: CreasePattern) -> Ints:
     """(n, 2) the pairs of facets of the flat pattern that cover a common area, sorted.
 

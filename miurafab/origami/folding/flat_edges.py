@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import signed_areas
-from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.crease_pattern import CreasePattern, restricted
 from miurafab.origami.energy.bar_hinge import rulings_among
 from miurafab.origami.energy.triangles import split_facets
 from miurafab.origami.folding.kinematics import FoldingMotion
@@ -130,23 +130,17 @@ def _dissolved(pattern: CreasePattern, part: Ints, loops: dict[int, list[int]]) 
     vertices = np.unique(faces[faces >= 0])
     gone = _flat_edges(pattern) & joined[pattern.edges_faces[:, 0]]
     edges = np.flatnonzero(~gone)
-    number = np.full(len(pattern.vertices_coords) + 1, -1, dtype=np.int64)  # the last maps -1
-    number[vertices] = np.arange(len(vertices))
-    folded, pieces = pattern.folded_coords, pattern.pieces
+    pieces, seams = pattern.pieces, pattern.seams
     place = np.cumsum(~gone) - 1
-    lean = replace(
+    lean = restricted(
         pattern,
-        vertices_coords=pattern.vertices_coords[vertices],
-        edges_vertices=number[pattern.edges_vertices[edges]],
-        edges_assignment=pattern.edges_assignment[edges],
-        edges_fold_angle=pattern.edges_fold_angle[edges],
-        faces_vertices=number[faces],
-        folded_coords=None if folded is None else folded[vertices],
+        vertices,
+        edges,
+        faces,
         pieces=None if pieces is None else pieces[kept],
-        seams=None if pattern.seams is None else place[pattern.seams],
+        seams=None if seams is None else place[seams],
     )
-    inside = np.flatnonzero(np.bincount(pattern.edges_vertices.ravel(), minlength=len(number) - 1))
-    inside = inside[number[inside] < 0]
+    inside = np.setdiff1d(pattern.edges_vertices, vertices)
     corners, places = _places(lean, pattern.vertices_coords[inside])
     return Dissolved(pattern, lean, vertices, edges, inside, corners, places)
 

@@ -25,7 +25,7 @@ from miurafab.geometry.overlaps import shared_areas
 from miurafab.geometry.polygons import next_corners
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.bennett import thick_placement
-from miurafab.origami.folding.contact import self_intersections
+from miurafab.origami.folding.contact import crossing_triangles
 from miurafab.origami.folding.kinematics import fold_angles_at, states_between
 from miurafab.origami.folding.plate_solids import PlateSolids
 from miurafab.origami.folding.thick_panels import corner_moves
@@ -270,7 +270,7 @@ class PlatePatch:
         placed = self.placed(solids, states)
         clear, collision = 0, None
         for frame in range(len(states)):
-            pairs = self_intersections(solids.as_pattern(placed[frame]))
+            pairs = crossing_triangles(placed[frame], solids.triangles)
             hit = np.sort(solids.facet[solids.triangles[pairs, 0]], axis=1)
             hit = hit[hit[:, 0] != hit[:, 1]]
             if len(hit):

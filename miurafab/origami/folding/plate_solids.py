@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
 
 
@@ -39,14 +38,3 @@ class PlateSolids:
             triangles += [count + each for each in (cap[:, ::-1], cap + k, *walls)]
             count += 2 * k
         return cls(np.concatenate(corners), np.concatenate(owner), np.concatenate(triangles))
-
-    def as_pattern(self, placed: Floats) -> CreasePattern:
-        """The triangles as facets that are folded to ``placed`` (n, 3)."""
-        return CreasePattern(
-            vertices_coords=np.zeros((len(placed), 2)),
-            edges_vertices=np.empty((0, 2), dtype=np.int64),
-            edges_assignment=np.empty(0, dtype="U1"),
-            edges_fold_angle=np.empty(0),
-            faces_vertices=self.triangles,
-            folded_coords=placed,
-        )

@@ -31,7 +31,7 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import filled, next_corners, previous_corners, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.angles_csv import ON_EACH_OTHER
-from miurafab.origami.folding.contact import self_intersections, triangulate
+from miurafab.origami.folding.contact import crossing_triangles, triangulate
 from miurafab.origami.folding.kinematics import first_facets, fold_angles_at, place, rigid_motion
 from miurafab.origami.folding.made_panels import MadePanels
 
@@ -207,7 +207,7 @@ def _collisions(
         points = np.concatenate([hinge, solids.corners])
         facet = np.concatenate([owner_of_vertex, solids.corner_facet])
         placed = np.einsum("nij,nj->ni", turn[facet], points) + shift[facet]
-        pairs = self_intersections(solids.as_pattern(placed))
+        pairs = crossing_triangles(placed, solids.triangles)
         panels = np.sort(solids.triangle_facet[pairs], axis=1)
         panels = np.unique(panels[panels[:, 0] != panels[:, 1]], axis=0)
         if pattern.pieces is not None:  # each piece folds by itself
@@ -253,17 +253,6 @@ class _Solids:
             np.tile(facet, 2),
             np.concatenate(triangles),
             np.concatenate(owners),
-        )
-
-    def as_pattern(self, placed: Floats) -> CreasePattern:
-        """The triangles as facets of a pattern that is folded to ``placed`` (V + C, 3)."""
-        return CreasePattern(
-            vertices_coords=np.zeros((len(placed), 2)),
-            edges_vertices=np.empty((0, 2), dtype=np.int64),
-            edges_assignment=np.empty(0, dtype="U1"),
-            edges_fold_angle=np.empty(0),
-            faces_vertices=self.triangles,
-            folded_coords=placed,
         )
 
 

@@ -36,7 +36,7 @@ from miurafab.geometry.arrays import Ints
 from miurafab.geometry.polygons import (
     connected_parts,
 )
-from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.crease_pattern import CreasePattern, restricted
 from miurafab.origami.flattening import ROUGHEST
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.folding.layers import LayerOrder
@@ -249,8 +249,6 @@ def _without_loose_vertices(pattern: CreasePattern) -> CreasePattern:
     used[faces[faces >= 0]] = True
     if used.all() or pattern.grid is not None or pattern.seams is not None:
         return pattern
-    number = np.full(len(used) + 1, -1, dtype=np.int64)  # the last entry maps -1 to -1
-    number[:-1][used] = np.arange(int(used.sum()))
     kept = used[pattern.edges_vertices].all(axis=1)
     loose, edges = int((~used).sum()), int((~kept).sum())
     says = (
@@ -258,15 +256,11 @@ def _without_loose_vertices(pattern: CreasePattern) -> CreasePattern:
         f"{'edge' if edges == 1 else 'edges'} there, {'is' if loose == 1 else 'are'} left out, the "
         f"first being vertex {int(np.argmin(used))}."
     )
-    folded = pattern.folded_coords
-    return replace(
+    return restricted(
         pattern,
-        vertices_coords=pattern.vertices_coords[used],
-        edges_vertices=number[pattern.edges_vertices[kept]],
-        edges_assignment=pattern.edges_assignment[kept],
-        edges_fold_angle=pattern.edges_fold_angle[kept],
-        faces_vertices=number[faces],
-        folded_coords=None if folded is None else folded[used],
+        np.flatnonzero(used),
+        np.flatnonzero(kept),
+        faces,
         told=(*pattern.told, Finding("lost-lines", says)),
     )
 
