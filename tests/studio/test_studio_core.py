@@ -18,16 +18,6 @@ from miurafab.studio.core import PARTS
 from miurafab.studio.messages import TYPES
 
 
-@pytest.fixture
-def asked(tmp_path):
-    return Asked(tmp_path)
-
-
-@pytest.fixture
-def done(tmp_path):
-    return Asked(tmp_path, Done)
-
-
 class Tags(html.parser.HTMLParser):
     def __init__(self, text):
         super().__init__()

@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mesh_shapes import kept, mesh, sheet
 from PIL import Image
-from studios import Asked, Done, saddle_obj, sentence
+from studios import Done, saddle_obj, sentence
 
 import miurafab
 from miurafab.errors import TargetError
@@ -61,16 +61,6 @@ def heights_png():
     held = io.BytesIO()
     Image.fromarray(shades.astype(np.uint8)).save(held, "PNG")
     return held.getvalue()
-
-
-@pytest.fixture
-def asked(tmp_path):
-    return Asked(tmp_path)
-
-
-@pytest.fixture
-def done(tmp_path):
-    return Asked(tmp_path, Done)
 
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
