@@ -63,14 +63,17 @@ def energy(
         from miurafab.origami.plotting import RESULTS
 
         new_file(out, "The energy", (*RESULTS, ".html"))
+    # a page shows the sheet too, and both are of one reading of the file
+    shown = miurafab.load(file) if out is not None and out.suffix.lower() == ".html" else None
+    thing = file if shown is None else shown
     with console.progress("pulling" if "pull" in given else "unfolding") as progress:
-        curve = miurafab.energy(file, material=material, on_progress=progress, **given)
+        curve = miurafab.energy(thing, material=material, on_progress=progress, **given)
     answer = curve.report()
     if out is not None:
-        if out.suffix.lower() == ".html":
+        if shown is not None:
             from miurafab.workflow.energy_page import write_energy_page
 
-            write_energy_page(curve, miurafab.load(file), out, title=file.stem)
+            write_energy_page(curve, shown, out, title=file.stem)
         else:
             curve.save(out, title=file.stem)
         answer["file"] = str(out)
