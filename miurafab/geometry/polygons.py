@@ -14,7 +14,7 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from miurafab.geometry.arrays import Floats, Ints, vector_product
+from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 
 
 def filled(faces: Ints) -> Ints:
@@ -83,6 +83,19 @@ def facet_normals(points: Floats, faces: Ints) -> Floats:
         normal = vector_product(spokes, np.roll(spokes, -1, axis=1)).sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+
+
+def reflex_corners(points: Floats, faces: Ints) -> Bools:
+    """(F, k) the corners of ``faces`` (F, k) in ``points`` (V, 3) whose angle within the face is
+    more than half a turn.
+
+    These turn against the area vector of their face. A face without area has none.
+    """
+    here = points[filled(faces)]
+    out = np.take_along_axis(here, next_corners(faces)[..., None], axis=1) - here
+    back = np.take_along_axis(here, previous_corners(faces)[..., None], axis=1) - here
+    turn = np.einsum("fck,fk->fc", vector_product(out, back), facet_normals(points, faces))
+    return np.asarray((faces >= 0) & (turn < 0))
 
 
 def facet_areas(points: Floats, faces: Ints) -> Floats:

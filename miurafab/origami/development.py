@@ -29,6 +29,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from miurafab.geometry.angles import angle_between
 from miurafab.geometry.arrays import Bools, Floats, Ints, run_starts
+from miurafab.geometry.polygons import reflex_corners
 from miurafab.geometry.quads import QuadCharts
 from miurafab.geometry.sparse import SymmetricSolver
 
@@ -213,11 +214,14 @@ def _cut(charts: QuadCharts, creases: Ints, used: Bools) -> Bools:
 def _headings(corners: Floats, tree: _Tree) -> tuple[Floats, Floats]:
     """(F, 4) the headings of all sides of quads with ``corners`` (F, 4, 3), and their lengths.
 
-    A side heads further left than the side before by the turn at their corner. The facet beyond a
-    side runs along that side in the opposite direction.
+    A side heads further left than the side before by the turn at their corner, and to the right
+    where the quad is not convex. The facet beyond a side runs along that side in the opposite
+    direction.
     """
     sides = np.roll(corners, -1, axis=1) - corners
     turns = angle_between(np.roll(sides, 1, axis=1), sides)
+    faces = np.arange(4 * len(corners)).reshape(-1, 4)
+    turns[reflex_corners(corners.reshape(-1, 3), faces)] *= -1.0
     turns[:, 0] = 0.0
     within = np.cumsum(turns, axis=1)
     first = np.zeros(len(corners))

@@ -27,8 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Bools, Floats, Ints
-from miurafab.geometry.polygons import next_corners, previous_corners
+from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import previous_corners
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import CornerRing, corner_ring, interior_vertices
 
@@ -126,7 +126,6 @@ def vertex_folds(pattern: CreasePattern) -> tuple[list[VertexFolds], int]:
     """
     vertices = interior_vertices(pattern)
     ring = corner_ring(pattern, np.pad(pattern.vertices_coords, ((0, 0), (0, 1))))
-    angle = np.where(_reflex(pattern), 2 * np.pi - ring.angle, ring.angle)
     edges = _edges_after(pattern)
     letters, angles = pattern.edges_assignment, pattern.edges_fold_angle
     start = np.full(len(pattern.vertices_coords), -1)
@@ -143,7 +142,7 @@ def vertex_folds(pattern: CreasePattern) -> tuple[list[VertexFolds], int]:
         if not len(folding):
             continue
         # A sector runs from one folding crease to the next.
-        places = np.cumsum(angle[around])
+        places = np.cumsum(ring.angle[around])
         sectors = np.diff(places[folding], append=places[-1] + places[folding[0]])
         judged.append(VertexFolds(vertex, np.roll(sectors, 1), angles[edge[folding]]))
     return judged, left_out
@@ -157,16 +156,6 @@ def _around(ring: CornerRing, first: int) -> Iterator[int]:
         corner = int(ring.following[corner])
         if corner == first or corner < 0:
             return
-
-
-def _reflex(pattern: CreasePattern) -> Bools:
-    """(F * k,) the corners of more than half a turn, in facets that run counter-clockwise."""
-    faces, points = pattern.faces_vertices, pattern.vertices_coords
-    after, before = next_corners(faces), previous_corners(faces)
-    out = points[np.take_along_axis(faces, after, axis=1)] - points[faces]
-    back = points[np.take_along_axis(faces, before, axis=1)] - points[faces]
-    left = out[..., 0] * back[..., 1] - out[..., 1] * back[..., 0]
-    return np.asarray((faces >= 0) & (left < 0)).reshape(-1)
 
 
 def _edges_after(pattern: CreasePattern) -> Ints:

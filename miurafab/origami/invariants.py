@@ -15,8 +15,10 @@ from miurafab.geometry.angles import angle_between
 from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.polygons import (
     edge_lengths,
+    filled,
     next_corners,
     previous_corners,
+    reflex_corners,
     sides_and_diagonals,
 )
 from miurafab.origami.crease_pattern import CreasePattern
@@ -86,7 +88,8 @@ def exactness(pattern: CreasePattern) -> float:
 class CornerRing:
     """The C = F * k corners of all facets.
 
-    ``vertex`` (C,) is -1 where a facet has fewer corners; ``angle`` (C,) is the sector angle;
+    ``vertex`` (C,) is -1 where a facet has fewer corners; ``angle`` (C,) is the sector angle, which
+    is more than pi where the facet is not convex;
     ``following`` (C,) the next corner counter-clockwise about the vertex, -1 at a border.
     """
 
@@ -105,6 +108,7 @@ def corner_ring(pattern: CreasePattern, points: Floats) -> CornerRing:
     to_next = points[np.take_along_axis(faces, after, axis=1)] - here
     to_previous = points[np.take_along_axis(faces, before, axis=1)] - here
     angle = np.where(real, angle_between(to_next, to_previous), 0.0)
+    angle = np.where(reflex_corners(points, faces), 2 * np.pi - angle, angle)
 
     # the corner that starts each directed side: sides[e, 0] along the edge, sides[e, 1] against it
     sides = np.full((len(pattern.edges_vertices), 2), -1, dtype=np.int64)
@@ -161,19 +165,22 @@ def kawasaki_residual(ring: CornerRing, vertices: Ints) -> Floats:
 
 
 def facet_planarity(pattern: CreasePattern, points: Floats) -> Floats:
-    """(F,) the largest |det(p1 - p0, p2 - p0, p3 - p0)| over four corners of each facet, divided by
+    """(F,) the largest |det(a - p0, b - p0, p - p0)| over the corners p of each facet, divided by
     the cube of the mean edge length; 0 for triangles.
+
+    Of a quad it is the determinant of its corners. The corner a is the farthest from p0, and b
+    that of the largest triangle with the two: corners in line say nothing of a plane.
     """
     faces = pattern.faces_vertices
     mean = float(edge_lengths(points, pattern.edges_vertices).mean())
-    worst = np.zeros(len(faces))
-    for corner in range(3, faces.shape[1]):
-        real = faces[:, corner] >= 0
-        p = points[faces[real][:, [0, 1, 2, corner]]]
-        a, b, c = (p[:, n] - p[:, 0] for n in (1, 2, 3))
-        volume = np.abs(np.einsum("fk,fk->f", a, vector_product(b, c)))
-        worst[real] = np.maximum(worst[real], volume / mean**3)
-    return worst
+    corners = points[filled(faces)]
+    spokes = corners - corners[:, :1]
+    here = np.arange(len(faces))
+    a = spokes[here, np.linalg.norm(spokes, axis=2).argmax(axis=1)]
+    across = vector_product(a[:, None], spokes)
+    normal = across[here, np.linalg.norm(across, axis=2).argmax(axis=1)]
+    volume = np.abs(np.einsum("fk,fck->fc", normal, spokes)).max(axis=1)
+    return np.asarray(np.where((faces >= 0).sum(axis=1) > 3, volume, 0.0) / mean**3)
 
 
 def isometry(pattern: CreasePattern) -> Floats:
@@ -218,8 +225,7 @@ def seam_gaps(pattern: CreasePattern) -> Floats:
 def crossed_facets(pattern: CreasePattern) -> Ints:
     """The facets of the flat pattern of which two sides cross: bow-ties.
 
-    Their sector angles, taken without sign, may add up as those of a developable vertex, so that
-    only their shape tells that they do not unfold.
+    Their corners turn to both sides, so that sector angles say little of them.
     """
     faces, points = pattern.faces_vertices, pattern.vertices_coords
     sizes, k = (faces >= 0).sum(axis=1), faces.shape[1]

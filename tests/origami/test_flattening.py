@@ -194,3 +194,47 @@ def test_a_net_is_cut_where_the_file_says() -> None:
     assert [finding.code for finding in read.told] == ["opened", "unfolded"]
     assert np.ptp(read.vertices_coords, axis=0) == pytest.approx([2, 2])
     assert mf.check(read).valid
+
+
+L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2), (2, 2), (3, 0), (3, 1), (3, 2)]
+L_FACETS = [(0, 1, 2, 3, 4, 5), (3, 2, 6, 4), (1, 7, 8, 2), (2, 8, 9, 6)]
+
+
+def folded_over(points: list[tuple[float, float]], angle: float) -> np.ndarray:
+    """``points`` with what is right of x = 2 turned up by ``angle`` about that line."""
+    x, y = np.array(points, dtype=np.float64).T
+    over = np.maximum(x - 2, 0)
+    return np.stack([x - over + over * math.cos(angle), y, over * math.sin(angle)], axis=1)
+
+
+def test_a_facet_with_a_corner_of_more_than_half_a_turn_lies_flat() -> None:
+    """An L and the square in its corner, and two squares that are folded up beside them: the angles
+    around the corner of the L are 270 and 90 degrees."""
+    read = parse_fold(form(folded_over(L_SHAPE, 1.0), L_FACETS))
+    flat = np.pad(np.array(L_SHAPE, dtype=np.float64), ((0, 0), (0, 1)))
+    assert np.abs(apart(read.vertices_coords) - apart(flat[:, :2])).max() < 1e-12
+    assert mf.check(read).valid
+    assert mf.check(read).measurements.quality.sector_angles[1] == pytest.approx(1.5 * math.pi)
+    motion = mf.fold(read, steps=4)
+    assert motion.report()["rigid"]
+    assert motion.report()["max_strain"] < 1e-12
+
+
+def test_a_dent_that_does_not_close_is_told_by_its_whole_angle() -> None:
+    """A quad with a corner of 240 degrees and four triangles of 60: with 120 that made 360."""
+    out = (3 + math.sqrt(6)) / (4 * math.sqrt(3))
+    ahead = 1 - math.sqrt(3) * out
+    side = math.sqrt(3) / 2
+    points = [(0, 0, 0), (0.5, side, 0), (-3, 0, 0), (0.5, -side, 0)]
+    points += [(ahead, -out, 0.5), (0, 0, 1), (ahead, out, 0.5)]
+    faces = [(0, 1, 2, 3), (0, 3, 4), (0, 4, 5), (0, 5, 6), (0, 6, 1)]
+    for a, b in ((3, 4), (4, 5), (5, 6), (6, 1)):
+        assert np.dot(points[a], points[b]) == pytest.approx(0.5)
+    with pytest.raises(PatternError, match="vertex 0 add up to 480 degrees"):
+        parse_fold(form(points, faces))
+
+
+def test_a_facet_that_begins_with_three_corners_in_line_is_not_flat_for_that() -> None:
+    points = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0.5], [1, 2, 0], [0, 1, 0.5]]
+    with pytest.raises(PatternError, match="Facet 0 is not flat"):
+        parse_fold(form(points, [(0, 1, 2, 3, 4, 5)]))

@@ -19,6 +19,7 @@ from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import isometry
 from miurafab.origami.miura import regular_miura
+from miurafab.origami.tessellation import Tessellation
 from miurafab.origami.unfold import unfold, unfold_charts
 from miurafab.origami.verify import audit
 
@@ -227,3 +228,11 @@ def test_facets_that_form_no_sheet_are_a_mistake_of_the_program(faces, says) -> 
     charts = QuadCharts(np.array(faces), np.array([[0, 0], [0, 1]]), np.zeros(2, np.int64), 6)
     with pytest.raises(ValueError, match=says):
         unfold_charts(charts, np.random.default_rng(0).random((6, 3)))
+
+
+def test_a_grid_with_a_facet_that_is_not_convex_lies_flat_as_it_is() -> None:
+    points = regular_miura(CELL, 4, 4).points.copy()
+    points[0, 0] += 0.7 * (points[1, 1] - points[0, 0])  # over the diagonal of its facet
+    pattern = unfold(Tessellation(points))
+    assert {finding.code for finding in audit(pattern).findings} == {"dented"}
+    assert isometry(pattern).max() < 1e-13
