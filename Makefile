@@ -12,7 +12,7 @@ TOOLS := .venv/tools
 COMPILE = $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --upgrade
 AUDIT = $(TOOLS)/bin/pip-audit --strict --disable-pip --require-hashes
 
-.PHONY: demo test test-large lint gallery docs benchmark lock audit sbom clean
+.PHONY: demo test test-large lint gallery docs benchmark mutants lock audit sbom clean
 
 demo: .venv/installed
 	$(BIN)/miurafab cut patterns/hypar.toml --port virtual
@@ -40,6 +40,11 @@ gallery: .venv/installed-dev
 benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/table.py
 
+# Puts faults into the modules of `[tool.mutants]` in pyproject.toml and tells which of them no test
+# sees; `make mutants AREA=tabs` for one area.
+mutants: .venv/installed-dev $(TOOLS)/installed
+	$(BIN)/python .ci/mutants.py $(AREA)
+
 # Makes a site of docs/ in site/, and fails on any warning.
 docs: .venv/installed-dev
 	$(BIN)/zensical build --clean --strict
@@ -65,7 +70,7 @@ packages: .venv/installed-dev $(TOOLS)/installed
 	$(OURS)
 	touch $@
 
-# The programs that write and judge the lock files, in an environment of their own.
+# The programs that write and judge the lock files and list faults, in an environment of their own.
 $(TOOLS)/installed: locks/tools.txt
 	$(PYTHON) -m venv $(TOOLS)
 	$(TOOLS)/bin/python -m pip install --quiet --require-hashes --requirement locks/tools.txt
