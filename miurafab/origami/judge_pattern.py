@@ -66,15 +66,18 @@ def gather(pattern: CreasePattern) -> Evidence:
     )
 
 
-def judge_quality(measured: Measurements) -> Iterator[Finding]:
-    """What makes a sheet hard to fold or leaves target out; all of it is left to the maker."""
+def judge_quality(measured: Measurements, *, fitted: bool) -> Iterator[Finding]:
+    """What makes a sheet hard to fold or leaves target out; all of it is left to the maker.
+
+    Only one that is ``fitted`` to a target can be asked for with other creases.
+    """
     shape = measured.quality
     if shape is not None and shape.fold_angles[2] > STEEP_FOLD:
         yield Finding(
             "steep-folds",
             f"Creases fold by up to {math.degrees(shape.fold_angles[2]):.0f} degrees, and facets "
-            "nearly lie on each other there; ask for other `facets`, or a lower `amplitude` or "
-            "`zigzag`.",
+            "nearly lie on each other there"
+            + ("; ask for other `facets`, or a lower `amplitude` or `zigzag`." if fitted else "."),
         )
     if measured.area_ratio is not None and measured.area_ratio > MUCH_PAPER:
         yield Finding(
@@ -154,8 +157,8 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
     if found is not None:
         yield from _inexact(found)
     pairs = evidence.crossings
-    if len(pairs) and pattern.unfolded is not None:
-        lying = _lie_together(pattern, pairs)
+    if len(pairs) and found is not None and pattern.grid is None and pattern.cells is None:
+        lying = _lie_together(pattern, pairs, found.worst)
         if lying.any():
             one, other = pairs[lying][0].tolist()
             yield Finding(
@@ -173,13 +176,15 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
         )
 
 
-def _lie_together(pattern: CreasePattern, pairs: Ints) -> Bools:
-    """(n,) whether the two facets of each of ``pairs`` lie in one plane of the folded form."""
+def _lie_together(pattern: CreasePattern, pairs: Ints, worst: float) -> Bools:
+    """(n,) whether the two facets of each of ``pairs`` lie in one plane of the folded form, whose
+    largest residual is ``worst``.
+    """
     points, faces = pattern.folded_coords, pattern.faces_vertices
     assert points is not None
     normals, middles = facet_normals(points, faces), facet_means(points, faces)
     one, other = pairs.T
-    near = TOGETHER + ROUNDINGS * (pattern.unfolded or 0.0)
+    near = TOGETHER + ROUNDINGS * worst
     level = np.linalg.norm(vector_product(normals[one], normals[other]), axis=1) <= near
     apart = np.abs(np.einsum("nk,nk->n", middles[other] - middles[one], normals[one]))
     mean = float(edge_lengths(points, pattern.edges_vertices).mean())

@@ -162,7 +162,7 @@ def audit(pattern: CreasePattern, surface: TargetSurface | None = None) -> Audit
     started = time.perf_counter()
     evidence = gather(pattern)
     measured = _measured(pattern, surface, evidence)
-    findings = (*judge(pattern, evidence), *judge_quality(measured))
+    findings = (*judge(pattern, evidence), *judge_quality(measured, fitted=bool(pattern.target)))
     seconds = time.perf_counter() - started
     return Audit(measured, findings, seconds, proved(pattern, evidence, findings))
 

@@ -103,7 +103,7 @@ def fit(
                     name, "is for a `size` that the bed decides; ask for the `size` bed"
                 )
         result = fit_request(asked.request, on_progress)
-    shape = () if result.measurements is None else judge_quality(result.measurements)
+    shape = () if result.measurements is None else judge_quality(result.measurements, fitted=True)
     return replace(result, findings=(*asked.findings, *result.findings, *shape))
 
 

@@ -17,13 +17,11 @@ from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.formats.files import load
 from miurafab.origami.formats.fold import read_further_frames
 from miurafab.origami.formats.fold_states import FurtherFrame
+from miurafab.origami.formats.two_forms import ROUNDED
 from miurafab.origami.judge_frames import judge_frames
 from miurafab.origami.judge_pattern import gather, judge
 from miurafab.origami.verify import Audit, audit
 from miurafab.surfaces.description import described_surface
-
-ROUNDED = 1e-4
-"""Flat and folded form in a file of five digits differ by as much, as a part of an edge."""
 
 _SHAPES = frozenset({"degenerate-edge", "bow-tie", "overlap", "self-intersection"})
 _WISHES = frozenset({"flat-folding", "closure"})

@@ -72,6 +72,7 @@ from miurafab.origami.formats.target_frame import (
     target_kept,
     target_seal,
 )
+from miurafab.origami.formats.two_forms import with_its_own_form
 from miurafab.origami.unfold import with_angles_of_the_folded_form
 from miurafab.version import __version__
 
@@ -236,6 +237,9 @@ def parse_fold(document: Any) -> CreasePattern:
     )
     pattern = replace(pattern, faces_vertices=oriented(flat, faces))
     pattern.edges_faces  # noqa: B018 - facets that do not fit their edges are a fault of the file
+    foreign = not any(name.startswith("miurafab:") for name in document)
+    if pattern.folded_coords is not None and foreign:
+        pattern = with_its_own_form(pattern)
     if pattern.folded_coords is not None and key.get("edges_foldAngle") is None:
         pattern = with_angles_of_the_folded_form(pattern)
     further = sum("foldedForm" in classes_of(frame) for frame in frames) > 1

@@ -34,13 +34,6 @@ _STROKES = {
 }  # fmt: skip
 _LETTERS = {(0, 0, 0): "B", (255, 0, 0): "M", (0, 0, 255): "V", (0, 255, 0): "C"}
 _LETTERS |= {(255, 255, 0): "F", (255, 0, 255): "U"}
-_NAMES = {
-    "black": "#000000", "red": "#ff0000", "blue": "#0000ff", "lime": "#00ff00",
-    "green": "#008000", "yellow": "#ffff00", "magenta": "#ff00ff", "fuchsia": "#ff00ff",
-    "gray": "#808080", "grey": "#808080", "silver": "#c0c0c0", "white": "#ffffff",
-    "maroon": "#800000", "navy": "#000080", "purple": "#800080", "olive": "#808000",
-    "teal": "#008080", "aqua": "#00ffff", "cyan": "#00ffff", "orange": "#ffa500",
-}  # fmt: skip
 _SHORTEST = 10.0
 """User units of the shortest line."""
 _BETWEEN = " \t\r\n,"
@@ -186,7 +179,6 @@ def _assignment(element: Element, look: _Look) -> str | None:
 
 
 def _colour(text: str) -> tuple[int, int, int] | None:
-    text = _NAMES.get(text, text)
     if re.fullmatch(r"#[0-9a-f]{3}", text):
         text = "#" + "".join(digit * 2 for digit in text[1:])
     if re.fullmatch(r"#[0-9a-f]{6}", text):
@@ -207,6 +199,10 @@ def _colour(text: str) -> tuple[int, int, int] | None:
         return red, green, blue
     if text in ("none", "", "transparent"):
         return None
+    from PIL import ImageColor  # only now: few drawings name colours
+
+    if text in ImageColor.colormap:
+        return _colour(str(ImageColor.colormap[text]))
     raise PatternError(f"the stroke '{text[:40]}' is not a colour; write it as #rrggbb.")
 
 

@@ -113,6 +113,15 @@ def test_the_shortest_line_of_an_svg_has_ten_units_and_the_sheet_its_size() -> N
     )
 
 
+@pytest.mark.parametrize(
+    ("name", "letter"), [("lightgray", "F"), ("DarkRed", "M"), ("mediumblue", "V")]
+)
+def test_any_colour_of_css_may_be_named(name: str, letter: str) -> None:
+    line = f'<line x1="0" x2="9" y1="0" y2="9" stroke="{name}"/>'
+    read = parse_svg(f'<svg xmlns="http://www.w3.org/2000/svg">{line}</svg>')
+    assert read.assignment.tolist() == [letter]
+
+
 def test_an_svg_of_another_hand() -> None:
     read = parse_svg(
         """<svg xmlns="http://www.w3.org/2000/svg"><style>.v { stroke: blue; opacity: 50% }</style>
