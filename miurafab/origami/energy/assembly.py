@@ -46,11 +46,12 @@ class Assembly:
 
     def matrix(self, blocks: Sequence[Floats]) -> sparse.csc_array:
         """The sum of ``blocks``, (n, k, k, 3, 3) for each group, between the free coordinates."""
-        rows, starts, place = self._sparsity
-        values = np.concatenate([block.ravel() for block in blocks])
-        data = np.bincount(place, values, len(rows) + 1)[1:]
+        sums, rows, starts, place = self._sparsity
+        total = sums[0] @ blocks[0].reshape(-1, 9)
+        for group, block in zip(sums[1:], blocks[1:], strict=True):
+            total += group @ block.reshape(-1, 9)
         size = len(starts) - 1
-        return sparse.csc_array((data, rows, starts), shape=(size, size))
+        return sparse.csc_array((total.ravel()[place], rows, starts), shape=(size, size))
 
     def scattered(self, stencils: Ints, vectors: Floats) -> Floats:
         """As :meth:`gather`, of ``vectors`` (n, k, 3) at ``stencils`` (n, k) of no group."""
@@ -85,19 +86,20 @@ class Assembly:
         return coordinates[~np.isin(coordinates, held)]
 
     @cached_property
-    def _pairs(self) -> tuple[Ints, Ints]:
-        """The vertex pairs of all 3x3 blocks of the matrix, in the order of computation."""
-        rows, columns = [], []
+    def _pairs(self) -> list[tuple[Ints, Ints]]:
+        """The rows and columns, as vertices, of the 3x3 blocks of each group as they are given."""
+        pairs = []
         for stencils in self.stencils:
             size = stencils.shape[1]
-            rows.append(np.repeat(stencils, size, axis=1).ravel())
-            columns.append(np.tile(stencils, size).ravel())
-        return np.concatenate(rows), np.concatenate(columns)
+            pairs.append(
+                (np.repeat(stencils, size, axis=1).ravel(), np.tile(stencils, size).ravel())
+            )
+        return pairs
 
     @cached_property
     def _elimination(self) -> Ints:
         """(V,) vertices in a fill-reducing order, by minimum degree on the vertex graph."""
-        rows, columns = self._pairs
+        rows, columns = (np.concatenate(ends) for ends in zip(*self._pairs, strict=True))
         shape = (self.count, self.count)
         graph = sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=shape).tocsc()
         graph.data[:] = -1.0
@@ -112,16 +114,28 @@ class Assembly:
         return places.reshape(-1, 3)
 
     @cached_property
-    def _sparsity(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Ints]:
-        """Rows and column starts of the matrix (CSC), and the place of each computed value in its
-        data: 1 + the index, or 0 for a held coordinate.
+    def _sparsity(
+        self,
+    ) -> tuple[list[sparse.csr_array], NDArray[np.int32], NDArray[np.int32], Ints]:
+        """What sums the given blocks, group by group, to the blocks of the matrix; rows and column
+        starts of the matrix (CSC); and the place of each of its numbers among the summed blocks.
         """
-        row, column = (self._places[ends] for ends in self._pairs)
-        rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
-        real = (rows >= 0) & (columns >= 0)
-        key = np.where(real, columns * len(self.free) + rows, -1).ravel()
-        keys, place = np.unique(key, return_inverse=True)
-        columns, rows = np.divmod(keys[keys >= 0], len(self.free))
-        starts = np.searchsorted(columns, np.arange(len(self.free) + 1))
-        offset = 1 - int((keys < 0).sum())
-        return rows.astype(np.int32), starts.astype(np.int32), place + offset
+        place = np.argsort(self._elimination)
+        keys = [place[columns] * self.count + place[rows] for rows, columns in self._pairs]
+        known, block = np.unique(np.concatenate(keys), return_inverse=True)
+        ends = np.cumsum([len(key) for key in keys])[:-1]
+        sums = []
+        for group in np.split(block, ends):
+            given = np.arange(len(group) + 1)
+            ones = np.ones(len(group))
+            sums.append(sparse.csc_array((ones, group, given), (len(known), len(group))).tocsr())
+        columns, rows = np.divmod(known, self.count)
+        starts = np.searchsorted(columns, np.arange(self.count + 1))
+        # the numbers of a block lie row by row, those of the matrix column by column
+        numbers = np.arange(9 * len(known)).reshape(-1, 3, 3).swapaxes(1, 2)
+        whole = sparse.bsr_array((numbers, rows, starts), 2 * (3 * self.count,)).tocsr()
+        coordinates = (self._elimination[:, None] * 3 + np.arange(3)).ravel()
+        free = np.flatnonzero(np.isin(coordinates, self.free))
+        inner = whole[:, free][free]
+        inner.sort_indices()
+        return sums, inner.indices.astype(np.int32), inner.indptr.astype(np.int32), inner.data

@@ -199,9 +199,10 @@ class Balance:
         model, points = self.model, state.points
         angle, gradient, hessian = hinge_derivatives(points, self.hinges)
         moment, slope = self.moments(angle, target)
-        scaled = slope[:, None, None] * gradient
-        bend = scaled[:, :, None, :, None] * gradient[:, None, :, None, :]
-        bend += moment[:, None, None, None, None] * hessian.swapaxes(2, 3)
+        turn = gradient.reshape(-1, 12)
+        bend = (slope[:, None] * turn)[:, :, None] * turn[:, None]
+        bend += moment[:, None, None] * hessian.reshape(-1, 12, 12)
+        blocks = bend.reshape(-1, 4, 3, 4, 3).swapaxes(2, 3)
         bars = model.bar_vectors(points) / model.lengths[:, None]
         weights = 1.0 / (model.compliance + EPS)
         block = weights[:, None, None] * bars[:, :, None] * bars[:, None, :]
@@ -209,7 +210,7 @@ class Balance:
         drive = self.drive(points, target)
         across = drive.gradient[:, None, :, None] * drive.gradient[None, :, None, :]
         held = state.mu * drive.hessian + across / EPS
-        matrix = self.assembly.matrix([bend, stretch_blocks(block), held[None]])
+        matrix = self.assembly.matrix([blocks, stretch_blocks(block), held[None]])
         touch = self.touch(points)
         matrix = self.assembly.joined(matrix, touch.stencils, touch.stiffness)
         return Factored(self.factored(matrix), bars, weights, drive.gradient)

@@ -29,12 +29,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from miurafab.geometry.arrays import Floats, Ints, vector_product
+from miurafab.geometry.arrays import Floats, Ints
 
 
 class _Frames(NamedTuple):
-    """Per hinge: the length ``l`` and direction ``t`` of the edge; per hinge and wing: ``s``, the
-    height ``h``, the in-plane ``m`` and the normal ``n``.
+    """The length ``l`` (H,) and direction ``t`` (3, H) of the edges; of both wings the foot ``s``
+    and height ``h`` (2, H), and the in-plane ``m`` and the normal ``n`` (3, 2, H).
+
+    Hinges come last, so that they lie side by side in memory: that takes half of the time.
     """
 
     l: Floats  # noqa: E741  (the letter of the algebra above)
@@ -66,54 +68,60 @@ def hinge_derivatives(points: Floats, hinges: Ints) -> tuple[Floats, Floats, Flo
 
 
 def _frames(points: Floats, hinges: Ints) -> _Frames:
-    p = points[hinges]
-    e = p[:, 1] - p[:, 0]
-    length = np.sqrt(np.einsum("hk,hk->h", e, e))
-    t = e / length[:, None]
-    wings = p[:, 2:] - p[:, :1]
-    along = np.einsum("hwk,hk->hw", wings, t)
-    m = wings - along[..., None] * t[:, None]
-    h = np.sqrt(np.einsum("hwk,hwk->hw", m, m))
-    m = m / h[..., None]
-    n = vector_product(t[:, None], m)
+    coordinates = np.ascontiguousarray(points.T)
+    u, v, a, b = (coordinates.take(ends, axis=1) for ends in hinges.T)
+    e = v - u
+    length = np.sqrt(_dot(e, e))
+    t = e / length
+    m = np.stack([a - u, b - u], axis=1)
+    along = _dot(m, t[:, None])
+    m -= along * t[:, None]
+    h = np.sqrt(_dot(m, m))
+    m /= h
+    n = np.empty_like(m)
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.multiply(t[i], m[j], out=n[k])
+        n[k] -= t[j] * m[i]
     n[:, 1] *= -1.0
-    return _Frames(length, t, along / length[:, None], h, m, n)
+    return _Frames(length, t, along / length, h, m, n)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    """The scalar product over the first axis."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 def _angle(f: _Frames) -> Floats:
     # n_a x n_b is along t; its component there is n_b . (t x n_a) = -n_b . m_a
-    sine = np.einsum("hk,hk->h", f.n[:, 1], f.m[:, 0])
-    return np.asarray(np.arctan2(sine, np.einsum("hk,hk->h", f.n[:, 0], f.n[:, 1])))
+    return np.asarray(np.arctan2(_dot(f.n[:, 1], f.m[:, 0]), _dot(f.n[:, 0], f.n[:, 1])))
 
 
 def _gradient(f: _Frames) -> Floats:
-    by_wing = f.n / f.h[..., None]
-    by_e = -np.einsum("hw,hwk->hk", f.s, by_wing)
-    gradient = np.empty((len(f.l), 4, 3))
-    gradient[:, 1] = by_e
-    gradient[:, 2:] = by_wing
-    gradient[:, 0] = -by_e - by_wing[:, 0] - by_wing[:, 1]
-    return gradient
+    gradient = np.empty((4, 3, len(f.l)))
+    by_wing = f.n / f.h
+    gradient[2:] = by_wing.swapaxes(0, 1)
+    gradient[1] = -(f.s * by_wing).sum(axis=1)
+    gradient[0] = -gradient[1] - gradient[2] - gradient[3]
+    return np.ascontiguousarray(gradient.transpose(2, 0, 1))
 
 
 def _hessian(f: _Frames) -> Floats:
-    nm = f.n[..., :, None] * f.m[..., None, :]
-    nm = nm + np.swapaxes(nm, -1, -2)
-    tn = f.t[:, None, :, None] * f.n[..., None, :]
+    nm = f.n[:, None] * f.m
+    nm += nm.swapaxes(0, 1).copy()
+    tn = f.t[:, None, None] * f.n
     per_height = 1.0 / f.h
-    per_area = per_height / f.l[:, None]
-    ww = -(per_height**2)[..., None, None] * nm
-    we = -f.s[..., None, None] * ww - per_area[..., None, None] * tn
-    ee = (f.s * per_area)[..., None, None] * (tn + np.swapaxes(tn, -1, -2)) - (
-        (f.s * per_height) ** 2 + 0.5 / f.l[:, None] ** 2
-    )[..., None, None] * nm
-    hessian = np.zeros((len(f.l), 4, 3, 4, 3))
-    hessian[:, 1, :, 1] = ee.sum(axis=1)
+    per_area = per_height / f.l
+    ww = -(per_height**2) * nm
+    we = -f.s * ww - per_area * tn
+    ee = (f.s * per_area) * (tn + tn.swapaxes(0, 1))
+    ee -= ((f.s * per_height) ** 2 + 0.5 / f.l**2) * nm
+    hessian = np.zeros((4, 3, 4, 3, len(f.l)))
+    hessian[1, :, 1] = ee[:, :, 0] + ee[:, :, 1]
     for w in (0, 1):
-        hessian[:, 2 + w, :, 2 + w] = ww[:, w]
-        hessian[:, 2 + w, :, 1] = we[:, w]
-        hessian[:, 1, :, 2 + w] = np.swapaxes(we[:, w], -1, -2)
-    hessian[:, 0, :, 1:] = -hessian[:, 1:, :, 1:].sum(axis=1)
-    hessian[:, 1:, :, 0] = -hessian[:, 1:, :, 1:].sum(axis=3)
-    hessian[:, 0, :, 0] = -hessian[:, 0, :, 1:].sum(axis=2)
-    return hessian
+        hessian[2 + w, :, 2 + w] = ww[:, :, w]
+        hessian[2 + w, :, 1] = we[:, :, w]
+        hessian[1, :, 2 + w] = we[:, :, w].swapaxes(0, 1)
+    hessian[0, :, 1:] = -(hessian[1, :, 1:] + hessian[2, :, 1:] + hessian[3, :, 1:])
+    hessian[1:, :, 0] = hessian[0, :, 1:].transpose(1, 2, 0, 3)
+    hessian[0, :, 0] = -(hessian[0, :, 1] + hessian[0, :, 2] + hessian[0, :, 3])
+    return np.ascontiguousarray(hessian.transpose(4, 0, 1, 2, 3))

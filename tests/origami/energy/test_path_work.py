@@ -7,6 +7,7 @@ import pytest
 from problems import fitted
 
 from miurafab.origami.energy import equilibrium
+from miurafab.origami.energy.assembly import Assembly
 from miurafab.origami.energy.continuation import LONGEST, Known, Walk
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.energy.driven import Driven
@@ -61,3 +62,28 @@ def test_the_prediction_finds_the_degree_of_a_path_by_itself(degree):
         walk.take(Known(float(s), at(s)))
     predicted = walk._predicted(1.125).points
     assert predicted == pytest.approx(at(1.125).points, abs=1e-10)
+
+
+def test_the_matrix_is_the_sum_of_its_blocks_in_the_order_of_elimination():
+    """Against a dense sum, block by block; held coordinates are left out, zeros are stored."""
+    rng = np.random.default_rng(7)
+    stencils = tuple(
+        np.stack([rng.permutation(30)[:size] for _ in range(count)])
+        for size, count in ((4, 25), (2, 40), (3, 1))
+    )
+    blocks = [rng.normal(size=(*s.shape, s.shape[1], 3, 3)) for s in stencils]
+    blocks[1][:5] = 0.0
+    assembly = Assembly(30, stencils, np.array([4, 11, 23]))
+    dense = np.zeros((90, 90))
+    stored = np.zeros((90, 90), dtype=bool)
+    for group, given in zip(stencils, blocks, strict=True):
+        for vertices, block in zip(group, given, strict=True):
+            at = (vertices[:, None] * 3 + np.arange(3)).ravel()
+            dense[np.ix_(at, at)] += block.swapaxes(1, 2).reshape(len(at), len(at))
+            stored[np.ix_(at, at)] = True
+    matrix = assembly.matrix(blocks)
+    inner = np.ix_(assembly.free, assembly.free)
+    assert matrix.shape == (84, 84)
+    assert matrix.toarray() == pytest.approx(dense[inner], abs=1e-14)
+    assert matrix.nnz == stored[inner].sum()
+    assert matrix.has_sorted_indices
