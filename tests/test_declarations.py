@@ -13,6 +13,7 @@ from functools import cache
 from html.parser import HTMLParser
 from importlib import resources
 
+import numpy as np
 import pytest
 
 from miurafab.errors import OptionError, spell_options
@@ -53,6 +54,17 @@ OPTIONS = [(cls, option) for cls in COMMANDS for option in declared(cls).values(
 every_option = pytest.mark.parametrize(
     ("cls", "option"), OPTIONS, ids=[f"{cls.__name__}-{option.name}" for cls, option in OPTIONS]
 )
+
+
+@every_option
+def test_yes_is_no_number_and_no_name(cls, option):
+    """In Python True is 1, and no option means that: each that is not yes or no names its value."""
+    if isinstance(option.kind, Flag):
+        assert option.kind.read(True) is True
+        return
+    for yes in (True, np.True_, (True, True), 6 * (True,)):
+        with pytest.raises(OptionError, match=r"True(?!rad)"):
+            read_options(cls, {option.name: yes})
 
 
 def flag(name: str) -> str:

@@ -23,8 +23,10 @@ from miurafab.units import (
     parse_pressure,
 )
 
-_TRUTHS = ("bool", "bool_")
-"""Types of yes and no, of Python and NumPy: neither is taken as 1 or 0."""
+
+def is_truth(value: object) -> bool:
+    """Whether ``value`` is yes or no, of Python or of NumPy: neither is taken as 1 or 0."""
+    return type(value).__name__ in ("bool", "bool_")
 
 
 class Kind:
@@ -72,7 +74,7 @@ class Quantity(Kind):
     above: bool = False
 
     def read(self, value: object) -> float:
-        truth = type(value).__name__ in _TRUTHS
+        truth = is_truth(value)
         if truth or not isinstance(value, str | int | float):
             if truth or not hasattr(value, "__float__"):
                 raise ValueError(f"is {value!r}, not {self.noun}")
@@ -170,7 +172,7 @@ class Whole(Kind):
         text = value.strip() if isinstance(value, str) else None
         if text is not None and text.lstrip("+-").isascii() and text.lstrip("+-").isdigit():
             value = int(text) if len(text) < 20 else self.high + 1
-        elif type(value).__name__ in _TRUTHS or not hasattr(value, "__index__"):
+        elif is_truth(value) or not hasattr(value, "__index__"):
             raise ValueError(f"is {value!r}, not a whole number")
         inside = int(value)
         self.check(inside)

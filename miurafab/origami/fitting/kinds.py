@@ -7,8 +7,10 @@ import math
 
 from miurafab.errors import UnitError
 from miurafab.options import Kind
-from miurafab.options.kinds import comma_parts
+from miurafab.options.kinds import comma_parts, is_truth, number
 from miurafab.units import parse_angle
+
+_FLAT_FOLDABILITY = "it must be exact, off, or an angle such as 0.016rad or 0.9deg"
 
 
 class FlatFoldability(Kind):
@@ -33,6 +35,8 @@ class FlatFoldability(Kind):
         except (TypeError, ValueError):
             pass
         else:
+            if is_truth(value):
+                raise ValueError(f"is {value}; {_FLAT_FOLDABILITY}")
             raise ValueError(
                 f"is {value} without a unit; write {value}rad, as the paper does, or degrees such "
                 "as 0.9deg"
@@ -40,9 +44,7 @@ class FlatFoldability(Kind):
         try:
             inside = parse_angle(value if isinstance(value, str) else repr(value))
         except UnitError:
-            raise ValueError(
-                f"is {value!r}; it must be exact, off, or an angle such as 0.016rad or 0.9deg"
-            ) from None
+            raise ValueError(f"is {value!r}; {_FLAT_FOLDABILITY}") from None
         self.check(inside)
         return inside
 
@@ -89,7 +91,7 @@ class Poles(Kind):
 
     def read(self, value: object) -> tuple[float, ...]:
         try:
-            numbers = tuple(float(part) for part in comma_parts(value))
+            numbers = tuple(number().read(part) for part in comma_parts(value))
         except (TypeError, ValueError):
             raise ValueError(
                 f"is {value!r}; write six numbers with commas between, such as 0,0,-50,0,0,50"
