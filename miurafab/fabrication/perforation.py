@@ -67,18 +67,18 @@ def perforate(starts: Floats, ends: Floats, material: Material, kind: str = "mou
 
 def unbroken(starts: Floats, ends: Floats, material: Material, kind: str = "mountain") -> Dashes:
     """One stroke along each of N creases of one ``kind``, except for the bridges at its ends."""
-    rule, least = material.perforation_of(kind), material.kerf_mm + MIN_STROKE_MM
+    rule = material.perforation_of(kind)
     length = np.linalg.norm(ends - starts, axis=1)
     nothing = np.zeros_like(length)
     ones = np.ones(len(length), dtype=np.int64)
-    bridge, end = _single(length, rule, least)
+    bridge, end = _single(length, rule)
     return _drawn(starts, ends, length, _Fit(ones, bridge, end, nothing, nothing), material.kerf_mm)
 
 
 def burnt_shares(dashes: Dashes, lengths: Floats, kerf_mm: float) -> Floats:
     """(N,) the part of each crease, of ``lengths`` (N,) in mm, that ``dashes`` burn through."""
     burnt = np.linalg.norm(dashes.ends - dashes.starts, axis=1) + kerf_mm
-    return np.asarray(np.bincount(dashes.crease, burnt, len(lengths)) / lengths)
+    return np.asarray(np.bincount(dashes.crease, burnt) / lengths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ def _drawn(starts: Floats, ends: Floats, length: Floats, fit: _Fit, kerf: float)
     at = np.where(index == 0, fit.bridge[crease], inner)
     at = np.where(last, (length - fit.bridge - fit.end)[crease], at)
     to = at + np.where((index == 0) | last, fit.end[crease], fit.cut[crease])
-    # In a crease shorter than two kerfs the dash is a short stroke in the middle.
+    # A dash too short for its kerf is a short stroke in its middle.
     shorten = np.minimum(kerf, np.maximum(to - at - MIN_STROKE_MM, 0.0)) / 2
     part = np.stack([at + shorten, to - shorten], axis=1) / length[crease, None]
     along = (ends - starts)[crease]
@@ -111,25 +111,24 @@ def _drawn(starts: Floats, ends: Floats, length: Floats, fit: _Fit, kerf: float)
     return Dashes(drawn[:, 0], drawn[:, 1], crease)
 
 
-def _single(length: Floats, rule: Perforation, least: float) -> tuple[Floats, Floats]:
+def _single(length: Floats, rule: Perforation) -> tuple[Floats, Floats]:
     """(N,) the bridge at each end and the length of the dash, for creases with one dash."""
     used = length - 2 * rule.bridge_mm
-    min_end = max(rule.min_end_mm, least)
+    min_end = max(rule.min_end_mm, MIN_STROKE_MM)
     end = np.where(used < min_end, np.minimum(min_end, length / 2), used)
-    return np.where(used < min_end, (length - end) / 2, rule.bridge_mm), end
+    return (length - end) / 2, end
 
 
 def _fitted(
     length: Floats,
     rule: Perforation,
-    least: float,
     count: Ints,
     end: Floats,
     cut: Floats,
     gap: Floats,
 ) -> _Fit:
     """The given fit for creases with two dashes or more, a single dash for other creases."""
-    bridge, alone = _single(length, rule, least)
+    bridge, alone = _single(length, rule)
     single = count < 2
     return _Fit(np.where(single, 1, count), bridge, np.where(single, alone, end), cut, gap)
 
@@ -143,8 +142,8 @@ def _centre(length: Floats, rule: Perforation, least: float) -> _Fit:
     used = length - 2 * rule.bridge_mm
     count = np.floor((used + 2 * cut + gap - 2 * min_end) / (cut + gap) + _SLACK).astype(np.int64)
     end = (used - (count - 2) * cut - (count - 1) * gap) / 2
-    same = np.ones_like(length)
-    return _fitted(length, rule, least, count, end, cut * same, gap * same)
+    inner, gaps = np.full_like(length, cut), np.full_like(length, gap)
+    return _fitted(length, rule, count, end, inner, gaps)
 
 
 def _stretch_cut(length: Floats, rule: Perforation, least: float) -> _Fit:
@@ -154,16 +153,17 @@ def _stretch_cut(length: Floats, rule: Perforation, least: float) -> _Fit:
     most = np.floor((used + gap) / (min_end + gap) + _SLACK)
     count = np.minimum(nearest, most).astype(np.int64)
     dash = (used - (count - 1) * gap) / np.maximum(count, 1)
-    return _fitted(length, rule, least, count, dash, dash, np.full_like(length, gap))
+    return _fitted(length, rule, count, dash, dash, np.full_like(length, gap))
 
 
 def _stretch_gap(length: Floats, rule: Perforation, least: float) -> _Fit:
     cut, gap = rule.cut_mm, rule.gap_mm
     used = length - 2 * rule.bridge_mm
-    count = np.floor((used + gap) / (cut + gap) + _SLACK).astype(np.int64)
+    most = np.floor((used + gap) / (cut + gap) + _SLACK)
+    count = np.where(used < rule.min_end_mm, 1, most).astype(np.int64)
     space = (used - count * cut) / np.maximum(count - 1, 1)
     dash = np.full_like(length, cut)
-    return _fitted(length, rule, least, count, dash, dash, space)
+    return _fitted(length, rule, count, dash, dash, space)
 
 
 _FITS = {"centre": _centre, "stretch_cut": _stretch_cut, "stretch_gap": _stretch_gap}
