@@ -242,7 +242,9 @@ def judged(fault: dict, area: dict, known: dict) -> tuple[str, float]:
 def key(fault: dict) -> tuple[str, ...]:
     """What names a fault while other lines of its module change."""
     parts = ("module", "within", "was", "becomes")
-    return tuple("\n".join(line.strip() for line in fault[part].splitlines()) for part in parts)
+    return tuple(
+        "\n".join(line.strip() for line in fault[part].strip().splitlines()) for part in parts
+    )
 
 
 def shown(fault: dict, how: str) -> str:

@@ -47,7 +47,7 @@ def test_each_survivor_is_in_the_code_and_has_a_reason():
     for entry in SURVIVORS:
         assert set(entry) == {"module", "within", "was", "becomes", "why"}
         assert entry["module"] in modules
-        was = "\n".join(line.strip() for line in entry["was"].splitlines())
+        was = "\n".join(line.strip() for line in entry["was"].strip().splitlines())
         assert was in within(entry["module"], entry["within"]), entry
         assert len(entry["why"].split()) >= 4
         assert was not in entry["becomes"]

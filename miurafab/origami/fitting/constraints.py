@@ -26,13 +26,6 @@ from miurafab.geometry.angles import sector_angles, sectors
 from miurafab.geometry.arrays import Floats, vector_product
 from miurafab.geometry.quads import QuadCharts, QuadGrid
 
-
-def flat_foldability(points: Floats, grid: QuadGrid) -> Floats:
-    """(I,) Kawasaki residual a0 + a2 - pi at each interior vertex, radians."""
-    angles = sector_angles(points, grid.interior_vertices, grid.interior_neighbours)
-    return angles[:, 0] + angles[:, 2] - np.pi
-
-
 Index = NDArray[np.int32]
 
 
@@ -46,7 +39,7 @@ class OrigamiConstraints:
 
     grid: QuadGrid | QuadCharts
     length: float
-    flat_foldable: bool = False
+    flat_foldable: bool
 
     @cached_property
     def _pattern(self) -> tuple[Index, Index]:
