@@ -36,7 +36,7 @@ KNIFE_MM = 0.005
 HPGL_MM = 0.03
 """Plotters count in steps of 0.025 mm."""
 SHORTEST_MM = 0.002
-"""A shorter segment may vanish in the rounding of a program."""
+"""A shorter segment of a wanted stroke may vanish in the rounding of a program."""
 
 KINDS = (
     "crease",
@@ -57,8 +57,8 @@ _NAMED = 5
 @dataclass(frozen=True, eq=False)
 class _Segments:
     """N segments: ``ends`` (N, 4) in mm, the ``operation`` (N,), -1 where it is not said, and the
-    ``stroke`` (N,) or move that each is of. Those longer than ``shortest`` are sure: they are not
-    lost in rounding.
+    ``stroke`` (N,) or move that each is of. Those longer than ``shortest`` are sure: no rounding
+    and no swivel of a knife makes or loses them.
     """
 
     ends: Floats
@@ -88,13 +88,14 @@ def traced_strokes(
     knife = machine.tool.knife
     near = HPGL_MM if machine.dialect == "hpgl" else NEAR_MM if knife is None else KNIFE_MM
     shortest = SHORTEST_MM if knife is None else 4 * near
-    burnt = _burnt(program, shortest)
+    burnt = _burnt(program, 0.0 if knife is None else shortest)
     if knife is not None:
         path, kinds = _made_by_knife(path, kinds, knife, machine)
         burnt, faults = _of_tip(burnt, program, knife, 2 * near, path.sheet)
         yield from faults
     operations = material.on(machine).operations
-    yield from _compared(path, kinds, burnt, program, near, operations, traced)
+    wanted = _wanted(path, shortest)
+    yield from _compared(path, kinds, wanted, burnt, program, near, operations, traced)
 
 
 def _made_by_knife(
@@ -131,13 +132,13 @@ def _of_tip(
 def _compared(
     path: Toolpath,
     kinds: Ints,
+    wanted: _Segments,
     burnt: _Segments,
     program: Program,
     near: float,
     operations: Mapping[str, Operation],
     traced: Counter[str],
 ) -> Iterator[Finding]:
-    wanted = _wanted(path, burnt.shortest)
     count = len(wanted.ends)
     # A segment may be burnt either way.
     both = np.concatenate([wanted.ends, wanted.ends[:, [2, 3, 0, 1]]])
@@ -152,7 +153,10 @@ def _compared(
     right[told] &= off.min(axis=1) <= near
     level = np.zeros(len(right), dtype=np.int64)
     level[told] = off.argmin(axis=1)
-    stray = ~right & burnt.sure
+    # A knife turns round at the corners of strokes, and nowhere else.
+    corners = tree_of(wanted.ends.reshape(-1, 2))
+    off_corners = np.asarray(corners.query(burnt.ends.reshape(-1, 2))[0]).reshape(-1, 2)
+    stray = ~right & (burnt.sure | (off_corners > near * 2).any(axis=1))
     for at in np.flatnonzero(stray)[:_NAMED].tolist():
         line = int(program.line[burnt.stroke[at]])
         x, y = burnt.ends[at, :2].tolist()

@@ -1,0 +1,224 @@
+"""The strokes of a program against those that are wanted: each fault is named, nothing else is."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from problems import regular
+
+from miurafab.fabrication.route.order import HOLE, OUTLINE, StrokeSet
+from miurafab.fabrication.strokes import RIM, SLOT
+from miurafab.fabrication.toolpath import Toolpath
+from miurafab.gcode.job import Job
+from miurafab.gcode.reading import read_program
+from miurafab.profiles import OPERATIONS, Material, load_machine, load_material
+from miurafab.workflow.trace import traced_strokes
+
+LASER, CARD = load_machine("grbl-laser-400"), load_material("card-250")
+PATTERN = regular()
+CREASE = int(np.flatnonzero(PATTERN.edges_assignment == "M")[0])
+FOLD = int(np.flatnonzero(PATTERN.edges_assignment == "V")[0])  # that a tab stands on
+SLIT = int(np.flatnonzero(PATTERN.edges_assignment == "B")[0])
+
+Stroke = tuple[str, list[tuple[float, float]], int, int]
+"""Operation, points, edge, rank."""
+
+
+def dash(x: float, y: float = 10.0, edge: int = CREASE) -> Stroke:
+    return "perforate", [(x, y), (x + 2, y)], edge, 0
+
+
+def wanted(strokes: Sequence[Stroke]) -> StrokeSet:
+    count = len(strokes)
+    table = [(OPERATIONS.index(name), edge, rank) for name, _, edge, rank in strokes]
+    operation, edge, rank = np.array(table, dtype=np.int64).reshape(-1, 3).T
+    path = Toolpath(
+        "sheet-01",
+        400.0,
+        400.0,
+        np.array([p for _, points, _, _ in strokes for p in points], dtype=float).reshape(-1, 2),
+        np.cumsum([0, *(len(points) for _, points, _, _ in strokes)]),
+        operation,
+        np.zeros(count, dtype=np.int64),
+        edge,
+    )
+    return StrokeSet(path, np.arange(count), rank)
+
+
+def burnt(name: str, points: Sequence[tuple[float, float]], z: float | None = None) -> str:
+    """The lines of one stroke, after a comment that names its operation, if any."""
+    begin, *others = points
+    return (
+        (f"(operation {name})\n" if name else "")
+        + ("" if z is None else f"G0 Z{z}\n")
+        + f"G0 X{begin[0]:g} Y{begin[1]:g}\n"
+        + "".join(f"G1 X{x:.4f} Y{y:.4f} S500 F900\n" for x, y in others)
+    )
+
+
+def found(
+    strokes: Sequence[Stroke], text: str, *, material: Material = CARD, machine: str = ""
+) -> tuple[list[str], Counter[str]]:
+    """The sentences on a program that begins with arming the beam, and what it has right."""
+    profile = load_machine(machine) if machine else LASER
+    program = read_program(Job("sheet-01.nc", f"M4 S0\n{text}M5\n"), profile)
+    traced: Counter[str] = Counter()
+    findings = traced_strokes(
+        wanted(strokes), PATTERN, np.array([FOLD]), program, profile, material, traced
+    )
+    listed = list(findings)
+    assert {each.code for each in listed} <= {"stroke"}
+    assert {each.severity for each in listed} <= {"refusal"}
+    return [each.sentence.removeprefix("sheet-01: ") for each in listed], +traced
+
+
+def test_each_kind_of_stroke_is_told_by_its_operation_edge_and_rank() -> None:
+    square = [(0.0, 0.0), (5.0, 0.0), (5.0, 5.0), (0.0, 0.0)]
+    kinds = {
+        "crease": ("perforate", CREASE, 0),
+        "tab fold": ("perforate", FOLD, 0),
+        "outline": ("cut", -1, OUTLINE),
+        "hole": ("cut", -1, HOLE),
+        "slit": ("cut", SLIT, 2),
+        "slot": ("cut", -1, SLOT),
+        "label": ("engrave", -1, 0),
+        "rim number": ("engrave", -1, RIM),
+        "tick": ("engrave", CREASE, 0),
+    }
+    strokes = [
+        (operation, [(x + 10.0 * n, y + 10.0) for x, y in square], edge, rank)
+        for n, (operation, edge, rank) in enumerate(kinds.values())
+    ]
+    text = "".join(burnt(name, points) for name, points, _, _ in strokes)
+    assert found(strokes, text) == ([], Counter(dict.fromkeys(kinds, 1)))
+    for n, kind in enumerate(kinds):
+        rest = "".join(burnt(name, points) for name, points, _, _ in strokes[:n] + strokes[n + 1 :])
+        says, traced = found(strokes, rest)
+        on = "" if strokes[n][2] < 0 else f" on edge {strokes[n][2]}"
+        assert says == [f"the {kind}{on} from X{10 * n:.3f} Y10.000 is not burnt."]
+        assert traced == Counter(dict.fromkeys(kinds, 1)) - Counter([kind])
+
+
+def test_a_stroke_may_be_burnt_either_way_and_its_operation_need_not_be_said() -> None:
+    strokes = [dash(10), dash(20)]
+    way = [strokes[0][1], strokes[1][1][::-1]]
+    assert found(strokes, burnt("perforate", way[0]) + burnt("perforate", way[1]))[0] == []
+    assert found(strokes, burnt("", way[0]) + burnt("", way[1]))[0] == []
+
+
+def test_a_stroke_by_another_operation_is_not_the_one_wanted() -> None:
+    says, traced = found([dash(10)], burnt("cut", dash(10)[1]))
+    assert says == [
+        "line 4 burns a stroke from X10.000 Y10.000 that is not of the pattern, or out of its "
+        "place.",
+        f"the crease on edge {CREASE} from X10.000 Y10.000 is not burnt.",
+    ]
+    assert not traced
+
+
+@pytest.mark.parametrize(
+    ("shift", "right"), [(0.0025, True), (-0.0025, True), (0.0035, False), (0.1, False)]
+)
+def test_a_stroke_out_of_its_place_by_more_than_rounding_is_named(
+    shift: float, right: bool
+) -> None:
+    moved = [(x + shift, y) for x, y in dash(10)[1]]
+    says, traced = found([dash(10)], burnt("perforate", moved))
+    assert len(says) == (0 if right else 2)
+    assert traced["crease"] == right
+
+
+def test_a_stroke_that_is_burnt_twice_is_named_once_and_is_not_right() -> None:
+    text = burnt("perforate", dash(10)[1])
+    says, traced = found([dash(10), dash(20)], 3 * text + burnt("perforate", dash(20)[1]))
+    assert says == [f"the crease on edge {CREASE} from X10.000 Y10.000 is burnt too often."]
+    assert traced == {"crease": 1}
+
+
+def test_five_faults_of_a_kind_are_named_and_the_others_counted() -> None:
+    strokes = [dash(10.0 * n) for n in range(1, 9)]
+    text = "".join(burnt("perforate", [(x, y + 1) for x, y in s[1]]) for s in strokes)
+    says, traced = found(strokes, text)
+    assert [s.partition(" from ")[0] for s in says] == [
+        *(f"line {4 + 3 * n} burns a stroke" for n in range(5)),
+        "so do 3 more segments.",
+        *5 * [f"the crease on edge {CREASE}"],
+        "so of 3 more strokes.",
+    ]
+    assert not traced
+    says, _ = found(strokes[:5], "".join(text.partition("(operation perforate)\nG0 X60")[:1]))
+    assert len(says) == 10
+
+
+def test_a_sheet_without_a_stroke_and_a_program_that_burns_nothing() -> None:
+    assert found([], "G0 X10 Y10\n") == ([], {})
+    says, traced = found([], burnt("perforate", dash(10)[1]))
+    assert [each[:21] for each in says] == ["line 4 burns a stroke"]
+    says, traced = found([dash(10)], "G0 X10 Y10\nG0 X12\n")
+    assert [each[-13:] for each in says] == ["is not burnt."]
+    assert not traced
+
+
+def test_each_segment_of_a_stroke_counts() -> None:
+    corners = [(10.0, 10.0), (12.0, 10.0), (12.0, 12.0), (10.0, 12.0)]
+    outline = ("cut", corners, -1, OUTLINE)
+    assert found([outline, dash(30)], burnt("cut", corners[:3]) + burnt("perforate", dash(30)[1]))[
+        0
+    ] == ["the outline from X10.000 Y10.000 is not burnt."]
+    other = [corners[1], corners[2], corners[3], corners[0]]
+    says, _ = found([outline], burnt("cut", corners) + burnt("cut", other[2:]))
+    assert len(says) == 1
+    assert "line 9 burns a stroke from X10.000 Y12.000" in says[0]
+
+
+def test_a_segment_shorter_than_rounding_may_vanish_and_a_longer_one_may_not() -> None:
+    for step, may in ((0.0015, True), (0.003, False)):
+        points = [(10.0, 10.0), (12.0, 10.0), (12.0 + step, 10.0), (14.0, 10.0)]
+        stroke = ("perforate", points, CREASE, 0)
+        assert found([stroke], burnt("perforate", points))[0] == []
+        # Without the short one, the third begins where the second does.
+        says, _ = found([stroke], burnt("perforate", [points[0], points[1], points[3]]))
+        assert (says == []) is may
+
+
+def test_a_stray_stroke_is_found_however_finely_it_is_cut_up() -> None:
+    """Steps of a micrometre, each of which could be the rounding of something."""
+    stray = [(50 + n / 1000, 50.0) for n in range(300)]
+    says, traced = found([dash(10)], burnt("perforate", dash(10)[1]) + burnt("perforate", stray))
+    assert says[0].startswith("line 7 burns a stroke from X50.000 Y50.000 that is not of the")
+    assert says[5] == "so do 294 more segments."
+    assert traced == {"crease": 1}
+    on = [(10.5 + n / 1000, 10.0) for n in range(300)]  # on a wanted stroke, burnt once already
+    assert found([dash(10)], burnt("perforate", dash(10)[1]) + burnt("perforate", on))[0]
+
+
+def test_each_pass_is_due_at_its_height() -> None:
+    operations = CARD.on(LASER).operations
+    twice = replace(operations["perforate"], passes=2, z_step_mm=0.5)
+    material = CARD.worked_with(LASER, perforate=twice)
+    at = {z: burnt("perforate", dash(10)[1], z) for z in (0.0, -0.5, -0.4)}
+    assert found([dash(10)], at[0.0] + at[-0.5], material=material) == ([], {"crease": 1})
+    crease = f"the crease on edge {CREASE} from X10.000 Y10.000"
+    once, _ = found([dash(10)], at[0.0], material=material)
+    assert once == [f"{crease} is not burnt."]
+    same, _ = found([dash(10)], at[0.0] + at[0.0], material=material)
+    assert same == [f"{crease} is not burnt.", f"{crease} is burnt too often."]
+    off, traced = found([dash(10)], at[0.0] + at[-0.4], material=material)
+    assert [s.split(" from ")[0] for s in off] == [
+        "line 9 burns a stroke",
+        f"the crease on edge {CREASE}",
+    ]
+    assert not traced
+    level = CARD.worked_with(LASER, perforate=replace(operations["perforate"], passes=3))
+    assert found([dash(10)], 3 * burnt("perforate", dash(10)[1]), material=level)[0] == []
+    assert len(found([dash(10)], 2 * burnt("perforate", dash(10)[1]), material=level)[0]) == 1
+    # The heights of one operation say nothing of another.
+    cut = ("cut", [(30.0, 10.0), (35.0, 10.0)], -1, OUTLINE)
+    says, _ = found(
+        [dash(10), cut], at[0.0] + at[-0.5] + burnt("cut", cut[1], -0.5), material=material
+    )
+    assert len(says) == 2
