@@ -34,6 +34,7 @@ from miurafab.grbl.events import (
 _BANNER = re.compile(r"(grbl\w*) (\S+) \[.*\]", re.IGNORECASE)
 _ANSWER = re.compile(r"(error|ALARM): ?(.+)")
 _STATUS = re.compile(r"<([A-Z][A-Za-z]*)(?::(\d+))?((?:[|,][^<>]*)?)>")
+_BEFORE_NAME = re.compile(r",(?=[A-Za-z])")  # in ``,MPos:1,2,3,WPos:4,5,6`` of GRBL 0.9
 _BRACKET = re.compile(r"\[(\w[\w.]*):(.*)\]")
 _MODES = re.compile(r"\[(?:GC:)?([GM]\d[\dGMTFS. -]*)\]")
 _PARAMETER = re.compile(r"\[(G5[4-9](?:\.[1-3])?|G28|G30|G92|TLO):(-?[\d.]+(?:,-?[\d.]+)*)\]")
@@ -58,15 +59,14 @@ def parse_reply(text: str) -> Event:
 
 def _answer(match: re.Match[str]) -> Event:
     kind, text = match[1], match[2]
-    code = int(text) if text.isascii() and text.isdigit() else None
+    code = int(text) if text.isdigit() else None
     return Error(code, text) if kind == "error" else Alarm(code, text)
 
 
 def _status(match: re.Match[str]) -> Event | None:
     state, substate, body = match[1], match[2], match[3]
     fields: dict[str, Any] = {}
-    parts = body[1:].split("|") if "|" in body else _fields_of_0_9(body[1:])
-    for part in parts:
+    for part in body.split("|") if "|" in body else _BEFORE_NAME.split(body):
         name, colon, value = part.partition(":")
         if part and not colon:
             return None
@@ -74,11 +74,6 @@ def _status(match: re.Match[str]) -> Event | None:
         if reader is not None:
             fields.update(reader(value))
     return StatusReport(state, None if substate is None else int(substate), **fields)
-
-
-def _fields_of_0_9(body: str) -> list[str]:
-    """``MPos:1,2,3,WPos:4,5,6`` split before each name."""
-    return re.split(r",(?=[A-Za-z])", body) if body else []
 
 
 def _numbers(value: str) -> tuple[float, ...]:
@@ -125,7 +120,7 @@ def _bracket(match: re.Match[str]) -> Event | None:
         return Version(version, text)
     if tag == "OPT":
         flags, *numbers = body.split(",")
-        planner_blocks, rx_bytes = ([int(n) for n in numbers[:2]] + [None, None])[:2]
+        planner_blocks, rx_bytes, *_ = [*map(int, numbers[:2]), None, None]
         return Options(flags, planner_blocks, rx_bytes)
     return Version(tag, body) if tag[0].isdigit() else None  # GRBL 0.9: [0.9j.20160303:]
 

@@ -97,6 +97,37 @@ def test_the_smaller_of_profile_and_report_bounds_the_buffer() -> None:
     hear(small, b"[OPT:V,15,64]\r\n")
     hear(large, b"[OPT:V,100,1024]\r\n")
     assert (small.rx_bytes, large.rx_bytes) == (64, 128)
+    hear(small, b"[OPT:VL]\r\n")  # FluidNC tells no number
+    assert small.rx_bytes == 64
+
+
+def test_a_new_connection_has_the_buffer_of_a_stock_controller_and_nothing_in_it() -> None:
+    """``RX_BUFFER_SIZE`` of GRBL 1.1's ``serial.h``."""
+    connection = Connection()
+    assert (connection.rx_bytes, connection.in_flight_bytes) == (128, 0)
+    assert not connection.writing_eeprom
+
+
+@pytest.mark.parametrize("resets", [False, True])
+def test_a_question_stands_for_a_missing_banner(resets: bool) -> None:
+    connection = greeted() if resets else Connection()
+    if resets:
+        connection.send_line(line("G1X1"))
+        with pytest.raises(ProtocolMisuse, match=r"cannot send b'\$I\\n' in READY"):
+            connection.probe()
+        connection.send_realtime(SOFT_RESET)
+    state = connection.state
+    assert connection.awaits_proof
+    assert connection.probe() == b"$I\n"
+    assert hear(connection, b"[VER:1.1h.20190830:]\r\nok\r\n")[-1] == Ok(None)
+    assert connection.state is state
+    assert not connection.may_send(line("G1X1"))
+    connection.prove()
+    assert connection.state is State.READY
+    assert not connection.awaits_proof
+    assert connection.may_send(line("G1X1"))
+    with pytest.raises(ProtocolMisuse):
+        connection.probe()
 
 
 @pytest.mark.parametrize(
@@ -133,7 +164,15 @@ def test_other_lines_do_not_write_eeprom(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "seconds"), [("G4P1.5", 1.5), ("G04P2", 2.0), ("G1X4P3", 0), ("G4", 0), ("G40P1", 0)]
+    ("text", "seconds"),
+    [
+        ("G4P1.5", 1.5),
+        ("G04P2", 2.0),
+        ("G1X4P3", 0),
+        ("G4", 0),
+        ("G40P1", 0),
+        ("G4P1.2.3", 0),
+    ],
 )
 def test_dwell(text: str, seconds: float) -> None:
     assert dwell_seconds(text.encode()) == seconds

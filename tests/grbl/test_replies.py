@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -47,6 +49,7 @@ FULL = StatusReport(
         ("ok \t", Ok()),
         ("error:20", Error(20, "20")),
         ("error: Bad number format", Error(None, "Bad number format")),
+        ("error: limit of X \t", Error(None, "limit of X")),
         ("ALARM:3", Alarm(3, "3")),
         ("Grbl 1.1h ['$' for help]", Banner("Grbl", "1.1h")),
         ("GrblHAL 1.1f ['$' or '$HELP' for help]", Banner("GrblHAL", "1.1f")),
@@ -56,6 +59,8 @@ FULL = StatusReport(
         ("[OPT:V,15,128]", Options("V", 15, 128)),
         ("[OPT:VL]", Options("VL", None, None)),
         ("[OPT:VNMSL,35,1024,3,0]", Options("VNMSL", 35, 1024)),
+        ("[OPT:V,15,128,A]", Options("V", 15, 128)),
+        ("[0.9j.20160303:mine]", Version("0.9j.20160303", "mine")),
         ("[GC:G0 G54 M5 F0 S0]", Modes(("G0", "G54", "M5", "F0", "S0"))),
         ("[G0 G54 G21 M0 F0.]", Modes(("G0", "G54", "G21", "M0", "F0."))),
         ("[G54:1.000,2.000,0.000]", Parameter("G54", (1.0, 2.0, 0.0))),
@@ -97,6 +102,7 @@ def test_each_form(text: str, event: Event) -> None:
         "<Idle|MPos:1,2,x|FS:0,0>",
         "<Idle|MPos:1,2,3",
         "<Idle|FS>",
+        "<Idle|MPos:0,0,0|noise>",
         "<|MPos:0,0,0>",
         "<Idle|MPos:1,nan,2>",
         "<Idle|FS:1>",
@@ -125,19 +131,33 @@ def test_parsing_never_raises(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "off"),
+    ("fields", "on", "off"),
     [
-        ("<Idle|MPos:0,0,0|FS:0,0>", True),
-        ("<Idle|MPos:0,0,0|FS:0,1>", False),
-        ("<Idle|MPos:0,0,0|FS:0,0|A:F>", True),
-        ("<Idle|MPos:0,0,0|FS:0,0|A:SF>", False),
-        ("<Idle|MPos:0,0,0|F:0>", False),
+        ("FS:0,0", False, True),
+        ("FS:0,1", True, False),
+        ("FS:0,0.001", True, False),
+        ("FS:500,0", False, True),
+        ("FS:500,0,8000", False, True),  # grblHAL tells the speed that it measures, too
+        ("FS:0,0|A:FM", False, True),
+        ("FS:0,0|A:SF", True, False),
+        ("FS:0,0|A:C", True, False),
+        ("F:0|A:S", True, False),
+        ("F:500", False, False),
     ],
 )
-def test_beam_off_is_claimed_only_when_said(text: str, off: bool) -> None:
-    report = parse_reply(text)
+def test_the_beam_is_on_or_off_only_where_that_is_said(fields: str, on: bool, off: bool) -> None:
+    report = parse_reply(f"<Idle|MPos:0,0,0|{fields}>")
     assert isinstance(report, StatusReport)
-    assert report.beam_off is off
+    assert (report.beam_on, report.beam_off) == (on, off)
+
+
+def test_a_report_in_inches_is_scaled_in_its_positions_alone() -> None:
+    report = StatusReport("Run", machine_position=(1.0, -2.0), feed=3.0)
+    inches = replace(report, machine_position=(25.4, -50.8))
+    assert report.scaled(25.4) == inches
+    assert replace(FULL, machine_position=None).scaled(2.0) == replace(
+        FULL, work_position=(3.0, -4.0, 0.0), work_offset=(20.0, 0.0, 0.0)
+    )
 
 
 @pytest.mark.parametrize("lost", [">", "<"])

@@ -60,6 +60,9 @@ def test_a_question_stands_for_a_banner_only_where_one_is_awaited() -> None:
 
 
 def test_closed_is_final_and_the_end_always_closes() -> None:
+    assert set(Input) - set(TRANSITIONS[State.CLOSED]) == {
+        *(Input.MOTION, Input.SYSTEM, Input.RESET, Input.REALTIME, Input.PROBE, Input.PROVEN)
+    }
     assert set(TRANSITIONS[State.CLOSED].values()) == {State.CLOSED}
     assert all(TRANSITIONS[state][Input.END] is State.CLOSED for state in State)
 

@@ -93,6 +93,9 @@ def test_in_check_mode_refusals_are_gathered() -> None:
         (b"<Sleep|MPos:0,0,0|FS:0,0>\r\n", "went into Sleep after it took line 1"),
         (b"<Alarm|MPos:0,0,0|FS:0,0>\r\n", "went into Alarm after it took line 1"),
         (b"ok\r\n" * 5, "answered a line that was never sent"),
+        (b"ok\r\nok\r\nerror:9\r\n", "answered a line that was never sent"),
+        (b"ALARM: Hard limit\r\n", r"stopped after it took line 1 of job: Hard limit\."),
+        (b"error: Bad number format\r\n", r"line 2 \('G1X0000002'\): Bad number format\."),
     ],
 )
 def test_what_ends_a_job(said: bytes, sentence: str) -> None:
@@ -101,6 +104,25 @@ def test_what_ends_a_job(said: bytes, sentence: str) -> None:
     streamer.pull()
     with pytest.raises(ControllerError, match=sentence):
         hear(connection, streamer, b"ok\r\n" + said)
+
+
+def test_what_ends_a_job_before_its_first_answer_says_so() -> None:
+    connection = greeted()
+    streamer = Streamer(connection, "job", numbered(3))
+    streamer.pull()
+    with pytest.raises(ControllerError, match="stopped before it took a line of job: ALARM:1"):
+        hear(connection, streamer, b"ALARM:1\r\n")
+
+
+def test_talk_ends_no_job() -> None:
+    connection = greeted()
+    streamer = Streamer(connection, "job", numbered(2))
+    talk = b"<Idle|MPos:0,0,0|FS:0,0>\r\n[MSG:hello]\r\n\xff\r\n"
+    hear(connection, streamer, talk)
+    streamer.pull()
+    hear(connection, streamer, talk + b"ok\r\n" + talk + b"ok\r\n" + talk)
+    assert streamer.finished
+    assert streamer.acknowledged == 2
 
 
 def test_dwell_in_flight_is_known() -> None:
