@@ -80,8 +80,6 @@ class StatusReport(Event):
 
     def scaled(self, factor: float) -> StatusReport:
         """The same with its positions times ``factor``."""
-        if factor == 1.0:
-            return self
 
         def times(position: tuple[float, ...] | None) -> tuple[float, ...] | None:
             return None if position is None else tuple(factor * value for value in position)
