@@ -12,7 +12,7 @@ TOOLS := .venv/tools
 COMPILE = $(TOOLS)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --upgrade
 AUDIT = $(TOOLS)/bin/pip-audit --strict --disable-pip --require-hashes
 
-.PHONY: demo test test-large lint gallery docs benchmark mutants lock audit sbom clean
+.PHONY: demo test test-large coverage lint gallery docs benchmark mutants lock audit sbom clean
 
 demo: .venv/installed
 	$(BIN)/miurafab cut patterns/hypar.toml --port virtual
@@ -24,6 +24,14 @@ test: .venv/installed-dev
 
 test-large: .venv/installed-dev
 	$(BIN)/python -m pytest -n 3 -m large
+
+# The branches of the package that the tests take. It fails under 95 in a hundred.
+coverage: .venv/installed-dev
+	rm -rf .coverage
+	$(BIN)/coverage run -m pytest -n 3
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage json --quiet
+	$(BIN)/python .ci/branches.py .coverage/report.json
 
 lint: .venv/installed-dev
 	$(BIN)/ruff check .

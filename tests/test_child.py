@@ -40,8 +40,8 @@ def trap(tmp_path, monkeypatch):
 
 
 def test_the_trap_works(trap):
-    subprocess.run([sys.executable, "-c", "import json"], capture_output=True)
-    assert trap.read_text() == "json"
+    subprocess.run([sys.executable, "-c", "import colorsys"], capture_output=True)
+    assert trap.read_text() == "colorsys"
 
 
 def test_the_worker_of_the_studio(trap, tmp_path):

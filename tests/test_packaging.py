@@ -258,6 +258,28 @@ def test_the_first_commands_run_from_the_wheel(installed, tmp_path):
         packages.tried(program, tmp_path / "again")
 
 
+@pytest.mark.parametrize(("taken", "exit_code", "share"), [(18, 0, "95.00"), (17, 1, "90.00")])
+def test_make_coverage_judges_the_branches_of_the_whole_package(tmp_path, taken, exit_code, share):
+    """A module under the limit is named; it fails nothing while the package holds."""
+    of = {"miurafab/grbl/a.py": (taken, 18), "miurafab/units.py": (1, 2), "miurafab/b.py": (0, 0)}
+    files = {
+        name: {"summary": {"covered_branches": some, "num_branches": count}}
+        for name, (some, count) in of.items()
+    }
+    (tmp_path / "report.json").write_text(json.dumps({"files": files}))
+    done = subprocess.run(
+        [sys.executable, ROOT / ".ci" / "branches.py", tmp_path / "report.json"],
+        capture_output=True,
+        text=True,
+    )
+    rooms, below, whole = (part.splitlines() for part in done.stdout.split("\n\n"))
+    assert done.returncode == exit_code, done
+    assert [row.split()[0] for row in rooms] == ["grbl", "units"]
+    assert below[-1].split() == ["miurafab/units.py", "1", "of", "2", "50.00", "%"]
+    assert len(below) == 1 + exit_code
+    assert " ".join(whole).split() == ["the", "package", f"{taken + 1}", "of", "20", share, "%"]
+
+
 @pytest.mark.parametrize("place", ["wheel", "checkout"])
 def test_shipped_files_are_found(installed, tmp_path, place):
     """From an empty folder, so that nothing is found by accident."""

@@ -32,6 +32,7 @@ from miurafab.grbl.events import (
 )
 from miurafab.grbl.replies import parse_reply
 from miurafab.grbl.states import KEEPS_ACCOUNT, TRANSITIONS, Input, State
+from miurafab.units import DECIMAL
 from miurafab.wire.line_reader import LineReader
 
 SOFT_RESET = b"\x18"
@@ -43,7 +44,7 @@ _WRITES_EEPROM = re.compile(
     rb"^\$(?:\d+|N\d|RST|I)=|G0*10(?![\d.])|G0*28\.10*(?!\d)|G0*30\.10*(?!\d)", re.IGNORECASE
 )
 _DWELL = re.compile(rb"G0*4(?![\d.])", re.IGNORECASE)
-_DWELL_SECONDS = re.compile(rb"P([-+]?[\d.]+)", re.IGNORECASE)
+_DWELL_SECONDS = re.compile(rf"P\+?({DECIMAL})".encode(), re.IGNORECASE)
 
 
 class ProtocolMisuse(RuntimeError):
@@ -63,10 +64,7 @@ def dwell_seconds(data: bytes) -> float:
     if _DWELL.search(data) is None:
         return 0.0
     match = _DWELL_SECONDS.search(data)
-    try:
-        return float(match[1]) if match is not None else 0.0
-    except ValueError:
-        return 0.0
+    return float(match[1]) if match is not None else 0.0
 
 
 class Connection:

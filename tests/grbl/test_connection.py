@@ -168,10 +168,13 @@ def test_other_lines_do_not_write_eeprom(text: str) -> None:
     [
         ("G4P1.5", 1.5),
         ("G04P2", 2.0),
+        ("g4p+.5", 0.5),
         ("G1X4P3", 0),
         ("G4", 0),
         ("G40P1", 0),
-        ("G4P1.2.3", 0),
+        ("G4P-2", 0),  # refused, and no time comes off what is waited for the others
+        ("G4P.", 0),
+        ("G4P1.5.2", 1.5),
     ],
 )
 def test_dwell(text: str, seconds: float) -> None:
@@ -190,6 +193,12 @@ def test_what_clears_the_byte_accounting(said: bytes, state: State) -> None:
     assert (connection.in_flight_bytes, len(connection.in_flight)) == (0, 0)
     assert not connection.may_send(line("G1X2"))
     assert not connection.may_send(line("$X"))
+
+
+def test_only_a_connection_that_waits_for_proof_asks_for_it() -> None:
+    with pytest.raises(ProtocolMisuse, match=r"cannot send b'\$I\\n' in GREETED"):
+        greeted().probe()
+    assert Connection().probe() == b"$I\n"
 
 
 def test_an_answer_without_a_line_breaks_the_byte_accounting() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from miurafab.errors import ProfileError
@@ -24,10 +26,14 @@ def test_a_dump_may_hold_the_final_ok_and_comments() -> None:
 
 @pytest.mark.parametrize(
     ("text", "sentence"),
-    [("$30=1\nhello\n", "my.txt, line 2: 'hello' is not a setting"), ("", "my.txt holds no")],
+    [
+        ("$30=1\nhello\n", "my.txt, line 2: 'hello' is not a setting"),
+        ("$30=1\n$110=-2e9\n", "my.txt, line 2: $110 is -2e+09, more than a controller has"),
+        ("", "my.txt holds no"),
+    ],
 )
 def test_a_bad_dump_is_named(text: str, sentence: str) -> None:
-    with pytest.raises(ProfileError, match=sentence.replace("$", r"\$")):
+    with pytest.raises(ProfileError, match=re.escape(sentence)):
         parse_dump(text, "my.txt")
 
 

@@ -106,12 +106,21 @@ def test_what_ends_a_job(said: bytes, sentence: str) -> None:
         hear(connection, streamer, b"ok\r\n" + said)
 
 
-def test_what_ends_a_job_before_its_first_answer_says_so() -> None:
+@pytest.mark.parametrize(
+    ("said", "sentence"),
+    [
+        (b"ALARM: Hard limit\r\n", "stopped before it took a line of job: Hard limit"),  # GRBL 0.9
+        (b"error: Bad number format\r\n", r"refused job, line 1 \(.*\): Bad number format"),
+        (b"ALARM:1\r\n", "stopped before it took a line of job: ALARM:1"),
+        (BANNER, "restarted by itself before it took a line of job; what it held is lost"),
+    ],
+)
+def test_what_ends_a_job_before_its_first_line(said: bytes, sentence: str) -> None:
     connection = greeted()
     streamer = Streamer(connection, "job", numbered(3))
     streamer.pull()
-    with pytest.raises(ControllerError, match="stopped before it took a line of job: ALARM:1"):
-        hear(connection, streamer, b"ALARM:1\r\n")
+    with pytest.raises(ControllerError, match=sentence):
+        hear(connection, streamer, said)
 
 
 def test_talk_ends_no_job() -> None:

@@ -78,6 +78,15 @@ def test_what_0_9_says_is_in_words_and_commas() -> None:
     assert parse_reply("ALARM: Hard limit") == Alarm(None, "Hard limit")
 
 
+@pytest.mark.parametrize("mask", range(16))
+def test_a_report_of_0_9_holds_what_setting_10_asks_for(mask: int) -> None:
+    device = ready("grbl-0.9")
+    said(device, b"$10=%d\n" % mask)
+    fields = ["MPos:0.000,0.000,0.000", "WPos:0.000,0.000,0.000", "Buf:0", "RX:0"]
+    asked = [field for bit, field in enumerate(fields) if mask >> bit & 1]
+    assert said(device, b"?") == [f"<{','.join(['Idle', *asked])}>"]
+
+
 def test_0_9_has_no_jog_no_overrides_no_laser_mode_and_no_sleep() -> None:
     device = ready("grbl-0.9", {30: 1000, 31: 0, 32: 0})
     assert said(device, b"$J=X5F100\n") == ["error: Bad number format"]

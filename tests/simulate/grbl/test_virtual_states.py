@@ -51,6 +51,56 @@ def test_the_door_puts_everything_out_and_a_start_brings_it_back() -> None:
     assert "|A:SF" in output
 
 
+def test_a_door_that_opens_again_while_all_comes_back_puts_everything_out_again() -> None:
+    device = ready()
+    play(device, "G91", "M3S500", "M8", "G1X10F400", 0.3, b"\x84", 1.0)
+    assert states(play(device, b"~", 0.5, b"?", 0.1)) == ["Door:3"]
+    assert device.beam_on
+    assert play(device, b"\x84", 0.2).startswith("[MSG:Check Door]")
+    assert (device.beam_on, device.air_on) == (False, False)
+    held = device.position
+    play(device, 6.0)
+    assert (device.position, device.beam_on) == (held, False)
+    assert states(play(device, b"~", 6.0, b"?")) == ["Run"]
+    assert (device.beam_on, device.air_on) == (True, True)
+
+
+def test_after_a_door_a_laser_comes_back_with_the_motion_and_without_a_wait() -> None:
+    device = ready(LASER)
+    play(device, "G91", "M4S500", "G1X10F400", 0.3, b"\x84", 1.0)
+    assert not device.beam_on
+    assert states(play(device, b"~", 0.1, b"?")) == ["Run"]
+    assert device.beam_on
+
+
+def test_check_mode_reads_all_and_does_nothing() -> None:
+    """The parser goes where the program would; motors, beam, air and clock stay."""
+    device = ready({20: 0})
+    assert play(device, "$C") == "[MSG:Enabled]\r\nok\r\n"
+    lines = ["M3S500", "M8", "G4P5", "G1X3F100", "M0", "G38.2X5F100", "G10L20P1X0", "G1Q"]
+    assert play(device, *lines) == "ok\r\n" * (len(lines) - 1) + "error:2\r\n"
+    assert (device.beam_on, device.air_on, device.position) == (False, False, (0, 0, 0))
+    assert play(device, "M2") == "[MSG:Pgm End]\r\nok\r\n"
+    assert play(device, "$C", 0.5) == f"[MSG:Disabled]\r\nok\r\n{BANNER}"
+    assert "[G54:5.000,0.000,0.000]" in play(device, "$#")  # where the probe would have ended
+
+
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [("$C", 8), ("$$1", 3), ("$I1", 3), ("$N0=G0X1", 8), ("$N0=$J=G91X1F100", 8), ("$RST=1", 3)],
+)
+def test_what_an_alarm_or_a_slip_of_the_pen_refuses(line: str, code: int) -> None:
+    assert ask(ready({22: 1}), line) == f"error:{code}\r\n"
+
+
+def test_a_startup_line_is_tried_before_it_is_kept() -> None:
+    device = ready()
+    assert play(device, "$N0=$J=G91X1F600", 2.0, "$N1=G1Q", "$N", 0.1).endswith(
+        "ok\r\nerror:2\r\n$N0=$J=G91X1F600\r\n$N1=\r\nok\r\n"
+    )
+    assert device.position == (1, 0, 0)
+
+
 def test_a_reset_in_motion_is_an_alarm_and_kills_the_beam_at_once() -> None:
     device = ready(LASER)
     play(device, "G91", "M3", "G1X20F3000S500", 0.2)
