@@ -115,15 +115,14 @@ def require_told(code: str, dialect: str) -> None:
 
 
 def known_elsewhere(code: str, dialect: str) -> str:
-    """The dialects that know a word of ``code`` which ``dialect`` does not, and what to write for
-    this one, as a clause.
+    """The dialects that know a word of ``code``, none of whose words is one of ``dialect`` that
+    :func:`require_told` refuses, and what to write for this one, as a clause.
     """
-    for word, _, dialects, instead in _special(code):
-        others = [_NAMES[each] for each in dialects if each != dialect]
-        if others and dialect not in dialects:
-            return (
-                f"; {' and '.join(others)} know{'s' * (len(others) == 1)} {word}; here, {instead}"
-            )
+    special = _special(code)
+    if special:
+        word, _, dialects, instead = special[0]
+        others = [_NAMES[each] for each in dialects]
+        return f"; {' and '.join(others)} know{'s' * (len(others) == 1)} {word}; here, {instead}"
     output = OUTPUT.search(code)
     if dialect not in _NAMES and output:
         return f"; grblHAL and FluidNC know {output[0]}; here, {_OUT}"

@@ -38,6 +38,7 @@ def test_moves_pens_speed_and_force() -> None:
         "PU;PA40,80;PD;PA80,80;PA80,40;",
         "PU40,80;PR;PD40,0;PD0,-40;PA;",
         "PU40,80;PD80.0,80,80,40.;IN;",
+        "IN;\n\n \nPU40,80;PD40,80;PD80,80,80,80,80,40;PD80,40;",
     ],
 )
 def test_the_ways_to_say_one_stroke(text: str) -> None:
@@ -50,6 +51,7 @@ def test_the_ways_to_say_one_stroke(text: str) -> None:
         ("PU1,2;\nPD3;", r"job\.plt, line 2: PD has 1 coordinates"),
         ("IN;\nAA10,10,90;", "line 2: AA is an HPGL instruction that is not read"),
         ("G0 X1 Y2", "line 1: 'G0 X1 Y2' is not HPGL"),
+        (f"IN;\n\nPD{'9' * 400},1;", r"line 3: a number of PD is too large\."),
     ],
 )
 def test_what_is_not_read_is_refused_by_line(text: str, complaint: str) -> None:
@@ -71,3 +73,23 @@ def test_marlins_inline_words_are_read_where_the_machine_is_one() -> None:
         parse_program(job)
     with pytest.raises(GcodeError, match="error:36"):
         parse_program(Job("job.nc", "M3 I2 S0"), inline=True)
+
+
+@pytest.mark.parametrize(
+    ("line", "complaint"),
+    [
+        ("X5", r"line 3: 'X5' begins with no command, and Marlin repeats none by itself\."),
+        ("X5 F60\nX6", "line 3: 'X5F60' begins with no command"),
+        ("G0 X1 M5", "line 3: 'G0X1M5' holds two commands, and Marlin reads one a line"),
+        ("M5 G0", "line 3: 'M5G0' holds two commands"),
+        ("G10 X1", "line 3: G10 is not a command that a job for Marlin may hold; those are G0, G1"),
+    ],
+)
+def test_what_marlin_would_not_run_is_refused_by_line(line: str, complaint: str) -> None:
+    with pytest.raises(GcodeError, match=complaint):
+        parse_program(Job("job.nc", f"M4 I S0\nG1 X2 F600 S5\n{line}\n"), inline=True)
+
+
+def test_marlin_waits_milliseconds_by_p_and_seconds_by_s() -> None:
+    program = parse_program(Job("job.nc", "G4 P500\nG04 S2\nG4 S1 P250\n"), inline=True)
+    assert program.event_seconds.tolist() == [0.5, 2.0, 1.25]

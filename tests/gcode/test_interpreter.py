@@ -36,6 +36,7 @@ def ends(text: str) -> list[list[float]]:
         ("G0 X4\nG28.1\nX9\nG28 Y2\nG28", [[4, 0, 0], [9, 0, 0], [9, 2, 0], [9, 0, 0], [4, 0, 0]]),
         ("G0 X4\nG30.1\nX9\nG30", [[4, 0, 0], [9, 0, 0], [4, 0, 0]]),
         ("G43.1 Z2\nG0 Z1\nG49\nG0 Z1", [[0, 0, 3], [0, 0, 1]]),
+        ("G43.1 Z2\nG0 Z5\nG10 L20 P1 Z1\nG0 Z3\nG49\nG0 Z3", [[0, 0, 7], [0, 0, 9], [0, 0, 7]]),
         ("g0x1(inline)y2;rest", [[1, 2, 0]]),
         ("/G0 X1", [[1, 0, 0]]),
     ],
@@ -67,6 +68,9 @@ def test_without_laser_mode_a_rapid_keeps_its_power() -> None:
 
 def test_inverse_time_is_a_feed() -> None:
     assert read("G93 G1 X10 F2").feed_mm_min.tolist() == [20]
+    arc = read("G93 G2 X4 I2 F3")  # the firmware's own: F times the chords, as mm/min
+    assert len(arc) > 10
+    assert set(arc.feed_mm_min.tolist()) == {3 * len(arc)}
 
 
 def test_events_say_where_motion_stops() -> None:
@@ -79,6 +83,13 @@ def test_events_say_where_motion_stops() -> None:
     assert program.event_power[[0, 3, 4]].tolist() == [0, 0, 0]
     assert read("G1 F60\nM3 S5").event_power.tolist() == [5]
     assert read("G1 F60\nM4 S5").event_power.tolist() == [0]
+
+
+def test_a_long_program_without_regular_lines_loses_none() -> None:
+    count = 5000  # more rows than are gathered before they are filed
+    program = read("G91 G1 F60\n" + "X1 Z2 S3\n" * count)
+    assert program.end[:, ::2].tolist() == [[n, 2 * n] for n in range(1, count + 1)]
+    assert program.line.tolist() == program.line_number[1:].tolist() == [*range(2, count + 2)]
 
 
 def test_lines_sent_are_counted_with_their_newline() -> None:
@@ -105,6 +116,11 @@ def test_an_arc_is_as_long_as_it_should_be() -> None:
         ("G0 X1\n\nG99", "job.nc, line 3: G99 is not a word that the controller knows (error:20)."),
         ("$H", "job.nc, line 1: '$H' is a command to the controller"),
         ("G0 X1?", "job.nc, line 1: '?' is the status query"),
+        (
+            "M64 P1",
+            "job.nc, line 1: M64 is not a word that the controller knows (error:20); grblHAL and "
+            "FluidNC know M64; here, leave it out.",
+        ),
     ],
 )
 def test_what_the_controller_would_refuse_is_named(text: str, sentence: str) -> None:

@@ -6,6 +6,7 @@ from its rules.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import pytest
@@ -134,6 +135,8 @@ def test_numbers_keep_eight_digits_and_overflow_as_the_firmware_does() -> None:
     assert read_single("123456789012") == single(123456780000.0)
     assert read_single("000000001.5") == 0.0
     assert read_single("-.5") == -0.5
+    assert read_single("-" + "9" * 60) == -math.inf
+    assert single(1e39) == math.inf
     assert whole_byte(256.0) == 0
     assert whole_byte(-1.0) == 255
     assert to_unsigned(float("nan")) == to_unsigned(2.0**32) == 0

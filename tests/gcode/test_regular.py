@@ -98,6 +98,21 @@ def test_every_way_to_end_a_file_is_read(text: str) -> None:
     same(*both(text))
 
 
+@pytest.mark.parametrize(
+    ("text", "inline"),
+    [
+        ("G1X1\nX2\nX3\n", False),  # no feed
+        ("G80\nX1\nX2\nX3\n", False),
+        ("G2X2R1F9\nX4\nX6\nX8\n", False),  # bare words repeat the arc
+        ("G1X1F9\nG1X2\nX3\nX4\n", True),  # for Marlin they repeat nothing
+    ],
+)
+def test_a_run_that_means_another_thing_is_refused_as_by_words(text: str, inline: bool) -> None:
+    one, other = both(text, inline=inline)
+    assert isinstance(one, str)
+    assert one == other
+
+
 def test_each_decimal_is_the_double_nearest_to_it() -> None:
     chance = random.Random(3)
     texts = [

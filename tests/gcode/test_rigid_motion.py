@@ -100,6 +100,11 @@ def test_relative_steps_do_not_add_up_their_rounding():
     assert np.abs(program.end[on, :2] - motion.of(before.end[on, :2])).max() < 1e-4
 
 
+def test_a_job_that_burns_nothing_stays_as_it_is():
+    text = "G90 G21\nG0 X10 Y10\nM5\n"
+    assert after(text, quarter(1, 2)) == text
+
+
 def test_marlin_says_its_words_again():
     text = "G21\nM4 I S0\nG0 X10 Y10 S0 F3000\nG1 X20 S100 F1000\nM5 I\nG0 X0 Y0 S0\n"
     assert after(text, quarter(), dialect="marlin").splitlines()[2:4] == [
