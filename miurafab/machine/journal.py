@@ -158,6 +158,8 @@ def read_journal(path: Path) -> list[JournalRun]:
 def _run(record: dict[str, Any]) -> JournalRun:
     """The run of a ``record``. Raises ``TypeError``, ``ValueError`` for values of other kinds."""
     run = JournalRun(**record)
+    if not isinstance(run.overrides, list | tuple) or len(run.overrides) != len(AS_WRITTEN):
+        raise ValueError("it holds other overrides than those of feed, rapids and power")
     texts = (run.job, run.sha256, run.machine, run.port, run.ended or "", run.why or "")
     numbers = (run.lines, run.from_line, run.blocks or 0, run.taken, run.line, *run.overrides)
     if not all(isinstance(text, str) for text in texts):
@@ -166,8 +168,6 @@ def _run(record: dict[str, Any]) -> JournalRun:
         raise ValueError("it holds something else in place of a whole number")
     if not isinstance(run.seconds, int | float) or not math.isfinite(run.seconds):
         raise ValueError("it holds something else in place of a time")
-    if len(run.overrides) != len(AS_WRITTEN):
-        raise ValueError("it holds other overrides than those of feed, rapids and power")
     return run
 
 

@@ -55,6 +55,12 @@ def test_a_refused_setting_is_named(text: dict[int, str], sentence: str) -> None
         actions.write_settings("virtual", Settings(text))
 
 
+def test_a_setting_that_does_not_stick_is_named() -> None:
+    """The controller answers ok and keeps one byte of it; the one beside it is written."""
+    with pytest.raises(ControllerError, match=r"Not every setting was taken: \$0 .*is 44.*300"):
+        actions.write_settings("virtual", Settings({0: "300", 30: "500"}))
+
+
 def test_a_missing_backup_is_named(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match=r"gone\.txt does not exist"):
         actions.read_dump(tmp_path / "gone.txt")

@@ -267,6 +267,11 @@ def test_a_dark_frame_never_arms_and_a_pointer_is_weak() -> None:
     for power in (0.06, -0.01):
         with pytest.raises(InputError, match="could burn"):
             frame_job("a.nc", bounds, MACHINE, pointer=power)
+    for name in ("grbl-pen-a4", "marlin-laser-220"):
+        with pytest.raises(InputError, match=f"{name} has no laser that could point"):
+            frame_job("a.nc", bounds, load_machine(name), pointer=0.02)
+    with pytest.raises(InputError, match="hpgl-cutter-a3 speaks hpgl, in which a frame is not"):
+        frame_job("a.nc", bounds, load_machine("hpgl-cutter-a3"))
 
 
 @pytest.mark.parametrize(

@@ -129,6 +129,54 @@ def test_what_is_no_journal_is_named(tmp_path: Path, text: str) -> None:
         read_journal(tmp_path / "gone")
 
 
+@pytest.mark.parametrize(
+    ("record", "why"),
+    [
+        ({"why": ["storm"]}, "in place of a text"),
+        ({"taken": -1}, "in place of a whole number"),
+        ({"line": True}, "in place of a whole number"),
+        ({"seconds": "1"}, "in place of a time"),
+        ({"seconds": 1e999}, "in place of a time"),
+        ({"overrides": [100, 100]}, "other overrides than those of feed, rapids and power"),
+        ({"overrides": 100}, "other overrides than those"),
+        ({"beam": 1}, "unexpected keyword argument 'beam'"),
+    ],
+)
+def test_a_journal_of_other_kinds_is_no_journal(
+    tmp_path: Path, record: dict[str, object], why: str
+) -> None:
+    """From it a job is gone on with: what it says is checked before."""
+    path = tmp_path / "j"
+    journal(path).close()
+    path.write_bytes(path.read_bytes() + json.dumps(record).encode() + b"\n")
+    with pytest.raises(InputError, match=rf"j is not a journal of this version.*{why}"):
+        read_journal(path)
+
+
+def test_a_place_that_cannot_be_written_is_told_before_anything_moves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def begun(path: Path, *, append: bool = True) -> None:
+        DurableFile(path, "journal", b"head\n", append=append)
+
+    (tmp_path / "taken").write_text("x")
+    with pytest.raises(InputError, match=r"^The journal .*/taken/j cannot be written: File exists\."):
+        begun(tmp_path / "taken" / "j")
+    with pytest.raises(InputError, match=r"^The journal .* cannot be written: .*directory"):
+        begun(tmp_path)
+    (tmp_path / "link").symlink_to(tmp_path / "taken")
+    with pytest.raises(InputError, match=r"^The journal .*/link is a link; remove it\."):
+        begun(tmp_path / "link")
+
+    def full(self: DurableFile, data: bytes) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(DurableFile, "_put", full)
+    with pytest.raises(InputError, match=r"/taken cannot be written: No space left on device\."):
+        begun(tmp_path / "taken")
+    assert (tmp_path / "taken").read_text() == "x"
+
+
 def test_a_transcript_shows_both_ways_with_the_time(tmp_path: Path) -> None:
     path = tmp_path / "t"
     script = Transcript(path, "a job")
