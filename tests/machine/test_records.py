@@ -160,7 +160,9 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_moves(
         DurableFile(path, "journal", b"head\n", append=append)
 
     (tmp_path / "taken").write_text("x")
-    with pytest.raises(InputError, match=r"^The journal .*/taken/j cannot be written: File exists\."):
+    with pytest.raises(
+        InputError, match=r"^The journal .*/taken/j cannot be written: File exists\."
+    ):
         begun(tmp_path / "taken" / "j")
     with pytest.raises(InputError, match=r"^The journal .* cannot be written: .*directory"):
         begun(tmp_path)

@@ -130,8 +130,6 @@ def corners_at_ends(lines: CreaseLines) -> CreaseLines:
         return lines
     open_ = np.ones((len(ends), 2), dtype=bool)
     open_[after, 1] = open_[after + 1, 0] = False
-    if not open_.any():
-        return lines
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     near, which = tree_of(ends[open_]).query(ends[after, 1])
     close = np.asarray(near) < _CORNER * np.minimum(length[after], length[after + 1])

@@ -127,10 +127,6 @@ class Spline:
     control: Floats
     weights: Floats
 
-    def moved(self, matrix: Floats) -> Spline:
-        """The same spline under ``matrix`` (2, 3)."""
-        return Spline(self.degree, self.knots, _moved(self.control, matrix), self.weights)
-
     def hull(self) -> Floats:
         """(n, 2) points whose box holds the spline, as its weights are positive."""
         return self.control
@@ -165,7 +161,9 @@ class Spline:
         return np.concatenate(found)
 
 
-Curve = Polyline | Bezier | Arc | Spline
+PlainCurve = Polyline | Bezier | Arc
+"""A curve of SVG, which may be moved."""
+Curve = PlainCurve | Spline
 
 
 def default_tolerance(curves: Sequence[Curve]) -> float:
@@ -178,7 +176,7 @@ def default_tolerance(curves: Sequence[Curve]) -> float:
     return SHARE * size if math.isfinite(size) and size > 0 else SHARE
 
 
-def bulged(start: Floats, end: Floats, bulge: float) -> Curve:
+def bulged(start: Floats, end: Floats, bulge: float) -> PlainCurve:
     """The arc from ``start`` to ``end`` whose ``bulge`` is the tangent of a quarter of its angle,
     positive where it turns left (DXF reference, LWPOLYLINE, group 42); a straight line where it
     rises by less than a millionth of its chord.
@@ -199,7 +197,7 @@ def bulged(start: Floats, end: Floats, bulge: float) -> Curve:
 
 def svg_arc(
     start: Floats, end: Floats, radii: Floats, turn: float, large: bool, sweep: bool
-) -> Curve:
+) -> PlainCurve:
     """The elliptical arc of an SVG path; ``turn`` of its axes in radians (SVG 1.1, appendix F.6).
 
     Radii that do not reach from ``start`` to ``end`` are enlarged; without a radius it is straight.

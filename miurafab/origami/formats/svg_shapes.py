@@ -11,7 +11,7 @@ import numpy as np
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats
-from miurafab.origami.formats.curves import Arc, Bezier, Curve, Polyline, svg_arc
+from miurafab.origami.formats.curves import Arc, Bezier, PlainCurve, Polyline, svg_arc
 from miurafab.origami.formats.lines import finite_number
 from miurafab.units import DECIMAL
 
@@ -26,7 +26,7 @@ def tag_of(element: Element) -> str:
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
-def shapes(element: Element) -> Iterator[Curve]:
+def shapes(element: Element) -> Iterator[PlainCurve]:
     """The lines that ``element`` draws; none for an element that draws none.
 
     Raises :class:`~miurafab.errors.PatternError` for what is no number or no path.
@@ -63,7 +63,7 @@ def value_of(text: str, name: str) -> float:
     return finite_number(number, name)
 
 
-def _rectangle(element: Element) -> Iterator[Curve]:
+def _rectangle(element: Element) -> Iterator[PlainCurve]:
     x, y, width, height = (
         value_of(element.get(name) or "0", name) for name in ("x", "y", "width", "height")
     )
@@ -96,7 +96,7 @@ class _PathReader:
         """The last control point of a curve before, of which S and T take the mirror image."""
         self.cubic = False
 
-    def drawn(self) -> Iterator[Curve]:
+    def drawn(self) -> Iterator[PlainCurve]:
         """The lines and curves; straight ones in one piece as far as they hang together."""
         corners: list[Floats] = []
         command = ""
@@ -145,7 +145,7 @@ class _PathReader:
             return np.array([self.at[0], self._number() + base[1]])
         return self._point(base)
 
-    def _curve(self, kind: str, relative: bool) -> Curve:
+    def _curve(self, kind: str, relative: bool) -> PlainCurve:
         """The next curve; its end is where the path is then."""
         start, base = self.at, self.at if relative else np.zeros(2)
         if kind == "A":

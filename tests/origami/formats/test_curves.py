@@ -90,6 +90,23 @@ def test_round_shapes_of_svg_are_closed() -> None:
     assert 0 < whole - abs(area) < 0.04
 
 
+def test_a_rectangle_whose_corners_meet_has_no_sides_between_them() -> None:
+    lines = parse_svg('<svg><rect width="8" height="4" rx="9" ry="2" stroke="red"/></svg>', 1e-3)
+    assert lines.curves == 4
+    assert (lines.curve >= 0).all()
+    radius = np.linalg.norm((lines.ends - [4, -2]) / [4, 2], axis=2)
+    np.testing.assert_allclose(radius, 1.0, atol=1e-12)
+
+
+def test_a_curve_that_one_line_is_near_enough_to_is_that_line() -> None:
+    bow = WAVE.replace("C 30 20 70 80", "Q 50 60")
+    pattern = pattern_from_lines(parse_svg(bow, curve_tolerance=6.0))
+    creases = np.isin(pattern.edges_assignment, ("M", "V"))
+    ((one, other),) = pattern.vertices_coords[pattern.edges_vertices[creases]].tolist()
+    assert sorted([one, other]) == [[0.0, 50.0], [100.0, 50.0]]
+    assert len(pattern.faces_vertices) == 2
+
+
 def drawing(draw) -> str:
     document = ezdxf.new("R2010")
     draw(document.modelspace())

@@ -6,9 +6,11 @@ import math
 import re
 from collections.abc import Callable
 from random import Random
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import svgelements
 from hypothesis import given
 from hypothesis import strategies as st
 from problems import fitted, regular
@@ -26,6 +28,15 @@ from miurafab.origami.formats.lines import (
 )
 from miurafab.origami.formats.planar_graph import pattern_from_lines
 from miurafab.origami.formats.svg import parse_svg, svg_text
+
+
+def spline_dxf(knots: str, weights: str, points: int = 2) -> str:
+    """A SPLINE of degree 1."""
+    tags: list[tuple[int, object]] = [(0, "SECTION"), (2, "ENTITIES"), (0, "SPLINE"), (71, 1)]
+    tags += [*((40, knot) for knot in knots.split()), *((41, each) for each in weights.split())]
+    tags += [pair for at in range(points) for pair in ((10, at), (20, at))]
+    return "".join(f"{code}\n{value}\n" for code, value in [*tags, (0, "ENDSEC"), (0, "EOF")])
+
 
 FORMATS: dict[str, tuple[Callable[[CreaseLines], str], Callable[[str], CreaseLines]]] = {
     "svg": (svg_text, parse_svg),
@@ -153,6 +164,13 @@ def test_an_svg_of_another_hand() -> None:
         ("<svg><g transform='warp(3)'/></svg>", "not a transform"),
         ("<svg><g transform='matrix(3)'/></svg>", "lacks a number"),
         ("<svg><path d='M0 0 L3' stroke='red'/></svg>", "lacks a number"),
+        (
+            "<svg><path d='4 5 L3 1' stroke='red'/></svg>",
+            "'4 5 L3 1' begins with a number",
+        ),
+        ("<svg><path d='M0 0 B3 1' stroke='red'/></svg>", "holds 'B', which is no command"),
+        ("<svg><line stroke='hsl(1, 2%)'/></svg>", r"the stroke 'hsl\(1, 2%\)' is not a colour"),
+        ("<svg><line stroke='rgb(1, 2)'/></svg>", r"the stroke 'rgb\(1, 2\)' is not a colour"),
         ("<html/>", "not an SVG"),
         ("<svg", "not an SVG drawing"),
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><svg/>", "entities"),
@@ -161,6 +179,64 @@ def test_an_svg_of_another_hand() -> None:
 def test_what_is_no_crease_pattern_in_svg_is_refused(text: str, words: str) -> None:
     with pytest.raises(PatternError, match=words):
         parse_svg(text)
+
+
+@pytest.mark.parametrize(
+    ("stroke", "letter"),
+    [
+        ("hsl(0, 100%, 50%)", "M"),
+        ("HSLA(240 100% 40% / 1)", "V"),
+        ("hsl(120, 100%, 50%)", "C"),
+        ("hsl(-120, 100%, 50%)", "V"),
+        ("rgb(100%, 0%, 0%)", "M"),
+        ("rgba(0, 0, 255, 1)", "V"),
+        ("rgb(0, 0, 0)", "B"),
+    ],
+)
+def test_a_colour_of_svg_is_read_however_it_is_written(stroke: str, letter: str) -> None:
+    assert parse_svg(f'<svg><line x2="1" stroke="{stroke}"/></svg>').assignment.tolist() == [letter]
+
+
+@pytest.mark.parametrize(
+    "transform",
+    [
+        "rotate(30)",
+        "rotate(-40 3,4)",
+        "skewX(20)",
+        "skewY(-15)",
+        "translate(4) scale(2 -3)",
+        "translate(1,2)rotate(30, 5, 6) , skewX(10) scale(.5) matrix(1 2 -3 4 5 6)",
+    ],
+)
+def test_an_svg_transform_moves_as_another_reader_moves(transform: str) -> None:
+    line = '<line x1="1" y1="2" x2="7" y2="-3" stroke="red"/>'
+    read = parse_svg(f'<svg><g transform="{transform}">{line}</g></svg>')
+    matrix = svgelements.Matrix(transform)
+    there = [matrix.point_in_matrix_space(point) for point in ((1, 2), (7, -3))]
+    np.testing.assert_allclose(read.ends[0], [[p.x, -p.y] for p in there], atol=1e-9)
+
+
+def test_what_is_no_line_in_a_drawing_draws_nothing() -> None:
+    parts = (
+        '<circle r="0"/><ellipse rx="3"/><polyline points="1 2"/><path d="M3 4"/><path d=""/>'
+        '<path d="A0 5 0 0 1 3 4"/>'  # an arc without a radius is a line
+    )
+    drawing = f'<svg stroke="red">{parts}<line x2="5"/></svg>'
+    assert parse_svg(drawing).ends.tolist() == [[[0, 0], [3, -4]], [[0, 0], [5, 0]]]
+
+
+def test_what_an_svg_holds_besides_lines_is_told() -> None:
+    square = '<rect width="9" height="9" stroke="black"/><use/><image/><use/>'
+    pattern = pattern_from_lines(parse_svg(f"<svg>{square}</svg>"))
+    assert [finding.sentence for finding in pattern.told] == [
+        "Parts of the drawing are not read: 1 image, 2 use."
+    ]
+
+
+@pytest.mark.parametrize("text", [svg_text, opx_text])
+def test_a_title_is_what_it_says_and_no_markup(text: Callable[..., str]) -> None:
+    root = ElementTree.fromstring(text(lines_of(regular(2, 2)), "<b> & 'c'"))
+    assert [each.text for each in root.iter() if each.text == "<b> & 'c'"] == ["<b> & 'c'"]
 
 
 def test_cp_and_opx_have_their_y_axis_downwards() -> None:
@@ -174,6 +250,8 @@ def test_cp_and_opx_have_their_y_axis_downwards() -> None:
     [
         (parse_cp, "1 0 0 1\n", "line 1"),
         (parse_cp, "1 0 0 1 1\nx 0 0 0 0\n", "line 2"),
+        (parse_cp, "1 0 0 1 1\n\n \n1 0 0 1_0 1\n", "line 4 is '1 0 0 1_0 1', not a type and four"),
+        (parse_cp, "1 0 0 \uff11 1\n", "line 1 is"),
         (parse_opx, "<java", "OPX"),
         (parse_dxf, "hello", "not a DXF"),
         (parse_dxf, "0\nSECTION\n2\nENTITIES\nx\nLINE\n", "line 5"),
@@ -188,6 +266,11 @@ def test_cp_and_opx_have_their_y_axis_downwards() -> None:
             "0\nSECTION\n2\nENTITIES\n0\nSPLINE\n71\n3\n10\n1\n20\n1\n0\nENDSEC\n0\nEOF\n",
             "do not go together",
         ),
+        (parse_dxf, spline_dxf("0 0 1 1", "1 1", points=0), "has points to fit and no control"),
+        (parse_dxf, spline_dxf("0 1 0 1", "1 1"), "knots that do not rise"),
+        (parse_dxf, spline_dxf("0 0 0 0", "1 1"), "knots that do not rise"),
+        (parse_dxf, spline_dxf("0 0 1 1", "1 0"), "a weight that is not positive"),
+        (parse_dxf, spline_dxf("0 0 1 1", "1"), "2 control points, 4 knots and 1 weights"),
     ],
 )
 def test_what_cannot_be_read_is_named(
@@ -219,6 +302,7 @@ def test_dxf_polylines_and_colours_are_read() -> None:
     body += tags(0, "POLYLINE", 8, "valleys", 62, 5, 70, 0, 10, 0, 20, 0)
     body += tags(0, "VERTEX", 8, "valleys", 10, 1, 20, 1, 0, "VERTEX", 8, "x", 10, 2, 20, 3)
     body += tags(0, "SEQEND", 0, "LINE", 8, "CutLine", 10, 1, 20, 2, 11, 3, 21, 4)
+    body += tags(0, "CIRCLE", 10, 5, 20, 5, 40, 0, 0, "LWPOLYLINE", 10, 1, 20, 1)  # nothing drawn
     body += tags(0, "ENDSEC", 0, "EOF")
     read = parse_dxf(body)
     assert "".join(read.assignment) == "MMM" + "V" + "B"
