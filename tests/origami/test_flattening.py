@@ -174,6 +174,11 @@ def test_several_sheets_and_a_sheet_with_a_hole() -> None:
               [(0, 1, 3), (0, 1, 2), (0, 3, 4)]), "no area"),
         ({"vertices_coords": [[0, 0, 0], [1, 0, 0], [1, 1, 0.4], [0, 1, 0]],
           "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2]]}, "faces_vertices"),
+        (form([[0, 0, 0], [1, 0, 0], [1, 1, 0.4]], [(0, 1, 3)]), "'faces_vertices' refers to a"),
+        (form([[0, 0, 0], [1, 0, 0.4], [1, 1, 0]], [(0, 1, 2)], edges_vertices=[[0, 3]]),
+         "'edges_vertices' refers to a vertex that does not exist"),
+        (form([[0, 0, 0], [math.inf, 0, 0.4], [1, 1, 0], [0, 1, 0]], [(0, 1, 2, 3)]),
+         "'vertices_coords' holds a coordinate that is not a finite number"),
     ],
 )  # fmt: skip
 def test_what_does_not_lie_flat_is_refused_by_how_much(document: dict, words: str) -> None:

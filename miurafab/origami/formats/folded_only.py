@@ -60,8 +60,12 @@ class _Sheet:
         self.angles, self.faces = angles, faces
 
     @classmethod
-    def of(cls, frame: Mapping[str, Any]) -> _Sheet:
-        points = points_at(frame, "vertices_coords")
+    def of(cls, frame: Mapping[str, Any], factor: float = 1.0) -> _Sheet:
+        """The sheet of ``frame``, whose unit is ``factor`` mm."""
+        with np.errstate(over="ignore"):
+            points = points_at(frame, "vertices_coords") * factor
+        if not np.isfinite(points).all():
+            raise PatternError("'vertices_coords' holds a coordinate that is not a finite number.")
         points = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
         if "faces_vertices" not in frame:
             raise PatternError(
@@ -85,17 +89,14 @@ def unfolded_pattern(frame: Mapping[str, Any], factor: float) -> CreasePattern:
 
     Raises :class:`~miurafab.errors.PatternError` for what does not lie flat without stretching.
     """
-    sheet = _Sheet.of(frame)
-    points = sheet.points * factor
-    if not (np.abs(points) < np.inf).all():
-        raise PatternError("'vertices_coords' holds a coordinate that is not a finite number.")
+    sheet = _Sheet.of(frame, factor)
     pattern = CreasePattern(
-        vertices_coords=np.zeros((len(points), 2)),
+        vertices_coords=np.zeros((len(sheet.points), 2)),
         edges_vertices=sheet.edges,
         edges_assignment=sheet.letters,
         edges_fold_angle=np.zeros(len(sheet.edges)),
         faces_vertices=sheet.faces,
-        folded_coords=points,
+        folded_coords=sheet.points,
     )
     signs = _signs(frame, sheet, pattern.edges_faces)
     if _is_seen_from_below(pattern, signs):

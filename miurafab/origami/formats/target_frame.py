@@ -48,8 +48,6 @@ def target_in(document: Mapping[str, Any]) -> dict[str, Any]:
         raise PatternError("'miurafab:target' is not an object.")
     try:
         origin_in(target)
-        if not np.isfinite(origin_in(target)).all():
-            raise ValueError("its origin is not finite")
         _check_values(target)
     except (TypeError, ValueError, OverflowError) as fault:
         raise PatternError(f"'miurafab:target' is damaged: {fault}.") from None

@@ -51,6 +51,16 @@ def test_a_pattern_in_the_plane_of_x_and_z_keeps_its_axes() -> None:
     assert laid_in_plane(points, faces) == pytest.approx(flat)
 
 
+@pytest.mark.parametrize("faces", [None, [], [7], [["a", 1, 2]], [[0, 1, 99]]])
+def test_facets_that_tell_no_side_leave_the_upper_one_up(faces: object) -> None:
+    pattern = named_patterns.waterbomb_base()
+    points = np.column_stack([pattern.vertices_coords, 0.5 * pattern.vertices_coords[:, 0]])
+    laid = laid_in_plane(points, faces)
+    assert laid is not None
+    shown = signed_areas(pattern.vertices_coords[pattern.faces_vertices])
+    assert signed_areas(laid[pattern.faces_vertices]) == pytest.approx(np.sqrt(1.25) * shown)
+
+
 def test_what_is_in_no_plane_is_no_flat_pattern() -> None:
     pattern = named_patterns.waterbomb_base()
     bent = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))

@@ -225,6 +225,22 @@ def test_mixed_polygons_are_padded() -> None:
         ({"miurafab:seams": [[0, 17]]}, "edge that does not exist"),
         ({"miurafab:seams": [[0, 4]]}, "Edge 4 is in a seam and is no border"),
         ({"miurafab:cells": [[0, 0]]}, "one column and row for each facet"),
+        ({"edges_vertices": [[0, -1]]}, "'edges_vertices' holds a negative vertex"),
+        ({"faces_vertices": [[0, 1, 2], [0, 1, 2, "a"]]}, "that is not a vertex number"),
+        ({"faces_vertices": [[0, 1, 2], [0, 1, 2, True]]}, "that is not a vertex number"),
+        ({"miurafab:unfolded": True}, "'miurafab:unfolded' is not a number"),
+        ({"miurafab:unfolded": 5}, "'miurafab:unfolded' is 5; it is from 0 to "),
+        ({"miurafab:unfolded": -1e-9}, "'miurafab:unfolded' is -1e-09; it is from 0 to "),
+        ({"miurafab:target": [1]}, "'miurafab:target' is not an object"),
+        ({"miurafab:target": {"origin": [1, 2]}}, "'miurafab:target' is damaged: "),
+        ({"miurafab:target": {"origin": [np.inf, 0, 0]}}, "origin is not three finite numbers"),
+        ({"miurafab:target": {"a": [1.0, {"b": np.nan}]}}, "damaged: it holds nan"),
+        ({"miurafab:target": {"a": ["\x1b[31m"]}}, "damaged: .* holds control characters"),
+        ({"miurafab:target": {"\x07": 1}}, "damaged: .* holds control characters"),
+        (
+            {"file_frames": [{"frame_classes": ["foldedForm"], "vertices_coords": [[0, 0, 0]]}]},
+            "The folded form has 1 vertices and the pattern 12",
+        ),
     ],
 )
 def test_a_fault_is_named(change: dict[str, Any], words: str) -> None:
