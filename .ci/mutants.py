@@ -34,6 +34,7 @@ import tomllib
 import traceback
 import types
 from collections import Counter, defaultdict
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -267,8 +268,8 @@ def explained() -> dict[tuple[str, ...], str]:
     }
 
 
-def run(name: str, area: dict, faults: list[dict], jobs: int) -> list[tuple[dict, str, float]]:
-    """Each of ``faults`` in ``area`` with what became of it."""
+def run(name: str, area: dict, faults: list[dict], jobs: int) -> Iterator[tuple[dict, str, float]]:
+    """Each of ``faults`` in ``area`` with what became of it, as they end."""
     known = watched(area)
     for library in known["libraries"]:
         with contextlib.suppress(Exception):
@@ -276,14 +277,10 @@ def run(name: str, area: dict, faults: list[dict], jobs: int) -> list[tuple[dict
     print(f"{name}: {len(faults)} faults, {len(known['seconds'])} tests", flush=True)
     with concurrent.futures.ProcessPoolExecutor(jobs, mp_context=FORK) as pool:
         calls = {pool.submit(judged, fault, area, known): fault for fault in faults}
-        done = []
-        for call in concurrent.futures.as_completed(calls):
-            fault = calls[call]
-            how, took = call.result()
-            done.append((fault, how, took))
-            if len(done) % 50 == 0:
-                print(f"  {len(done)}", flush=True)
-    return done
+        for done, call in enumerate(concurrent.futures.as_completed(calls), start=1):
+            if done % 50 == 0:
+                print(f"  {done}", flush=True)
+            yield calls[call], *call.result()
 
 
 def listed(modules: list[str], python: Path) -> list[dict]:
@@ -325,9 +322,10 @@ def main() -> int:
                 how = "explained"
             elif how == "survived":
                 wrong.append(shown(fault, how))
+                print(wrong[-1], flush=True)
             counts[fault["module"]][how] += 1
             counts[fault["module"]]["seconds"] += took
-    print("".join(f"\n{text}" for text in wrong))
+    print("\nTo kill or to explain:" if wrong else "", *wrong, sep="\n")
     columns = ("killed", "timeout", "explained", "survived", "seconds")
     print(f"{'module':44}" + "".join(f"{column:>10}" for column in columns))
     for path, count in counts.items():
