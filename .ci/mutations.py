@@ -100,37 +100,46 @@ class Faults(MutationVisitor):
             return True
         return super()._skip_node_and_children(node)
 
+    def around(self, node: cst.CSTNode) -> Iterator[cst.CSTNode]:
+        """``node``, and what it stands in, from within; the module is left out."""
+        while not isinstance(node, cst.Module):
+            yield node
+            node = self.get_metadata(ParentNodeProvider, node)
+
     def place(self, node: cst.CSTNode) -> tuple[str, int, int]:
         """The function or class around ``node``, and the lines of its statement."""
-        names: list[str] = []
-        statement = None
-        walked: cst.CSTNode | None = node
-        while walked is not None:
-            if statement is None and isinstance(walked, cst.SimpleStatementLine):
-                statement = walked
-            if isinstance(walked, cst.FunctionDef | cst.ClassDef) and walked is not node:
-                names.append(walked.name.value)
-            walked = self.get_metadata(ParentNodeProvider, walked, None)
-        span = self.get_metadata(PositionProvider, statement or node)
+        around = list(self.around(node))
+        names = [
+            each.name.value
+            for each in around[1:]
+            if isinstance(each, cst.FunctionDef | cst.ClassDef)
+        ]
+        statements = [each for each in around if isinstance(each, cst.SimpleStatementLine)]
+        span = self.get_metadata(PositionProvider, [*statements, node][0])
         last = span.start.line if isinstance(node, cst.If | cst.While) else span.end.line
         return ".".join(reversed(names)), span.start.line, last
 
 
 def mutations(path: str) -> Iterator[dict[str, object]]:
     """The faults of the module at ``path``, each once."""
-    source = Path(path).read_text(encoding="utf-8")
-    wrapper = MetadataWrapper(cst.parse_module(source))
-    faults = Faults()
-    seen = {source}
-    old = source.splitlines()
+    wrapper = MetadataWrapper(cst.parse_module(Path(path).read_text(encoding="utf-8")))
+    module, faults = wrapper.module, Faults()
+    texts = {statement: module.code_for_node(statement) for statement in module.body}
+    before, line = {}, sum(module.code_for_node(each).count("\n") for each in module.header)
+    for statement, text in texts.items():
+        before[statement] = line
+        line += text.count("\n")
+    seen = set(texts.values())
     with faults.resolve(wrapper):
-        wrapper.module.visit(faults)
+        module.visit(faults)
         for fault in faults.mutations:
-            code = wrapper.module.deep_replace(fault.original_node, fault.mutated_node).code
+            (*_, statement) = faults.around(fault.original_node)
+            changed = statement.deep_replace(fault.original_node, fault.mutated_node)
+            code = module.code_for_node(changed)
             if code in seen or not _compiles(code):
                 continue
             seen.add(code)
-            new = code.splitlines()
+            old, new = texts[statement].splitlines(), code.splitlines()
             head = _common(old, new)
             tail = _common(old[head:][::-1], new[head:][::-1])
             was = "\n".join(old[head : len(old) - tail])
@@ -142,7 +151,7 @@ def mutations(path: str) -> Iterator[dict[str, object]]:
                 "module": path,
                 "within": within,
                 "statement": [first, last],
-                "lines": [head, len(old) - tail],
+                "lines": [before[statement] + head, before[statement] + len(old) - tail],
                 "was": was,
                 "becomes": becomes,
             }
