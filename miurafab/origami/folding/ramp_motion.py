@@ -166,13 +166,13 @@ def _wrong_edges(piece: Piece, path: RampPath) -> Ints:
 
 
 def _unfollowed(pattern: CreasePattern, part: float) -> PatternError:
-    """The error for a pattern of curved creases that does not come to its first frame."""
+    """The error for a pattern with rulings that does not come to its first frame."""
     angle = part * math.degrees(float(np.abs(pattern.edges_fold_angle).max()))
     return PatternError(
         f"The sheet could not be followed to its first position, where its creases fold by up to "
-        f"{angle:.0f} degrees: beside curved creases facets have to bend, and no balance was found "
-        "in which they do. Ask for more `steps`, so that it is nearer to flat, or give the creases "
-        "smaller fold angles."
+        f"{angle:.0f} degrees: facets have to bend where two folds meet that are not in line, as "
+        "along a curved crease, and no balance was found in which they do. Ask for more `steps`, "
+        "so that it is nearer to flat, or give the creases smaller fold angles."
     )
 
 

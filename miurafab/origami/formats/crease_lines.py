@@ -12,7 +12,7 @@ from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.nearest import tree_of
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.formats.curves import Curve, Polyline, default_tolerance
+from miurafab.origami.formats.curves import Curve, Polyline, default_tolerance, shared_tolerances
 
 FARTHEST = 1e9
 """A coordinate beyond this is refused, mm."""
@@ -74,8 +74,10 @@ def straightened(
         near = default_tolerance([line.course for line in drawn])
     ends, letters, angles = [np.empty((0, 2, 2))], list[str](), list[float]()
     number, curve = -1, list[int]()
-    for line in drawn:
-        points = line.course.points(near)
+    for line, within in zip(
+        drawn, shared_tolerances([line.course for line in drawn], near), strict=True
+    ):
+        points = line.course.points(within)
         count = len(points) - 1
         curved = not isinstance(line.course, Polyline)
         if curved and len(curve) + count > _MOST:

@@ -8,8 +8,8 @@ Design 3, 1986). So a curve is cut at equal steps of its parameter, as few as th
 - an arc c + A (cos t, sin t) has |B''| <= |A|, the larger radius of its ellipse;
 - of a spline the number of steps between two knots is doubled until the middles lie near enough.
 
-Curves of one shape are cut alike, so that the creases of a pleat have their corners opposite to
-each other, where the paper between them is ruled.
+Curves of one shape are cut into as many lines as the largest of them, so that the creases of a
+pleat have their corners opposite to each other, where the paper between them is ruled.
 """
 
 from __future__ import annotations
@@ -174,6 +174,37 @@ def default_tolerance(curves: Sequence[Curve]) -> float:
     with np.errstate(invalid="ignore", over="ignore"):
         size = float(np.ptp(hull, axis=0).max())
     return SHARE * size if math.isfinite(size) and size > 0 else SHARE
+
+
+def shared_tolerances(curves: Sequence[Curve], tolerance: float) -> list[float]:
+    """For each of ``curves`` the ``tolerance`` with which it is cut into as many lines as the
+    largest one of its shape, as far as that is up to 16 times as large.
+    """
+    shapes = [_shape(curve) for curve in curves]
+    largest: dict[bytes, float] = {}
+    for shape, size in shapes:
+        largest[shape] = max(size, largest.get(shape, 0.0))
+    return [
+        tolerance * max(size / largest[shape], 1.0 / 16.0) if largest[shape] > 0 else tolerance
+        for shape, size in shapes
+    ]
+
+
+def _shape(curve: Curve) -> tuple[bytes, float]:
+    """The shape of a ``curve``, in steps of a twentieth of its size, and its size; 0 for a curve
+    that is compared with no other.
+    """
+    if isinstance(curve, Bezier):
+        numbers = (curve.control[1:] - curve.control[0]).ravel()
+    elif isinstance(curve, Arc):
+        numbers = curve.axes.ravel()
+    else:
+        return b"", 0.0
+    size = float(np.abs(numbers).max())
+    if size == 0:
+        return b"", 0.0
+    turns = [curve.start, curve.sweep] if isinstance(curve, Arc) else []
+    return np.rint(20 * np.append(numbers / size, turns)).astype(np.int64).tobytes(), size
 
 
 def bulged(start: Floats, end: Floats, bulge: float) -> PlainCurve:

@@ -8,13 +8,23 @@ runs to either side, in the middle of the angle there, up to the next line. Such
 folds and two rulings, folds exactly (it meets Kawasaki's condition).
 
 A ruling that comes to a curve ends at the nearer corner of that curve, so that the paper between
-two curves is ruled from corner to corner. Where the crease is hollow rulings may meet; then the
-shorter one stays.
+two curves is ruled from corner to corner.
+
+Between two curves of one shape the rulings join what corresponds: they are parallel if one curve is
+the other moved, and meet in one point if it is the other enlarged from there. So the paper is part
+of a cylinder or a cone, a plane cuts it in each curve, and it goes on mirrored in that plane. (By
+the formulas of Fuchs and Tabachnikov the rulings on both sides of a plane curve are one line when
+flat.) So beyond the last of such curves rulings go straight on.
+
+Where the crease is hollow, rulings across it may meet. Beside a single curve the paper is then
+ruled across the chord, as a cylinder that is mirrored; otherwise, and if the curve turns back, the
+shorter of two rulings that meet stays.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -23,6 +33,13 @@ from miurafab.origami.crease_pattern import CreasePattern
 
 BEND = math.radians(60.0)
 """The largest turn of a curved crease at one of its corners; at a larger one the crease is kinked.
+"""
+
+ALIKE = 0.02
+"""Two curves whose sides differ by at most this part of their length are of one shape."""
+
+AHEAD = 0.3
+"""The least cosine of the angle of a side of a curve with its chord, for rulings across the chord.
 """
 
 _CLOSE = 0.25
@@ -34,55 +51,145 @@ def rulings(pattern: CreasePattern, curved: Bools) -> Floats:
     folds = np.isin(pattern.edges_assignment, ("M", "V"))
     found: list[Floats] = []
     seen: set[tuple[int, int]] = set()
+    facets = []
     for face, edges in zip(pattern.faces_vertices, pattern.faces_edges, strict=True):
         corners = face[face >= 0]
         sides = edges[: len(corners)]
         if len(corners) > 3 and (curved & folds)[sides].any():
-            found += _of_facet(pattern.vertices_coords, corners, curved[sides], folds[sides], seen)
+            facet = _Facet(pattern.vertices_coords, corners, curved[sides], folds[sides])
+            facets.append(facet)
+    axes: dict[int, Floats] = {}
+    alone = []
+    for facet in facets:
+        pairs = facet.counterparts()
+        for one, other in pairs:
+            seen.add((min(one, other), max(one, other)))
+            ray = pattern.vertices_coords[[one, other]]
+            found.append(ray)
+            axes[one] = axes[other] = ray[1] - ray[0]
+        if not pairs:
+            alone.append(facet)
+    many = {vertex for facet in facets for vertex in facet.of_many_curves()}
+    for facet in alone:
+        for vertex, axis in facet.blocked():
+            if vertex not in many:
+                axes.setdefault(vertex, axis)
+    for facet in alone:
+        found += facet.rays(axes, seen)
     return np.array(found).reshape(-1, 2, 2)
 
 
-def _of_facet(
-    points: Floats, corners: Ints, curved: Bools, folds: Bools, seen: set[tuple[int, int]]
-) -> list[Floats]:
-    """The rulings of the facet of ``corners`` (k,) whose sides from corner to corner are ``curved``
-    and ``folds`` (k,); ``seen`` holds the pairs of vertices that are joined already.
+class _Facet:
+    """A facet of the ``corners`` (k,) whose sides from corner to corner are ``curved`` and
+    ``folds`` (k,). Curved folds meet at the ``bent`` (k,) ones.
     """
-    p = points[corners]
-    count = len(p)
-    along = np.roll(p, -1, axis=0) - p
-    length = np.linalg.norm(along, axis=1)
-    unit = along / length[:, None]
-    before = np.roll(unit, 1, axis=0)
-    turn = np.abs(np.arctan2(_cross(before, unit), (before * unit).sum(axis=1)))
-    both = folds & np.roll(folds, 1)
-    bent = both & (curved | np.roll(curved, 1)) & (turn < BEND)
-    rays = []
-    for corner in np.flatnonzero(bent).tolist():
-        tangent = before[corner] + unit[corner]
-        inward = np.array([-tangent[1], tangent[0]]) / np.linalg.norm(tangent)
-        step = min(length[corner], length[corner - 1])
-        hit = _first_hit(p, along, curved, corner, inward, _CLOSE * step)
-        if hit is not None:
-            end, at = hit
-            rays.append((float(np.linalg.norm(end - p[corner])), corner, at, end))
-    kept: list[Floats] = []
-    for _, corner, at, end in sorted(rays, key=lambda ray: ray[:2]):
-        one = int(corners[corner])
-        if at >= 0:
-            pair = (min(one, int(corners[at])), max(one, int(corners[at])))
-            apart = abs(at - corner) not in (0, 1, count - 1)
-            if not apart or pair in seen:
-                continue
-        ray = np.stack([p[corner], end])
+
+    def __init__(self, points: Floats, corners: Ints, curved: Bools, folds: Bools) -> None:
+        self.corners, self.curved = corners, curved
+        self.places = p = points[corners]
+        self.along = np.roll(p, -1, axis=0) - p
+        self.length = np.linalg.norm(self.along, axis=1)
+        self.unit = unit = self.along / self.length[:, None]
+        self.before = np.roll(unit, 1, axis=0)
+        turn = np.abs(np.arctan2(_cross(self.before, unit), (self.before * unit).sum(axis=1)))
+        both = folds & np.roll(folds, 1)
+        self.bent = both & (curved | np.roll(curved, 1)) & (turn < BEND)
+        across = np.stack([-self.before[:, 1] - unit[:, 1], self.before[:, 0] + unit[:, 0]], axis=1)
+        self.inward = across / np.maximum(np.linalg.norm(across, axis=1), 1e-9)[:, None]
+
+    def counterparts(self) -> list[tuple[int, int]]:
+        """The pairs of vertices that correspond to each other on the two curves of one shape at the
+        facet's sides; none if there are other curves.
+        """
+        runs = self._runs()
+        if len(runs) != 2 or len(runs[0]) != len(runs[1]) or len(runs[0]) < 2:
+            return []
+        one, other = runs[0], runs[1][::-1]
+        p = self.places
+        steps, likewise = np.diff(p[one], axis=0), np.diff(p[other], axis=0)
+        size = float((steps * likewise).sum() / (steps**2).sum())
+        off = np.linalg.norm(likewise - size * steps, axis=1)
+        if size <= 0 or (off > ALIKE * np.linalg.norm(likewise, axis=1)).any():
+            return []
+        rays = np.stack([p[one], p[other]], axis=1)
         sides = np.stack([p, np.roll(p, -1, axis=0)], axis=1)
-        others = np.concatenate([sides, np.array(kept).reshape(-1, 2, 2)])
-        if _crossed(ray, others).any():
-            continue
-        if at >= 0:
-            seen.add(pair)
-        kept.append(ray)
-    return kept
+        if any(_crossed(ray, np.concatenate([sides, rays])).any() for ray in rays):
+            return []
+        ends = zip(self.corners[one].tolist(), self.corners[other].tolist(), strict=True)
+        return list(ends)
+
+    def _runs(self) -> list[Ints]:
+        """The bent corners that follow each other, along the border of the facet."""
+        count = len(self.bent)
+        starts = np.flatnonzero(self.bent & ~np.roll(self.bent, 1))
+        stops = np.flatnonzero(self.bent & ~np.roll(self.bent, -1))
+        if not len(starts):  # a closed curve has no first corner
+            return []
+        ends = stops[np.searchsorted(stops, starts) % len(stops)]
+        ends = np.where(ends < starts, ends + count, ends)
+        pairs = zip(starts.tolist(), ends.tolist(), strict=True)
+        return [np.arange(start, end + 1) % count for start, end in pairs]
+
+    def of_many_curves(self) -> list[int]:
+        """The vertices of its curves, where it has several."""
+        runs = self._runs()
+        return self.corners[np.concatenate(runs)].tolist() if len(runs) > 1 else []
+
+    def blocked(self) -> list[tuple[int, Floats]]:
+        """The vertices of curves across which rulings would meet each other in this facet, with the
+        normal of the chord of their curve. Curves that turn back from it are left as they are.
+        """
+        found: list[tuple[int, Floats]] = []
+        for run in self._runs():
+            hits = [(corner, self._hit(corner, self.inward[corner])) for corner in run.tolist()]
+            rays = np.array([[self.places[at], hit[0]] for at, hit in hits if hit is not None])
+            if not any(_crossed(ray, rays).any() for ray in rays):
+                continue
+            sides = np.append(run[0] - 1, run)
+            chord = self.along[sides].sum(axis=0)
+            chord /= np.linalg.norm(chord)
+            if (self.unit[sides] @ chord > AHEAD).all():
+                normal = np.array([-chord[1], chord[0]])
+                found += [(vertex, normal) for vertex in self.corners[run].tolist()]
+        return found
+
+    def _hit(self, corner: int, direction: Floats) -> tuple[Floats, int] | None:
+        near = _CLOSE * min(self.length[corner], self.length[corner - 1])
+        return _first_hit(self.places, self.along, self.curved, corner, direction, near)
+
+    def rays(self, axes: Mapping[int, Floats], seen: set[tuple[int, int]]) -> list[Floats]:
+        """The rulings that begin at bent corners: along the one of ``axes`` of their vertex, or
+        across the crease. ``seen`` holds the pairs of vertices that are joined already.
+        """
+        p, count = self.places, len(self.places)
+        rays = []
+        for corner in np.flatnonzero(self.bent).tolist():
+            direction = self.inward[corner]
+            axis = axes.get(int(self.corners[corner]))
+            if axis is not None:
+                direction = math.copysign(1.0, float(axis @ direction)) * axis
+            hit = self._hit(corner, direction)
+            if hit is not None:
+                end, at = hit
+                rays.append((float(np.linalg.norm(end - p[corner])), corner, at, end))
+        kept: list[Floats] = []
+        for _, corner, at, end in sorted(rays, key=lambda ray: ray[:2]):
+            one = int(self.corners[corner])
+            if at >= 0:
+                other = int(self.corners[at])
+                pair = (min(one, other), max(one, other))
+                apart = abs(at - corner) not in (0, 1, count - 1)
+                if not apart or pair in seen:
+                    continue
+            ray = np.stack([p[corner], end])
+            sides = np.stack([p, np.roll(p, -1, axis=0)], axis=1)
+            others = np.concatenate([sides, np.array(kept).reshape(-1, 2, 2)])
+            if _crossed(ray, others).any():
+                continue
+            if at >= 0:
+                seen.add(pair)
+            kept.append(ray)
+        return kept
 
 
 def _first_hit(
