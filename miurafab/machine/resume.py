@@ -37,7 +37,7 @@ from miurafab.gcode.job import Job, plain_code
 from miurafab.gcode.parser import ModalState, ReaderRules, parse_block
 from miurafab.gcode.program import RAPID, Program, Strokes, strokes
 from miurafab.gcode.reading import read_program
-from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST, NO_MOTION
+from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST
 from miurafab.geometry.arrays import Ints
 from miurafab.machine.journal import JournalRun, job_digest
 from miurafab.profiles import MachineProfile
@@ -301,7 +301,4 @@ def _modes(state: ModalState) -> Iterator[str]:
     # The motion mode is G0 here, in which laser mode keeps the beam dark whatever S is.
     yield f"M{state.spindle or 5}S{state.speed:g}" + (f"F{state.feed:.4f}" if state.feed else "")
     yield f"G{20 if state.inches else 21}G{91 if state.distance else 90}G{17 + state.plane}"
-    if state.motion in _MOTION_WORDS:
-        yield _MOTION_WORDS[state.motion]
-    elif state.motion == NO_MOTION:
-        yield "G80"
+    yield _MOTION_WORDS[state.motion]  # that of a move, as the line behind a move comes next

@@ -18,6 +18,7 @@ from miurafab.gcode.job import Job
 from miurafab.machine.dialects import make_safe
 from miurafab.machine.faulty import FaultyDevice
 from miurafab.machine.journal import read_journal
+from miurafab.machine.judge_job import judge_job
 from miurafab.machine.known_controller import PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.planning import SendOptions, plan_job
@@ -242,6 +243,50 @@ def test_a_restart_ends_the_job() -> None:
     with pytest.raises(ControllerError, match="restarted by itself after it took line"):
         send(dashes(), Wire(device, before_read=restart))
     assert_dark(device)
+
+
+def test_a_halt_of_its_own_ends_the_job() -> None:
+    """As of a thermal fault, or of another program that sends M112."""
+    device = new_device()
+
+    def halt(now: float) -> None:
+        if now > 3.0 and not device.killed:
+            device.receive(b"M112\n")
+
+    with pytest.raises(ControllerError, match=r"halted after it took line \d+ .*'Error:"):
+        send(dashes(), Wire(device, before_read=halt))
+    assert_dark(device)
+
+
+def test_the_transcript_holds_the_halt(tmp_path: Path) -> None:
+    """Both ways are in it, to the last byte that was sent."""
+    job = Job("bad.nc", dashes(3).text.replace("M5 I\n", "G17\n"))
+    wire = Wire(new_device())
+    with pytest.raises(ControllerError, match="refused line"):
+        send(job, wire, force=frozenset({"program"}), transcript_path=tmp_path / "t")
+    lines = (tmp_path / "t").read_text().splitlines()
+    sent = "".join(line.partition(" > ")[2] for line in lines)
+    assert sent.replace("\\n", "\n").encode() == wire.written
+    assert any(" < Error:Printer halted" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("M3 S200\nG1 X5 F600\nG4 P500\nM5\n", 5),
+        ("M3\nG1 X5 S200 F600\nG4 S1\nM5\n", 5),  # its S is a time
+        ("M3 S0\nG4 S1\nM3 S200\nG0 X5\nG04 P1\nM5\n", 7),
+        ("M3 S200\nG4 P0\nM5\nG4 P9\n", None),
+        ("M4 I S200\nG1 X5 F600\nG4 P500\nM5 I\n", None),
+    ],
+)
+def test_a_dwell_with_the_beam_on_is_refused(text: str, line: int | None) -> None:
+    """``M3`` without ``I`` burns at once, whatever the motion mode is."""
+    job = Job("dwell.nc", "G21\nG90\n" + text)
+    found = {each.code: each for each in judge_job(job, MACHINE).findings}
+    assert ("dwell" in found) == (line is not None)
+    if line is not None:
+        assert found["dwell"].sentence.startswith(f"dwell.nc, line {line} waits with the beam on")
 
 
 def test_silence_is_asked_again_and_then_told() -> None:

@@ -73,6 +73,17 @@ def test_every_stroke_is_cut_though_the_cutter_is_slower_than_the_wire(tmp_path:
     assert run.line == ROWS + 3
 
 
+def test_the_transcript_holds_what_was_handed_over_and_what_the_cutter_said(tmp_path: Path) -> None:
+    job, device = strokes(speed=3), new_device()
+    send(job, device, transcript_path=tmp_path / "t")
+    lines = (tmp_path / "t").read_text().splitlines()
+    sent = "".join(line.partition(" > ")[2] for line in lines)
+    assert sent.startswith(job.text.replace("\n", ""))
+    said = "".join(line.partition(" < ")[2] for line in lines)
+    assert said == "\\x13\\x11" * (len(said) // 8)  # XOFF and XON in turn
+    assert said
+
+
 @pytest.mark.parametrize("knows", [True, False])
 def test_ctrl_c_lifts_the_tool_behind_what_the_cutter_holds(knows: bool) -> None:
     device = new_device()

@@ -21,7 +21,7 @@ from miurafab.gcode.job import Job
 from miurafab.gcode.program import strokes
 from miurafab.machine.journal import JournalRun, job_digest, read_journal
 from miurafab.machine.planning import SendOptions, plan_job
-from miurafab.machine.resume import Resumption, resume
+from miurafab.machine.resume import Resumption, from_stroke, resume
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
@@ -231,6 +231,44 @@ def test_the_modes_are_those_of_the_whole(tmp_path: Path) -> None:
         assert "M8" in rest.job.text
 
 
+def test_every_mode_is_brought_back_by_name() -> None:
+    """Inches, both kinds of air, the height, the plane and the motion mode of the line before."""
+    head = "G90\n(blank)\n\n\n\n\n\n\nM7\nM8\nM3 S0\nG0 Z-2\n"
+    rows = [f"G21 G0 X{n} Y5\nG1 X{n + 0.5} S300 F900\nG20\nG0 S0\n" for n in range(60)]
+    job = Job("modes.nc", "".join([head, *rows, "M5\n"]))
+    rest = resume(job, MACHINE, [record(job, line=180, taken=180)])
+    preamble = rest.job.text[: rest.job.text.index("\n\n")].splitlines()
+    assert preamble[:2] == ["G21G90G17G94M5", f"G0X{rest.stroke}.0000Y5.0000"]
+    assert preamble[2:] == ["G0Z-2.0000", "M8", "M7", "M3S0F900.0000", "G21G90G17", "G0"]
+    whole, again = strokes(parse_program(job)), strokes(parse_program(rest.job))
+    for index in range(len(again)):
+        assert again.stroke(index) == pytest.approx(whole.stroke(rest.stroke + index), abs=1e-3)
+
+
+def test_strokes_that_hang_together_are_taken_up_where_the_first_begins() -> None:
+    """Between them is no travel: a rest that began at a later one would begin with the beam on."""
+    chain = "".join(f"(patch {n})\nG1 X{12 + 2 * n} S500 F3000\n" for n in range(100))
+    head = "G21\nG90\nM4 S0\n" + "".join(f"G0 X{n} Y{n}\n" for n in range(10))
+    job = Job("chain.nc", f"{head}G1 X9.5 S500 F3000\nG0 X10 Y5\n{chain}M5\n")
+    whole = parse_program(job)
+    assert len(strokes(whole)) == 101
+    rest = resume(job, MACHINE, [record(job, line=200, taken=200)])
+    assert (rest.stroke, rest.line) == (1, 16)
+    assert not parse_program(rest.job).beam_on[0]
+    assert rest.new_stroke > 90
+    assert "strokes 2 to " in rest.finding.sentence
+
+
+def test_a_rest_is_the_whole_where_nothing_can_stand_before_it() -> None:
+    bare = Job("bare.nc", "M4 S500 G1 X5 F600\n" + "G0 X9\nG1 X5\n" * 50 + "M5\n")
+    rest = resume(bare, MACHINE, [record(bare)])
+    assert (rest.line, rest.stroke, rest.job.text) == (1, 0, bare.text)
+    travels = "".join(f"G0 X{n} Y{n % 7}\n" for n in range(80))
+    late = Job("late.nc", f"M4 S0\n{travels}G1 X5 S500 F600\nM5\n")
+    rest = resume(late, MACHINE, [record(late, line=2, taken=2)])
+    assert rest.finding.sentence.endswith("; no stroke is burnt twice.")
+
+
 def record(job: Job, **changes: object) -> JournalRun:
     made = JournalRun(job.name, job_digest(job), MACHINE.name, "virtual", job.line_count)
     return replace(made, ended="failed", **changes)
@@ -269,6 +307,15 @@ def test_what_cannot_be_resumed_is_said() -> None:
     shifted = Job("shift.nc", job.text.replace("G90\n", "G90\nG92 X5\n", 1))
     with pytest.raises(GcodeError, match=r"shift\.nc, line 3 \(G92X5\)"):
         resume(shifted, MACHINE, [record(shifted, line=200, taken=200)])
+    over = Job("over.nc", job.text + "".join(f"G0 X{n} Y1\n" for n in range(1, 60)))
+    with pytest.raises(InputError, match=r"Every stroke of over\.nc was burnt before .* is left\."):
+        resume(over, MACHINE, [record(over, line=over.line_count, taken=over.line_count)])
+    for name in ("grbl09-laser-300", "grbl-pen-a4"):
+        other = load_machine(name)
+        with pytest.raises(InputError, match=f"{name} has no laser mode, so .* up to line 200"):
+            resume(job, other, [record(job, line=200, taken=200)])
+        with pytest.raises(InputError, match=f"{name} has no laser mode.* leave .from_stroke. out"):
+            from_stroke(job, other, 2)
     rest = resume(job, MACHINE, [record(job, line=200, taken=200)])
     with pytest.raises(InputError, match=r"'home'.*'at'"):
         plan_job(job, MACHINE, resumption=rest)
