@@ -1,4 +1,4 @@
-"""What is wrong with the slots and the double tabs of a written layout.
+"""What is wrong with the folds, the slots and the double tabs of a written layout.
 
 A slot is made anew from its tab, the fold angle of the seam and the material, and the slot that
 the layout names must be the same. That it holds is judged by what it is, without the rules that
@@ -20,7 +20,7 @@ from miurafab.fabrication.nesting import turned
 from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.sheets import Layout
 from miurafab.fabrication.slots import CLEAR_MM
-from miurafab.fabrication.tabs import in_mate
+from miurafab.fabrication.tabs import FOLDS, in_mate
 from miurafab.geometry.arrays import Floats
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
@@ -61,11 +61,17 @@ def joint_faults(
     labels: tuple[str, ...],
     join: str,
 ) -> Iterator[str]:
-    """What is wrong with the slots and double tabs of the first model, in sentences."""
+    """What is wrong with the folds of the tabs, and with the slots and double tabs of the first
+    model, in sentences.
+    """
     for patch in layout.patches:
         for tab in patch.tabs:
             if tab.join != ("glue" if tab.mate_patch is None else join):
                 yield f"Tab {tab.label} is not held as the options of the job say."
+            letter = str(pattern.edges_assignment[tab.edge])
+            inner = tab.edge == tab.mate_edge and tab.join != "double"
+            if inner and tab.fold != FOLDS.get(letter, "flat"):
+                yield f"Tab {tab.label} is told to fold {tab.fold}, and its edge is {letter}."
     yield from _slot_faults(layout, pattern, outlined, labels)
     if join == "double":
         yield from _pair_faults(pattern, outlined, labels)
