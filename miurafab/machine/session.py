@@ -345,8 +345,6 @@ class Session:
         return self.stop()
 
     def _reset_now(self, hold_first: bool) -> None:
-        if self.connection.state is State.CLOSED:
-            raise PortError(f"The port {self.name} is closed.")
         data = self.connection.send_realtime(FEED_HOLD) if hold_first else b""
         data += self.connection.send_realtime(SOFT_RESET)
         self._transport.write_now(data)

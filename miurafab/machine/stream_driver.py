@@ -231,7 +231,6 @@ class StreamDriver(ABC):
     def make_safe(self) -> None:
         """Stop the machine if it is still at risk: the last line of defence on every way out."""
         if self.at_risk:
-            self.at_risk = False
             self.stop(None)
 
 

@@ -1,0 +1,537 @@
+"""A session with a controller that is told what to answer: what is sent then, and what counts."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from session_walk import FRAME, JOB, MACHINE
+from wires import BANNER, FakeWire
+
+from miurafab.errors import ControllerError, JobStopped, MachineError, PortError
+from miurafab.grbl.connection import Connection
+from miurafab.grbl.events import Banner
+from miurafab.grbl.states import State
+from miurafab.machine.greeting import restarts
+from miurafab.machine.journal import read_journal
+from miurafab.machine.known_controller import MachineState, PortSetup
+from miurafab.machine.machine_session import MachineSession
+from miurafab.machine.owner import Owner, owner_of, this_owner
+from miurafab.machine.resting_beam import resting_power
+from miurafab.machine.session import Session
+from miurafab.machine.signals import StopSignals
+from miurafab.machine.transcript import Transcript
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
+
+DARK = b"<Idle|MPos:0.000,0.000,0.000|FS:0,0>\r\n"
+LIT = b"<Idle|MPos:0.000,0.000,0.000|FS:0,500>\r\n"
+UNTOLD = b"<Idle|MPos:0.000,0.000,0.000|F:0>\r\n"
+
+
+class Scripted:
+    """A wire at whose other end each thing that is sent has its answers, one after the other, the
+    last of them for ever; what comes ``late`` comes at its time.
+    """
+
+    name, blocks = "the script", False
+
+    def __init__(self, late: Sequence[tuple[float, bytes]] = (), **answers: Sequence[bytes]):
+        names = {"query": b"?", "reset": b"\x18", "hold": b"!"}
+        self.time = 0.0
+        self.sent: list[tuple[float, bytes]] = []
+        self._late = sorted(late)
+        self._answers = {
+            names.get(key, key.encode() + b"\n"): list(said) for key, said in answers.items()
+        }
+        self._said = b""
+
+    @property
+    def commands(self) -> bytes:
+        return b"".join(data for _, data in self.sent).replace(b"?", b"")
+
+    def now(self) -> float:
+        return self.time
+
+    def write(self, data: bytes) -> None:
+        self.sent.append((self.time, data))
+        said = self._answers.get(data, [b""])
+        self._said += said[0] if len(said) == 1 else said.pop(0)
+
+    write_now = write
+
+    def read(self, timeout: float) -> bytes:
+        said, self._said = self._said, b""
+        self.time += 0.02 if said else max(min(timeout, 0.1), 0.001)
+        while self._late and self._late[0][0] <= self.time:
+            said += self._late.pop(0)[1]
+        return said
+
+    def close(self) -> None:
+        pass
+
+
+def greeted(**script: Sequence[bytes]) -> tuple[Session, Scripted]:
+    wire = Scripted(**script)
+    session = Session(wire, Connection())
+    session.connection.receive_data(BANNER)
+    list(session.connection.events())
+    return session, wire
+
+
+# Stopping
+
+
+@pytest.mark.parametrize(
+    ("reports", "after_m5", "dark", "sent"),
+    [
+        ([DARK], b"ok\r\n", True, b"\x18"),
+        ([LIT, LIT, DARK], b"ok\r\n", True, b"\x18\x18\x18"),
+        ([LIT, LIT, LIT, DARK], b"ok\r\n", True, b"\x18\x18\x18M5\n"),
+        ([LIT], b"ok\r\n", False, b"\x18\x18\x18M5\n"),
+        ([LIT, LIT, LIT, b""], b"ok\r\n", False, b"\x18\x18\x18M5\n"),
+        ([LIT, LIT, LIT, UNTOLD], b"ok\r\n", False, b"\x18\x18\x18M5\n"),
+        ([LIT, LIT, LIT, DARK], b"error:9\r\n", False, b"\x18\x18\x18M5\n"),
+        ([UNTOLD], b"ok\r\n", False, b"\x18"),
+        ([b""], b"ok\r\n", False, b"\x18"),
+    ],
+)
+def test_a_stop_is_confirmed_by_nothing_but_a_report_that_the_beam_is_off(
+    reports: list[bytes], after_m5: bytes, dark: bool, sent: bytes
+) -> None:
+    session, wire = greeted(reset=[BANNER], query=reports, M5=[after_m5])
+    assert session.stop() is dark
+    assert wire.commands == sent
+
+
+def test_a_reset_that_is_not_heard_is_sent_three_times_and_no_line_after_it() -> None:
+    session, wire = greeted()
+    assert session.stop() is False
+    assert wire.commands == 3 * b"\x18"
+    session, wire = greeted(reset=[b"", BANNER], query=[b"", b"", DARK])
+    assert session.stop() is True
+    assert wire.commands == 2 * b"\x18"
+
+
+def test_a_hold_comes_before_the_reset_of_a_refused_job_in_one_piece() -> None:
+    session, wire = greeted(query=[DARK])
+    wire._answers[b"!\x18"] = [BANNER]
+    assert session.stop(hold_first=True) is True
+    assert wire.sent[0][1] == b"!\x18"
+
+
+HOLDING = b"<Hold:1|MPos:1.000,0.000,0.000|FS:100,0>\r\n"
+HELD = b"<Hold:0|MPos:1.000,0.000,0.000|FS:0,0>\r\n"
+
+
+@pytest.mark.parametrize(
+    ("before", "seconds"),
+    [
+        ([HELD], (0.0, 0.2)),
+        ([HOLDING, HOLDING, HELD], (0.0, 0.5)),
+        ([DARK.replace(b"Idle", b"Jog"), DARK], (0.0, 0.5)),
+        ([HOLDING], (0.9, 1.3)),
+        ([b"", b"", DARK], (0.9, 1.3)),
+    ],
+)
+def test_a_hold_is_waited_for_a_second_at_most_and_then_comes_the_reset(
+    before: list[bytes], seconds: tuple[float, float]
+) -> None:
+    session, wire = greeted(query=before, reset=[BANNER])
+    session.hold_and_stop()
+    assert wire.commands.startswith(b"!\x18")
+    assert wire.sent[0][1] == b"!"
+    at = next(when for when, data in wire.sent if data == b"\x18")
+    assert seconds[0] <= at <= seconds[1]
+
+
+def test_a_slow_board_has_its_whole_patience_to_come_back() -> None:
+    session, wire = greeted(late=[(2.0, BANNER)])
+    session.write(session.connection.send_realtime(b"\x18"))
+    assert restarts(session, 3.0)
+    assert 2.0 <= wire.time < 2.2
+    session, wire = greeted(late=[(5.0, BANNER)])
+    session.write(session.connection.send_realtime(b"\x18"))
+    assert not restarts(session, 3.0)
+    assert 3.0 <= wire.time < 4.5
+
+
+@pytest.mark.parametrize("state", ["Run", "Jog", "Home", "Hold:0", "Door:1", "Tool"])
+def test_a_controller_at_work_is_left_alone(state: str) -> None:
+    wire = Scripted(query=[f"<{state}|MPos:0.000,0.000,0.000|FS:0,0>\r\n".encode()])
+    word = state.partition(":")[0]
+    with pytest.raises(ControllerError, match=rf"is at work \({word}\)"):
+        Session(wire, Connection()).greet(1.0)
+    assert wire.commands == b""
+
+
+@pytest.mark.parametrize("state", ["Sleep", "Check", "Run"])
+def test_a_controller_that_neither_works_nor_rests_is_reset(state: str) -> None:
+    wire = Scripted(query=[DARK.replace(b"Idle", state.encode()), DARK], reset=[BANNER])
+    session = Session(wire, Connection())
+    session.greet(1.0, reset=state == "Run")
+    assert wire.commands == b"\x18"
+    assert session.banner == Banner("Grbl", "1.1h")
+    assert not session.restarted
+
+
+# Lines
+
+
+@pytest.mark.parametrize(
+    ("said", "sentence"),
+    [
+        (b"ALARM:8\r\n", r"stopped at 'M8': ALARM:8, "),
+        (BANNER, r"restarted at 'M8'\."),
+        (b"error:20\r\n", r"refused 'M8': error:20, "),
+        (b"", r"The controller at the script did not answer 'M8' within 3 s\."),
+        (b"[MSG:hello]\r\n", r"did not answer 'M8' within 3 s\."),
+    ],
+)
+def test_a_line_ends_by_ok_alone(said: bytes, sentence: str) -> None:
+    session, wire = greeted(M8=[said])
+    with pytest.raises(ControllerError, match=sentence):
+        session.command("M8")
+    assert wire.commands == b"M8\n"
+
+
+def test_what_is_said_before_the_ok_is_the_answer_and_is_recorded(tmp_path: Path) -> None:
+    session, _ = greeted(M8=[b"[MSG:hello]\r\n" + DARK + b"ok\r\n"])
+    session.transcript = Transcript(tmp_path / "t", "a test")
+    assert [type(event).__name__ for event in session.command("M8")] == ["Feedback", "StatusReport"]
+    session.transcript.close()
+    sent, came = (tmp_path / "t").read_text().splitlines()[1:3]
+    assert sent.endswith(r"> M8\n")
+    assert came.endswith(r"< [MSG:hello]\r\n")
+
+
+def test_homing_makes_a_position_known_again_and_asks_where_the_head_is() -> None:
+    session, wire = greeted(**{"$H": [b"ok\r\n"], "query": [DARK]})
+    session.restarted_itself = True
+    heeded: list[float] = []
+    session.home(lambda: heeded.append(wire.time))
+    assert not session.restarted_itself
+    assert heeded
+    assert wire.sent == [(wire.sent[0][0], b"$H\n"), (wire.sent[1][0], b"?")]
+    session, wire = greeted(**{"$H": [b"ALARM:9\r\n"], "query": [DARK]})
+    session.restarted_itself = True
+    with pytest.raises(ControllerError, match="ALARM:9"):
+        session.home()
+    assert session.restarted_itself
+
+
+def test_each_start_is_counted_and_one_that_nobody_sent_is_told() -> None:
+    session, wire = greeted(reset=[BANNER], query=[DARK])
+    assert session.stop()
+    assert session.starts == 2
+    assert not session.restarted_itself
+    wire._said += BANNER
+    session.pause(0.2)
+    assert session.starts == 3
+    assert session.restarted_itself
+    assert session.connection.state is State.GREETED
+
+
+# The session that owns a port
+
+
+def here(**changes: float) -> tuple[MachineSession, FakeWire]:
+    """A session with the virtual controller."""
+    values = virtual_settings(MACHINE) | {int(name[1:]): value for name, value in changes.items()}
+    wire = FakeWire(VirtualGrbl(values, baud=115_200))
+    return MachineSession(wire, StopSignals(), PortSetup.of(MACHINE)), wire
+
+
+def sent_by(wire: FakeWire, action: object) -> bytes:
+    """What goes over the wire in ``action``, without the status queries."""
+    assert callable(action)
+    before = len(wire.commands)
+    action()
+    return wire.commands[before:]
+
+
+def test_all_that_is_known_of_a_machine_at_rest() -> None:
+    session, wire = here()
+    state = session.open()
+    assert state == MachineState(
+        port="the fake wire",
+        firmware="Grbl 1.1h",
+        state="Idle",
+        position=(0.0, 0.0, 0.0),
+        machine_position=(0.0, 0.0, 0.0),
+        work_offset=(0.0, 0.0, 0.0),
+        shift=(0.0, 0.0, 0.0),
+        modes=("G0", "G54", "G17", "G21", "G90", "G94", "M5", "M9", "T0", "F0", "S0"),
+        overrides=state.overrides,
+        beam_on=False,
+        beam_off=True,
+        pins="",
+        loaded=None,
+        settings=state.settings,
+    )
+    assert state.overrides == (100, 100, 100)
+    assert state.settings.values == pytest.approx(wire.device.settings, abs=5e-4)
+    session.realtime(b"\x91")
+    wire.device.press_limit("X")
+    session.say("M8")
+    session.watch(1.5)
+    after = session.look()
+    assert after.overrides.feed == 110
+    assert after.pins == "X"
+    assert "M8" in after.modes
+
+
+def test_what_is_known_is_known_no_more_after_a_reset() -> None:
+    session, wire = here()
+    session.set_origin()
+    assert sent_by(wire, session.set_origin) == b"G92X0.000Y0.000\n$#\n"
+    assert sent_by(wire, session.abort) == b"\x18"
+    assert sent_by(wire, session.set_origin) == (
+        b"$#\n$G\nG21G90G17G94G54\nG92X0.000Y0.000\n$#\n$G\n"
+    )
+
+
+def test_the_offset_of_a_job_is_that_of_g54_with_the_shift() -> None:
+    session, _ = here()
+    session.say("G10L2P1X7Y-2")
+    session.say("G92X3")
+    assert session.known.job_offset() == pytest.approx((-3.0, -2.0, 0.0))
+
+
+def test_a_session_that_is_dark_and_at_rest_is_left_without_a_reset() -> None:
+    session, wire = here()
+    session.open()
+    assert sent_by(wire, session.abort) == b"\x18"
+    assert sent_by(wire, session.close) == b""
+    session, wire = here()
+    session.say("$C")
+    assert session.look().state == "Check"
+    assert sent_by(wire, session.close) == b""
+    session, wire = here(s22=1, s24=500, s25=3000)
+    assert session.open().state == "Alarm"
+    session.look()
+    assert sent_by(wire, session.close) == b""
+
+
+def test_a_stop_that_was_not_confirmed_is_tried_again_at_the_end() -> None:
+    session, wire = here(s32=0)
+    session.open()
+    write = wire.write
+    lost = (b"\x18", b"M5\n")
+    wire.write = lambda data: write(b"" if data in lost else data)  # type: ignore[method-assign]
+    wire.device.receive(b"M3S500\n")
+    assert session.abort() is False
+    wire.write = write  # type: ignore[method-assign]
+    assert sent_by(wire, session.close) == b"\x18"
+    wire.settle()
+    assert not wire.device.beam_on
+
+
+def test_a_refused_line_takes_no_reset() -> None:
+    session, wire = here()
+    session.set_origin()
+
+    def refused() -> None:
+        with pytest.raises(ControllerError, match="error:20"):
+            session.say("G99")
+
+    assert b"\x18" not in sent_by(wire, refused)
+
+
+def jogging() -> tuple[MachineSession, FakeWire]:
+    """A session whose head is on its way over 50 mm."""
+    session, wire = here()
+    session.open()
+    session.nudge(50.0, 0.0)
+    session.watch(0.2)
+    assert session.state.state == "Jog"
+    return session, wire
+
+
+def test_a_dark_jog_comes_to_rest_before_the_reset_unless_it_is_to_be_at_once() -> None:
+    session, wire = jogging()
+    assert sent_by(wire, session.abort) == b"!\x18"
+    assert session.look().state == "Idle"  # no alarm: the position is not lost
+    assert b"$J" not in sent_by(wire, lambda: session.watch(1.0))
+    session, wire = jogging()
+    assert sent_by(wire, lambda: session.abort(at_once=True)) == b"\x18"
+
+
+def test_a_jog_that_burns_is_reset_at_once() -> None:
+    session, wire = jogging()
+    status = session.conversation.status
+    assert status is not None
+    session.conversation.status = replace(status, speed=500.0)
+    assert sent_by(wire, session.abort) == b"\x18"
+
+
+def test_a_beam_of_which_nothing_is_known_is_disarmed_before_a_jog() -> None:
+    session, wire = here()
+    session.open()
+    assert "M5" in session.state.modes
+    status = session.look() and session.conversation.status
+    assert status is not None
+    session.known.may_differ()
+    session.conversation.status = replace(status, state="Run")  # it tells no modes meanwhile
+    assert sent_by(wire, session.known.disarm) == b"M5\n"
+
+
+def test_a_broken_account_at_rest_is_told_and_asks_nothing() -> None:
+    session, wire = here()
+    session.say("G92X1")
+    wire.lies = [(wire.now() + 0.1, b"ok\r\n")]
+    session.watch(0.3)
+    session.known.may_differ()
+    assert sent_by(wire, session.look) == b""
+    with pytest.raises(ControllerError, match=r"not ready for 'M8' \(it is unsynced\); reset it"):
+        session.say("M8")
+
+
+def test_a_hold_pressed_at_the_machine_is_no_pause_of_the_program() -> None:
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=115_200))
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    orders = [(1.0, b"!"), (4.0, b"~")]
+
+    def press(call: int) -> None:
+        if orders and wire.now() >= orders[0][0]:
+            wire.device.receive(orders.pop(0)[1])
+
+    wire.before_call = press
+    assert session.cut(replace(JOB, at_pause="go on")).seconds > 4
+    assert not orders
+    assert b"~" not in wire.commands
+
+
+@pytest.mark.parametrize(
+    ("lines", "laser_mode", "power"),
+    [
+        ("M3 S500", False, 500.0),
+        ("M4 S500", False, 500.0),
+        ("M3 S500", True, 0.0),
+        ("G1 M3 S500", True, 500.0),
+        ("G2 M3 S500", True, 500.0),
+        ("G3 M3 S500", True, 500.0),
+        ("G1 M4 S500", True, 0.0),
+        ("G1 M3 S500 G0", True, 0.0),
+        ("G1 M3 S500 G80", True, 0.0),
+        ("G1 M3 S500 G38.2", True, 0.0),
+        ("G1 M3 S500 G4", True, 500.0),
+        ("M3 S500 M2", False, 0.0),
+        ("M3 S500 M5", False, 0.0),
+        ("M3 S500 M30", False, 0.0),
+        ("M3 S500 M8", False, 500.0),
+        ("M3 S500 S0", False, 0.0),
+    ],
+)
+def test_the_power_of_a_beam_at_rest(lines: str, laser_mode: bool, power: float) -> None:
+    words = [(word[0], float(word[1:])) for word in lines.split()]
+    assert resting_power(words, laser_mode=laser_mode) == power
+
+
+def test_a_query_from_before_a_reset_keeps_none_back_after_it() -> None:
+    """Of a board that does not greet: the first question is due as soon as a banner is not."""
+    session, wire = greeted(query=[b"", DARK], **{"$I": [b"[VER:1.1h.20190830:]\r\nok\r\n"]})
+    session.ask_status()
+    assert session.stop()
+    asked = [when for when, data in wire.sent if data == b"?"]
+    assert asked[1] == pytest.approx(0.8, abs=0.05)
+
+
+def test_an_abort_forgets_the_arrows_that_are_still_held() -> None:
+    session, wire = jogging()
+    session.nudge(50.0, 0.0)
+    session.nudge(0.0, 50.0)
+    session.abort()
+    assert b"$J" not in sent_by(wire, lambda: session.watch(1.0))
+
+
+@pytest.mark.parametrize(("key", "sent"), [("q", b"!\x18"), ("\x18", b"\x18")])
+def test_a_key_that_aborts_a_watched_jog(key: str, sent: bytes) -> None:
+    class Once:
+        keys = ""
+
+        def pressed(self) -> str:
+            keys, self.keys = self.keys, ""
+            return keys
+
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=115_200))
+    keys = Once()
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
+    session.open()
+    session.nudge(50.0, 0.0)
+    session.watch(0.2)
+    keys.keys = key
+    assert sent_by(wire, lambda: session.watch(0.1)) == sent
+
+
+def test_settling_waits_for_a_jog() -> None:
+    session, wire = jogging()
+    assert session.settle().state == "Idle"
+    assert wire.device.state == "Idle"
+
+
+def test_realtime_bytes_of_a_person_are_no_lines() -> None:
+    session, wire = here()
+    session.open()
+    for text in "!~":
+        assert sent_by(wire, lambda text=text: session.say(text)) == text.encode()
+    before = wire.bytes_written.count(b"?")
+    session.say("?")
+    assert wire.bytes_written.count(b"?") > before
+    assert sent_by(wire, lambda: session.say(" reset ")) == b"\x18"
+    assert sent_by(wire, lambda: session.say("(a comment)")) == b""
+
+
+def test_fresh_material_is_told_before_a_word_and_at_rest() -> None:
+    session, _ = here()
+    assert session.load().state == ""
+    session.open()
+    assert session.load().state == "Idle"
+
+
+def test_a_frame_leaves_the_sheet_fresh_and_a_cut_does_not() -> None:
+    session, _ = here()
+    session.frame(FRAME)
+    assert session.state.loaded is None
+    session.cut(JOB)
+    assert session.state.loaded == "rows.nc"
+
+
+def test_a_journal_knows_how_far_the_controller_plans_ahead(tmp_path: Path) -> None:
+    session, _ = here()
+    session.cut(JOB, journal_path=tmp_path / "rows.journal")
+    (record,) = read_journal(tmp_path / "rows.journal")
+    assert (record.blocks, record.ended) == (15, "done")
+
+
+def test_who_is_said_to_own_a_port_owns_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE)))
+    wire.name = "socket://of-a-test"
+    mine = this_owner()
+    told = Owner("miurafab cut x", mine.process, mine.since, mine.holder)
+    session = MachineSession(wire, StopSignals(), owner=told)
+    assert owner_of(wire.name) == told
+    session.close()
+    assert owner_of(wire.name) is None
+
+
+def test_a_signal_ends_a_session_with_the_reset_first() -> None:
+    signals = StopSignals()
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=115_200))
+    session = MachineSession(wire, signals, PortSetup.of(MACHINE))
+    session.open()
+    calls = itertools.count()
+
+    def stop(call: int) -> None:
+        if next(calls) == 20:
+            signals.caught = "SIGINT"
+
+    wire.before_call = stop
+    with pytest.raises((KeyboardInterrupt, JobStopped, MachineError, PortError)):
+        session.jog(x=50.0)
+    at = wire.commands.index(b"\x18")
+    assert b"$J" not in wire.commands[at:]
+    assert session.close()
