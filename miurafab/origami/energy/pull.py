@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from miurafab.origami.energy.bar_hinge import BarHingeModel, Paper, sheet_model
 from miurafab.origami.energy.continuation import Known, Progress, Walk, without_load
 from miurafab.origami.energy.result import EnergyResult
 from miurafab.origami.energy.yielding import YieldingDriven
+from miurafab.origami.piece import Piece, pieces_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,9 +59,9 @@ class PullCurve(EnergyResult):
         in creases and facets, and what yielding creases have dissipated.
     coords : array (n, V, 3)
         The vertices in each state, mm, in the axes of the folded form, with one triangle near the
-        middle held still.
+        middle held still. Pieces that are not pulled stand still.
     slips : array (C,)
-        How far the rest angle of each crease has moved at the end, radians.
+        How far the rest angle of each crease of the piece has moved at the end, radians.
     converged : bool
         Whether all cycles were found; otherwise the curve ends where the sheet jumps away.
     """
@@ -209,16 +210,30 @@ def pull(
     """Pull the vertices ``ends`` of ``pattern`` apart by ``strain``, and let go, in ``cycles``.
 
     The way out has equal ``steps``. ``uncut`` is the share of each edge (E,) that is left uncut, or
-    of all. A negative strain pushes together. Raises
+    of all. A negative strain pushes together. Of several pieces the one with both vertices is
+    pulled, alone. Raises
     :class:`~miurafab.errors.PatternError` as
     :func:`~miurafab.origami.energy.bar_hinge.sheet_model` does and for ``corners`` of a pattern
     without a grid, and :class:`~miurafab.errors.InputError` for vertices that cannot be pulled.
     """
     if pattern.pieces_count > 1:
-        raise PatternError(
-            f"The pattern has {pattern.pieces_count} pieces, and only one can be pulled; save the "
-            "piece as a pattern of its own."
+        piece, pair = _piece_of(pattern, ends)
+        mine = np.searchsorted(piece.vertices, pair)
+        shares = np.broadcast_to(uncut, len(pattern.edges_vertices))[piece.edges]
+        curve = pull(
+            piece.pattern,
+            paper,
+            (int(mine[0]), int(mine[1])),
+            strain=strain,
+            cycles=cycles,
+            steps=steps,
+            uncut=shares,
+            on_progress=on_progress,
         )
+        assert pattern.folded_coords is not None
+        coords = np.repeat(pattern.folded_coords[None], len(curve.coords), axis=0)
+        coords[:, piece.vertices] = curve.coords
+        return replace(curve, ends=pair, coords=coords)
     model = sheet_model(pattern, paper=paper, uncut=uncut)
     pair = _pair(pattern, ends)
     bending = len(model.hinges) - (len(model.creases) if paper.crease_length_mm else 0)
@@ -230,6 +245,30 @@ def pull(
     pulled = _Pulled(driven, strain, steps, cycles, on_progress)
     converged = pulled.run()
     return _curve(pulled, pair, paper, converged, driven.slips[bending:])
+
+
+def _piece_of(pattern: CreasePattern, ends: tuple[int, int] | str) -> tuple[Piece, tuple[int, int]]:
+    """The piece that has both vertices, and these."""
+    pieces = pieces_of(pattern)
+    if isinstance(ends, str):
+        largest = max(pieces, key=lambda piece: len(piece.facets))
+        points = pattern.vertices_coords[largest.vertices]
+        far = largest.vertices[np.argmax(np.linalg.norm(points - points[0], axis=1))]
+        raise PatternError(
+            f"The pattern has {len(pieces)} pieces, and one of them is pulled: name two of its "
+            f"vertices as `pull`, such as {largest.vertices[0]},{far}."
+        )
+    pair = _pair(pattern, ends)
+    one, other = (
+        next(n for n, piece in enumerate(pieces) if vertex in piece.vertices) for vertex in pair
+    )
+    if one != other:
+        raise PatternError(
+            f"`pull` is {ends[0]},{ends[1]}, a vertex of piece {one} and one of piece {other}: "
+            "pieces are pulled one at a time, as they are before they are joined; name two "
+            "vertices of one."
+        )
+    return pieces[one], pair
 
 
 def _pair(pattern: CreasePattern, ends: tuple[int, int] | str) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -16,6 +17,7 @@ from miurafab.origami.energy.bar_hinge import Paper
 from miurafab.origami.energy.pull import pull
 from miurafab.origami.fitting.fit import FitRequest, fit
 from miurafab.origami.folding.kinematics import rigid_motion
+from miurafab.origami.piece import pieces_of
 from miurafab.surfaces.catalogue import make_surface
 
 PAPER = Paper(0.2, 3e9, crease_length_mm=50.0, yield_angle=0.3, hardening=0.1)
@@ -176,5 +178,28 @@ def test_what_cannot_be_pulled_is_said():
     reached = lost.report()["cycles"][0]["strain"]
     assert 0 < reached < 3
     assert lost.report()["set_mm"] is None
-    with pytest.raises(PatternError, match="2 pieces, and only one"):
-        pull(two_pieces(5, 5, 2), PAPER)
+
+
+def test_of_several_pieces_the_one_with_both_vertices_is_pulled():
+    pattern = two_pieces(7, 5, 3)
+    one, other = pieces_of(pattern)
+    ends = int(other.vertices[0]), int(other.vertices[-1])
+    share = np.linspace(0.2, 1.0, len(pattern.edges_vertices))
+    whole = pull(pattern, PAPER, ends, strain=0.1, steps=4, cycles=1, uncut=share)
+    last = len(other.vertices) - 1
+    alone = pull(
+        other.pattern, PAPER, (0, last), strain=0.1, steps=4, cycles=1, uncut=share[other.edges]
+    )
+    assert whole.ends == ends
+    assert np.array_equal(whole.forces, alone.forces)
+    assert whole.forces.max() > 0
+    assert np.array_equal(whole.coords[:, other.vertices], alone.coords)
+    assert np.ptp(whole.coords[:, one.vertices], axis=0).max() == 0
+    with pytest.raises(
+        PatternError, match=r"2 pieces.*name two of its vertices .* such as (\d+),"
+    ) as no:
+        pull(pattern, PAPER)
+    named = tuple(map(int, re.search(r"such as (\d+),(\d+)", str(no.value)).groups()))
+    assert pull(pattern, PAPER, named, strain=0.05, steps=2, cycles=1).converged
+    with pytest.raises(PatternError, match="vertex of piece 0 and one of piece 1"):
+        pull(pattern, PAPER, (int(one.vertices[0]), ends[1]))
