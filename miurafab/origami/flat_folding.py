@@ -32,9 +32,10 @@ from miurafab.geometry.polygons import previous_corners
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import CornerRing, corner_ring, interior_vertices
 
-CLOSED = 1e-6
-"""Radians; a vertex that closes better than this is exact. Fitted sheets close to 1e-12; a file
-with six decimals of millimetres and degrees to 1e-7."""
+CLOSED = 1e-5
+"""Radians; a vertex that closes better than this is exact. Fitted sheets close to 1e-12, a file
+with six decimals of millimetres and degrees to 1e-7, and coordinates of single precision beside
+short edges to 6e-6."""
 
 ROUGH = 0.01
 """Radians; what drawings with few digits leave open at a vertex that was meant to close."""

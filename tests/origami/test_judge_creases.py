@@ -273,3 +273,19 @@ def test_a_sector_of_more_than_half_a_turn_is_told_as_such() -> None:
     (found,), _ = vertex_folds(pattern)
     assert sorted(np.degrees(found.sectors)) == pytest.approx([90, 270])
     assert "90 and 270" in found.why_not_flat(1e-6) or "270 and 90" in found.why_not_flat(1e-6)
+
+
+def test_coordinates_of_single_precision_beside_short_edges_fold_flat_all_the_same() -> None:
+    """A grid of a size of 1 and edges of 0.02 in seven digits, its places of no short numbers."""
+    from named_patterns import flat_only, miura
+
+    pattern = flat_only(miura(6))
+    turned = pattern.vertices_coords @ np.array([[0.8, 0.6], [-0.6, 0.8]]) / 600 + 0.7
+    rounded = turned.astype(np.float32).astype(np.float64)
+    single = replace(pattern, vertices_coords=rounded)
+    assert max(each.kawasaki for each in vertex_folds(single)[0]) > 1e-6
+    assert [f.code for f in judge_flat_folding(single)] == []
+    off = rounded.copy()
+    off[24] += 1e-5
+    found = [f.code for f in judge_flat_folding(replace(pattern, vertices_coords=off))]
+    assert found == ["not-flat-foldable"]

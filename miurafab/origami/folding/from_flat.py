@@ -132,14 +132,15 @@ def fold_from_flat(
     *,
     touching: bool = False,
     softness: float = SOFTNESS,
+    finer: int = 1,
     seed: int = 0,
     on_progress: Progress | None = None,
 ) -> RampPath:
     """The path of ``pattern``, of one piece, from flat through ``parts`` (n + 1,) of its ramp.
 
     With ``touching`` facets do not pass through each other. ``softness`` is the compliance of a bar
-    over its length (:func:`~miurafab.origami.energy.bar_hinge.flat_model`), and ``seed`` is that of
-    the shaking out of a snap. Raises what
+    over its length (:func:`~miurafab.origami.energy.bar_hinge.flat_model`), ``finer`` the number of
+    steps to a frame, and ``seed`` is that of the shaking out of a snap. Raises what
     :func:`~miurafab.origami.energy.bar_hinge.flat_model` raises. Failure is a result.
     """
     model = flat_model(pattern, softness=softness)
@@ -149,9 +150,10 @@ def fold_from_flat(
     walk = _Walk(pattern, model, near, np.random.default_rng(seed))
     start = linear_seed(model)
     frames: list[RampFrame] = []
-    found = any(walk.leave_flat(start.heights, float(parts[1]) * first) for first in FIRST_PARTS)
+    nominal = float(parts[1]) / finer
+    found = any(walk.leave_flat(start.heights, nominal * first) for first in FIRST_PARTS)
     for number, part in enumerate(parts[1:].tolist()):
-        found = found and walk.reach(part, float(parts[1]))
+        found = found and walk.reach(part, nominal)
         if not found:
             break
         frame = walk.frame()

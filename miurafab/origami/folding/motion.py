@@ -44,6 +44,8 @@ Progress = Callable[[float, str], None]
 SOFTER = 10 * SOFTNESS
 """For a sheet that is held back: sides as soft as those of other simulators, which stretch by some
 hundredths on the way."""
+FINER = 3
+"""The steps to a frame of a way that is gone again, since it was lost."""
 LEAST_FRAMES = 2
 """A way of fewer frames shows no motion."""
 
@@ -112,25 +114,50 @@ def _from_flat(
     pattern: CreasePattern, steps: int, mismatch: float | None, on_progress: Progress | None
 ) -> FoundMotion:
     softness = SOFTNESS
-    motion, verdict = ramp_motion(pattern, steps, on_progress=on_progress)
+    motion, verdict = _followed(pattern, steps, on_progress)
     if verdict.is_held_back:
         soft, its_verdict = ramp_motion(pattern, steps, softness=SOFTER, on_progress=on_progress)
         if its_verdict.is_better_than(verdict):
             softness, motion, verdict = SOFTER, soft, its_verdict
-    if verdict.wrong_signs <= MOST_WRONG and contacts(motion):
-        # where it ends before its first frame, the contacts of the way without it are told
+    # beside a curved crease facets bend, so that what flat ones could not do says nothing
+    ruled = is_ruled(pattern)
+    if _is_sequence(verdict, ruled):
+        raise _sequence(verdict)
+    if contacts(motion):
+        # where it ends before its first frame, or the folds go astray, the contacts of the way
+        # without it are told
         with suppress(PatternError):
-            motion, verdict = ramp_motion(
+            apart, its_verdict = ramp_motion(
                 pattern, steps, touching=True, softness=softness, on_progress=on_progress
             )
-    # beside a curved crease facets bend, so that what flat ones could not do says nothing
-    waits = verdict.is_held_back and len(verdict.waiting_edges) and not is_ruled(pattern)
-    if verdict.wrong_signs > MOST_WRONG or waits:
-        raise _sequence(verdict)
+            if not _is_sequence(its_verdict, ruled):
+                motion, verdict = apart, its_verdict
     rigid, certificate = certified(motion)
     if not (verdict.touching and contacts(rigid)):  # flat facets may touch where bent ones do not
         motion = rigid
     return FoundMotion(motion, mismatch, verdict, certificate)
+
+
+def _followed(
+    pattern: CreasePattern, steps: int, on_progress: Progress | None
+) -> tuple[FoldingMotion, RampVerdict]:
+    """The motion from flat. Where it is lost it is gone again in finer steps: the number of frames
+    that are asked for shall not decide whether a pattern folds.
+    """
+    try:
+        motion, verdict = ramp_motion(pattern, steps, on_progress=on_progress)
+    except PatternError:
+        return ramp_motion(pattern, steps, finer=FINER, on_progress=on_progress)
+    if verdict.complete:
+        return motion, verdict
+    again, its_verdict = ramp_motion(pattern, steps, finer=FINER, on_progress=on_progress)
+    farther = its_verdict.complete or len(again.frames) > len(motion.frames)
+    return (again, its_verdict) if farther else (motion, verdict)
+
+
+def _is_sequence(verdict: RampVerdict, ruled: bool) -> bool:
+    waits = verdict.is_held_back and len(verdict.waiting_edges) > 0 and not ruled
+    return verdict.wrong_signs > MOST_WRONG or waits
 
 
 def _past_itself(

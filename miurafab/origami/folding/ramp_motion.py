@@ -75,12 +75,14 @@ def ramp_motion(
     *,
     touching: bool = False,
     softness: float = SOFTNESS,
+    finer: int = 1,
     on_progress: Callable[[float, str], None] | None = None,
 ) -> tuple[FoldingMotion, RampVerdict]:
     """The motion of ``pattern`` from flat, all creases together, and its verdict.
 
     With ``touching`` springs keep facets from passing through each other. ``softness`` is the
-    compliance of a side over its length, in facets' stiffness k_f.
+    compliance of a side over its length, in facets' stiffness k_f, and ``finer`` the number of
+    steps to a frame.
 
     ``states`` are the parts of the fold angles of the pattern that creases strive for. Creases of
     half a turn go to nine tenths of it. If the solver loses the path, the motion ends there. Raises
@@ -99,7 +101,12 @@ def ramp_motion(
     for number, piece in enumerate(folding):
         progress = part_of(on_progress, number, len(folding))
         path = fold_from_flat(
-            piece.pattern, parts, touching=touching, softness=softness, on_progress=progress
+            piece.pattern,
+            parts,
+            touching=touching,
+            softness=softness,
+            finer=finer,
+            on_progress=progress,
         )
         paths.append(path)
     count = min(len(path.frames) for path in paths)
