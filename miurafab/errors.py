@@ -12,10 +12,11 @@ The tree (the exit code of the command line in brackets)::
     │   ├── PatternError        a pattern file that cannot be read or made
     │   ├── LayoutError         a pattern, bed and material that admit no layout
     │   └── GcodeError          a G-code program that cannot be read or must not be sent
-    └── MachineError [3]        the machine, its port or its controller failed
-        ├── PortError           the port cannot be opened, or went away
-        ├── ControllerError     the controller answered an error or an alarm
-        └── JobStopped [130]    the job ended early at somebody's wish
+    ├── MachineError [3]        the machine, its port or its controller failed
+    │   ├── PortError           the port cannot be opened, or went away
+    │   ├── ControllerError     the controller answered an error or an alarm
+    │   └── JobStopped [130]    the job ended early at somebody's wish
+    └── PersonNeeded [5]        the work waits for a person, such as for fresh material
 
 Numerical failure is not here: a fit that does not converge is a result with advice. An exception
 outside this tree is a defect of miurafab; the command line turns it into a sentence and a log file.

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from pages import ROOT
 
-PARTS = ("zensical.toml", "docs", "miurafab", "tests/examples/griffe_options.py")
+PARTS = ("zensical.toml", "docs", "miurafab", "tests/examples/griffe_docstrings.py")
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +70,10 @@ def test_the_reference_has_the_options_of_each_function(site):
     assert "{options}" not in text
     assert 'id="miurafab.fit"' in text
     assert "max_deviation" in text
+
+
+def test_the_reference_shows_no_source_of_docstrings(site):
+    """A role as ``:func:`` stood in the text of the page."""
+    text = (site / "reference" / "api.html").read_text(encoding="utf-8")
+    assert re.findall(r":(?:func|class|meth|mod|data|attr):.{30}", text) == []
+    assert 'href="#miurafab.list_machines"><code>list_machines</code>' in text
