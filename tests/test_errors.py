@@ -6,7 +6,8 @@ from miurafab import errors
 
 
 def below(parent):
-    return {child: below(child) for child in parent.__subclasses__()}
+    children = [child for child in parent.__subclasses__() if child.__module__ == errors.__name__]
+    return {child: below(child) for child in children}
 
 
 def listed(tree, depth=0):

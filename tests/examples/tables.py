@@ -6,6 +6,7 @@ Each stands between ``<!-- table: NAME -->`` and ``<!-- end -->``.
 """
 
 import contextlib
+import html
 import inspect
 import io
 import re
@@ -150,9 +151,15 @@ def _markdown(made):
         return made
     head, rows = made
     lines = [head, ["---"] * len(head), *rows]
-    return "".join(
-        "| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |\n" for line in lines
+    return "".join("| " + " | ".join(map(_cell, line)) + " |\n" for line in lines)
+
+
+def _cell(text):
+    """``text`` in a table, where a bar ends a cell. Readers differ on its escape in backticks."""
+    barred = re.sub(
+        r"`([^`]*\|[^`]*)`", lambda code: f"<code>{html.escape(code[1], quote=False)}</code>", text
     )
+    return barred.replace("|", "&#124;")
 
 
 def with_tables(text):

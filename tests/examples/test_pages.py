@@ -161,16 +161,6 @@ def headings_of(page):
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
-def test_the_drawing_of_the_rooms_is_that_of_the_import_rules():
-    (drawing,) = [b.text for b in blocks_of(ROOT / "CONTRIBUTING.md") if b.language == "text"]
-    drawn = [
-        set(re.findall(r"\w+", line.strip().split("    ")[0])) for line in drawing.splitlines()
-    ]
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    (rule, *_) = project["tool"]["importlinter"]["contracts"]
-    assert drawn == [set(re.findall(r"\w+", layer)) for layer in rule["layers"]]
-
-
 def test_the_functions_in_the_table_of_python_exist():
     prose = prose_of(ROOT / "docs" / "python.md")
     named = [name for row in re.findall(r"^\| (`\w+\(.*?) \|", prose, re.MULTILINE)
