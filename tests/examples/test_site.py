@@ -77,3 +77,10 @@ def test_the_reference_shows_no_source_of_docstrings(site):
     text = (site / "reference" / "api.html").read_text(encoding="utf-8")
     assert re.findall(r":(?:func|class|meth|mod|data|attr):.{30}", text) == []
     assert 'href="#miurafab.list_machines"><code>list_machines</code>' in text
+
+
+def test_the_bar_of_a_choice_has_no_escape_on_the_page(site):
+    """In backticks Markdown's readers differ: this one showed ``sector\\|open``."""
+    text = (site / "fit.html").read_text(encoding="utf-8")
+    assert "sector|open|seam" in text.replace("&#124;", "|")
+    assert not re.search(r"<code>[^<]*\\\|", text)
