@@ -57,6 +57,7 @@ RULES = {
     "flat-foldable": Rule("refusal", "a sheet less flat-foldable than asked"),
     "barrier": Rule("refusal", "a sheet that cannot have the barrier asked for"),
     "smaller-part": Rule("warning", "a sheet on a smaller part of the mesh's rectangle"),
+    "more-facets": Rule("note", "more facets than were asked for, since the pieces need them"),
     "whole-facets": Rule("note", "whole facets at the border, since a cut leaves short edges"),
     "far-from-target": Rule("warning", "a sheet that lies over 1 % of its size from the target"),
     # A pattern, read from a file (miurafab.origami.formats)

@@ -144,6 +144,8 @@ def test_a_value_is_one_line_and_shows_a_picture(sheet, job):
         shown = value._repr_mimebundle_()
         assert shown["image/svg+xml"].startswith("<svg")
         assert "<table>" in shown["text/html"]
+    assert "<th style='text-align:left'>status</th>" in sheet._repr_mimebundle_()["text/html"]
+    assert "<td style='text-align:left'></td>" not in sheet._repr_mimebundle_()["text/html"]
 
 
 def test_everything_is_plotted(sheet, job):

@@ -40,6 +40,7 @@ from miurafab.fabrication.stock import LaidStock, lay_stock
 from miurafab.fabrication.strokes import Blank, sheet_strokes
 from miurafab.fabrication.tooling import made_by
 from miurafab.fabrication.toolpath import Toolpath
+from miurafab.fabrication.wording import count
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
@@ -156,8 +157,8 @@ class Layout(Shown):
     def _summary(self) -> str:
         totals = self.totals
         return (
-            f"{totals.patches} patches, {totals.tabs} tabs, {totals.sheets} sheets of "
-            f"{self.material} for {self.machine}"
+            f"{count(totals.patches, 'patch', 'patches')}, {count(totals.tabs, 'tab', 'tabs')}, "
+            f"{count(totals.sheets, 'sheet', 'sheets')} of {self.material} for {self.machine}"
         )
 
     @property

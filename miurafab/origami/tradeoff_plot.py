@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 SIZE = (12.0, 3.8)
 SHEETS, LAW = BLUE, ORANGE
+MOST_TICKS = 6
+"""So many sheets are labelled on an axis by their facets; of more, every second or third is."""
 
 
 def tradeoff_table(found: Tradeoff) -> str:
@@ -53,7 +55,7 @@ def draw_tradeoff(found: Tradeoff, axes: Sequence[Axes], title: str = "") -> Non
     if found.coefficient is None or found.area_limit is None or found.area_slope is None:
         raise InputError("There is nothing to plot: fewer than three sheets were found.")
     from matplotlib import colormaps
-    from matplotlib.ticker import ScalarFormatter
+    from matplotlib.ticker import LogLocator, NullLocator, ScalarFormatter
 
     distance, area, costs = axes
     facets = np.array([s.columns * s.rows for s in found.found], dtype=np.float64)
@@ -86,12 +88,16 @@ def draw_tradeoff(found: Tradeoff, axes: Sequence[Axes], title: str = "") -> Non
             least = cost(curve.weight, best, found.coefficient / best)
             costs.loglog(best**2, least, "v", color=shade, ms=6)
     costs.set_ylabel("cost: (1 - w) distance / 1 %  +  w facets / 1000")
+    ticks = facets[:: -(-len(facets) // MOST_TICKS)]
     for each in axes:
         each.set_xlabel("facets (n$^2$)")
+        each.set_xticks(ticks, [f"{number:.0f}" for number in ticks])
+        each.xaxis.set_minor_locator(NullLocator())
     without_frame(*axes)
     for each in (distance, costs):
+        each.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         each.yaxis.set_major_formatter(ScalarFormatter())
-        each.yaxis.set_minor_formatter(ScalarFormatter())
+        each.yaxis.set_minor_locator(NullLocator())
     for each in (distance, area):
         each.legend(frameon=False, fontsize=8)
     costs.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
 from miurafab.errors import OptionError
 from miurafab.files import AnyPath
+from miurafab.findings import Finding
 from miurafab.options import declared, read_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.fitting.fit import fit as fit_request
-from miurafab.origami.fitting.request import BED, FitOptions
+from miurafab.origami.fitting.request import BED, FitOptions, FitRequest
 from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.judge_pattern import judge_quality
+from miurafab.origami.verify import Measurements
 from miurafab.profiles import MachineProfile, Material
 from miurafab.workflow.bed_size import BedOptions, fit_to_bed
 from miurafab.workflow.design import design
@@ -103,8 +105,23 @@ def fit(
                     name, "is for a `size` that the bed decides; ask for the `size` bed"
                 )
         result = fit_request(asked.request, on_progress)
-    shape = () if result.measurements is None else judge_quality(result.measurements, fitted=True)
-    return replace(result, findings=(*asked.findings, *result.findings, *shape))
+    found = list(asked.findings + result.findings)
+    if result.measurements is not None:
+        found += _more_facets(asked.request, result.measurements)
+        found += judge_quality(result.measurements, fitted=True)
+    return replace(result, findings=tuple(found))
+
+
+def _more_facets(asked: FitRequest, measured: Measurements) -> Iterator[Finding]:
+    """Whether the pieces took more facets than were asked for: each has columns of its own."""
+    count = 0 if asked.facets is None else asked.columns * asked.rows
+    if measured.pieces > 1 and 0 < count < measured.facets:
+        yield Finding(
+            "more-facets",
+            f"`facets` asks for {count} facets and the sheet has {measured.facets}: it comes in "
+            f"{measured.pieces} pieces, and each has whole columns of its own. Fewer `pieces` "
+            "need fewer.",
+        )
 
 
 described(fit, FitOptions, BedOptions)

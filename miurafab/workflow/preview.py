@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from miurafab.display import Shown
 from miurafab.errors import InputError
 from miurafab.fabrication.layout import LayoutHead, read_head
+from miurafab.fabrication.wording import count
 from miurafab.files import AnyPath, as_path, new_folder, read_text
 from miurafab.findings import Finding, findings_json
 from miurafab.gcode.job import Job
@@ -106,7 +107,7 @@ class Preview(Shown):
 
     def _summary(self) -> str:
         return (
-            f"{self.name} on {self.machine.name}: {len(self.sheets)} sheets, "
+            f"{self.name} on {self.machine.name}: {count(len(self.sheets), 'sheet', 'sheets')}, "
             f"{clock_text(self.seconds)}"
         )
 

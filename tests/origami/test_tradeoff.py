@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import warnings
@@ -12,10 +13,12 @@ import pytest
 from command_line import sentence
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 
 import miurafab
 from miurafab.errors import InputError, TargetError
 from miurafab.origami.tradeoff import Sample, Tradeoff, cost, optimal_side, summarise
+from miurafab.origami.tradeoff_plot import SIZE, draw_tradeoff
 
 SIDES = (6, 8, 12)
 
@@ -123,6 +126,23 @@ def test_the_files(hypar, tmp_path):
         content = (tmp_path / f"a.{kind}").read_bytes()
         assert content.startswith(start)
         assert content == (tmp_path / f"b.{kind}").read_bytes()
+
+
+@pytest.mark.parametrize("sides", [(4, 6, 8, 10), (8, 12, 16, 24, 32, 48), tuple(range(4, 13))])
+def test_the_numbers_on_an_axis_do_not_overlap(sides):
+    """Less than a decade of facets was labelled in tenths, one over the other."""
+    figure = Figure(figsize=SIZE, layout="constrained")
+    axes = figure.subplots(1, 3)
+    draw_tradeoff(summarise(made(sides)), axes)
+    figure.canvas.draw()
+    for axis in (each for pair in axes for each in (pair.xaxis, pair.yaxis)):
+        boxes = [
+            label.get_window_extent()
+            for label in axis.get_ticklabels(which="both")
+            if label.get_text() and label.get_visible()
+        ]
+        assert len(boxes) > 1
+        assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
 
 
 def test_the_command(run, tmp_path, hypar):

@@ -11,6 +11,7 @@ from problems import saddle_mesh
 from miurafab.errors import InputError, OptionError
 from miurafab.surfaces.catalogue import make_surface
 from miurafab.workflow.design import design
+from miurafab.workflow.fit import fit
 
 
 def test_values_and_text_ask_for_the_same():
@@ -85,3 +86,14 @@ def test_a_fault_of_a_file_names_the_file_and_one_of_the_caller_does_not(tmp_pat
     file.write_text('sizee = "3mm"\n[target]\nsurface = "hypar"\n')
     with pytest.raises(OptionError, match=r"^mine\.toml: 'sizee' is not a known key; .* 'size'"):
         design(str(file))
+
+
+def test_more_facets_than_asked_for_are_told():
+    """Each of four pieces has two columns at least: 6 x 8 facets; none were told before."""
+    sheet = fit("ellipsoid", close="seam", pieces=4, facets=(6, 4), polish="off")
+    (found,) = [each for each in sheet.findings if each.code == "more-facets"]
+    assert sheet.measurements.facets == 48
+    assert "`facets` asks for 24 facets and the sheet has 48" in found.sentence
+    assert "more-facets" not in {
+        each.code for each in fit("plane", facets=(4, 4), polish="off").findings
+    }

@@ -129,8 +129,11 @@ class FitResult(Shown):
         return "" if self.pattern is None else self.pattern._picture()
 
     def _facts(self) -> Mapping[str, object]:
-        report = self.report()
-        return {key: value for key, value in report.items() if not isinstance(value, list | dict)}
+        return {
+            key: value
+            for key, value in self.report().items()
+            if value not in ("", None) and not isinstance(value, list | dict)
+        }
 
     def report(self) -> dict[str, Any]:
         """The fit report, ready for JSON."""
