@@ -37,6 +37,7 @@ from miurafab.fabrication.drawing.page import (
     heading,
     legend,
     paragraph,
+    paragraph_height,
     scale_bar,
     text,
 )
@@ -50,6 +51,11 @@ from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.seam_lines import SEAM_WORDS
 from miurafab.profiles import MachineProfile, Material
+
+BESIDE, FACTS = 106.0, ROOM - 118.0
+"""The widths of the flat view on the first page, and of the facts beside it, mm."""
+LEAST_VIEW = 98.0
+"""The least height of the folded view there, mm."""
 
 
 @dataclass(frozen=True)
@@ -123,27 +129,39 @@ class _Overview:
         top = heading(canvas, self.title, self.subtitle())
         if pattern.folded_coords is not None:
             caption(canvas, "Folded", MARGIN, top)
-            scale = self.views.folded_view(canvas, (MARGIN, top - 104, ROOM, 98))
-            scale_bar(canvas, scale, MARGIN, top - 108)
-            top -= 118
+            tall = self._folded_height(top - BOTTOM)
+            scale = self.views.folded_view(canvas, (MARGIN, top - 6 - tall, ROOM, tall))
+            scale_bar(canvas, scale, MARGIN, top - 10 - tall)
+            top -= tall + 20
         caption(canvas, "Flat, seen from the front", MARGIN, top)
-        beside = 106.0
-        tall = min(top - BOTTOM - 22, beside * self.views.aspect)
-        scale = self.views.flat_view(canvas, (MARGIN, top - 8 - tall, beside, tall))
+        tall = min(top - BOTTOM - 22, BESIDE * self.views.aspect)
+        scale = self.views.flat_view(canvas, (MARGIN, top - 8 - tall, BESIDE, tall))
         below = top - 8 - tall - 6
         scale_bar(canvas, scale, MARGIN, below)
         entries = [("mountain", MOUNTAIN, 0.3), ("valley", VALLEY, 0.3), ("cut", INK, 0.45)]
-        legend(canvas, entries, MARGIN + beside, below - 7)
+        legend(canvas, entries, MARGIN + BESIDE, below - 7)
         if self.views.seams:
             colour = HexColor(self.views.seams[0].colour)
-            legend(canvas, [(SEAM_WORDS, colour, 0.6)], MARGIN + beside, below - 12)
-        x, y = MARGIN + beside + 12, top - 3.2
+            legend(canvas, [(SEAM_WORDS, colour, 0.6)], MARGIN + BESIDE, below - 12)
+        x, y = WIDTH - MARGIN - FACTS, top - 3.2
         for name, lines in self.facts():
             text(canvas, x, y, name, 7.5, colour=QUIET)
             y -= 4.4
             for line in lines:
-                y = paragraph(canvas, x, y, line, WIDTH - MARGIN - x, 9)
+                y = paragraph(canvas, x, y, line, FACTS, 9)
             y -= 2.2
+
+    def _folded_height(self, room: float) -> float:
+        """The height of the folded view: what flat view and facts leave of ``room``, but no more
+        than the view fills.
+        """
+        flat = BESIDE * self.views.aspect + 30
+        facts = sum(
+            6.6 + sum(paragraph_height(line, FACTS, 9) for line in lines)
+            for _, lines in self.facts()
+        )
+        left = room - 20 - max(flat, facts)
+        return max(LEAST_VIEW, min(left, ROOM * self.views.folded_aspect))
 
     def facts(self) -> list[tuple[str, list[str]]]:
         """The text of the overview beside the pictures."""

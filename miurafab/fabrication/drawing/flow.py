@@ -18,6 +18,7 @@ from miurafab.fabrication.drawing.page import (
     BOTTOM,
     HEIGHT,
     INK,
+    LEADING,
     MARGIN,
     QUIET,
     ROOM,
@@ -40,7 +41,7 @@ from miurafab.fabrication.drawing.svg_canvas import Pen
 
 _TOP = HEIGHT - MARGIN - 19
 """The top of the content under the head of a page."""
-_SIZE, _LINE = 9.0, 9.0 * 0.47
+_SIZE, _LINE = 9.0, 9.0 * LEADING
 _GAP = 6.0
 """Between figures side by side."""
 _HEAD = 13.0

@@ -33,6 +33,9 @@ ROOM = WIDTH - 2 * MARGIN
 BOTTOM = 17.0
 """The lower end of the content, above the foot."""
 
+LEADING = 0.47
+"""From one baseline to the next, in mm for each point of the size of the type: 1.33 sizes."""
+
 INK, QUIET, RULE = HexColor(picture.INK), HexColor("#5c6670"), HexColor("#c3cad2")
 PALE = HexColor("#eef1f4")
 MOUNTAIN, VALLEY = HexColor(picture.CREASES["M"]), HexColor(picture.CREASES["V"])
@@ -99,11 +102,15 @@ def paragraph(
     colour: Color = INK,
 ) -> float:
     """``words`` in lines from the baseline ``y`` down; returns the next baseline."""
-    step = size * 0.47
     for line in wrapped(words, width, size, bold=bold):
         text(canvas, x, y, line, size, bold=bold, colour=colour)
-        y -= step
+        y -= size * LEADING
     return y
+
+
+def paragraph_height(words: str, width: float, size: float = 9.0) -> float:
+    """The height of a :func:`paragraph`, mm."""
+    return len(wrapped(words, width, size)) * size * LEADING
 
 
 def heading(canvas: Pen, title: str, subtitle: str) -> float:

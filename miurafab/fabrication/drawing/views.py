@@ -117,6 +117,14 @@ class Views:
         width, height = np.ptp(self.flat, axis=0)
         return float(height / max(width, 1e-9))
 
+    @property
+    def folded_aspect(self) -> float:
+        """The height of the folded view over its width."""
+        assert self.pattern.folded_coords is not None
+        view = project(self.pattern.folded_coords, self.pattern.faces_vertices)
+        width, height = np.ptp(view.places, axis=0)
+        return float(height / max(width, 1e-9))
+
     @cached_property
     def rings(self) -> list[list[Ints]]:
         """The vertices around each patch, and around each of its holes."""
