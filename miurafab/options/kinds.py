@@ -102,9 +102,8 @@ class Quantity(Kind):
             return "a finite number"
         if math.isinf(self.high):
             return f"greater than {low}" if self.above else f"{low} or more"
-        return (
-            f"greater than {low} and at most {high}" if self.above else f"between {low} and {high}"
-        )
+        between = f"between {low} and {high}"
+        return f"greater than {low} and at most {high}" if self.above else between
 
 
 def _written(value: float) -> float:

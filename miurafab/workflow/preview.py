@@ -106,10 +106,8 @@ class Preview(Shown):
         return (*files, page)
 
     def _summary(self) -> str:
-        return (
-            f"{self.name} on {self.machine.name}: {count(len(self.sheets), 'sheet', 'sheets')}, "
-            f"{clock_text(self.seconds)}"
-        )
+        sheets, time = count(len(self.sheets), "sheet", "sheets"), clock_text(self.seconds)
+        return f"{self.name} on {self.machine.name}: {sheets}, {time}"
 
     def _picture(self) -> str:
         from miurafab.workflow.picture import first_sheet
