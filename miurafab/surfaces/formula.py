@@ -144,6 +144,9 @@ def formula_surface(
 
 
 def _of(name: str, text: str, variables: tuple[str, ...]) -> Formula:
+    left, equals, right = text.partition("=")
+    if equals and left.strip() == name:
+        raise TargetError(f"The formula of {name} begins with '{name}='; write {right.strip()!r}.")
     try:
         return read_formula(text, variables)
     except TargetError as fault:

@@ -87,6 +87,7 @@ def test_signs_and_powers_bind_as_in_mathematics(text, value):
         ("z=1/x", "no finite value at u = 0"),
         ("z=1e300*x", "a value beyond 1e.100 .*; scale it down"),
         ("x=u,y=u,z=u", "no tangent plane"),
+        ("z=z=x*y", "begins with 'z='; write 'x.y'"),
         ("z=x,u0=1", "each start under its end"),
         ("z=x,u1=2*x", "'x' is not known"),
         ("z=x,w=2", "no parameter 'w'; it has z, x, y, u0"),

@@ -6,7 +6,7 @@ import { fitOrder, layoutOrder, restoreForm } from "./choices.js";
 import { showTerms } from "./results.js";
 import { beginSketch, sketch } from "./sketch.js";
 import { beginSliders, placeSliders } from "./sliders.js";
-import { seeTarget, takeFit } from "./target.js";
+import { seeTarget, takeFit, tellOnce } from "./target.js";
 import { texts } from "./texts.js";
 import { ask, byId, element, say } from "./tools.js";
 
@@ -164,8 +164,8 @@ function show() {
   byId("pattern").classList.toggle("old", stale);
   byId("stale").hidden = !stale;
   if (stale) byId("stale-words").textContent = say(live.stale, { subject: pattern.subject });
-  byId("refused").hidden = !refused;
   byId("refused").textContent = refused;
+  tellOnce();
   byId("subject").textContent = pattern?.subject ?? "";
   byId("go-on").disabled = stale;
   showResultOf(pattern, whole);

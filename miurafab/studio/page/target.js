@@ -231,6 +231,13 @@ function refuse({ refused = "", mends = [] }) {
     });
     return button;
   }));
+  tellOnce();
+}
+
+/** The form says why it has no fit; what stands above the picture is not said there too. */
+export function tellOnce() {
+  const words = byId("refused").textContent;
+  byId("refused").hidden = !words || words === byId("target-refused-words").textContent;
 }
 
 /** Write a value into a field of the form as a hand would. */
