@@ -85,7 +85,7 @@ def assert_dark_after_reset(wire: FakeWire) -> None:
 @given(
     st.integers(0, 2**32),
     st.sampled_from([0.0, 0.001, 0.016]),
-    st.integers(1, 40),
+    st.integers(1, 20),
     st.sampled_from(["character-counting", "send-response"]),
 )
 @settings(max_examples=30)
@@ -180,7 +180,7 @@ def test_the_same_job_makes_the_same_records(tmp_path: Path) -> None:
 
 # Stopped by somebody
 
-STOPPED = zigzag(30)
+STOPPED = zigzag(16)  # more moves than a controller holds
 NO_SHRINKING = (Phase.explicit, Phase.generate)  # it takes minutes; the first failure says enough
 
 
