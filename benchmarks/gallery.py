@@ -1,12 +1,14 @@
 """The gallery: named surfaces and shapes of the world about us, fitted, laid out and drawn.
 
-    python benchmarks/gallery.py                # writes docs/gallery.md's table and pictures
+    python benchmarks/gallery.py                # writes docs/gallery.md's tables and pictures
     python benchmarks/gallery.py --front        # writes front.png, for the README
     python benchmarks/gallery.py hypar globe    # these rows, printed; nothing is written
-    python benchmarks/gallery.py --designs      # every design of patterns/, one line each
+    python benchmarks/gallery.py --designs      # every design of patterns/ with 28x28 facets
 
 Each row is made by the commands that it shows: ``miurafab fit``, then ``miurafab sheets`` for the
-README's laser and card. A picture shows the target, the folded shell and the flat pattern.
+README's laser and card. A picture shows the target, the folded shell and the flat pattern. The
+second table has the designs of ``patterns/`` as they are, without pictures.
+
 ``--designs`` exits with 1 if a design does not converge with every residual at most 1e-12, crosses
 itself, overlaps when flat, or has a shorter edge than it asks for.
 """
@@ -22,13 +24,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import kit_pictures
 import numpy as np
+import page_tables
 import resvg_py
 from PIL import Image
 
@@ -45,7 +48,6 @@ from miurafab.workflow.picture import png_bytes
 
 ROOT = Path(__file__).parent.parent
 PAGE, PICTURES = ROOT / "docs" / "gallery.md", ROOT / "docs" / "gallery"
-START, END = "<!-- gallery -->\n\n", "<!-- end of gallery -->"
 RESIDUAL = 1e-12
 WIDTH, COLOURS = 330, 256
 """Pixels of a panel, and colours of a picture."""
@@ -66,7 +68,7 @@ ENTRIES = (
     *(Entry(name, f"{name} --facets 20x20") for name in (
         "plane", "cylinder", "log-spiral", "sphere", "hypar", "saddle", "paraboloid", "bump",
         "helicoid", "pill", "candlestick", "vase", "hyperboloid", "catenoid", "ellipsoid",
-        "revolution")),
+        "revolution", "formula")),
     Entry("globe", "ellipsoid:latitude=85,height=1,angle=360 --close seam --pieces 8 "
           "--facets 24x48"),
     Entry("whole-vase", "vase:angle=360 --close seam --facets 24x24"),
@@ -74,6 +76,9 @@ ENTRIES = (
     Entry("mask", "face.stl --facets 20x20 --size 200mm"),
     Entry("roof", "hood.stl --facets 20x20 --size 200mm"),
 )  # fmt: skip
+DESIGNS = tuple(
+    Entry(path.stem, f"patterns/{path.name}") for path in sorted((ROOT / "patterns").glob("*.toml"))
+)
 MESHES = ("lampshade", "face", "hood")
 """Meshes of ``tests/mesh_shapes.py`` that entries fit."""
 
@@ -89,46 +94,65 @@ def main() -> int:
     if asked.front:
         (PICTURES / "front.png").write_bytes(front())
         return 0
-    rows = [HEAD]
+    rows: page_tables.Rows = []
     for entry in ENTRIES:
         if not asked.names or entry.name in asked.names:
             row, picture = made(entry)
             rows.append(row)
-            print(row, flush=True)
+            print(*row, sep=" | ", flush=True)
             if not asked.names:
                 PICTURES.mkdir(exist_ok=True)
                 (PICTURES / f"{entry.name}.png").write_bytes(picture)
     if not asked.names:
-        write_page(rows)
+        plain = [design_row(entry) for entry in DESIGNS]
+        tables = {
+            "shapes": page_tables.markdown(HEAD, rows, 2),
+            "designs": page_tables.markdown(DESIGN_HEAD, plain, 1),
+        }
+        page_tables.write_tables(PAGE, "gallery", tables)
     return 0
 
 
-HEAD = (
-    "| | target, shell, flat pattern | facets, pieces | off, mm | folds | paper | sheets | glue "
-    "| laser |\n| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |"
-)
+FIGURES = ("facets, pieces", "off, mm", "folds", "paper", "sheets", "glue", "laser")
+HEAD = ("shape", "target, shell, flat pattern", *FIGURES)
+DESIGN_HEAD = ("design", *FIGURES)
 
 
-def write_page(rows: Sequence[str]) -> None:
-    """Put the ``rows`` into the page."""
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(START)
-    after = rest[rest.index(END) :]
-    PAGE.write_text(before + START + "\n".join(rows) + "\n\n" + after, encoding="utf-8")
-
-
-def made(entry: Entry) -> tuple[str, bytes]:
+def made(entry: Entry) -> tuple[tuple[str, ...], bytes]:
     """The row of one entry, and its picture as a PNG."""
+    shown = f"![{entry.name}](gallery/{entry.name}.png)"
+    with _workplace(entry):
+        row = (_named(entry), shown, *figures(entry))
+        return row, side_by_side(panels(mf.load("fitted.fold")))
+
+
+def design_row(entry: Entry) -> tuple[str, ...]:
+    """The row of a design, which has no picture."""
+    with _workplace(entry):
+        return (_named(entry), *figures(entry))
+
+
+def _named(entry: Entry) -> str:
+    return f"**{entry.name}**<br>`fit {entry.words}`"
+
+
+@contextlib.contextmanager
+def _workplace(entry: Entry) -> Iterator[None]:
+    """A new working directory with the files that the entry fits."""
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        Path("patterns").symlink_to(ROOT / "patterns")
         write_meshes(entry)
-        report = answer(["fit", *shlex.split(entry.words), "-o", "fitted.fold"])
-        job = answer(["sheets", "fitted.fold", "-o", "job", *LASER])["totals"]
-        picture = side_by_side(panels(mf.load("fitted.fold")))
+        yield
+
+
+def figures(entry: Entry) -> tuple[str, ...]:
+    """The :data:`FIGURES` of the entry, whose pattern is then in ``fitted.fold``."""
+    report = answer(["fit", *shlex.split(entry.words), "-o", "fitted.fold"])
+    job = answer(["sheets", "fitted.fold", "-o", "job", *LASER])["totals"]
     quality = report["quality"]
     folds = [round(angle) for angle in quality["fold_angle_deg"]]
     minutes, seconds = divmod(round(job["seconds"]), 60)
-    cells = [
-        f"**{entry.name}**<br>`fit {entry.words}`",
-        f"![{entry.name}](gallery/{entry.name}.png)",
+    return (
         f"{report['facets']:,}, {report['pieces']}",
         f"{report['hausdorff_midsurface_mm']:.2f}",
         f"{folds[0]}, {folds[2]}",
@@ -136,8 +160,7 @@ def made(entry: Entry) -> tuple[str, bytes]:
         f"{job['sheets']}",
         f"{job['seam_mm'] / 1000:.2f} m",
         f"{minutes}:{seconds:02d}",
-    ]
-    return f"| {' | '.join(cells)} |", picture
+    )
 
 
 def write_meshes(entry: Entry) -> None:
@@ -242,7 +265,7 @@ def polygons(points: np.ndarray, faces: np.ndarray, azimuth: float, tiles: bool 
 
 
 def designs() -> int:
-    """Fit the designs of patterns/ with 28x28 facets and print what each is worth."""
+    """Fit the designs of patterns/ with 28x28 facets, and print how well each fits."""
     print(
         f"{'design':<14} {'status':<11} {'facets':>6} {'planar':>8} {'develop':>8} {'isometry':>8} "
         f"{'flatfold':>8} {'min edge':>8} {'mid dev':>8} {'cross':>5} {'over':>4} {'tries':>5} "

@@ -10,9 +10,10 @@ from miurafab.files import write_text
 Rows = list[tuple[str, ...]]
 
 
-def markdown(head: tuple[str, ...], rows: Rows) -> str:
-    """A table of a page."""
-    lines = [head, tuple("---" for _ in head), *rows]
+def markdown(head: tuple[str, ...], rows: Rows, texts: int | None = None) -> str:
+    """A table of a page, whose columns behind the first ``texts`` are figures."""
+    texts = len(head) if texts is None else texts
+    lines = [head, ("---",) * texts + ("---:",) * (len(head) - texts), *rows]
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
 
 
