@@ -91,3 +91,46 @@ def test_a_halt_is_at_once_with_the_emergency_parser_and_else_in_turn(
     assert said(device, b"M115\n") == []
     device.power_cycle()
     assert said(device, b"M5\n") == ["start", "ok"]
+
+
+def test_a_quick_stop_ends_the_motion_and_leaves_the_controller_to_its_user() -> None:
+    """``M410`` (``M410.cpp``): what was planned is dropped, and the place is that of the stop."""
+    device = ready()
+    said(device, b"G1 X100 F1200\n", 1.0)
+    said(device, b"M410\n")
+    assert not device.killed
+    (place,) = [line for line in said(device, b"M114\n") if line.startswith("X:")]
+    x = float(place.partition(" ")[0].removeprefix("X:"))
+    assert 10 < x < 40
+    device.advance(10.0)
+    assert said(device, b"M114\n")[0] == place
+
+
+@pytest.mark.parametrize(("percent", "seconds"), [(50, 2.0), (200, 0.5)])
+def test_the_feed_goes_with_its_override(percent: int, seconds: float) -> None:
+    device = ready()
+    said(device, b"M220 S%d\nM4 I\nG1 X20 F1200 S100\n" % percent, 9.0)
+    burnt = device.beam_log[-1].t1 - device.beam_log[0].t0
+    assert burnt == pytest.approx(seconds, rel=0.1)
+
+
+@pytest.mark.parametrize("line", [b"G999", b"X5", b"G1 X5 G0", b"G1 X1 X2", b"M999"])
+def test_what_it_does_not_know_is_said_and_answered(line: bytes) -> None:
+    code = line.replace(b" ", b"").decode()
+    assert said(ready(), line + b"\n") == [f'echo:Unknown command: "{code}"', "ok"]
+
+
+def test_bytes_beyond_the_receive_ring_are_lost() -> None:
+    """``RX_BUFFER_SIZE``: while a command waits, 128 bytes behind it find room."""
+    device = VirtualMarlin(PARAMETERS, baud=115_200)
+    sent = b"G4 S1\n" + b"M5\n" * 100
+    said(device, sent, 0.5)
+    assert device.lost_bytes == len(sent) - len(b"G4 S1\n") - 128
+
+
+def test_a_line_is_cut_off_where_the_line_buffer_ends() -> None:
+    """``MAX_CMD_SIZE`` is 96 with the end: the comment and the second word beyond it are lost."""
+    device = ready()
+    assert said(device, b"G1 X2" + b" " * 90 + b"Y7 F6000\nM114\n", 3.0)[1].startswith(
+        "X:2.00 Y:0.00"
+    )
