@@ -129,6 +129,13 @@ def test_what_the_controller_would_refuse_is_named(text: str, sentence: str) -> 
     assert str(caught.value).startswith(sentence)
 
 
+def test_a_word_of_another_dialect_is_told_on_a_dialect_that_has_words_of_its_own() -> None:
+    with pytest.raises(GcodeError, match=r"; FluidNC knows M7\.1; here, switch it off by M9\.$"):
+        read("G0 X1\nM7.1\n", dialect="grblhal")
+    with pytest.raises(GcodeError, match=r"on FluidNC M7\.1 switches a coolant off; the effect"):
+        read("G0 X1\nM7.1\n", dialect="fluidnc")
+
+
 def test_strokes_join_what_burns_and_know_where_they_belong() -> None:
     program = read(
         "(sheet A)\n(patch 1)\n(operation perforate)\nM4 S9\nG0 X1\nG1 X2 F60\nX3\nG0 X4\nG1 X5\n"

@@ -50,6 +50,7 @@ MATERIAL = (shipped_directory("materials") / "card-250.toml").read_text()
             r"'width' is 40000 mm; it must be between 10 mm",
         ),
         ('width = "400mm"', 'width = "nan"', r"'width' cannot be read"),
+        ("[bed]", "z = 3\n[bed]", r"'z' must be a table \[z\], not 3"),
         (
             'margin = "5mm"',
             'margin = "300mm"',
@@ -73,6 +74,38 @@ def test_a_fault_in_a_machine_is_named(tmp_path, old, new, named):
     with pytest.raises(ProfileError, match=r"mine\.toml") as fault:
         load_machine(path)
     assert re.search(named, str(fault.value)), str(fault.value)
+
+
+@pytest.mark.parametrize(
+    ("machine", "old", "new", "named"),
+    [
+        (
+            "hpgl-cutter-a3",
+            "[bed]",
+            '[z]\ntravel = "5mm"\nmax_rate = "500mm/min"\nacceleration = 20\n[bed]',
+            "'z' is for G-code; HPGL lifts its tool without a height",
+        ),
+        (
+            "marlin-laser-220",
+            "[tool]",
+            '[tool]\nair_word = "M7"',
+            "'tool' has the air_word M7; Mar",
+        ),
+        (
+            "grbl-knife-a3",
+            "[tool]",
+            "[tool]\ns_shallow = 9999",
+            "'s_shallow' is 9999, which exceed",
+        ),
+    ],
+)
+def test_what_a_machine_of_its_kind_cannot_have_is_named(tmp_path, machine, old, new, named):
+    text = (shipped_directory("firmware_profiles") / f"{machine}.toml").read_text()
+    key = new.partition(" = ")[0].split()[-1]
+    kept = [line for line in text.splitlines() if not line.startswith(f"{key} ")]
+    (tmp_path / "mine.toml").write_text("\n".join(kept).replace(old, new, 1))
+    with pytest.raises(ProfileError, match=re.escape(named)):
+        load_machine(tmp_path / "mine.toml")
 
 
 @pytest.mark.parametrize(
