@@ -234,6 +234,31 @@ def test_each_start_is_counted_and_one_that_nobody_sent_is_told() -> None:
     assert session.connection.state is State.GREETED
 
 
+@pytest.mark.parametrize(
+    ("said", "position", "machine_position"),
+    [
+        ([], None, None),
+        (["MPos:5.000,6.000,0.000"], (5, 6, 0), (5, 6, 0)),
+        (["WPos:5.000,6.000,0.000"], (5, 6, 0), None),
+        (["MPos:5.000,6.000,0.000|WCO:1.000,2.000,0.000"], (4, 4, 0), (5, 6, 0)),
+        (["WPos:5.000,6.000,0.000|WCO:1.000,2.000,0.000"], (5, 6, 0), (6, 8, 0)),
+        (["WPos:0.000,0.000,0.000|WCO:1.000,2.000,0.000", "WPos:1,1,0"], (1, 1, 0), (2, 3, 0)),
+        (["FS:0,0"], None, None),
+    ],
+)
+def test_a_position_is_told_or_is_the_sum_of_what_is_told(
+    said: list[str],
+    position: tuple[float, ...] | None,
+    machine_position: tuple[float, ...] | None,
+) -> None:
+    session, wire = greeted()
+    for fields in said:
+        wire._said = f"<Idle|{fields}>\r\n".encode()
+        session.pause(0.01)
+    assert session.position == position
+    assert session.machine_position == machine_position
+
+
 # The session that owns a port
 
 

@@ -17,6 +17,7 @@ from miurafab.origami.miura import regular_miura
 from miurafab.origami.tessellation import Tessellation
 from miurafab.origami.unfold import unfold, with_angles_of_the_folded_form
 from miurafab.origami.verify import audit
+from miurafab.surfaces.catalogue import make_surface
 
 PROMISED = {
     "status", "advice", "facets", "vertices", "max_planarity", "max_developability",
@@ -243,3 +244,22 @@ def test_the_report_names_what_the_fit_report_names():
     names = set(fitted("hypar").report()) & PROMISED
     assert names == PROMISED
     assert names <= set(audit(regular()).report())
+
+
+def test_a_flat_sheet_over_a_plane_is_measured_by_hand():
+    """Four squares of 50 mm that lie 1 mm over a plane of 100 x 100 mm."""
+    surface = make_surface("plane", {})[0]
+    scale = 100.0 / surface.domain.width
+    lowest = np.array([surface.domain.u0, surface.domain.v0]) * scale
+    grid = np.stack(np.meshgrid([0.0, 50.0, 100.0], [0.0, 50.0, 100.0]), axis=-1)
+    points = np.concatenate([grid + lowest, np.ones((3, 3, 1))], axis=2)
+    pattern = replace(unfold(Tessellation(points)), scale=scale)
+    found = audit(pattern, surface).measurements
+    assert found.sheet_to_target_mm == pytest.approx(1.0)
+    assert found.target_to_sheet_mm == pytest.approx(1.0)
+    assert found.hausdorff_midsurface_mm == pytest.approx(1.0)
+    assert found.hausdorff_relative == pytest.approx(1 / math.hypot(100, 100))
+    assert found.area_ratio == pytest.approx(1.0)
+    assert (found.coverage, found.overhang) == pytest.approx((1.0, 0.0))
+    assert (found.facets, found.vertices, found.pieces, found.seam_mm) == (4, 9, 1, 0.0)
+    assert found.min_edge_mm == pytest.approx(50.0)
