@@ -43,6 +43,10 @@ ROUGH = 0.01
 _SPREAD = 20.0
 """So many times the median residual are still the rounding of the same digits."""
 
+_FINE = 1e-3
+"""Radians; where some vertices of a drawing are exact, the others are off by less, in the median,
+if that is the rounding of its digits."""
+
 SAME = 1e-4
 """Radians; sectors that differ by less are equal."""
 
@@ -181,9 +185,10 @@ def judge_flat_folding(pattern: CreasePattern) -> Iterator[Finding]:
     sizes = np.concatenate([np.abs(each.angles) for each in folds])
     folded_flat = bool((np.abs(sizes - math.pi) <= CLOSED).all())
     if not folded_flat:
-        yield from _loops(folds)
-    median = float(np.median([each.kawasaki for each in folds]))
-    within = max(CLOSED, _SPREAD * median) if median <= CLOSED else ROUGH
+        yield from _loops(folds, _rounding(pattern, np.array([each.gap for each in folds])))
+    off = np.array([each.kawasaki for each in folds])
+    median = float(np.median(off))
+    within = max(_SPREAD * median, _rounding(pattern, off)) if median <= CLOSED else ROUGH
     faults = {each.vertex: why for each in folds if (why := each.why_not_flat(within))}
     if not faults:
         return
@@ -202,14 +207,28 @@ def judge_flat_folding(pattern: CreasePattern) -> Iterator[Finding]:
         yield Finding("not-flat-foldable", says, tuple(sorted(faults)))
 
 
-def _loops(folds: list[VertexFolds]) -> Iterator[Finding]:
-    """Vertices around which the sheet does not close with the fold angles of the file."""
+def _rounding(pattern: CreasePattern, off: Floats) -> float:
+    """Up to where residuals ``off`` (n,) of vertices may be the rounding of a file, radians.
+
+    Our own sheets are exact. In drawings of others many vertices lie on the lines of a grid, which
+    have few digits, and the others are rounded.
+    """
+    own = pattern.grid is not None or pattern.cells is not None or bool(pattern.target)
+    loose = off[off > CLOSED]
+    typical = 0.0 if own or not len(loose) else float(np.median(loose))
+    return min(_SPREAD * typical, ROUGH) if CLOSED < typical <= _FINE else CLOSED
+
+
+def _loops(folds: list[VertexFolds], within: float) -> Iterator[Finding]:
+    """Vertices around which the sheet does not close ``within`` radians with the fold angles of the
+    file.
+    """
     gaps = np.array([each.gap for each in folds])
     vertices = np.array([each.vertex for each in folds])
     if not any((each.angles != 0).any() for each in folds):
         yield Finding("not-proven", "The file gives every fold as 0 degrees, so no size is known.")
         return
-    wide = np.flatnonzero(gaps > CLOSED)
+    wide = np.flatnonzero(gaps > within)
     if not len(wide):
         return
     where = tuple(vertices[wide].tolist())

@@ -14,7 +14,7 @@ import colorsys
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from xml.etree.ElementTree import Element
 
@@ -95,7 +95,7 @@ def parse_svg(text: str, curve_tolerance: float | None = None) -> CreaseLines:
 
     Curves become straight lines within ``curve_tolerance``, mm
     (:func:`~miurafab.origami.formats.crease_lines.straightened`). Lines without a stroke are left
-    out.
+    out. A drawing whose folds are all opaque, and that gives no angle, tells no fold angles.
     """
     root = xml_root(text, "an SVG drawing")
     if tag_of(root) != "svg":
@@ -103,6 +103,7 @@ def parse_svg(text: str, curve_tolerance: float | None = None) -> CreaseLines:
     rules = _style_rules(root)
     drawn: list[DrawnLine] = []
     left_out: dict[str, int] = {}
+    sized = False
     for element, look in _walk(root, _Look("none", 1.0, 1.0, _millimetres(root)), rules):
         tag = tag_of(element)
         if tag in _UNKNOWN:
@@ -111,8 +112,11 @@ def parse_svg(text: str, curve_tolerance: float | None = None) -> CreaseLines:
         if letter is None:
             continue
         angle = _fold_angle(element, look, letter)
+        sized |= element.get("data-foldAngle") is not None or (letter in "MV" and look.opacity < 1)
         upwards = look.matrix * np.array([[1.0], [-1.0]])
         drawn += [DrawnLine(shape.moved(upwards), letter, angle) for shape in shapes(element)]
+    if not sized:
+        drawn = [replace(line, angle=math.nan) if line.letter in "MV" else line for line in drawn]
     return straightened(drawn, curve_tolerance, left_out)
 
 
