@@ -1,12 +1,14 @@
 """A sheet with the barrier that is asked for: its fairness and Kawasaki residuals are tuned.
 
 Sheets are fitted with the usual weight of fairness and with larger ones, which fold more softly at
-the same distance. The residuals of a fitted sheet are all multiplied by one factor f, and the rest
-of the sheet moves as little as possible (:mod:`~miurafab.origami.fitting.scaling`). The barrier is
-measured along the folding path of each such sheet. It goes from 0 at f = 0 up, at first with f^2,
-so sqrt(asked / measured) is the step, and regula falsi on logarithms closes in on the answer. Of
-the sheets with the barrier, the closest to the target is taken. Where the sheets end before they
-have it (they cannot be found, cross themselves, or break a limit), the answer says how far they go.
+the same distance, and within limits on the residual (eps_ff), whose residuals are rougher, so that
+they have a high barrier closer to the target. The residuals of a fitted sheet are all multiplied by
+one factor f, and the rest of the sheet moves as little as possible
+(:mod:`~miurafab.origami.fitting.scaling`). The barrier is measured along the folding path of each
+such sheet. It goes from 0 at f = 0 up, at first with f^2, so sqrt(asked / measured) is the step,
+and regula falsi on logarithms closes in on the answer. Of the sheets with the barrier, the closest
+to the target is taken. Where the sheets end before they have it (they cannot be found, cross
+themselves, or break a limit), the answer says how far they go.
 """
 
 from __future__ import annotations
@@ -34,8 +36,10 @@ CLOSE = 0.01
 """A barrier is what was asked within this part."""
 STEPS = 24
 """Steps of the folding path."""
-FAIRNESS = (1.0, 10.0, 100.0)
-"""The weights of fairness that are tried, over the usual one."""
+FAIRNESS = (10.0, 100.0)
+"""The weights of fairness that are tried beside the usual one, over it."""
+LIMITS = (0.2, 0.05)
+"""The limits on Kawasaki's residual (eps_ff) that are tried, over the worst residual of the fit."""
 TRIALS = 30
 SHRINKS = 5
 WIDEST = (0.25, 2.0)
@@ -73,33 +77,30 @@ def tuned(
             "is for a sheet that is one whole grid, and this one is not; ask for one of `pieces`, "
             "and on a mesh for a rectangle as the `edge`",
         )
-    if worst_residual(pattern) <= EXACT:
+    worst = worst_residual(pattern)
+    if worst <= EXACT:
         return _missed(result, "The sheet folds rigidly, so it has no barrier to change.")
     found: list[Tried] = []
 
-    def at(fairness: float, fitted: CreasePattern, factor: float) -> Tried | None:
+    def at(family: str, fitted: CreasePattern, factor: float) -> Tried | None:
         sheet = _tried(request, fitted, factor)
         if sheet is not None:
             found.append(sheet)
         if on_progress is not None:
             said = "no sheet" if sheet is None else f"barrier {sheet.barrier:.3g}"
-            on_progress(
-                1 - 0.9 ** len(found),
-                f"fairness times {fairness:g}, residuals times {factor:.3g}: {said}",
-            )
+            on_progress(1 - 0.9 ** len(found), f"{family}, residuals times {factor:.3g}: {said}")
         return sheet
 
     interrupted = False
     try:
-        for fairness in FAIRNESS:
-            fitted: CreasePattern | None = pattern
-            if fairness != 1.0:
-                fairer = fit(replace(request, fairness=fairness, barrier=None))
-                if fairer.status == "interrupted":
-                    raise KeyboardInterrupt
-                fitted = fairer.pattern if fairer.is_valid else None
-            if fitted is not None and fitted.grid is not None and worst_residual(fitted) > EXACT:
-                _search(asked, partial(at, fairness, fitted))
+        _search(asked, partial(at, "the fit", pattern))
+        for family, other in _families(request, worst):
+            fitted = fit(other)
+            if fitted.status == "interrupted":
+                raise KeyboardInterrupt
+            sheet = fitted.pattern if fitted.is_valid else None
+            if sheet is not None and sheet.grid is not None and worst_residual(sheet) > EXACT:
+                _search(asked, partial(at, family, sheet))
     except KeyboardInterrupt:
         interrupted = True
         if not found:
@@ -127,12 +128,26 @@ def tuned(
     high = max(found, key=lambda sheet: sheet.barrier)
     return _missed(
         answer,
-        f"No sheet with a barrier of {asked:.3g} k_f L was found: with fairness times "
-        f"{', '.join(f'{each:g}' for each in FAIRNESS)} and residuals scaled, it has barriers from "
+        f"No sheet with a barrier of {asked:.3g} k_f L was found: with fairness times 1, "
+        f"{_listed(FAIRNESS)}, with residuals within {_listed(LIMITS)} of the usual ones, and with "
+        f"all residuals scaled, it has barriers from "
         f"{low.barrier:.3g} (residual {worst_residual(low.pattern):.2g} rad) to "
         f"{high.barrier:.3g} (residual {worst_residual(high.pattern):.2g} rad), and beyond them no "
         "sheet without faults. Ask for other `facets`.",
     )
+
+
+def _families(request: FitRequest, worst: float) -> list[tuple[str, FitRequest]]:
+    """The requests of the other sheets; ``worst`` is the residual of the fit."""
+    plain = replace(request, barrier=None)
+    fairer = [(f"fairness times {f:g}", replace(plain, fairness=f)) for f in FAIRNESS]
+    limits = [share * worst for share in LIMITS]
+    within = [(f"eps_ff {eps:.2g}", replace(plain, flat_foldable=eps)) for eps in limits]
+    return fairer + within
+
+
+def _listed(numbers: tuple[float, ...]) -> str:
+    return ", ".join(f"{each:g}" for each in numbers)
 
 
 def _search(asked: float, at: Callable[[float], Tried | None]) -> None:

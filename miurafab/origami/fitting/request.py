@@ -101,8 +101,8 @@ class FitOptions(Shown):
     )
     barrier: float | None = option(
         number(0, 1e3, above=True),
-        "The energy barrier that holds the folded form, in k_f L, within 1 %: fairness and "
-        "residuals are tuned, and the closest such sheet is taken.",
+        "The energy barrier that holds the folded form, in k_f L, within 1 %: fairness and the "
+        "Kawasaki residuals (eps_ff) are tuned, and the closest such sheet is taken.",
         group="Limits",
         default_text="as it comes",
     )

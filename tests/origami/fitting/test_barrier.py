@@ -49,12 +49,20 @@ def test_a_barrier_out_of_reach_is_told_with_what_there_is():
     assert 1e-3 < result.barrier < 10.0
 
 
-def test_sheets_without_balance_end_the_search_with_what_there_is():
+def test_sheets_without_balance_end_the_search_with_what_there_is(monkeypatch):
     """On the way up to 0.01 a sheet is tried whose folded form is in no balance."""
+    monkeypatch.setattr(tuning, "LIMITS", ())
     result = fit("hypar:height=1", facets=(8, 8), barrier=1e-2)
     assert result.status == "infeasible"
     assert 1e-3 < result.barrier < 1e-2
     assert "beyond them no sheet without faults" in result.advice
+
+
+@pytest.mark.large
+def test_limits_on_the_residual_reach_farther():
+    """The barrier that the test above does not reach."""
+    result = fit("hypar:height=1", facets=(8, 8), barrier=1e-2)
+    assert (result.status, result.barrier) == ("converged", pytest.approx(1e-2, rel=0.01))
 
 
 def test_a_sheet_that_folds_rigidly_has_no_barrier_to_change():
@@ -90,11 +98,24 @@ def test_what_does_not_go_with_a_barrier_is_said(options, part):
 
 def test_fairness_gives_a_closer_sheet_with_the_same_barrier(monkeypatch):
     found = asked(1e-3, "sphere")
-    monkeypatch.setattr(tuning, "FAIRNESS", (1.0,))
+    monkeypatch.setattr(tuning, "LIMITS", ())
+    monkeypatch.setattr(tuning, "FAIRNESS", ())
     scaled = asked.__wrapped__(1e-3, "sphere")
     assert (found.status, scaled.status) == ("converged", "converged")
     assert found.barrier == pytest.approx(scaled.barrier, rel=0.02)
     assert found.deviation_mm < 0.9 * scaled.deviation_mm
+
+
+def test_limits_on_the_residual_give_a_closer_sheet_with_the_same_barrier(monkeypatch):
+    """eps_ff is tuned: from rougher residuals a high barrier is nearer to the target."""
+    found = asked(1e-3)
+    monkeypatch.setattr(tuning, "LIMITS", ())
+    without = asked.__wrapped__(1e-3)
+    assert (found.status, without.status) == ("converged", "converged")
+    assert found.barrier == pytest.approx(1e-3, rel=0.01)
+    assert found.barrier == pytest.approx(without.barrier, rel=0.02)
+    assert found.deviation_mm < 0.6 * without.deviation_mm
+    assert found.measurements.max_flat_foldability < without.measurements.max_flat_foldability
 
 
 @pytest.mark.parametrize("name", ["barrier", "size", "amplitude", "min_edge", "seed"])
