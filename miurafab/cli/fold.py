@@ -233,13 +233,18 @@ def _show_plates(console: Console, thick: dict[str, Any]) -> None:
         one, other = seam["between"]
         slits = ", ".join(map(str, seam["slits"]))
         if seam["patch"] is None:
-            console.line(f"patches {one} and {other}: nothing joins them at edges {slits}")
+            console.line(
+                f"patches {one} and {other}: no hinge joins them; fold both and strap them "
+                f"together at edges {slits}, then up to {seam['opens_mm']:.3g} mm apart"
+            )
         else:
             hinges = ", ".join(map(str, seam["hinges"])) or "none"
             console.line(
                 f"patch {seam['patch']}, blocks {one} and {other}: hinges at edges {hinges}; slit "
                 f"along {slits}, which opens up to {seam['opens_mm']:.3g} mm"
             )
+    if any(seam["patch"] is None for seam in thick["seams"]):
+        console.line("Patches that are strapped together keep the folded form and no longer move.")
     for number, patch in enumerate(patches):
         if patch["collision"] is not None:
             a, b = patch["collision"]

@@ -7,15 +7,21 @@ pattern are made one by one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from miurafab.errors import InputError, PatternError
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import facet_means
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.folding.bennett import BennettHeights, bennett_heights
+from miurafab.origami.folding.bennett import (
+    BennettHeights,
+    bennett_heights,
+    thick_placement,
+)
+from miurafab.origami.folding.kinematics import fold_angles_at, place
 from miurafab.origami.folding.made_panels import MadePanels
 from miurafab.origami.folding.plate_patch import PlatePatch
 from miurafab.origami.folding.slits import (
@@ -130,7 +136,7 @@ def _mechanisms(
             patches.append(_of_whole(found[0], part))
             seams += [_renumbered(seam, part, number) for seam in found[1]]
         else:
-            return patches, seams
+            return patches, list(_apart(pattern, patches, seams))
     raise PatternError(
         "No plates of one thickness fit on shifted hinges, neither for the whole sheet, slit or "
         f"not, nor for patches of {PATCHES[-1]} x {PATCHES[-1]} facets; use tapered panels."
@@ -169,6 +175,43 @@ def _measured(
     return tuple(
         replace(seam, opens_mm=width, patch=0) for seam, width in zip(seams, widths, strict=True)
     )
+
+
+def _apart(
+    pattern: CreasePattern, patches: list[PlatePatch], seams: list[PlateSeam]
+) -> Iterator[PlateSeam]:
+    """``seams``, those between loose patches with the width that a joint bridges in the folded
+    form. There each patch lies where the middles of its plates are nearest to the thin sheet.
+    """
+    folded = np.ones(1)
+    thin = place(pattern, fold_angles_at(pattern, folded))
+    turn, shift = thin.turn[0], np.zeros((len(pattern.faces_vertices), 3))
+    height = np.zeros(len(shift))
+    for patch in patches:
+        mine, plates = patch.facets, thick_placement(patch.pattern, patch.axis_mm, folded)
+        height[mine] = patch.bottom_mm + patch.thickness_mm / 2
+        # plates turn as the facets do, but for one turn of the patch as a whole
+        whole = turn[mine[0]] @ plates.turn[0, 0].T
+        shift[mine] = plates.shift[0] @ whole.T
+        flat = facet_means(pattern.vertices_coords, pattern.faces_vertices[mine])
+        flat = np.column_stack([flat, np.zeros(len(mine))])
+        level = np.column_stack([flat[:, :2], height[mine]])
+        wanted = np.einsum("nij,nj->ni", turn[mine], flat) + thin.shift[0, mine]
+        placed = np.einsum("nij,nj->ni", turn[mine], level) + shift[mine]
+        shift[mine] += (wanted - placed).mean(axis=0)
+    for seam in seams:
+        if seam.patch is not None:
+            yield seam
+            continue
+        edges = list(seam.slits)
+        ends = pattern.vertices_coords[pattern.edges_vertices[edges]].reshape(-1, 2)
+        places = []
+        for facet in np.repeat(pattern.edges_faces[edges], 2, axis=0).T:
+            points = np.column_stack([ends, height[facet]])
+            places.append(np.einsum("nij,nj->ni", turn[facet], points) + shift[facet])
+        yield replace(
+            seam, opens_mm=float(np.linalg.norm(places[0] - places[1], axis=1).max(initial=0.0))
+        )
 
 
 def _of_whole(patch: PlatePatch, piece: Piece) -> PlatePatch:

@@ -44,7 +44,8 @@ class PlateSeam:
         The edges that have none.
     opens_mm : float or None
         How far the edges of two plates come from each other along the slits, at half their
-        thickness, in the motion; None for loose patches.
+        thickness: in the motion, or of loose patches in the folded form, each laid where it fits
+        the thin sheet best.
     patch : int or None
         The patch that is slit; None between loose patches.
     """

@@ -22,7 +22,12 @@ from miurafab.errors import InputError, PatternError
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding import plates as plates_module
-from miurafab.origami.folding.bennett import bennett_heights, nearest_heights, thick_loop_gap
+from miurafab.origami.folding.bennett import (
+    bennett_heights,
+    nearest_heights,
+    thick_loop_gap,
+    thick_placement,
+)
 from miurafab.origami.folding.kinematics import fold_angles_at, place, states_between
 from miurafab.origami.folding.plates import ThickPlates, thick_plates
 from miurafab.origami.folding.slits import blocks_of, facet_cells
@@ -191,13 +196,48 @@ def test_loose_patches_are_made_where_slits_do_not_help() -> None:
     facets = np.concatenate([patch.facets for patch in made.patches])
     assert sorted(facets.tolist()) == list(range(64))
     assert made.folds
-    assert [(seam.patch, seam.blocks, seam.hinges, seam.opens_mm) for seam in made.seams] == [
-        (None, (0, 1), (), None),
-        (None, (0, 2), (), None),
-        (None, (1, 3), (), None),
-        (None, (2, 3), (), None),
+    assert [(seam.patch, seam.blocks, seam.hinges) for seam in made.seams] == [
+        (None, (0, 1), ()),
+        (None, (0, 2), ()),
+        (None, (1, 3), ()),
+        (None, (2, 3), ()),
     ]
     assert all(len(seam.slits) == 4 for seam in made.seams)
+
+
+def test_loose_patches_are_joined_in_the_folded_form() -> None:
+    """How far their edges are apart there, with each patch laid onto the folded form by itself."""
+    pattern = exact("hypar", 8)
+    made = thick_plates(pattern, 2.0)
+    assert pattern.folded_coords is not None
+    where: dict[tuple[int, int], np.ndarray] = {}
+    for patch in made.patches:
+        plates = thick_placement(patch.pattern, patch.axis_mm, np.ones(1))
+        faces = pattern.faces_vertices[patch.facets]
+        middle = patch.bottom_mm + 1.0
+        flat = pattern.vertices_coords[faces]
+        level = np.concatenate(
+            [flat, np.broadcast_to(middle[:, None, None], (*flat.shape[:2], 1))], axis=2
+        )
+        placed = np.einsum("fij,fcj->fci", plates.turn[0], level) + plates.shift[0, :, None]
+        # the normals of both, side by side, give the turn
+        thin = pattern.folded_coords[faces]
+        normals = [np.cross(x[:, 1] - x[:, 0], x[:, 3] - x[:, 0]) for x in (placed, thin)]
+        u, _, vt = np.linalg.svd(normals[0].T @ normals[1])
+        placed = placed @ (u @ vt)
+        placed += (thin - placed).mean(axis=(0, 1))
+        assert np.abs(placed - thin).max() < 16 * 2.0
+        for facet, face, points in zip(patch.facets, faces, placed, strict=True):
+            where |= {(int(facet), int(v)): point for v, point in zip(face, points, strict=True)}
+    for seam in made.seams:
+        gaps = [
+            np.linalg.norm(where[int(one), int(v)] - where[int(other), int(v)])
+            for edge in seam.slits
+            for one, other in [pattern.edges_faces[edge]]
+            for v in pattern.edges_vertices[edge]
+        ]
+        assert seam.opens_mm == pytest.approx(max(gaps), rel=1e-6)
+        assert seam.opens_mm > 0.1
 
 
 def test_a_loose_patch_may_be_slit(monkeypatch: pytest.MonkeyPatch) -> None:
