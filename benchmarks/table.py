@@ -137,7 +137,7 @@ def page(runs: list[Run]) -> str:
         "Made by `make benchmark` in one run. Times are processor times, unless a line says "
         "otherwise; compare them only with each other. An exit code of 1 says that a benchmark "
         "misses its own limit.\n",
-        f"{_machine()}\n",
+        f"{machine()}\n",
         "\n".join(
             ["| benchmark | shows | exit code | seconds |", "| --- | --- | --- | ---: |", *rows]
         )
@@ -152,7 +152,8 @@ def page(runs: list[Run]) -> str:
     return "\n".join(parts)
 
 
-def _machine() -> str:
+def machine() -> str:
+    """The processor, the system and the versions of what is measured."""
     model = platform.processor() or platform.machine()
     cpus = Path("/proc/cpuinfo")
     if cpus.exists():

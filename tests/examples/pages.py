@@ -93,3 +93,13 @@ def prose_of(page):
         elif not fenced:
             kept.append(line)
     return "\n".join(kept)
+
+
+def matches(shown, printed):
+    """Whether ``printed`` is as ``shown``, where ``...`` stands for any text."""
+    parts = [re.escape(part) for part in _plain(shown).split("...")]
+    return re.fullmatch(".*?".join(parts), _plain(printed), re.DOTALL) is not None
+
+
+def _plain(text):
+    return "\n".join(line.rstrip() for line in text.strip().splitlines())

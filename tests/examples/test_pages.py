@@ -9,7 +9,7 @@ import tomllib
 
 import pytest
 from commands import run_line
-from pages import PAGES, ROOT, blocks_of, indented_code, prose_of
+from pages import PAGES, ROOT, blocks_of, indented_code, matches, prose_of
 from tables import TABLES, tables_in, with_tables
 
 import miurafab
@@ -77,16 +77,6 @@ class Page:
 def _compare(block, printed):
     if block.shown is not None:
         assert matches(block.shown, printed), f"shown:\n{block.shown}\nprinted:\n{printed}"
-
-
-def matches(shown, printed):
-    """Whether ``printed`` is as ``shown``, where ``...`` stands for any text."""
-    parts = [re.escape(part) for part in _plain(shown).split("...")]
-    return re.fullmatch(".*?".join(parts), _plain(printed), re.DOTALL) is not None
-
-
-def _plain(text):
-    return "\n".join(line.rstrip() for line in text.strip().splitlines())
 
 
 @pytest.fixture(scope="session")
