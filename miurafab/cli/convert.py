@@ -57,7 +57,8 @@ def convert(
     for finding in done.findings:
         console.note(finding.sentence)
     report = done.report()
+    hidden = {"findings"} if target.suffix.lower() == ".fold" else {"findings", "folded_form"}
     console.answer(
-        report, lambda: console.facts({k: v for k, v in report.items() if k != "findings"})
+        report, lambda: console.facts({k: v for k, v in report.items() if k not in hidden})
     )
     return DONE

@@ -174,7 +174,7 @@ def _stream(
 
         def show_progress(now: SheetProgress) -> None:
             bar(
-                now.stroke / max(now.strokes, 1),
+                now.share,
                 f"sheet {now.number} of {len(prepared.jobs)}, stroke {now.stroke} of "
                 f"{now.strokes}, {clock_text(now.seconds_left)} left, {now.stream.state}"
                 + (f", {words}" if (words := now.stream.overrides.words) else ""),

@@ -53,4 +53,4 @@ def surfaces(*, console: Console = Console()) -> int:
 
 
 def _defaults(parameters: Mapping[str, SurfaceParameter]) -> str:
-    return ",".join(f"{key}={each.default_text}" for key, each in parameters.items())
+    return ", ".join(f"{key}={each.default_text}" for key, each in parameters.items())

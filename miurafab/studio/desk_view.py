@@ -72,7 +72,7 @@ def progress_table(operator: Operator) -> dict[str, Any]:
         table["waits"] = told.partition(":")[0] if told.startswith("waiting") else ""
         table["progress"] = {
             "stroke": progress.stroke,
-            "share": max(0.0, 1.0 - progress.seconds_left / max(operator.burn().seconds, 1e-3)),
+            "share": progress.share,
             "words": stroke_words(progress.stroke, progress.strokes, progress.seconds_left),
         }
     return table

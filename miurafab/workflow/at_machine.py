@@ -11,6 +11,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from miurafab.errors import InputError, MiurafabError, PersonNeeded
+from miurafab.gcode.program import strokes
 from miurafab.machine.known_controller import MachineState
 from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.session_process import Heard, Outcome, SessionProcess
@@ -130,8 +131,7 @@ class Operator:
 
     def _place(self, now: Progress) -> None:
         if self._timeline is not None:
-            done, left = self._timeline.place(now)
-            self.progress = SheetProgress(self.number, done, self._timeline.strokes, left, now)
+            self.progress = self._timeline.place(self.number, now)
 
     def _end(self, outcome: Outcome) -> None:
         if outcome.action == self.busy:
@@ -226,7 +226,7 @@ class Operator:
         power = float(burning.max()) / tool.s_max if len(burning) else 0.0
         return Burn(
             self.sheet,
-            Timeline(expected, 0).strokes,
+            len(strokes(expected.program)),
             expected.seconds,
             expected.bounds_mm,
             "" if job.directory is None else job.directory.layout.material,

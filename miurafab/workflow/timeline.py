@@ -20,11 +20,14 @@ from miurafab.workflow.dry_run import SheetPreview
 
 @dataclass(frozen=True, slots=True)
 class SheetProgress:
-    """Where sheet ``number`` (from 1) is: strokes done of all, and the seconds left."""
+    """Where sheet ``number`` (from 1) is: strokes done of all, the ``share`` of its time that is
+    over, and the seconds left.
+    """
 
     number: int
     stroke: int
     strokes: int
+    share: float
     seconds_left: float
     stream: Progress
 
@@ -34,15 +37,15 @@ class Timeline:
 
     def __init__(self, sheet: SheetPreview, blocks: int) -> None:
         burnt = strokes(sheet.program)
-        self.strokes = len(burnt)
+        self._strokes = len(burnt)
         self._stroke_ends = burnt.last_move
         self._program = sheet.program
         self._ends = np.concatenate([[0.0], sheet.end_seconds])
         self._blocks = blocks
         self._move = 0  # the move being made; never decreases
 
-    def place(self, now: Progress) -> tuple[int, float]:
-        """The strokes done, and the seconds left."""
+    def place(self, number: int, now: Progress) -> SheetProgress:
+        """Where the sheet is, which is sheet ``number``."""
         planned = int(np.searchsorted(self._program.line, now.line, side="right"))
         first, share = max(self._move, planned - self._blocks - 2), 0.0
         if now.state == "Idle" and now.lines_acknowledged == now.lines_total:
@@ -60,8 +63,11 @@ class Timeline:
         done = int(np.searchsorted(self._stroke_ends, first))
         begun = self._ends[first]
         ended = self._ends[min(first + 1, len(self._ends) - 1)]
-        left = self._ends[-1] - begun - share * (ended - begun)
-        return done, max(0.0, float(left)) * 100.0 / max(now.overrides.feed, 1)
+        over = float(begun + share * (ended - begun))
+        total = float(self._ends[-1])
+        left = max(0.0, total - over) * 100.0 / max(now.overrides.feed, 1)
+        of_time = min(over / total, 1.0) if total else 1.0
+        return SheetProgress(number, done, self._strokes, of_time, left, now)
 
 
 def placed(
@@ -75,11 +81,7 @@ def placed(
         return None
     timeline = Timeline(sheet, blocks)
 
-    def tell(now: Progress) -> None:
-        done, left = timeline.place(now)
-        on_progress(SheetProgress(number, done, timeline.strokes, left, now))
-
-    return tell
+    return lambda now: on_progress(timeline.place(number, now))
 
 
 def _nearest(at: Floats, start: Floats, end: Floats) -> tuple[Floats, Floats]:

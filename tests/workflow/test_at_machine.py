@@ -56,8 +56,8 @@ def test_what_will_burn_is_found_once_a_sheet(tmp_path, monkeypatch):
     job.write_text("M4 S0\nG0 X5\nG1 X15 S500 F3000\nM5\n")
     operator = Operator(Held(), prepare(job), CutOptions())
     asked = []
-    real = at_machine.Timeline
-    monkeypatch.setattr(at_machine, "Timeline", lambda *given: asked.append(given) or real(*given))
+    real = at_machine.strokes
+    monkeypatch.setattr(at_machine, "strokes", lambda one: asked.append(one) or real(one))
     told = {operator.describe() for _ in range(3)}
     assert len(told) == len(asked) == 1
     assert told.pop().startswith("line.nc: 1 strokes, about 0:0")
