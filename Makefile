@@ -88,7 +88,8 @@ lock: $(TOOLS)/installed
 	$(COMPILE) locks/tools.in --output-file locks/tools.txt
 	$(COMPILE) pyproject.toml locks/build.in --output-file locks/run.txt
 	$(COMPILE) pyproject.toml locks/build.in --extra dev --constraints locks/run.txt --output-file locks/dev.txt
-	$(COMPILE) pyproject.toml --extra bench --extra cluster --extra host --extra layers --extra step --constraints locks/dev.txt --output-file locks/extras.txt
+	$(COMPILE) pyproject.toml --extra cluster --extra host --extra layers --extra step --constraints locks/dev.txt --output-file locks/extras.txt
+	$(COMPILE) pyproject.toml --extra bench --constraints locks/dev.txt --output-file locks/bench.txt
 	npm update --prefix tests/interop --package-lock-only --no-audit --no-fund
 
 # Asks the services of PyPI and npm for known weaknesses, and so needs the network. It fails where
@@ -96,6 +97,7 @@ lock: $(TOOLS)/installed
 audit: $(TOOLS)/installed
 	$(AUDIT) --requirement locks/dev.txt
 	$(AUDIT) --requirement locks/extras.txt
+	$(AUDIT) --requirement locks/bench.txt
 	$(AUDIT) --requirement locks/tools.txt
 	npm audit --prefix tests/interop --package-lock-only
 

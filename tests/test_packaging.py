@@ -61,7 +61,8 @@ def test_the_same_source_gives_the_same_packages(installed, tmp_path):
 LOCKS = {
     "run": ("build.in", ()),
     "dev": ("build.in", ("dev",)),
-    "extras": (None, ("bench", "cluster", "host", "layers", "step")),
+    "extras": (None, ("cluster", "host", "layers", "step")),
+    "bench": (None, ("bench",)),
     "tools": ("tools.in", None),
 }
 """What `make lock` makes each file of: a list beside it, and extras of pyproject.toml."""
@@ -125,12 +126,13 @@ def test_the_lock_files_pin_what_their_libraries_ask_for():
 
 
 def test_the_lock_files_agree_on_versions():
-    run, dev, extras = (
+    run, dev, *others = (
         {name: entry.split()[0] for name, entry in pinned(lock).items()}
-        for lock in ("run", "dev", "extras")
+        for lock in ("run", "dev", "extras", "bench")
     )
     assert run.items() <= dev.items()
-    assert {name: extras[name] for name in extras.keys() & dev.keys()}.items() <= dev.items()
+    for lock in others:
+        assert {name: lock[name] for name in lock.keys() & dev.keys()}.items() <= dev.items()
 
 
 def test_make_lock_makes_each_lock_file():
@@ -140,7 +142,8 @@ def test_make_lock_makes_each_lock_file():
     made = {lock: inputs.split() for inputs, lock in made.items()}
     assert made.keys() == LOCKS.keys() == {p.stem for p in (ROOT / "locks").glob("*.txt")}
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert {"dev", *LOCKS["extras"][1]} == project["optional-dependencies"].keys()
+    locked = [extra for _, extras in LOCKS.values() for extra in extras or ()]
+    assert sorted(locked) == sorted(project["optional-dependencies"])
     for lock, (beside, extras) in LOCKS.items():
         given = [] if extras is None else ["pyproject.toml"]
         given += [] if beside is None else [f"locks/{beside}"]
