@@ -3,8 +3,9 @@
 With ``--json`` a failure is also one object ``{"error": ..., "kind": ...}`` on standard output.
 A sentence of a room below names options in backticks; here they are written ``--min-edge``.
 
-An exception that no command expects is a defect of miurafab: the traceback goes to a log file, and
-the sentence (and ``"log"`` in the object) says where it is.
+An exception that no command expects comes of a library that is missing or broken, which is told
+with the command that mends it. Else it is a defect of miurafab: the traceback goes to a log file,
+and the sentence (and ``"log"`` in the object) says where it is.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from miurafab.errors import (
 from miurafab.files import state_folder, write_text
 from miurafab.version import __version__
 from miurafab.workflow.json_text import json_text
+from miurafab.workflow.libraries import library_problems
 
 
 def flag(name: str) -> str:
@@ -78,6 +80,8 @@ def _failed(error: Exception) -> int:
         return _fail(error.sentence, type(error).__name__, error.exit_code)
     if isinstance(error, OSError):
         return _end_of_os_error(error)
+    if not isinstance(error, MemoryError) and (broken := library_problems(error)):
+        return _fail(" ".join(broken), "LibraryError", BAD_INPUT)
     return _defect(error)
 
 

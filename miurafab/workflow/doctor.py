@@ -7,17 +7,11 @@ read. Each problem ends with the command that mends it.
 
 from __future__ import annotations
 
-import getpass
-import importlib
 import importlib.metadata
-import importlib.util
 import io
 import os
 import platform
-import re
-import shlex
 import shutil
-import sys
 import webbrowser
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -28,6 +22,7 @@ from miurafab.errors import ProfileError
 from miurafab.profiles import known_names, load_machine, load_material
 from miurafab.profiles.own import configuration_folder
 from miurafab.version import __version__
+from miurafab.workflow.libraries import examined_libraries, not_installed, pip_install
 from miurafab.workflow.ports import Port, no_port, serial_ports
 
 ROOM_NEEDED_MB = 100
@@ -40,8 +35,6 @@ EXTRAS = {
     "step": ("cascadio", "STEP files"),
 }
 """What each extra brings, and what it is for."""
-
-_MODULES = {"fonttools": "fontTools", "pillow": "PIL", "pyserial": "serial"}  # others: their name
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,19 +90,15 @@ def doctor() -> Examination:
     }
     problems, notes = [], []
     try:
-        needed = importlib.metadata.requires("miurafab") or []
+        for name, versions[name], trouble in examined_libraries():
+            problems += [trouble] if trouble else []
     except importlib.metadata.PackageNotFoundError:
-        needed = []
-        problems.append("miurafab runs from its source and is not installed; run pip install .")
-    for name, least in _needs(needed):
-        versions[name], trouble = _library(name, least)
-        if trouble:
-            problems.append(trouble)
+        problems.append(not_installed())
     for extra, (name, purpose) in EXTRAS.items():
         try:
             versions[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
-            notes.append(f"{name}, for {purpose}, is not installed: {_pip()} 'miurafab[{extra}]'")
+            notes.append(f"{name}, for {purpose}, is not installed: {pip_install()} 'miurafab[{extra}]'")
     problems += _plot_problems()
     ports = serial_ports()
     problems.extend(f"{port.device}: {port.trouble}." for port in ports if port.trouble)
@@ -130,45 +119,6 @@ def doctor() -> Examination:
     return Examination(versions, ports, tuple(problems), tuple(notes))
 
 
-def _needs(requirements: list[str]) -> list[tuple[str, str]]:
-    """The names and least versions in lines such as ``numpy>=2.1``, without those that only an
-    extra asks for.
-    """
-    always = (line for line in requirements if "extra ==" not in line)
-    found = (re.match(r"([\w.-]+)(?:\[.*\])?\s*(?:>=([\w.]+))?", line) for line in always)
-    return sorted({(line[1], line[2] or "") for line in found if line})
-
-
-def _library(name: str, least: str) -> tuple[str, str | None]:
-    """The version of the library ``name``, and what is wrong with it."""
-    try:
-        version = importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return "missing", f"{name} is not installed; run {_pip()} {name}."
-    if _numbers(version) < _numbers(least):
-        return version, f"{name} is {version}; run {_pip()} --upgrade '{name}>={least}'."
-    try:
-        importlib.import_module(_MODULES.get(name.lower(), name.replace("-", "_")))
-    except (ImportError, OSError, ValueError) as fault:  # ValueError: built for another numpy
-        told = " ".join(str(fault).split())
-        return version, f"{name} does not load ({told}); run {_pip()} --force-reinstall {name}."
-    return version, None
-
-
-def _pip() -> str:
-    """What installs into this environment, which has no pip of its own where uv made it."""
-    python = shlex.quote(sys.executable)
-    if importlib.util.find_spec("pip") is None:
-        return f"uv pip install --python {python}"
-    return f"{python} -m pip install"
-
-
-def _numbers(version: str) -> tuple[int, ...]:
-    """The leading numbers of a version: (2, 1) of ``2.1rc1``."""
-    found = re.match(r"\d+(?:\.\d+)*", version)
-    return tuple(map(int, found[0].split("."))) if found else ()
-
-
 def _plot_problems() -> list[str]:
     """What keeps a plot from being drawn."""
     try:
@@ -177,7 +127,7 @@ def _plot_problems() -> list[str]:
         Figure((1, 1)).savefig(io.BytesIO(), format="png")
     except (ImportError, OSError, ValueError, RuntimeError) as fault:
         told = " ".join(str(fault).split())
-        return [f"No plot is drawn ({told}); run {_pip()} --force-reinstall matplotlib pillow."]
+        return [f"No plot is drawn ({told}); run {pip_install()} --force-reinstall matplotlib pillow."]
     return []
 
 
@@ -191,8 +141,8 @@ def _folder_problems(folder: Path) -> list[str]:
     if os.access(there, os.W_OK | os.X_OK):
         return []
     return [
-        f"Your own profiles cannot be written to {folder}; run sudo chown -R "
-        f"{getpass.getuser()} {there}, or name another folder in XDG_CONFIG_HOME."
+        f"Your own profiles cannot be written to {folder}; run sudo chown -R $(id -u) {there}, or "
+        "name another folder in XDG_CONFIG_HOME."
     ]
 
 

@@ -43,12 +43,30 @@ def _trouble(device: str) -> str | None:
     path = Path(device)
     if not path.exists() or os.access(path, os.R_OK | os.W_OK):
         return None
-    return f"you may not open it; {_join(path.group())}"
+    return f"you may not open it; {_join(_group(path))}"
+
+
+def _group(path: Path) -> str:
+    """The group of ``path``: its number where it has no name, as in a container."""
+    try:
+        return path.group()
+    except KeyError:
+        return str(path.stat().st_gid)
+
+
+def _user() -> str | None:
+    """The name of the user; in a container, users may have none."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # until and from Python 3.13
+        return None
 
 
 def _join(group: str) -> str:
     """How the user joins ``group``."""
-    user = getpass.getuser()
+    user = _user()
+    if user is None or group.isdecimal():
+        return f"it needs its group: run the container with --group-add {group}"
     if user in (_members(group) or ()):
         return f"you are in its group {group} from your next login on: log out and in again"
     return f"join its group: sudo usermod -aG {group} {user}, then log in again"

@@ -6,6 +6,7 @@ import importlib.metadata
 import importlib.util
 import os
 import shlex
+import subprocess
 import sys
 import tomllib
 import webbrowser
@@ -17,6 +18,7 @@ from packaging.requirements import Requirement
 import miurafab as mf
 from miurafab.workflow import doctor as doctor_module
 from miurafab.workflow import ports as ports_module
+from miurafab.workflow.libraries import library_problems
 
 PIP = f"{shlex.quote(sys.executable)} -m pip install"
 REQUIRED = ["numpy>=2.1", "resvg_py>=0.4", "casadi>=3.6; extra == 'bench'"]
@@ -57,9 +59,11 @@ def test_a_source_tree_is_named_as_one(monkeypatch):
         raise importlib.metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr(importlib.metadata, "requires", absent)
-    assert "miurafab runs from its source and is not installed; run pip install ." in (
-        mf.doctor().problems
-    )
+    checkout = Path(mf.__file__).parents[1]
+    told = f"miurafab runs from its source and is not installed; run {PIP} {checkout}."
+    assert told in mf.doctor().problems
+    assert library_problems(ImportError("No module named 'numpy'")) == (told,)
+    assert library_problems(ValueError("ours")) == ()
 
 
 def test_a_library_that_is_too_old_or_does_not_load_stops_a_job(installed):
@@ -131,6 +135,26 @@ def test_a_port_that_may_not_be_opened_names_its_group(installed, tmp_path, list
     assert f"{device}: you may not open it; {way}." in mf.doctor().problems
 
 
+@pytest.mark.parametrize("fault", [KeyError("uid not found"), OSError("No username set")])
+def test_a_user_or_a_group_without_a_name_is_one_of_a_container(installed, tmp_path, fault):
+    device = tmp_path / "ttyUSB0"
+    device.touch()
+
+    def nameless(*_):
+        raise fault
+
+    installed.setattr(ports_module, "list_ports", lambda: [(str(device), "CH340")])
+    installed.setattr(os, "access", lambda path, mode: path != device)
+    installed.setattr(ports_module.getpass, "getuser", nameless)
+    installed.setattr(Path, "group", lambda self: "dialout")
+    way = "you may not open it; it needs its group: run the container with --group-add"
+    assert [port.trouble for port in mf.doctor().ports] == [f"{way} dialout"]
+    installed.setattr(Path, "group", lambda self: {}[self])
+    assert [port.trouble for port in mf.doctor().ports] == [f"{way} {device.stat().st_gid}"]
+    installed.setattr(os, "access", lambda path, mode: False)
+    assert any("sudo chown -R $(id -u) " in problem for problem in mf.doctor().problems)
+
+
 def test_before_a_port_is_plugged_in_its_group_is_told(installed):
     installed.setattr(ports_module, "list_ports", list)
     installed.setattr(ports_module.sys, "platform", "linux")
@@ -154,3 +178,22 @@ def test_profiles_that_cannot_be_written_are_a_problem(installed, tmp_path):
     (tmp_path / "config").write_text("")
     (problem,) = mf.doctor().problems
     assert f"run mv {tmp_path / 'config'} {tmp_path / 'config'}.old." in problem
+
+
+@pytest.mark.parametrize("name", ["cyclopts", "numpy"])
+def test_a_library_without_which_the_program_does_not_start_is_named(tmp_path, name):
+    """By ``doctor`` as by any command, with no word of a defect."""
+    (tmp_path / f"{name}.py").write_text("raise ImportError('broken')")
+    paths = os.pathsep.join([str(tmp_path), str(Path(mf.__file__).parents[1])])
+    done = subprocess.run(
+        [sys.executable, "-m", "miurafab", "doctor"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": paths, "XDG_STATE_HOME": str(tmp_path / "state")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    told = f"{name} does not load (broken); run {PIP} --force-reinstall {name}."
+    assert done.stderr == f"miurafab: {told}\n"
+    assert not (tmp_path / "state").exists()
