@@ -6,18 +6,20 @@
 
 The last commit is cloned into a new folder, where README's own commands make the environment. Each
 command then runs in a terminal of 100 columns, in that folder, one after the other, as printed. The
-rules by which it departs from print are those of ``tests/examples/commands.py``: the virtual machine
-stands in for each port, and a server is stopped when it has said where it serves. The Python of a
-page is run as one program.
+rules by which it departs from print are those of ``tests/examples/commands.py``: the virtual
+machine stands in for each port, and a server is stopped when it has said where it serves. The
+Python of a page is run as one program.
 
 A row has the command, its seconds, those of the processor, the longest time in which the terminal
 showed nothing new, and the files that it wrote. A command that ends with another code than the page
-promises, or prints something else, ends the walk.
+promises, or prints something else, ends the walk. Beside these tables is one of what the new
+environment takes on the disk, library by library.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import pty
 import re
@@ -55,6 +57,22 @@ WALKED = {
 
 LEFT_OUT = {"make test": "the tests, see `.ci/run`"}
 """Commands that are not walked, and why."""
+
+SIZED = """
+import importlib.metadata, json
+print(json.dumps({
+    each.name: sum(path.stat().st_size for path in map(each.locate_file, each.files or ())
+                   if path.is_file())
+    for each in importlib.metadata.distributions()
+}))
+"""
+"""Prints the bytes of each library of the Python that runs it."""
+
+NOT_THE_READERS = (".venv", ".git", "__pycache__")
+"""Folders in which a reader looks for nothing."""
+
+SMALL_MB = 1.0
+"""Libraries below this are one row together."""
 
 HEAD = ("command", "seconds", "processor", "silent", "wrote")
 _ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -122,7 +140,9 @@ def files_of(page: Path) -> Iterator[tuple[str, str]]:
             yield block.directives["file"], block.text
 
 
-def in_terminal(words: list[str], folder: Path, environment: dict[str, str], *, serves: bool) -> Ran:
+def in_terminal(
+    words: list[str], folder: Path, environment: dict[str, str], *, serves: bool
+) -> Ran:
     """Run ``words`` in a terminal of 100 columns and read what it shows.
 
     A process that ``serves`` is interrupted, as by Ctrl-C, after its first line.
@@ -183,6 +203,20 @@ class Walk:
         words = ["git", "clone", "--quiet", str(ROOT), str(self.folder)]
         subprocess.run(words, check=True)
 
+    def sizes(self) -> str:
+        """A table of what the libraries of the new environment take."""
+        words = [str(self.folder / ".venv" / "bin" / "python"), "-c", SIZED]
+        told = subprocess.run(
+            words, capture_output=True, text=True, check=True, env=self.environment
+        )
+        sizes = {name: size / 1e6 for name, size in json.loads(told.stdout).items()}
+        large = sorted((size, name) for name, size in sizes.items() if size >= SMALL_MB)
+        rows = [(f"`{name}`", f"{size:.0f}") for size, name in reversed(large)]
+        rest = [size for size in sizes.values() if size < SMALL_MB]
+        rows.append((f"{len(rest)} others", f"{sum(rest):.0f}"))
+        rows.append(("all", f"{sum(sizes.values()):.0f}"))
+        return markdown(("library", "MB"), rows)
+
     def page(self, page: Path) -> list[tuple[str, ...]]:
         """The rows of all that ``page`` tells a reader to run."""
         for name, text in files_of(page):
@@ -226,11 +260,13 @@ class Walk:
         """Every file that a command may have written, by its name for the reader."""
         found = {}
         for root, title in ((self.folder, ""), (self.home, "configuration/")):
-            for path in root.rglob("*"):
-                name = path.relative_to(root).as_posix()
-                if not re.match(r"\.venv/|\.git/|.*__pycache__", name) and path.is_file():
+            for folder, folders, names in os.walk(root):
+                folders[:] = [name for name in folders if name not in NOT_THE_READERS]
+                for name in names:
+                    path = Path(folder, name)
                     told = path.stat()
-                    found[title + name] = (told.st_mtime_ns, told.st_size)
+                    written = path.relative_to(root).as_posix()
+                    found[title + written] = (told.st_mtime_ns, told.st_size)
         return found
 
     def _wrote(self, before: dict[str, tuple[int, int]]) -> str:
@@ -256,12 +292,13 @@ def main() -> None:
         walk.clone()
         if asked.only not in (None, "readme"):
             walk.step(Step("make demo"))
-        tables = {
+        tables = {"machine": f"{machine()}\n"}
+        tables |= {
             title: markdown(HEAD, walk.page(page))
             for title, page in WALKED.items()
             if asked.only in (None, title)
         }
-    tables |= {"machine": f"{machine()}\n"}
+        tables["libraries"] = walk.sizes()
     write_tables(PAGE if asked.only is None else None, "newcomer", tables)
 
 

@@ -90,7 +90,8 @@ def doctor() -> Examination:
     }
     problems, notes = [], []
     try:
-        for name, versions[name], trouble in examined_libraries():
+        for name, version, trouble in examined_libraries():
+            versions[name] = version
             problems += [trouble] if trouble else []
     except importlib.metadata.PackageNotFoundError:
         problems.append(not_installed())
@@ -98,7 +99,9 @@ def doctor() -> Examination:
         try:
             versions[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
-            notes.append(f"{name}, for {purpose}, is not installed: {pip_install()} 'miurafab[{extra}]'")
+            notes.append(
+                f"{name}, for {purpose}, is not installed: {pip_install()} 'miurafab[{extra}]'"
+            )
     problems += _plot_problems()
     ports = serial_ports()
     problems.extend(f"{port.device}: {port.trouble}." for port in ports if port.trouble)
@@ -127,7 +130,9 @@ def _plot_problems() -> list[str]:
         Figure((1, 1)).savefig(io.BytesIO(), format="png")
     except (ImportError, OSError, ValueError, RuntimeError) as fault:
         told = " ".join(str(fault).split())
-        return [f"No plot is drawn ({told}); run {pip_install()} --force-reinstall matplotlib pillow."]
+        return [
+            f"No plot is drawn ({told}); run {pip_install()} --force-reinstall matplotlib pillow."
+        ]
     return []
 
 

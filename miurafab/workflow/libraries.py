@@ -87,7 +87,10 @@ def _library(name: str, least: str, *, loads: bool) -> tuple[str, str | None]:
         importlib.import_module(_MODULES.get(name.lower(), name.replace("-", "_")))
     except (ImportError, OSError, ValueError) as fault:  # ValueError: built for another numpy
         told = " ".join(str(fault).split())
-        return version, f"{name} does not load ({told}); run {pip_install()} --force-reinstall {name}."
+        return (
+            version,
+            f"{name} does not load ({told}); run {pip_install()} --force-reinstall {name}.",
+        )
     return version, None
 
 

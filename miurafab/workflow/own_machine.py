@@ -71,7 +71,8 @@ def add_machine(
     Raises
     ------
     InputError
-        For a name that cannot be one or is that of another machine, and if neither or both sources are given.
+        For a name that cannot be one or is that of another machine, and if neither or both sources
+        are given.
     ProfileError
         Where the settings do not make a machine.
     MachineError
