@@ -11,9 +11,9 @@ machine stands in for each port, and a server is stopped when it has said where 
 Python of a page is run as one program.
 
 A row has the command, its seconds, those of the processor, the longest time in which the terminal
-showed nothing new, and the files that it wrote. A command that ends with another code than the page
-promises, or prints something else, ends the walk. Beside these tables is one of what the new
-environment takes on the disk, library by library.
+showed nothing new, and the files that it wrote. If a command ends with another code than the page
+promises, or prints something else, that is told at the end, and nothing is written. Beside these
+tables is one of what the new environment takes on the disk, library by library.
 """
 
 from __future__ import annotations
@@ -194,6 +194,7 @@ class Walk:
         self.folder = folder / "miurafab"
         self.home = folder / "configuration"
         self.log = log
+        self.faults: list[str] = []
         own = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
         beside = f"{self.folder / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}"
         self.environment = {**own, "PATH": beside, "XDG_CONFIG_HOME": str(self.home)}
@@ -224,7 +225,7 @@ class Walk:
         return [self.step(step) for step in steps_of(page)]
 
     def step(self, step: Step) -> tuple[str, ...]:
-        """Run ``step`` and give its row; ends the walk if it is not as promised."""
+        """Run ``step`` and give its row; what is not as promised is one of the ``faults``."""
         name = f"`{step.command}`" if step.program is None else step.command
         if step.why_not:
             return name, "", "", "", f"not run: {step.why_not}"
@@ -237,9 +238,9 @@ class Walk:
                 kept.write(f"$ {step.command}\n{ran.text}\n")
         promised = {0, 130} if serves else {step.code}
         if ran.code not in promised:
-            sys.exit(f"{step.command} ended with {ran.code}:\n{ran.text}")
+            self.faults.append(f"{step.command} ended with {ran.code}:\n{ran.text}")
         if step.shown is not None and not matches(f"...{step.shown}", ran.text):
-            sys.exit(f"{step.command} printed:\n{ran.text}\nand not:\n{step.shown}")
+            self.faults.append(f"{step.command} printed:\n{ran.text}\nand not:\n{step.shown}")
         figures = (f"{value:.1f}" for value in (ran.seconds, ran.processor, ran.silent))
         return name, *figures, self._wrote(before)
 
@@ -299,6 +300,8 @@ def main() -> None:
             if asked.only in (None, title)
         }
         tables["libraries"] = walk.sizes()
+    if walk.faults:
+        sys.exit("\n".join(walk.faults))
     write_tables(PAGE if asked.only is None else None, "newcomer", tables)
 
 

@@ -27,7 +27,7 @@ def completion(
 
     bash: add 'eval "$(miurafab completion bash)"' to ~/.bashrc.
 
-    zsh: write the script to a file named _miurafab in a folder of $fpath.
+    zsh: write the script to a file named _miurafab in a folder of $fpath; compinit finds it.
 
     fish: write the script to ~/.config/fish/completions/miurafab.fish.
 
@@ -35,5 +35,7 @@ def completion(
     """
     # The command line takes one of SHELLS only, which a str does not say.
     script = program.generate_completion(shell=shell)  # type: ignore[arg-type]
+    # zsh calls a function by the name of its file, which is that of the program
+    script = script.replace("\n_cyclopts_miurafab() {", "\n_miurafab() {")
     console.answer({"shell": shell, "script": script}, lambda: print(script, file=sys.stdout))
     return DONE

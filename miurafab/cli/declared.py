@@ -11,6 +11,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any, get_origin
 
 from cyclopts import Group, Parameter, Token
@@ -18,6 +19,9 @@ from cyclopts import Group, Parameter, Token
 from miurafab.cli.ending import flag, spelled
 from miurafab.errors import OptionError
 from miurafab.options import Choice, Declared, Flag, Kind, Several, Text, declared
+
+Named = str | Path
+"""What is a name or a file: text, for which shells complete files."""
 
 ARGUMENTS = Group("Arguments", sort_key=0)
 OPTIONS = Group("Options", sort_key=1)
@@ -76,7 +80,7 @@ def _read(kind: Kind, token: Token) -> Any:
 
 
 TargetArgument = Annotated[
-    str,
+    Named,
     argument(
         "TARGET",
         "A named surface (hypar:height=0.5), a formula (formula:z=x*y/2), a design .toml, a mesh "

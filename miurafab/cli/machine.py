@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from miurafab.cli import open_session
 from miurafab.cli.console import Console
-from miurafab.cli.declared import MachineOption, argument, option, takes
+from miurafab.cli.declared import MachineOption, Named, argument, option, takes
 from miurafab.errors import DONE
 from miurafab.findings import findings_json
 from miurafab.options import Flag, Text, Whole, declared, feed, length, read_options
@@ -183,7 +183,7 @@ _NO_FRAME = ("check_mode", "resume", "frame", "from_stroke", "allow_m3", "force"
 
 @takes(_frame_options, without=_NO_FRAME)
 def frame(
-    thing: Annotated[str, argument("THING", "A job directory or a G-code file.")],
+    thing: Annotated[Named, argument("THING", "A job directory or a G-code file.")],
     /,
     *,
     port: Annotated[

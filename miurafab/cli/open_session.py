@@ -12,7 +12,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 from miurafab.cli.console import Console
-from miurafab.cli.declared import MachineOption, argument, option, takes
+from miurafab.cli.declared import MachineOption, Named, argument, option, takes
 from miurafab.errors import DONE, InputError, JobStopped, MachineError
 from miurafab.options import Text, length, read_options
 from miurafab.profiles.own import own_defaults
@@ -66,7 +66,7 @@ def open_(
         str | None, argument("PORT", "As --port. Without either it is that of 'miurafab use'.")
     ] = None,
     thing: Annotated[
-        str | None, argument("THING", "A job directory or a G-code file to frame and to cut.")
+        Named | None, argument("THING", "A job directory or a G-code file to frame and to cut.")
     ] = None,
     /,
     *,

@@ -15,7 +15,7 @@ from typing import Annotated, Protocol
 from cyclopts import Group, Parameter
 
 from miurafab.cli.console import Console
-from miurafab.cli.declared import argument, option
+from miurafab.cli.declared import Named, argument, option
 from miurafab.errors import DONE, InputError
 from miurafab.files import read_text
 from miurafab.options import File, Flag, Text, Whole
@@ -49,7 +49,7 @@ class ServeStudio(Protocol):
 
 def studio(
     thing: Annotated[
-        str | None,
+        Named | None,
         argument(
             "FILE|TARGET",
             "What to begin with: a pattern .fold, a named surface (hypar:height=0.5), a design "
@@ -110,7 +110,7 @@ def studio(
     if host is None and (password_file or certificate or certificate_key):
         raise InputError("A password and a certificate are for `host`; give it, too.")
     serve(
-        thing,
+        None if thing is None else str(thing),
         port=port,
         open_browser=not no_browser,
         host=host,

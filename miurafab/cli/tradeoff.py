@@ -51,7 +51,7 @@ def tradeoff(
         found = miurafab.tradeoff(target, on_progress=progress, **given)
     answer = found.report()
     if out is not None and (found.curves or out.suffix.lower() == ".csv"):
-        found.save(out, title=target)
+        found.save(out, title=str(target))
         answer["file"] = str(out)
 
     def show() -> None:

@@ -12,8 +12,7 @@ import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from miurafab.errors import InputError
-from miurafab.files import read_text, write_text
+from miurafab.files import write_text
 from miurafab.options import Text
 from miurafab.profiles.table import Table, read_toml, toml_text
 
@@ -47,18 +46,6 @@ def own_defaults() -> OwnDefaults:
     found = {each.name: table.value(each.name, Text(), None) for each in fields(OwnDefaults)}
     table.finish()
     return OwnDefaults(**found)
-
-
-def write_own(path: Path, text: str) -> None:
-    """Write the ``text`` of a new profile; a file that is there must say the same."""
-    if path.exists():
-        if read_text(path, InputError, "a profile") != text:
-            raise InputError(
-                f"{path} exists already and says something else; choose another name or remove it."
-            )
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, text)
 
 
 def write_defaults(defaults: OwnDefaults) -> Path:

@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from miurafab.errors import InputError, OptionError, ProfileError
-from miurafab.files import AnyPath, as_path
+from miurafab.files import AnyPath, as_path, write_text
 from miurafab.grbl.settings import Settings
 from miurafab.machine.actions import read_dump, read_settings
 from miurafab.options import read_options
 from miurafab.profiles import MachineProfile, find_profile, load_machine, read_toml
 from miurafab.profiles.beam import Laser
 from miurafab.profiles.board import PLACES, told
-from miurafab.profiles.own import write_own
 from miurafab.profiles.shipped import own_directory
 from miurafab.profiles.table import toml_text
 from miurafab.simulate.grbl.controller import virtual_settings
@@ -71,8 +70,7 @@ def add_machine(
     Raises
     ------
     InputError
-        For a name that cannot be one or is that of another machine, and if neither or both sources
-        are given.
+        For a name that cannot be one or is taken, and if neither or both sources are given.
     ProfileError
         Where the settings do not make a machine.
     MachineError
@@ -89,6 +87,8 @@ def add_machine(
     if not _NAME.fullmatch(name):
         raise InputError(f"'{name}' cannot name a machine; use letters, digits, '-' and '_'.")
     path = own_directory("firmware_profiles") / f"{name}.toml"
+    if path.exists():
+        raise InputError(f"{path} exists already; choose another name or remove it.")
     if (port is None) == (settings is None):
         raise InputError("Give the `port` of the board, or a file of its `settings`.")
     base = find_profile("firmware_profiles", like)
@@ -107,8 +107,9 @@ def add_machine(
         values.setdefault("controller", {})["baud"] = speed
     _take(values, found)
     values["title"] = title or f"{name}, like {base.stem}"
+    path.parent.mkdir(parents=True, exist_ok=True)
     head = f"# From the settings of the board ({source}); the rest is that of {base.stem}.\n"
-    write_own(path, head + toml_text(values))
+    write_text(path, head + toml_text(values))
     try:
         return path, load_machine(path)
     except ProfileError:

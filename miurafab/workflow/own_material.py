@@ -9,12 +9,11 @@ from typing import Any
 
 from miurafab.errors import InputError, ProfileError
 from miurafab.fabrication.perforation import MIN_STROKE_MM
-from miurafab.files import AnyPath, Reading, as_path, file_name, parse_json, read_text
+from miurafab.files import AnyPath, Reading, as_path, file_name, parse_json, read_text, write_text
 from miurafab.options import read_value
 from miurafab.options.verbs import verb
 from miurafab.profiles import Material, find_file, load_material, read_toml
 from miurafab.profiles.material import KERF
-from miurafab.profiles.own import write_own
 from miurafab.profiles.table import toml_text
 from miurafab.workflow.calibrate import CHOICES, SCHEMA, written_operation
 from miurafab.workflow.job_files import settle_job
@@ -40,8 +39,7 @@ def add_material(
     Parameters
     ----------
     name : str or os.PathLike
-        What the material is called, or the path of its file. A file that says something else is not
-        overwritten.
+        What the material is called, or the path of its file. A file is not overwritten.
     directory : str or os.PathLike
         The job directory of the calibration sheet.
     cell : str, optional
@@ -80,6 +78,8 @@ def add_material(
     path = Path(name) if name.endswith(".toml") else Path(f"{name}.toml")
     if not _NAME.fullmatch(path.stem):
         raise InputError(f"'{path.stem}' cannot name a material; use letters, digits, '-' and '_'.")
+    if path.exists():
+        raise InputError(f"{path} exists already; choose another name or remove it.")
     if cell is None and cut is None and score is None and kerf is None:
         raise InputError("Nothing was chosen; give a `cell`, a `cut`, a `score` or a `kerf`.")
     settle_job(directory)
@@ -106,7 +106,7 @@ def add_material(
         if value is not None
     )
     head = f"# {choices['material']} calibrated on {choices['machine']}: {said}.\n"
-    write_own(path, head + toml_text(values))
+    write_text(path, head + toml_text(values))
     try:
         material = load_material(path)
         _drawable(material)

@@ -99,11 +99,7 @@ def test_a_machine_of_ones_own_is_made_from_its_board(run, tmp_path, configurati
     assert (own.bed, own.motion) == (like.bed, like.motion)
     assert own.settings[32] == 1
     assert own.tool.laser == Laser("diode", 10.0, 450.0)
-    again = ("profiles", "add", "mine", "--port", "virtual", *BEAM)
-    assert json.loads(run(*again, "--json").stdout) == made
-    other = (word.replace("10", "20") for word in again)
-    assert "exists already and says something else" in sentence(run(*other), 2)
-    assert miurafab.load_machine("mine") == own
+    assert "exists already" in sentence(run("profiles", "add", "mine", "--port", "virtual"), 2)
     assert run("use", "mine").returncode == 0
     assert miurafab.profiles.read_machine(None) == own
 
