@@ -273,13 +273,15 @@ class Walk:
     def _wrote(self, before: dict[str, tuple[int, int]]) -> str:
         """What is new or changed, a folder with the number of its files."""
         new = [name for name, told in self._files().items() if before.get(name) != told]
-        folders: dict[str, int] = {}
+        folders: dict[str, list[str]] = {}
         for name in sorted(new):
-            top = name if "/" not in name else f"{name.rpartition('/')[0]}/"
-            folders[top] = folders.get(top, 0) + 1
+            folders.setdefault(name.rpartition("/")[0], []).append(name)
+        whole = folders.pop("", [])
+        for folder, names in folders.items():
+            whole.append(names[0] if len(names) == 1 else f"{folder}/")
         return ", ".join(
-            f"`{top}` ({count} files)" if top.endswith("/") and count > 1 else f"`{top}`"
-            for top, count in folders.items()
+            f"`{name}`" + (f" ({len(folders[name[:-1]])} files)" if name.endswith("/") else "")
+            for name in sorted(whole)
         )
 
 
