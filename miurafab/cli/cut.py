@@ -10,15 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from miurafab.cli.console import Console
-from miurafab.cli.declared import (
-    MachineOption,
-    MaterialOption,
-    Named,
-    argument,
-    option,
-    split,
-    takes,
-)
+from miurafab.cli.declared import MachineOption, MaterialOption, argument, option, split, takes
 from miurafab.cli.fit import RigidOption, bed_options, fit_options
 from miurafab.cli.machine import PORT
 from miurafab.errors import (
@@ -77,7 +69,7 @@ def cut_options() -> type[CutOptions]:
 @takes(cut_options, fit_options, bed_options)
 def cut(
     thing: Annotated[
-        Named,
+        str | Path,
         argument("THING", "A job directory, a .nc file, a pattern .fold, a design, or a target."),
     ],
     /,
