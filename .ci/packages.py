@@ -8,8 +8,8 @@ the first of them the sdist. Then ``uv tool install`` and ``pipx install`` of th
 programs of ``locks/tools.txt``. In each, from an empty folder and without the checkout: the
 version, ``doctor``, completion for four shells, and a job from a target to ``check``.
 
-Then each extra in turn is added to the environment that pip made for each Python, with
-``locks/extras.txt``, and a command that needs it runs. In the first of them, each library in turn
+Then each extra in turn is added to the environment that pip made for each Python, by the command
+that ``doctor`` prints, and what needs it runs. In the first of them, each library in turn
 is removed, replaced by one that does not load, and made too old: ``doctor`` must name it, and the
 command that it prints must mend it.
 
@@ -134,11 +134,14 @@ def with_pipx(python: Path, package: Path, at: Path) -> tuple[Path, Path]:
     return at / "bin" / "miurafab", at / "home" / "venvs"
 
 
-def with_extra(extra: str, package: Path, at: Path, folder: Path) -> float:
-    """Add ``extra`` to the environment ``at``, and run in ``folder`` what needs it; its MB."""
-    program, python, before = at / "bin" / "miurafab", at / "bin" / "python", megabytes(at)
-    lock = ("--constraint", ROOT / "locks" / "extras.txt")
-    run(python, "-m", "pip", "install", *QUIET, *lock, f"{package}[{extra}]", cwd=ROOT)
+def with_extra(extra: str, at: Path, folder: Path) -> float:
+    """Add ``extra`` to the environment ``at``, as ``doctor`` says, and run in ``folder`` what needs
+    it; its MB.
+    """
+    program, before = at / "bin" / "miurafab", megabytes(at)
+    notes = json.loads(run(program, "doctor", "--json", cwd=folder, clean=False).stdout)["notes"]
+    (note,) = (each for each in notes if f"miurafab[{extra}]" in each)
+    run(*shlex.split(note.partition("is not installed: ")[2]), cwd=folder)
     shutil.copy(ROOT / "tests" / "data" / "hypar.step", folder)
     (folder / "password").write_text("a long enough password\n")
     words = EXTRAS[extra]
@@ -240,7 +243,7 @@ def steps(pythons: dict[str, Path], wheel: Path, sdist: Path, scratch: Path) -> 
         places = scratch / f"env-{number}", scratch / f"work-{number}"
         yield "new", f"pip, wheel, {version}", partial(installed, with_pip, python, wheel, *places)
         for extra in EXTRAS:
-            yield "extras", f"  and {extra}", partial(with_extra, extra, wheel, *places)
+            yield "extras", f"  and {extra}", partial(with_extra, extra, *places)
         if number == 0:
             yield "broken", "  each library broken and mended", partial(mended, *places)
     version, python = next(iter(pythons.items()))

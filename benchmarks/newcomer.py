@@ -21,7 +21,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import pty
 import re
 import select
 import shlex
@@ -147,7 +146,7 @@ def in_terminal(
 
     A process that ``serves`` is interrupted, as by Ctrl-C, after its first line.
     """
-    ours, theirs = pty.openpty()
+    ours, theirs = os.openpty()
     size = {"COLUMNS": "100", "LINES": "40", "TERM": "xterm"}
     started = last = time.monotonic()
     child = subprocess.Popen(

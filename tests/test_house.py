@@ -32,6 +32,8 @@ WRITE_COMMANDS = (
     "studio/recipe.py",
     "fabrication/drawing/calibration_guide.py",
     "workflow/doctor.py",
+    "workflow/libraries.py",
+    "workflow/ports.py",
 )
 """Below ``cli``, these spell options for it, or write whole command lines for a person to type."""
 

@@ -2,15 +2,15 @@
 
 import contextlib
 import os
-import pty
 import re
 import select
 import shutil
 import subprocess
-import termios
 import time
 
 import pytest
+
+termios = pytest.importorskip("termios")  # a terminal of Unix
 
 SHELLS = {
     "bash": (["bash", "--norc", "--noprofile"], "script", "source ./script"),
@@ -30,7 +30,7 @@ class Terminal:
     """A shell in a terminal; mutable: it is typed into."""
 
     def __init__(self, words, folder):
-        self.ours, theirs = pty.openpty()
+        self.ours, theirs = os.openpty()
         termios.tcsetwinsize(theirs, (40, 200))
         paths = f"{folder}{os.pathsep}{os.environ['PATH']}"
         kept = {"PATH": paths, "TERM": "dumb", "LANG": "C.UTF-8"}
