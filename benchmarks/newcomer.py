@@ -11,7 +11,7 @@ machine stands in for each port, and a server is stopped when it has said where 
 Python of a page is run as one program.
 
 A row has the command, its seconds, those of the processor, the longest time in which the terminal
-showed nothing new, and the files that it wrote. If a command ends with another code than the page
+got no byte, and the files that it wrote. If a command ends with another code than the page
 promises, or prints something else, that is told at the end, and nothing is written. Beside these
 tables is one of what the new environment takes on the disk, library by library.
 """
