@@ -301,9 +301,10 @@ def main() -> None:
             if asked.only in (None, title)
         }
         tables["libraries"] = walk.sizes()
+        if not walk.faults:
+            write_tables(PAGE if asked.only is None else None, "newcomer", tables)
     if walk.faults:
         sys.exit("\n".join(walk.faults))
-    write_tables(PAGE if asked.only is None else None, "newcomer", tables)
 
 
 if __name__ == "__main__":
