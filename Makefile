@@ -5,7 +5,7 @@ BIN := .venv/bin
 
 SHELL := bash
 .SHELLFLAGS := -o pipefail -c
-SHOWN := | sed -u -n 's/^Collecting \([^=]*\).*/  \1/p'
+SHOWN := | sed -u -n 's/^Collecting \([^=]*\).*/  \1/p; s/^Installing collected .*/Unpacking them./p'
 LOCKED := $(BIN)/python -m pip install --require-hashes --requirement
 OURS := $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 TOOLS := .venv/tools
