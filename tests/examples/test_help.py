@@ -29,7 +29,10 @@ DRAWING = (
 NO_SWITCHES = "miurafab machine home"
 """The virtual machine has no homing switches: it refuses, exit code 3."""
 
-OF_OTHERS = {"--best", "--no-package-lock", "--round", "--glue", "--largest", "--live"}
+OF_OTHERS = {
+    *("--best", "--no-package-lock", "--round", "--glue", "--largest", "--live"),
+    *("--nworkers", "--nthreads", "--rm"),
+}
 """Options of other programs, and of benchmarks, that pages name."""
 
 
