@@ -39,7 +39,8 @@ def test_the_time_left_holds(tmp_path, toolpath):
         assert now.stream.seconds_elapsed + now.seconds_left == pytest.approx(
             total, rel=0.03, abs=2.5
         )
-        assert now.share == pytest.approx(now.stream.seconds_elapsed / total, abs=0.03 + 2.5 / total)
+        over = now.stream.seconds_elapsed / total
+        assert now.share == pytest.approx(over, abs=0.03 + 2.5 / total)
     assert [now.stroke for now in seen] == sorted(now.stroke for now in seen)
     assert seen[-1].stroke == seen[-1].strokes
     assert seen[-1].seconds_left == pytest.approx(0, abs=0.1)
