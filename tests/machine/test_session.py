@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -458,3 +459,36 @@ def test_the_owner_of_a_port_is_known_until_its_process_is_gone(
         gone.wait()
     claim(port, Owner("miurafab cut x", gone.pid, this_owner().since, gone.pid))
     assert owner_of(port) is None
+    claim(port, Owner("miurafab studio", 7, this_owner().since, os.getpid()))
+    assert holder_of(port).endswith("; do it there, on the tab Machine")
+    claim(port, Owner("miurafab cut x", 7, this_owner().since, os.getpid()))
+    assert holder_of(port).endswith("; wait for its end, or stop it there")
+
+
+def test_a_claim_that_another_session_made_meanwhile_stays(
+    tmp_path: os.PathLike[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    port = "socket://127.0.0.1:4001"
+    release = claim(port, Owner("first", 7, 1.0, os.getpid()))
+    claim(port, second := Owner("second", 8, 2.0, os.getpid()))
+    release()
+    assert owner_of(port) == second
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="Linux tells who has a device open")
+def test_whoever_else_has_the_device_open_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    port = str(tmp_path / "port")
+    code = "import sys; held = open(sys.argv[1], 'w'); print(flush=True); sys.stdin.read()"
+    command = [sys.executable, "-c", code, port]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, **pipes) as other:
+        assert other.stdout is not None
+        other.stdout.readline()
+        said = holder_of(port)
+        other.communicate()
+    assert said == f", process {other.pid} ({' '.join(command)[:100]}); do it there"
+    assert holder_of(port) == "; do it there"
