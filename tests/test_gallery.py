@@ -44,7 +44,7 @@ def test_it_has_every_named_surface():
     assert set(mf.list_surfaces()) <= shown
 
 
-def test_on_a_phone_each_figure_has_the_name_of_its_column():
+def test_on_the_site_each_figure_has_the_name_of_its_column():
     """There the heads of the columns are not shown."""
     style = (gallery.PAGE.parent / "site.css").read_text(encoding="utf-8")
     named = dict(re.findall(r"nth-child\((\d)\)::before { content: \"(.*): \"; }", style))
