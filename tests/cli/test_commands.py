@@ -238,6 +238,7 @@ def test_check_says_no_to_a_torn_pattern(run, tmp_path):
         (("fit", "hypar:height", "-o", "x.fold"), "parameter=value"),
         (("fit", "sphere:width=900deg", "-o", "x.fold"), "must be between"),
         (("fit", "gone.stl", "-o", "x.fold"), "gone.stl does not exist"),
+        (("check", "a.fold", "--rebuild"), "--rebuild is for a job directory; a.fold is a pattern"),
         (("fit", "gone.toml", "-o", "x.fold"), "gone"),
         (("fit", "hypar", "--facets", "20", "-o", "x.fold"), "--facets"),
         (("fit", "hypar", "--facets", "1x9", "-o", "x.fold"), "1x9"),
