@@ -144,6 +144,7 @@ def with_extra(extra: str, at: Path, folder: Path) -> float:
     run(*shlex.split(note.partition("is not installed: ")[2]), cwd=folder)
     shutil.copy(ROOT / "tests" / "data" / "hypar.step", folder)
     (folder / "password").write_text("a long enough password\n")
+    (folder / "password").chmod(0o600)
     words = EXTRAS[extra]
     if extra == "cluster":
         with cluster(program.with_name("dask"), folder) as address:
