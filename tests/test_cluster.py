@@ -10,7 +10,9 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
+import warnings
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,7 @@ from pages import ROOT, blocks_of
 
 import miurafab as mf
 from miurafab.errors import InputError
+from miurafab.workflow import tradeoff as tradeoff_module
 from miurafab.workflow.tradeoff import _results
 
 distributed = pytest.importorskip("distributed")
@@ -112,6 +115,21 @@ def test_the_services_run_what_the_image_has():
         assert service["image"] == "miurafab"
         assert ("entrypoint" in service) == ("command" in service)
         assert service.get("entrypoint", "dask") == "dask"
+
+
+def test_a_cluster_without_workers_is_given_time_and_then_told(monkeypatch):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with distributed.LocalCluster(
+            n_workers=0, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as started:
+            monkeypatch.setattr(tradeoff_module, "_JOINING_S", 0.1)
+            with pytest.raises(InputError, match="has no workers; start one and try again"):
+                mf.tradeoff("hypar", SIDES[:3], cluster=started.scheduler_address)
+            monkeypatch.setattr(tradeoff_module, "_JOINING_S", 60)
+            threading.Timer(0.5, started.scale, [1]).start()
+            found = mf.tradeoff("hypar", SIDES[:3], cluster=started.scheduler_address)
+    assert len(found.found) == 3
 
 
 def test_workers_without_miurafab_are_told():

@@ -29,6 +29,9 @@ from miurafab.origami.fitting.request import FitOptions
 from miurafab.origami.tradeoff import WEIGHTS, Sample, Tradeoff, summarise
 from miurafab.workflow.design import design
 
+_JOINING_S = 20.0
+"""How long a cluster that was just started may take until its first worker has joined."""
+
 SIDES = (8, 12, 16, 24, 32, 48)
 Job = tuple[str | Mapping[str, Any], dict[str, Any]]
 Progress = Callable[[float, str], None]
@@ -255,8 +258,12 @@ def _on_cluster(jobs: list[Job], address: str) -> Iterator[Sample]:
         reason = " ".join(str(fault).split()).rstrip(".")
         raise InputError(f"The `cluster` {address} does not answer: {reason}.") from None
     with client:
-        if not client.scheduler_info()["workers"]:
-            raise InputError(f"The cluster at {address} has no workers; start one and try again.")
+        try:
+            client.wait_for_workers(1, timeout=_JOINING_S)
+        except TimeoutError:
+            raise InputError(
+                f"The cluster at {address} has no workers; start one and try again."
+            ) from None
         yield from _results(client.map(sample, jobs, pure=False), address)
 
 
