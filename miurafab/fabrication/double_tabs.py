@@ -36,7 +36,7 @@ def double_tabs(
 ) -> TabRegions:
     """The tabs on both sides of N ``seams``: N on the first sides, then N on the others."""
     seams = replace(seams, fold=np.full(len(seams), "M"))
-    facing = seams.swapped(np.ones(len(seams), dtype=bool))
+    facing = seams.swapped(np.full(len(seams), True))
     own, other = (tab_regions(pattern, each, material, bearing) for each in (seams, facing))
     length = edge_lengths(pattern.vertices_coords, pattern.edges_vertices[seams.edges[:, 1]])
     points, count = in_mate(pattern, own), own.count

@@ -15,9 +15,12 @@ from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.seams import Seams, all_seams, border_seams
 from miurafab.fabrication.slots import slotted_tabs
 from miurafab.fabrication.tabs import TabRegions, tab_regions
-from miurafab.geometry.arrays import Bools, Ints
+from miurafab.geometry.arrays import Bools, Ints, places_in_runs
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
+
+LARGER = 1 + 1e-9
+"""The glue of a tab over that of another of the same size, at least: rounding chooses no side."""
 
 
 def choose_tabs(
@@ -43,22 +46,20 @@ def choose_tabs(
     options = options or LayoutOptions()
     seams = all_seams(pattern, face_patch)
     patch = face_patch[seams.faces]
-    lower = patch[:, 0] < patch[:, 1]
-    lower |= (patch[:, 0] == patch[:, 1]) & (seams.edges[:, 0] < seams.edges[:, 1])
+    lower = patch[:, 0] <= patch[:, 1]  # a seam names its lower edge first
     seams = seams.swapped(_by_lower(patch, options.tab_side) != lower)
-    free = np.ones(face_patch.max(initial=-1) + 1, dtype=bool) if tight is None else ~tight
+    free = np.ones(len(face_patch), dtype=bool) if tight is None else ~tight
     if options.join == "slots":
         tabs, unusual = _slotted(pattern, seams, face_patch, material, options, free)
     elif options.join == "double":
         tabs = double_tabs(pattern, seams, material, _drawn_twice(pattern, seams, face_patch))
-        unusual = np.zeros(len(tabs), dtype=bool)
+        unusual = np.full(len(tabs), False)
     else:
         tabs, unusual = _glued(pattern, seams, face_patch, material, options, free)
     edges = chosen_edges(pattern, options.border_tabs)
-    if len(edges):
-        tabs = tabs.joined(open_tabs(pattern, edges, material))
-        unusual = np.append(unusual, np.zeros(len(edges), dtype=bool))
-    kept = tabs.glue > 0
+    tabs = tabs.joined(open_tabs(pattern, edges, material))
+    unusual = np.append(unusual, np.full(len(edges), False))
+    kept = tabs.usable
     if options.join == "double":
         kept = in_pairs(tabs, kept)
     return tabs.take(kept), unusual[kept], np.unique(tabs.edge[~kept])
@@ -81,9 +82,9 @@ def _glued(
 
     tabs = made(seams)
     weak = tabs.glue < material.tabs.min_area_mm2
-    unusual = np.zeros(len(seams), dtype=bool)
+    unusual = np.full(len(seams), False)
     if weak.any():
-        better = made(seams.swapped(weak)).glue > tabs.glue
+        better = made(seams.swapped(weak)).glue > tabs.glue * LARGER
         swapped = weak & better & free[face_patch[seams.faces[:, 1]]]
         tabs = made(seams.swapped(swapped))
         weak = tabs.glue < material.tabs.min_area_mm2
@@ -121,10 +122,10 @@ def _slotted(
 def border_tabs(pattern: CreasePattern, material: Material, options: LayoutOptions) -> TabRegions:
     """All tabs that may stand on borders of the pattern, on either side of each seam."""
     seams = border_seams(pattern)
-    seams = seams.joined(seams.swapped(np.ones(len(seams), dtype=bool)))
+    seams = seams.joined(seams.swapped(np.full(len(seams), True)))
     tabs = tab_regions(pattern, seams, material, full_facet=options.full_facet)
     edges = chosen_edges(pattern, options.border_tabs)
-    return tabs.joined(open_tabs(pattern, edges, material)) if len(edges) else tabs
+    return tabs.joined(open_tabs(pattern, edges, material))
 
 
 def _by_lower(patch: Ints, side: str) -> Bools:
@@ -132,21 +133,17 @@ def _by_lower(patch: Ints, side: str) -> Bools:
     if side != "alternate":
         return np.full(len(patch), side == "lower")
     # Every second edge of each seam, in the order of the edges.
-    order = np.lexsort((np.arange(len(patch)), patch.max(axis=1), patch.min(axis=1)))
-    pair = np.sort(patch, axis=1)[order]
-    fresh = np.append(True, (pair[1:] != pair[:-1]).any(axis=1))[: len(patch)]
-    place = np.arange(len(patch))
-    first = np.maximum.accumulate(np.where(fresh, place, 0))
-    found = np.empty(len(patch), dtype=bool)
-    found[order] = (place - first) % 2 == 0
-    return found
+    pairs = np.unique(np.sort(patch), axis=0, return_inverse=True, return_counts=True)
+    which, place = pairs[1].reshape(-1), np.arange(len(patch))
+    place[np.argsort(which, kind="stable")] = places_in_runs(pairs[2])
+    return np.asarray(place % 2 == 0)
 
 
 def _drawn_twice(pattern: CreasePattern, seams: Seams, face_patch: Ints) -> Bools:
     """:func:`_bearing` of double tabs, which lie on no facet: only where two tabs of one patch are
     drawn on one facet they must share it.
     """
-    both = seams.joined(seams.swapped(np.ones(len(seams), dtype=bool)))
+    both = seams.joined(seams.swapped(np.full(len(seams), True)))
     pairs = np.column_stack([face_patch[both.faces[:, 0]], both.faces[:, 1]])
     _, which, times = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     return _bearing(pattern, both.take(times[which.reshape(-1)] > 1))

@@ -42,9 +42,6 @@ SLENDER = 2.0
 MIN_SIDE_MM = 1.0
 """A tab with a smaller mean height cannot be handled (judged)."""
 
-MIN_AREA_MM2 = 2.0
-"""A tab with a smaller glue area does not hold (judged)."""
-
 RAISED = 2.0
 """The height of a raised tab over the standard height, at most; weak tabs are raised (judged)."""
 
@@ -73,8 +70,8 @@ class Tab:
     mate_edge: int | None
     mate_patch: int | None
     polygon_mm: Floats
-    fold: str = "flat"
-    join: str = "glue"
+    fold: str
+    join: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,8 +143,7 @@ class TabRegions:
     def usable(self) -> Bools:
         """(N,) whether each tab is long and large enough to hold."""
         base = np.linalg.norm(self.points[:, 1] - self.points[:, 0], axis=1)
-        area = self.areas
-        large = (base >= MIN_BASE_MM) & (area >= MIN_SIDE_MM * base) & (area >= MIN_AREA_MM2)
+        large = (base >= MIN_BASE_MM) & (self.areas >= MIN_SIDE_MM * base)
         return np.asarray(large & (self.count >= 3))
 
     @property
@@ -185,7 +181,7 @@ def tab_regions(
     corners = pattern.faces_vertices[mate]
     real = corners >= 0
     following = np.roll(corners, -1, axis=1)
-    last = real & ~np.roll(np.pad(real, ((0, 0), (0, 1))), -1, axis=1)[:, :-1]
+    last = real & ~np.pad(real, ((0, 0), (0, 1)))[:, 1:]
     following = np.where(last, corners[:, :1], following)
     local = np.einsum("nij,nkj->nki", frame, pattern.vertices_coords[corners] - a[:, None])
     ahead = np.einsum("nij,nkj->nki", frame, pattern.vertices_coords[following] - a[:, None])
@@ -197,7 +193,7 @@ def tab_regions(
 
     inset = inset_of(material)
     other = real & (pattern.faces_edges[mate] != seams.edges[:, 1:])
-    reach = np.abs(local).max(axis=(1, 2), initial=0.0) + 1.0
+    reach = np.abs(local).max(axis=(1, 2)) + 1.0
     asked = np.full(count, material.tabs.height_mm)
     if raised is not None:
         asked[raised] *= RAISED
@@ -223,16 +219,11 @@ def tab_regions(
         limit = offset[:, k] + inset * np.linalg.norm(towards, axis=1)
         points, sides = clip_convex(points, sides, towards, np.where(shared, limit, NO_LIMIT))
     points, sides = base_first(points, sides)
-    # If the facet is not convex at an end of its side, the line of the side continues inside it.
+    # If the facet is not convex at an end of its side, the line of the side continues inside it;
+    # what is found there stands beside the side.
     length = edge_lengths(pattern.vertices_coords, ends_of)
-    for way, reach_out, limit in (
-        (1.0, points[:, 0, 0] < -1e-9, zero),
-        (-1.0, points[:, 1, 0] > length + 1e-9, -length),
-    ):
-        normals = np.broadcast_to(np.array([way, 0.0]), (count, 2))
-        over = (sides >= 3) & reach_out
-        points, sides = clip_convex(points, sides, normals, np.where(over, limit, NO_LIMIT))
-        points, sides = base_first(points, sides)
+    beside = (points[:, 0, 0] < -1e-9) | (points[:, 1, 0] > length + 1e-9)
+    sides = np.where(beside, 0, sides)
     if not full_facet:
         largest = np.full(count, material.tabs.max_angle)
         if raised is not None:
@@ -282,7 +273,7 @@ def not_steeper(points: Floats, count: Ints, angle: Floats) -> tuple[Floats, Int
     c, s = np.cos(angle), np.sin(angle)
     row = np.arange(len(points))
     for end, normal in ((0, np.column_stack([s, -c])), (1, np.column_stack([-s, -c]))):
-        beyond = points[row, 2 if end else np.maximum(count, 1) - 1]
+        beyond = points[row, 2 if end else count - 1]
         limit = np.einsum("nk,nk->n", points[:, end], normal)
         # Only sides that are too steep are cut: elsewhere the clip would double the corner.
         steep = (count >= 3) & (np.einsum("nk,nk->n", beyond, normal) < limit - 1e-9)

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from miurafab.fabrication.layout_findings import longest_run
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.tab_choice import choose_tabs
-from miurafab.fabrication.tabs import MIN_AREA_MM2, MIN_BASE_MM, inset_of
+from miurafab.fabrication.tabs import MIN_BASE_MM, MIN_SIDE_MM, inset_of
 from miurafab.origami.crease_pattern import CreasePattern
 
 CASES = {
@@ -46,7 +46,6 @@ def assert_tabs_are_sound(pattern, outlined, material):
     patches = [shapely.union_all(facets[piece.faces]) for piece in outlined.patches]
     shapes = np.array([shapely.Polygon(tabs.polygon(i)) for i in range(len(tabs))])
     assert shapely.is_valid(shapes).all()
-    assert (shapely.area(shapes) >= MIN_AREA_MM2 - 1e-9).all()
     owner = outlined.face_patch[tabs.own_face]
     for i, shape in enumerate(shapes):
         edge, own, mate = tabs.edge[i], tabs.own_face[i], tabs.mate_face[i]
@@ -61,6 +60,7 @@ def assert_tabs_are_sound(pattern, outlined, material):
         base = shapely.LineString(shapely.get_coordinates(shape)[:2])
         assert seam.buffer(1e-9).contains(base)
         assert base.length >= MIN_BASE_MM - 1e-9
+        assert shape.area >= MIN_SIDE_MM * base.length - 1e-9
         line = shapely.get_coordinates(seam)
         way = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
         off = (tabs.polygon(i) - line[0]) @ np.array([-way[1], way[0]])
