@@ -50,8 +50,8 @@ PauseOption = Annotated[
     bool | None,
     option(
         Flag(),
-        "Wait for a person to put in fresh material before each further sheet; without a terminal "
-        "the command ends there with exit code 5.",
+        "Wait for a person to put in fresh material before each further sheet, and to look at each "
+        "frame; without a terminal the command ends there with exit code 5.",
         "--pause",
         default_text="yes, but for the virtual machine and a machine with roll_fed",
         negative="--no-pause",
@@ -163,12 +163,11 @@ def _stream(
         _wait(console, keys, request)
 
     def after_frame(number: int) -> None:
-        if waits:
-            request = f"That is the frame of sheet {number}; Enter cuts, Ctrl-C does not."
-            _wait(console, keys, request)
+        request = f"That is the frame of sheet {number}; Enter cuts, Ctrl-C does not."
+        _wait(console, keys, request)
 
     attended = sys.stdin.isatty()
-    waits = pause if pause is not None else port != "virtual" and attended
+    asks = pause if pause is not None else port != "virtual" and attended
 
     with _hint_at_resume(console, prepared), console.progress("cutting") as bar:
 
@@ -189,7 +188,7 @@ def _stream(
                 keys=keys,
                 pause=pause,
                 before_sheet=before if attended or pause else None,
-                after_frame=after_frame,
+                after_frame=after_frame if asks else None,
                 on_start=lambda finding: console.note(finding.sentence),
                 on_progress=show_progress,
             )

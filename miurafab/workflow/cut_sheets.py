@@ -116,15 +116,17 @@ def cut(
     sheets : sequence of int, optional
         The numbers of the sheets to cut, from 1. The default is all.
     pause : bool, optional
-        Whether a person puts in fresh material before each further sheet. The default is yes,
-        but for the virtual machine and a machine that feeds itself (``roll_fed``).
+        Whether a person puts in fresh material before each further sheet, and looks at each frame.
+        The default is yes, but for the virtual machine and, for material, a machine that feeds
+        itself (``roll_fed``).
     keys : Keys, optional
         Keys of a person that hold, resume or stop the job.
     before_sheet : callable, optional
         Called with the number of the sheet and how many there are, before each further sheet that
         a person must put in: it returns when the material is there.
     after_frame : callable, optional
-        Called with the number of the sheet whose frame was traced.
+        Called with the number of the sheet whose frame was traced: it returns when the sheet may
+        be cut.
     on_start : callable, optional
         Called with a finding, before the port is opened, on where a sheet lies, where it begins or
         goes on, and what of it is burnt twice or left out.
@@ -148,7 +150,8 @@ def cut(
     MachineError
         If the controller fails, or the job is stopped. The beam is off then.
     PersonNeeded
-        If a further sheet needs fresh material and ``before_sheet`` is not given.
+        If a further sheet needs fresh material and ``before_sheet`` is not given, and after a frame
+        for which ``after_frame`` is not.
 
     Examples
     --------
@@ -238,6 +241,12 @@ def cut_prepared(
                 if after_frame is not None:
                     with session.waits():
                         after_frame(number)
+                elif port != VIRTUAL if pause is None else pause:
+                    raise PersonNeeded(
+                        f"The frame of {prepared.jobs[number - 1].name} is traced, and nobody is "
+                        "here to look at it. Cut without `frame`, or say that nobody is to be "
+                        "waited for (`pause`)."
+                    )
             # A frame has homed the machine.
             home = plan.options.home and not options.frame
             sent = replace(plan, options=replace(plan.options, home=home))

@@ -92,6 +92,21 @@ def test_a_resumed_job_asks_too(job):
     assert ended(job) == ["done"] * 3
 
 
+def test_where_nobody_looks_at_a_frame_nothing_is_cut(job):
+    options = CutOptions(send=SendOptions(at=(0.0, 0.0)), frame=True)
+    with pytest.raises(PersonNeeded, match=r"frame of sheet-01\.nc is traced, and nobody") as fault:
+        cut_prepared(job, port="virtual", options=options, pause=True)
+    assert fault.value.exit_code == WAITING
+    assert ended(job) == []
+    looked = []
+    cut_prepared(
+        job, port="virtual", sheets=[1], options=options, pause=True, after_frame=looked.append
+    )
+    assert (looked, ended(job)) == ([1], ["done"])
+    cut_prepared(job, port="virtual", sheets=[2], options=options, pause=False)
+    assert ended(job) == ["done", "done"]
+
+
 @pytest.mark.parametrize("ready", [{"A", "B"}, {"B"}, set()])
 def test_machines_that_share_a_job_wait_each_for_its_material(job, monkeypatch, ready):
     opened = []
