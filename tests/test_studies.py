@@ -81,6 +81,24 @@ def test_the_verdict_of_the_force_table_is_that_of_its_rows(monkeypatch):
         assert f"- {sentence}\n" in text
 
 
+def test_the_barriers_of_the_page_are_what_was_asked():
+    """Where they are reached, within 1 %, and closer to the target with limits than without."""
+    rows = rows_of("fit.md", "barrier_reach", "reach")
+    held = [row for row in rows if row[2] == "converged"]
+    assert len(held) >= len(rows) - 2 > 3
+    for row in held:
+        assert float(row[3]) == pytest.approx(float(row[1]), rel=0.011)
+        assert row[6] == "-" or float(row[5]) <= float(row[6])
+
+
+@pytest.mark.large
+def test_the_table_of_barriers_is_what_its_command_computes():
+    written = rows_of("fit.md", "barrier_reach", "reach")[0]
+    computed = study("barrier_reach").row(written[0], float(written[1]))
+    for cell, other in zip(written, computed, strict=True):
+        same(cell, other, 0.02)
+
+
 def study_rows(name):
     return rows_of("energy-study.md", "energy_study", name)
 
