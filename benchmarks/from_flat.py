@@ -30,9 +30,9 @@ from miurafab.origami.energy.driven import Driven
 from miurafab.origami.energy.equilibrium import Balance, solve
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.certificate import certified
-from miurafab.origami.folding.from_flat import unstable_directions
 from miurafab.origami.folding.kinematics import facet_strain
 from miurafab.origami.folding.ramp_motion import ramp_motion
+from miurafab.origami.folding.ramp_walk import unstable_directions
 
 STEPS = 20
 PATTERNS = {

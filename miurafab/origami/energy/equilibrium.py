@@ -194,8 +194,19 @@ class Balance:
         strain = np.abs(residual.strain).max(initial=0.0)
         return float(np.max([force, strain, abs(residual.miss)]))
 
-    def factor(self, state: EquilibriumState, target: float) -> Factored:
-        """K at ``state``. Raises ``RuntimeError`` where it is singular."""
+    def factor(self, state: EquilibriumState, target: float, *, definite: bool = False) -> Factored:
+        """K at ``state``. Raises ``RuntimeError`` where it is singular, and with ``definite`` where
+        it is not positive definite.
+        """
+        weights = 1.0 / (self.model.compliance + EPS)
+        bars = self.model.bar_vectors(state.points) / self.model.lengths[:, None]
+        drive = self.drive(state.points, target)
+        matrix = self.stiffness(state, target)
+        k = self._solver.factor(matrix) if definite else self.factored(matrix)
+        return Factored(k, bars, weights, drive.gradient)
+
+    def stiffness(self, state: EquilibriumState, target: float) -> sparse.csc_array:
+        """K at ``state``, between the free coordinates."""
         model, points = self.model, state.points
         angle, gradient, hessian = hinge_derivatives(points, self.hinges)
         moment, slope = self.moments(angle, target)
@@ -212,8 +223,7 @@ class Balance:
         held = state.mu * drive.hessian + across / EPS
         matrix = self.assembly.matrix([blocks, stretch_blocks(block), held[None]])
         touch = self.touch(points)
-        matrix = self.assembly.joined(matrix, touch.stencils, touch.stiffness)
-        return Factored(self.factored(matrix), bars, weights, drive.gradient)
+        return self.assembly.joined(matrix, touch.stencils, touch.stiffness)
 
     def factored(self, matrix: sparse.csc_array) -> Factor:
         """The factor of a ``matrix`` of :attr:`assembly`: by Cholesky, five times as fast, where
@@ -279,14 +289,21 @@ def _iterations_left(before: float, now: float) -> float:
 
 
 def solve(
-    driven: Balance, guess: EquilibriumState, target: float, factored: Factored | None = None
+    driven: Balance,
+    guess: EquilibriumState,
+    target: float,
+    factored: Factored | None = None,
+    *,
+    definite: bool = False,
+    factors: int = MAX_ITERATIONS,
 ) -> Solution:
     """The equilibrium near ``guess`` with what is driven at ``target``.
 
     ``factored`` is an earlier K to start with. A step that does not lower the largest component of
-    F is repeated with a new K, then shortened. Failure is a result, not an exception.
+    F is repeated with a new K, then shortened. With ``definite`` the iteration ends where K is not
+    definite, and in any case after so many ``factors``. Failure is a result, not an exception.
     """
-    state, fresh = guess, False
+    state, fresh, made = guess, False, 0
     residual = driven.residual(state, target)
     size = driven.size(residual)
     for _ in range(MAX_ITERATIONS):
@@ -299,9 +316,12 @@ def solve(
         if not np.isfinite(size):
             break
         if factored is None:
+            if made == factors:
+                break
             try:
-                factored, fresh = driven.factor(state, target), True
-            except RuntimeError:  # exactly singular
+                factored, fresh = driven.factor(state, target, definite=definite), True
+                made += 1
+            except RuntimeError:  # exactly singular, or not definite
                 break
         step = driven.step(factored, residual)
         length = 1.0

@@ -5,8 +5,9 @@ Angles are counted on from the last state, so that half a turn can be reached an
 beyond ``LIMIT`` a stiff spring pushes back, as the other facet would.
 
 Flat is where very many motions meet. K is indefinite there, and Newton's iteration goes to one of
-the saddles. :func:`descend` leaves out what makes K indefinite (Gauss-Newton): the energy is a sum
-of squares of fold angles and of strains, and only the tension of bars is kept beside their squares,
+the saddles. :func:`descend` takes K + mu I where it is definite. Elsewhere it leaves out what makes
+K indefinite (Gauss-Newton): the energy is a sum of squares of fold angles and of strains, and only
+the tension of bars is kept beside their squares,
 
     K = sum k grad rho grad rho' + sum n n' / delta + max(f, 0) / L + mu I,
 
@@ -24,6 +25,7 @@ import numpy as np
 from scipy import sparse
 
 from miurafab.geometry.arrays import Floats
+from miurafab.geometry.sparse import Factor
 from miurafab.origami.energy.equilibrium import (
     NO_TOUCH,
     Balance,
@@ -32,9 +34,11 @@ from miurafab.origami.energy.equilibrium import (
     stretch_blocks,
 )
 from miurafab.origami.energy.hinges import hinge_angles, hinge_gradients
+from miurafab.origami.energy.touch_pairs import REACH
 from miurafab.origami.energy.touching import (
     NO_PAIRS,
     TouchPairs,
+    free_way,
     touch,
     touch_energy,
 )
@@ -50,6 +54,12 @@ LARGEST_MOVE = 0.3
 FIRST_MU, LEAST_MU, GREATEST_MU = 1e-3, 1e-12, 1e6
 SHARPER, BLUNTER = 1.0 / 3.0, 4.0
 """The factors on mu after a step that is taken, and after one that is not."""
+SHORTENINGS = 5
+"""How often a step is halved before mu is raised: a new mu costs a factorisation."""
+THIN = 0.05
+"""The extent, over the largest, of a sheet in a direction in which it is thin."""
+SOFT_MU = 1e-6
+"""mu where the moves of soft parts are looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +67,7 @@ class Ramped(Balance):
     """A model whose hinges rest at the part ``target`` of their rest angles.
 
     ``last`` (H,) are the fold angles of the last accepted state, from which angles are counted on.
-    It is the one array that changes, by :meth:`accept`. ``pairs`` are the vertices and triangles
-    that touch.
+    It is the one array that changes, by :meth:`accept`. ``pairs`` are those that touch or may.
     """
 
     last: Floats = field(default_factory=lambda: np.empty(0))
@@ -84,7 +93,7 @@ class Ramped(Balance):
 
     def touch(self, points: Floats, *, stiff: bool = True, definite: bool = False) -> Touch:
         """The springs of the pairs that touch."""
-        if not len(self.pairs.side):
+        if not len(self.pairs.edges):
             return NO_TOUCH
         return touch(points, self.pairs, stiff=stiff, definite=definite)
 
@@ -132,6 +141,10 @@ class Ramped(Balance):
         matrix = self.assembly.matrix([bent, stretched, none])
         return gradient, self.assembly.joined(matrix, push.stencils, push.stiffness)
 
+    def definite(self, matrix: sparse.csc_array) -> Factor:
+        """The factor of ``matrix``. Raises ``RuntimeError`` where it is not positive definite."""
+        return self._solver.factor(matrix)
+
     def _counted_on(self, angle: Floats) -> Floats:
         """``angle`` (H,) in (-pi, pi], with the whole turns nearest to the last state."""
         return np.asarray(angle + 2 * np.pi * np.round((self.last - angle) / (2 * np.pi)))
@@ -143,10 +156,14 @@ class Ramped(Balance):
 
 
 class Descent(NamedTuple):
-    """Where a descent ended: ``points`` (V, 3), and the largest component of the ``force``."""
+    """Where a descent ended: ``points`` (V, 3), the largest component of the ``force``, mu there,
+    and whether its way was longer than its leash.
+    """
 
     points: Floats
     force: float
+    mu: float = FIRST_MU
+    leashed: bool = False
 
 
 def descend(
@@ -156,31 +173,98 @@ def descend(
     force: float,
     rounds: int,
     leash: float = np.inf,
+    mu: float = FIRST_MU,
 ) -> Descent:
     """Lower the energy from ``points`` (V, 3) until no force is above ``force``.
 
-    It takes at most ``rounds`` steps, and none that leads farther than ``leash`` from the start.
-    All bars need a compliance. ``ramped`` accepts each step.
+    It takes at most ``rounds`` steps, and ends before points come nearer to each other by ``leash``
+    (:func:`nearing`). No step leads through what touches. All bars need a compliance. ``ramped``
+    accepts each step.
     """
-    start, energy, mu = points, ramped.energy(points, target), FIRST_MU
-    gradient, matrix = ramped.gauss_newton(points, target)
+    start, energy = points, ramped.energy(points, target)
+    down, leashed = _Downhill(ramped, points, target), False
     for _ in range(rounds):
-        if np.abs(gradient).max(initial=0.0) <= force or mu > GREATEST_MU:
+        if down.force <= force or mu > GREATEST_MU or leashed:
             break
-        raised = raised_diagonal(matrix, mu)
-        step = ramped.assembly.vectors(-ramped.factored(raised).solve(gradient))
-        trial = points + step
-        turned = np.abs(ramped.angles(trial) - ramped.last).max(initial=0.0)
-        short = turned <= LARGEST_TURN and np.abs(step).max() <= LARGEST_MOVE
-        short = short and np.abs(trial - start).max() <= leash
-        lower = ramped.energy(trial, target) if short else np.inf
+        step = down.step(mu)
+        step *= min(1.0, LARGEST_MOVE / np.abs(step).max())
+        while np.isfinite(leash) and nearing(start, points + step) > leash:
+            leashed = True
+            step /= 2
+        way = free_way(points, step, ramped.pairs)
+        leashed = leashed and way == 1.0
+        step *= way
+        for _ in range(SHORTENINGS):
+            trial = points + step
+            turned = np.abs(ramped.angles(trial) - ramped.last).max(initial=0.0)
+            lower = ramped.energy(trial, target) if turned <= LARGEST_TURN else np.inf
+            if lower < energy:
+                break
+            leashed = False
+            step /= 2
         if lower < energy:
             points, energy, mu = trial, lower, max(mu * SHARPER, LEAST_MU)
             ramped.accept(points)
-            gradient, matrix = ramped.gauss_newton(points, target)
+            down = _Downhill(ramped, points, target)
         else:
             mu *= BLUNTER
-    return Descent(points, float(np.abs(gradient).max(initial=0.0)))
+    return Descent(points, down.force, mu, leashed)
+
+
+class _Downhill:
+    """The ways down from ``points``, with K once for all of them."""
+
+    def __init__(self, ramped: Ramped, points: Floats, target: float) -> None:
+        self._ramped, self._points, self._target = ramped, points, target
+        self._state = ramped.state(points)
+        self._gradient = ramped.residual(self._state, target).force
+
+    @property
+    def force(self) -> float:
+        """The largest component of the gradient."""
+        return float(np.abs(self._gradient).max(initial=0.0))
+
+    def step(self, mu: float) -> Floats:
+        """The step (V, 3) of Newton with ``mu``, or that of Gauss and Newton where K with ``mu`` is
+        not definite.
+        """
+        ramped = self._ramped
+        try:
+            factor = ramped.definite(raised_diagonal(self._exact, mu))
+        except RuntimeError:
+            factor = ramped.definite(raised_diagonal(self._loose, mu))
+        return ramped.assembly.vectors(-factor.solve(self._gradient))
+
+    @cached_property
+    def _exact(self) -> sparse.csc_array:
+        return self._ramped.stiffness(self._state, self._target)
+
+    @cached_property
+    def _loose(self) -> sparse.csc_array:
+        return self._ramped.gauss_newton(self._points, self._target)[1]
+
+
+def softest_moves(ramped: Ramped, points: Floats, target: float, forces: Floats) -> Floats:
+    """The moves (V, 3) that small ``forces`` (V, 3) cause: large where the sheet is soft."""
+    matrix = raised_diagonal(ramped.gauss_newton(points, target)[1], SOFT_MU)
+    pushed = ramped.definite(matrix).solve(forces.ravel()[ramped.assembly.free])
+    return ramped.assembly.vectors(pushed)
+
+
+def nearing(before: Floats, after: Floats) -> float:
+    """By how much two points of a sheet that were ``REACH`` apart can have come nearer, at most.
+
+    All moves as the affine motion that fits best, which shortens nothing by more than its least
+    singular value, but for what each point (V, 3) moves beside it. In directions in which the sheet
+    is thin it is no affine motion. Infinite for a motion that turns it inside out.
+    """
+    one, other = before - before.mean(axis=0), after - after.mean(axis=0)
+    affine = np.eye(3) + np.linalg.lstsq(one, other - one, rcond=THIN)[0]
+    if np.linalg.det(affine) <= 0:
+        return np.inf
+    least = float(np.linalg.svd(affine, compute_uv=False)[-1])
+    beside = float(np.linalg.norm(other - one @ affine, axis=1).max())
+    return REACH * max(1 - least, 0.0) + 2 * beside
 
 
 def raised_diagonal(matrix: sparse.csc_array, by: float) -> sparse.csc_array:

@@ -9,7 +9,7 @@ from energy_problems import APEX, HEIGHT, SIDES, kresling, kresling_other_state
 from miurafab.origami.energy.continuation import follow
 from miurafab.origami.energy.driven import Driven
 from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, solve
-from miurafab.origami.folding.from_flat import unstable_directions
+from miurafab.origami.folding.ramp_walk import unstable_directions
 
 
 def height(state: EquilibriumState) -> float:

@@ -17,11 +17,12 @@ from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.seed import linear_seed
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.certificate import certified
-from miurafab.origami.folding.from_flat import FIRMER, fold_from_flat, ramp_parts
+from miurafab.origami.folding.from_flat import fold_from_flat, ramp_parts
 from miurafab.origami.folding.judge_motion import median_fold, motion_findings
 from miurafab.origami.folding.kinematics import CLOSED_FORM, FROM_FLAT, facet_strain
 from miurafab.origami.folding.motion import find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
+from miurafab.origami.folding.ramp_walk import FIRMER
 
 RIGID = {
     "waterbomb base": named_patterns.waterbomb_base,
