@@ -355,6 +355,15 @@ def test_a_weak_tab_stays_where_the_other_side_has_no_more_room(order):
     assert unusual.tolist() == [True]
 
 
+def test_a_weak_tab_goes_where_there_is_somewhat_more_room():
+    pattern = flat_patterns.grid(np.stack(np.meshgrid([0.0, 1.9, 3.1], [0.0, 20]), axis=-1))
+    material = card(inset=0.1, kerf=0.0)
+    material = replace(material, tabs=replace(material.tabs, min_area_mm2=1e6))
+    for order in ([0, 1], [1, 0]):
+        tabs, _, _ = choose_tabs(pattern, np.array(order), material)
+        assert tabs.mate_face.tolist() == [0]
+
+
 def test_a_full_facet_tab_has_no_limit_but_the_facet():
     pattern = shaken(8)
     patches = np.arange(len(pattern.faces_vertices))
