@@ -180,7 +180,9 @@ def test_energy_takes_the_shape_to_which_a_pattern_folds_from_flat(run, tmp_path
     path = written(tmp_path, **drawing(0.0))
     answer = json.loads(run("energy", path, "--steps", "4", "--json").stdout)
     assert answer["rigid"]
-    assert answer["folded_angle_deg"] > 90
+    assert answer["converged"]
+    # not one of the two that make half a turn, whose sign rounding decides
+    assert 90 < abs(answer["folded_angle_deg"]) < 179
     assert answer["barrier"] == 0
 
 

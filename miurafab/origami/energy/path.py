@@ -28,6 +28,8 @@ Progress = Callable[[float, str], None]
 
 NEARLY_FLAT = math.radians(2.5)
 """The last angle of the driven crease, radians, a little short of flat."""
+_HALF_TURN = math.pi - 1e-3
+"""Beyond this angle, radians, rounding decides the sign of a crease."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,7 +141,8 @@ def trace(
 def main_crease(model: BarHingeModel) -> int:
     """The index in ``model.creases`` of the default driven crease, in the largest mechanism.
 
-    Of the creases folded by the median fold angle or more, it is the nearest to the middle.
+    Of the creases folded by the median fold angle or more, it is the nearest to the middle. Those
+    folded by half a turn are left out, where there are others.
     """
     largest = np.bincount(model.mechanisms).argmax()
     return _main_of(model, np.flatnonzero(model.mechanisms == largest))
@@ -147,6 +150,9 @@ def main_crease(model: BarHingeModel) -> int:
 
 def _main_of(model: BarHingeModel, creases: Ints) -> int:
     angles = np.abs(hinge_angles(model.points, model.creases[creases]))
+    open_ = angles < _HALF_TURN
+    if (angles[open_] > NEARLY_FLAT).any():
+        creases, angles = creases[open_], angles[open_]
     middle = model.points[model.creases[creases, :2]].mean(axis=1) - model.points.mean(axis=0)
     away = np.linalg.norm(middle, axis=1)
     return int(creases[np.argmin(np.where(angles >= np.median(angles), away, np.inf))])
