@@ -16,7 +16,7 @@ import miurafab
 
 BLOCKS = [block for page in PAGES for block in blocks_of(page)]
 
-NOT_RUN = {"README.md": 2, "cluster.md": 3, "fit.md": 1, "studio.md": 3}
+NOT_RUN = {"README.md": 2, "cluster.md": 4, "fit.md": 1, "studio.md": 3}
 """Blocks that no test can run, by page, and how many: the reason stands in the page."""
 
 LANGUAGES = {"sh", "python", "toml", "usage", "text", "console", "csv", "yaml", "powershell"}
