@@ -77,8 +77,9 @@ def test_what_is_not_as_promised_is_a_fault(walk):
 
 def test_a_command_sees_a_terminal_and_a_server_is_interrupted(tmp_path):
     program = (
-        "import sys, time\nprint(sys.stdout.isatty())\n"
-        "try: time.sleep(60)\nexcept KeyboardInterrupt: print('over')"
+        "import sys, time\n"
+        "try: print(sys.stdout.isatty()) or time.sleep(60)\n"
+        "except KeyboardInterrupt: print('over')"
     )
     ran = in_terminal([sys.executable, "-uc", program], tmp_path, {}, serves=True)
     assert (ran.code, ran.text) == (0, "True\nover\n")

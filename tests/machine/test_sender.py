@@ -316,7 +316,7 @@ def test_a_lost_answer_is_noticed_when_the_controller_idles() -> None:
 def test_talk_among_the_replies_does_no_harm() -> None:
     wire = FakeWire(new_device())
     wire.lies = [(0.5, b"\xff\x00\xf0garbage\r\n"), (1.0, b"[MSG:hello]\r\n")]
-    assert send(STOPPED, wire).lines == 65
+    assert send(STOPPED, wire).lines == 37
 
 
 def test_an_answer_to_nothing_ends_the_job() -> None:
@@ -405,7 +405,7 @@ def test_the_journal_says_what_was_taken(tmp_path: Path) -> None:
     with pytest.raises(PortError, match=r"went away; .* switch the laser off"):
         send(STOPPED, wire, journal_path=path)
     done, failed = read_journal(path)
-    assert (done.job, done.lines, done.taken, done.ended) == ("zigzag.nc", 65, 65, "done")
+    assert (done.job, done.lines, done.taken, done.ended) == ("zigzag.nc", 37, 37, "done")
     assert failed.ended == "failed"
     assert 0 < failed.taken < 65
     assert "went away" in (failed.why or "")
@@ -464,7 +464,7 @@ def test_a_board_that_rests_is_reset_only_if_asked(reset: bool) -> None:
     assert BANNER in device.take_output()
     wire = FakeWire(device)
     plan = plan_job(STOPPED, MACHINE, SendOptions(reset=reset))
-    assert deliver(plan, wire, StopSignals()).lines == 65
+    assert deliver(plan, wire, StopSignals()).lines == 37
     first = b"\x18" if reset else b"$I\n"
     assert wire.commands.startswith(first + HANDSHAKE + b"G21\nG90\n")
 

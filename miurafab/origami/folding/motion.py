@@ -130,8 +130,10 @@ def _from_flat(
             apart, its_verdict = ramp_motion(
                 pattern, steps, touching=True, softness=softness, on_progress=on_progress
             )
-            if not _is_sequence(its_verdict, ruled):
+            if _waits(its_verdict, ruled) or its_verdict.wrong_signs <= MOST_WRONG:
                 motion, verdict = apart, its_verdict
+        if _waits(verdict, ruled):  # without contact such folds pass through the sheet
+            raise _sequence(verdict)
     rigid, certificate = certified(motion)
     if not (verdict.touching and contacts(rigid)):  # flat facets may touch where bent ones do not
         motion = rigid
@@ -156,8 +158,11 @@ def _followed(
 
 
 def _is_sequence(verdict: RampVerdict, ruled: bool) -> bool:
-    waits = verdict.is_held_back and len(verdict.waiting_edges) > 0 and not ruled
-    return verdict.wrong_signs > MOST_WRONG or waits
+    return verdict.wrong_signs > MOST_WRONG or _waits(verdict, ruled)
+
+
+def _waits(verdict: RampVerdict, ruled: bool) -> bool:
+    return verdict.is_held_back and len(verdict.waiting_edges) > 0 and not ruled
 
 
 def _past_itself(

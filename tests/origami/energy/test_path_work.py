@@ -21,9 +21,9 @@ def test_a_path_of_40_steps_takes_few_factors_all_of_them_by_cholesky(monkeypatc
     for name in ("factor", "step"):
         kept = getattr(Balance, name)
 
-        def counting(*given, name=name, kept=kept):
+        def counting(*given, name=name, kept=kept, **how):
             calls[name] += 1
-            return kept(*given)
+            return kept(*given, **how)
 
         monkeypatch.setattr(Balance, name, counting)
 
