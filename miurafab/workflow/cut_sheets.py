@@ -36,7 +36,7 @@ from miurafab.profiles import MachineProfile
 from miurafab.workflow.alignment import align
 from miurafab.workflow.cut import Prepared, prepare
 from miurafab.workflow.cut_options import DEFAULT_OPTIONS, CutOptions
-from miurafab.workflow.material_change import at_pause, needs_person
+from miurafab.workflow.material_change import at_pause, is_attended, needs_person
 from miurafab.workflow.sheet_plans import (
     beside,
     journal_path,
@@ -241,7 +241,7 @@ def cut_prepared(
                 if after_frame is not None:
                     with session.waits():
                         after_frame(number)
-                elif port != VIRTUAL if pause is None else pause:
+                elif is_attended(port, pause):
                     raise PersonNeeded(
                         f"The frame of {prepared.jobs[number - 1].name} is traced, and nobody is "
                         "here to look at it. Cut without `frame`, or say that nobody is to be "

@@ -22,7 +22,13 @@ WAITS = "waits for fresh material"
 
 def needs_person(prepared: Prepared, port: str, pause: bool | None) -> bool:
     """Whether a person puts in the material of each further sheet; ``pause`` if that is given."""
-    return port != VIRTUAL and not prepared.machine.bed.roll_fed if pause is None else pause
+    feeds_itself = prepared.machine.bed.roll_fed and pause is None
+    return is_attended(port, pause) and not feeds_itself
+
+
+def is_attended(port: str, pause: bool | None) -> bool:
+    """Whether what is done at ``port`` waits for a person; ``pause`` if that is given."""
+    return port != VIRTUAL if pause is None else pause
 
 
 def at_pause(waits: bool, keys: Keys | None) -> AtPause:

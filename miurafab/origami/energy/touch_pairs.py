@@ -26,12 +26,13 @@ LOWER = 0.5
 
 class NearPairs:
     """The pairs that are near each other in a sheet of ``triangles`` (T, 3) with ``edges`` (E, 2),
-    which lies flat at ``flat`` (V, 3).
+    which lies flat at ``flat`` (V, 3). ``hinges`` (H, 4) are the vertices of each two triangles
+    with a common side.
     """
 
-    def __init__(self, triangles: Ints, edges: Ints, flat: Floats) -> None:
+    def __init__(self, triangles: Ints, edges: Ints, hinges: Ints, flat: Floats) -> None:
         self._triangles, self._edges, self._count = triangles, edges, len(flat)
-        self._hinges = np.unique(self._keys(_hinges(triangles, len(flat))))
+        self._hinges = np.unique(self._keys(hinges))
         self._low = np.empty(0, dtype=np.int64)
         self._heights = np.empty(0)
         keys, pairs = self._within(flat, HEIGHT / LOWER)
@@ -103,17 +104,6 @@ class NearPairs:
         """(n,) a number for each set of four vertices (n, 4)."""
         a, b, c, d = np.sort(corners, axis=1).T
         return np.asarray(((a * self._count + b) * self._count + c) * self._count + d)
-
-
-def _hinges(triangles: Ints, count: int) -> Ints:
-    """(H, 4) the vertices of each two of ``triangles`` (T, 3) with a common side."""
-    tails, heads, thirds = (np.roll(triangles, -turn, axis=1).ravel() for turn in range(3))
-    key = tails * count + heads
-    order = np.argsort(key)
-    back = heads * count + tails
-    at = np.searchsorted(key, back, sorter=order).clip(max=len(key) - 1)
-    both = np.flatnonzero(key[order[at]] == back)
-    return np.column_stack([tails[both], heads[both], thirds[both], thirds[order[at[both]]]])
 
 
 def _crossing(points: Floats, stencils: Ints) -> Floats:

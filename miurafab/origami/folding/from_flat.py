@@ -97,7 +97,8 @@ def fold_from_flat(
     model = flat_model(pattern, softness=softness)
     near = None
     if touching:
-        near = NearPairs(model.triangles, pattern.edges_vertices, model.points)
+        hinges = np.concatenate([model.hinges, model.creases])
+        near = NearPairs(model.triangles, pattern.edges_vertices, hinges, model.points)
     walk = RampWalk(model, near, np.random.default_rng(seed))
     start = linear_seed(model)
     frames: list[RampFrame] = []

@@ -31,6 +31,7 @@ from miurafab.origami.folding.kinematics import CLOSED_FORM, FROM_FLAT, rigid_mo
 from miurafab.origami.folding.motion import find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
 
+NO_EDGES, NO_HINGES = (np.empty((0, k), dtype=np.int64) for k in (2, 4))
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0.1, 1, 0]], float)
 OVER_TRIANGLE = {
     "the inside": (0.3, 0.2, 0.0),
@@ -150,7 +151,7 @@ def test_what_was_far_from_each_other_is_found_when_it_comes_near() -> None:
 def test_pairs_are_those_within_reach_that_no_sides_join() -> None:
     """A vertex over a triangle, and two triangles with a common side, folded onto each other."""
     flat = np.array([[0.3, 0.3, 9.0], *TRIANGLE])
-    near = NearPairs(np.array([[1, 2, 3]]), np.empty((0, 2), dtype=np.int64), flat)
+    near = NearPairs(np.array([[1, 2, 3]]), NO_EDGES, NO_HINGES, flat)
     points = flat.copy()
     points[0, 2] = 0.9 * REACH
     assert near.at(points).distance == pytest.approx([0.9 * REACH])
@@ -159,13 +160,13 @@ def test_pairs_are_those_within_reach_that_no_sides_join() -> None:
     shape = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, 1, 0.01]], float)
     triangles = np.array([[0, 1, 2], [1, 0, 3]])
     sides = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [3, 1]])
-    assert not len(NearPairs(triangles, sides, shape).at(shape).edges)
+    assert not len(NearPairs(triangles, sides, np.array([[0, 1, 2, 3]]), shape).at(shape).edges)
 
 
 def test_parallel_edges_push_less_than_edges_that_cross() -> None:
     far = [[9, 9, 9], [9, 8, 9], [8, 9, 9]]
     flat = np.array([[0, 0, 0], [1, 0, 0], [0, 5, 0], [1, 5, 0], *far], float)
-    near = NearPairs(np.array([[4, 5, 6]]), np.array([[0, 1], [2, 3]]), flat)
+    near = NearPairs(np.array([[4, 5, 6]]), np.array([[0, 1], [2, 3]]), NO_HINGES, flat)
     points = flat.copy()
     points[2:4] = ((0.5, -0.5, 0.01), (0.5, 0.5, 0.01))
     assert near.at(points).weight.tolist() == [1.0]
@@ -175,7 +176,7 @@ def test_parallel_edges_push_less_than_edges_that_cross() -> None:
 
 def test_what_is_near_in_the_flat_sheet_does_not_push() -> None:
     flat = np.array([[0.3, -0.5 * HEIGHT, 0.0], *TRIANGLE])
-    near = NearPairs(np.array([[1, 2, 3]]), np.empty((0, 2), dtype=np.int64), flat)
+    near = NearPairs(np.array([[1, 2, 3]]), NO_EDGES, NO_HINGES, flat)
     pairs = near.at(flat)
     assert pairs.height == pytest.approx([0.25 * HEIGHT])
     assert touch_energy(flat, pairs) == 0.0
@@ -266,7 +267,8 @@ def touching_spiral() -> tuple[Ramped, list[Floats], Floats]:
     pattern = named_patterns.roll(10, 105.0, 0.93)
     path = fold_from_flat(pattern, ramp_parts(pattern, 20), touching=True)
     model = path.model
-    near = NearPairs(model.triangles, pattern.edges_vertices, model.points)
+    hinges = np.concatenate([model.hinges, model.creases])
+    near = NearPairs(model.triangles, pattern.edges_vertices, hinges, model.points)
     ramped = Ramped(model)
     shapes = [frame.points @ ramped.axes for frame in path.frames]
     for points in shapes:
