@@ -124,6 +124,10 @@ def _apart(pattern: CreasePattern, ends: tuple[int, int]) -> float:
     return float(np.linalg.norm(pattern.folded_coords[ends[0]] - pattern.folded_coords[ends[1]]))
 
 
+def _residuals(pair: tuple[CreasePattern, CreasePattern]) -> str:
+    return " / ".join(f"{worst_residual(pattern):.2g}" for pattern in pair)
+
+
 @cache
 def forces() -> tuple[tuple[str, ...], Rows]:
     """Every pair of sheets at every pair of points."""
@@ -144,7 +148,7 @@ def forces() -> tuple[tuple[str, ...], Rows]:
             rows.append(
                 (
                     name,
-                    " / ".join(f"{worst_residual(pattern):.2g}" for pattern in pair),
+                    _residuals(pair),
                     where,
                     f"{a['force_n']:.3f} / {b['force_n']:.3f}",
                     f"{a['force_n'] / b['force_n']:.2f}",
@@ -171,8 +175,7 @@ def sheets() -> tuple[tuple[str, ...], Rows]:
             model = sheet_model(pattern)
             angles = np.degrees(np.abs(hinge_angles(model.points, model.creases)))
             folded.append(f"{np.median(angles):.0f}")
-        residuals = " / ".join(f"{worst_residual(pattern):.2g}" for pattern in pair)
-        rows.append((name, residuals, " / ".join(away), " / ".join(folded)))
+        rows.append((name, _residuals(pair), " / ".join(away), " / ".join(folded)))
     return head, rows
 
 

@@ -69,14 +69,11 @@ def straightened(
     """
     if not all((np.abs(line.course.hull()) < FARTHEST).all() for line in drawn):
         raise too_far()
-    near = curve_tolerance
-    if near is None:
-        near = default_tolerance([line.course for line in drawn])
+    courses = [line.course for line in drawn]
+    near = default_tolerance(courses) if curve_tolerance is None else curve_tolerance
     ends, letters, angles = [np.empty((0, 2, 2))], list[str](), list[float]()
     number, curve = -1, list[int]()
-    for line, within in zip(
-        drawn, shared_tolerances([line.course for line in drawn], near), strict=True
-    ):
+    for line, within in zip(drawn, shared_tolerances(courses, near), strict=True):
         points = line.course.points(within)
         count = len(points) - 1
         curved = not isinstance(line.course, Polyline)

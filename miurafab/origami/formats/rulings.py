@@ -87,7 +87,8 @@ class _Facet:
     def __init__(self, points: Floats, corners: Ints, curved: Bools, folds: Bools) -> None:
         self.corners, self.curved = corners, curved
         self.places = p = points[corners]
-        self.along = np.roll(p, -1, axis=0) - p
+        self.sides = np.stack([p, np.roll(p, -1, axis=0)], axis=1)
+        self.along = self.sides[:, 1] - p
         self.length = np.linalg.norm(self.along, axis=1)
         self.unit = unit = self.along / self.length[:, None]
         self.before = np.roll(unit, 1, axis=0)
@@ -112,8 +113,7 @@ class _Facet:
         if size <= 0 or (off > ALIKE * np.linalg.norm(likewise, axis=1)).any():
             return []
         rays = np.stack([p[one], p[other]], axis=1)
-        sides = np.stack([p, np.roll(p, -1, axis=0)], axis=1)
-        if any(_crossed(ray, np.concatenate([sides, rays])).any() for ray in rays):
+        if any(_crossed(ray, np.concatenate([self.sides, rays])).any() for ray in rays):
             return []
         ends = zip(self.corners[one].tolist(), self.corners[other].tolist(), strict=True)
         return list(ends)
@@ -182,8 +182,7 @@ class _Facet:
                 if not apart or pair in seen:
                     continue
             ray = np.stack([p[corner], end])
-            sides = np.stack([p, np.roll(p, -1, axis=0)], axis=1)
-            others = np.concatenate([sides, np.array(kept).reshape(-1, 2, 2)])
+            others = np.concatenate([self.sides, np.array(kept).reshape(-1, 2, 2)])
             if _crossed(ray, others).any():
                 continue
             if at >= 0:
