@@ -1,5 +1,5 @@
-"""Tests are the same every time: Hypothesis draws the same examples, and the closing of a terminal
-ends programs even where the tests were started to outlive theirs.
+"""Tests are the same every time: Hypothesis draws the same examples, and Ctrl-C or the closing of a
+terminal ends programs even where the tests were started to outlive theirs, or in the background.
 
 The program is imported before numpy, so that the tests have one thread of OpenBLAS, as it has.
 """
@@ -23,6 +23,8 @@ settings.load_profile("same-every-time")
 
 if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(autouse=True, scope="session")
