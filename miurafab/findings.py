@@ -66,6 +66,7 @@ RULES = {
     "lost-lines": Rule("warning", "lines of a drawing that are not in the pattern"),
     "holes": Rule("note", "parts of a drawing without paper, bounded by borders alone"),
     "unfolded": Rule("note", "a flat pattern that is computed from the folded form of its file"),
+    "rounded": Rule("note", "a file of few digits, whose two forms differ by their rounding"),
     "resized": Rule("note", "a folded form that is taken at the size of the flat pattern"),
     "folded-form": Rule("warning", "a folded form that is not of the flat pattern, left out"),
     "opened": Rule("note", "a sheet that is opened along cuts, or along seams where it closes"),

@@ -23,7 +23,7 @@ from miurafab.display import Shown
 from miurafab.errors import OptionError, PatternError
 from miurafab.files import AnyPath
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.options import Choice, read_value
 from miurafab.surfaces.frame import origin_in
 
@@ -34,6 +34,9 @@ LARGEST_MM = 1e9
 """No coordinate is farther from the origin: squares of areas stay finite."""
 
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
+
+UNCREASED = ("F", "J")
+"""The letters of edges that do not fold: the facets beside them move as one."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -76,6 +79,9 @@ class CreasePattern(Shown):
     unfolded : float, optional
         The residual to which the flat pattern fits, where it was computed from the folded form of a
         file that has no flat one (:mod:`miurafab.origami.flattening`).
+    rounded : float, optional
+        The residual that the rounding of a file of few digits leaves between its two forms
+        (:mod:`miurafab.origami.formats.two_forms`).
     told : tuple of Finding
         What the reader of its file changed, left out or assumed.
 
@@ -100,6 +106,7 @@ class CreasePattern(Shown):
     target_kept: bool | None = True
     angles_assumed: bool = False
     unfolded: float | None = None
+    rounded: float | None = None
     told: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
@@ -255,6 +262,12 @@ class CreasePattern(Shown):
             "flat size": f"{width:.4g} x {height:.4g} mm",
             "target": self.name or "none",
         }
+
+    @property
+    def edges_creased(self) -> Bools:
+        """(E,) whether an edge lies between two facets and folds, or may fold (letters M, V, U)."""
+        inner = (self.edges_faces >= 0).all(axis=1)
+        return np.asarray(inner & np.isin(self.edges_assignment, ("M", "V", "U")))
 
     @cached_property
     def faces_edges(self) -> Ints:

@@ -27,8 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.polygons import previous_corners
+from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import CornerRing, corner_ring, interior_vertices
 
@@ -131,7 +130,6 @@ def vertex_folds(pattern: CreasePattern) -> tuple[list[VertexFolds], int]:
     """
     vertices = interior_vertices(pattern)
     ring = corner_ring(pattern, np.pad(pattern.vertices_coords, ((0, 0), (0, 1))))
-    edges = _edges_after(pattern)
     letters, angles = pattern.edges_assignment, pattern.edges_fold_angle
     start = np.full(len(pattern.vertices_coords), -1)
     corners = np.flatnonzero(ring.vertex >= 0)
@@ -139,7 +137,7 @@ def vertex_folds(pattern: CreasePattern) -> tuple[list[VertexFolds], int]:
     judged, left_out = [], 0
     for vertex in vertices.tolist():
         around = list(_around(ring, int(start[vertex])))
-        edge = edges[around]
+        edge = ring.edge[around]
         if np.isin(letters[edge], ("U", "C", "B")).any():
             left_out += 1
             continue
@@ -161,14 +159,6 @@ def _around(ring: CornerRing, first: int) -> Iterator[int]:
         corner = int(ring.following[corner])
         if corner == first or corner < 0:
             return
-
-
-def _edges_after(pattern: CreasePattern) -> Ints:
-    """(F * k,) the edge that follows each corner counter-clockwise about its vertex: the side that
-    comes into the corner.
-    """
-    faces, edges = pattern.faces_vertices, pattern.faces_edges
-    return np.asarray(np.take_along_axis(edges, previous_corners(faces), axis=1)).reshape(-1)
 
 
 def judge_flat_folding(pattern: CreasePattern) -> Iterator[Finding]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.geometry.angles import angle_between
-from miurafab.geometry.arrays import Floats, Ints, vector_product
+from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 from miurafab.geometry.polygons import (
     edge_lengths,
     filled,
@@ -65,7 +65,7 @@ def residuals(pattern: CreasePattern) -> Residuals:
         inner,
         facet_planarity(pattern, pattern.folded_coords),
         np.abs(angle_defect(ring, inner)) if len(inner) else none,
-        np.abs(kawasaki_residual(ring, inner)) if len(inner) else none,
+        kawasaki_residual(ring, inner, pattern.edges_creased) if len(inner) else none,
         isometry(pattern),
         exactness(pattern),
     )
@@ -76,12 +76,14 @@ def exactness(pattern: CreasePattern) -> float:
 
     It is ``EXACT``, and more where the sheet lies so far from the origin that its coordinates have
     no digits left for that: at a distance D, a coordinate is rounded by D times 1.1e-16. A flat
-    pattern that was unfolded from a rounded folded form is as exact as that.
+    pattern that was unfolded from a rounded folded form is as exact as that, and so are two forms
+    that their file has rounded.
     """
     assert pattern.folded_coords is not None
     mean = float(edge_lengths(pattern.folded_coords, pattern.edges_vertices).mean())
     rounding = float(np.spacing(np.abs(pattern.folded_coords).max()))
-    return max(EXACT + ROUNDINGS * rounding / mean, 2 * (pattern.unfolded or 0.0))
+    known = max(2 * (pattern.unfolded or 0.0), pattern.rounded or 0.0)
+    return max(EXACT + ROUNDINGS * rounding / mean, known)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +92,14 @@ class CornerRing:
 
     ``vertex`` (C,) is -1 where a facet has fewer corners; ``angle`` (C,) is the sector angle, which
     is more than pi where the facet is not convex;
-    ``following`` (C,) the next corner counter-clockwise about the vertex, -1 at a border.
+    ``following`` (C,) the next corner counter-clockwise about the vertex, -1 at a border, and
+    ``edge`` (C,) the edge on the way there, -1 where a facet has fewer corners.
     """
 
     vertex: Ints
     angle: Floats
     following: Ints
+    edge: Ints
 
 
 def corner_ring(pattern: CreasePattern, points: Floats) -> CornerRing:
@@ -122,7 +126,8 @@ def corner_ring(pattern: CreasePattern, points: Floats) -> CornerRing:
     leaves_against = (pattern.edges_vertices[incoming, 0] != faces[face, corner]).astype(np.int64)
     following = np.full(count * k, -1, dtype=np.int64)
     following[face * k + corner] = sides[incoming, leaves_against]
-    return CornerRing(faces.reshape(-1), angle.reshape(-1), following)
+    edge = np.where(real, np.take_along_axis(edges, before, axis=1), -1).reshape(-1)
+    return CornerRing(faces.reshape(-1), angle.reshape(-1), following, edge)
 
 
 def interior_vertices(pattern: CreasePattern) -> Ints:
@@ -141,10 +146,12 @@ def angle_defect(ring: CornerRing, vertices: Ints) -> Floats:
     return np.asarray(2 * np.pi - total[vertices])
 
 
-def kawasaki_residual(ring: CornerRing, vertices: Ints) -> Floats:
+def kawasaki_residual(ring: CornerRing, vertices: Ints, creased: Bools) -> Floats:
     """(I,) |alternate sum of sector angles - pi| at interior ``vertices``, radians.
 
-    Kawasaki's condition for any even degree; a vertex of odd degree cannot fold flat and gets pi.
+    A sector runs from one of the ``creased`` edges (E,) to the next. It is Kawasaki's condition for
+    any even number of creases; a vertex of an odd number cannot fold flat and gets pi, and one
+    without creases gets 0.
     """
     corners = np.flatnonzero(ring.vertex >= 0)
     start = np.full(int(ring.vertex.max()) + 1, -1, dtype=np.int64)
@@ -152,16 +159,14 @@ def kawasaki_residual(ring: CornerRing, vertices: Ints) -> Floats:
     first = start[vertices]
     at, done = first, np.zeros(len(vertices), dtype=bool)
     sums = np.zeros((2, len(vertices)))
-    steps = np.zeros(len(vertices), dtype=np.int64)
-    parity = 0
+    creases, here = np.zeros(len(vertices), dtype=np.int64), np.arange(len(vertices))
     while not done.all():
-        sums[parity] += np.where(done, 0.0, ring.angle[at])
-        steps += ~done
+        sums[creases % 2, here] += np.where(done, 0.0, ring.angle[at])
+        creases += ~done & creased[ring.edge[at]]
         at = np.where(done, at, ring.following[at])
         done |= at == first
-        parity = 1 - parity
-    odd = steps % 2 == 1
-    return np.where(odd, np.pi, np.abs(sums[0] - np.pi))
+    odd = creases % 2 == 1
+    return np.where(creases == 0, 0.0, np.where(odd, np.pi, np.abs(sums[0] - np.pi)))
 
 
 def facet_planarity(pattern: CreasePattern, points: Floats) -> Floats:

@@ -7,7 +7,7 @@ have the order that the closed form (:mod:`~miurafab.origami.folding.layers`) gi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -27,21 +27,39 @@ STRETCH = 1e-6
 def judge_frames(pattern: CreasePattern, frames: Sequence[FurtherFrame]) -> Iterator[Finding]:
     """The faults of ``frames``, and what cannot be judged of them."""
     flat = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
-    for frame in frames:
-        lengths = edge_lengths(frame.points, pattern.edges_vertices)
-        apart = np.abs(lengths - flat) / flat.mean()
-        stretched = np.flatnonzero(~(apart <= STRETCH))
-        off = float(apart.max())
-        if len(stretched):
-            yield Finding(
-                "stretched" if frame.orders is None else "frame",
-                f"Frame {frame.number} is no state of the sheet: {len(stretched)} of its edges are "
-                f"up to {off:.1e} mean edges longer or shorter than in the flat pattern; write the "
-                "file anew, or take the frame out.",
-                tuple(stretched.tolist()),
-            )
-        elif frame.orders is not None:
+    apart = [
+        np.abs(edge_lengths(frame.points, pattern.edges_vertices) - flat) / flat.mean()
+        for frame in frames
+    ]
+    for code, ordered in (("stretched", False), ("frame", True)):
+        own = [n for n, frame in enumerate(frames) if (frame.orders is not None) == ordered]
+        stretched = {frames[n].number: apart[n] for n in own if not (apart[n] <= STRETCH).all()}
+        if stretched:
+            yield _stretched(code, stretched, len(own))
+    for frame, off in zip(frames, apart, strict=True):
+        if frame.orders is not None and (off <= STRETCH).all():
             yield from _judge_layers(pattern, frame, frame.orders)
+
+
+def _stretched(code: str, apart: Mapping[int, Floats], count: int) -> Finding:
+    """The finding on those of ``count`` frames that stretch the sheet. By the number of each,
+    ``apart`` (E,) is how much longer or shorter its edges are, in mean edges.
+    """
+    worst = max(apart, key=lambda number: float(apart[number].max()))
+    edges = np.flatnonzero(~(apart[worst] <= STRETCH))
+    which, them = f"Frame {worst} is no state of the sheet: {len(edges)} of its edges", "frame"
+    if len(apart) > 1:
+        which = (
+            f"{len(apart)} of {count} frames are no states of the sheet: in frame {worst}, the "
+            f"worst, {len(edges)} edges"
+        )
+        them = "frames"
+    return Finding(
+        code,
+        f"{which} are up to {apart[worst].max():.1e} mean edges longer or shorter than in the flat "
+        f"pattern; write the file anew, or take the {them} out.",
+        tuple(edges.tolist()),
+    )
 
 
 def _judge_layers(pattern: CreasePattern, frame: FurtherFrame, orders: Ints) -> Iterator[Finding]:

@@ -218,7 +218,7 @@ def proved(
             ),
             (
                 {"planarity", "isometry", "developability"},
-                f"The {facets} facets are flat, and the same in both forms.",
+                f"The {facets} facets are flat, and the same in both forms{_within(evidence)}.",
             ),
             *(
                 [({"self-intersection"}, "No facets meet in the folded form.")]
@@ -229,6 +229,13 @@ def proved(
     if pattern.seams is not None:
         claims.append(({"seam"}, f"The two edges of each of {len(pattern.seams)} seams fit."))
     return tuple(sentence for codes, sentence in claims if not codes & broken)
+
+
+def _within(evidence: Evidence) -> str:
+    """How well forms agree of which more is not known than the digits of their file tell."""
+    assert evidence.residuals is not None
+    left = evidence.residuals.worst
+    return f" within {left:.2g} mean edges or radians" if left > EXACT else ""
 
 
 def unlisted_seams(pattern: CreasePattern) -> Ints:

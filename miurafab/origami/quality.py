@@ -42,7 +42,8 @@ class Quality:
 
 def quality(pattern: CreasePattern, ring: CornerRing) -> Quality:
     """The quality of the folded ``pattern``; ``ring`` are its corners in the folded form."""
-    folds = np.abs(crease_angles(pattern))
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    folds = np.abs(crease_angles(pattern))[pattern.edges_creased[inner]]
     sectors = ring.angle[ring.vertex >= 0]
     lengths = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
     real = pattern.faces_edges >= 0

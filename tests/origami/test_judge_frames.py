@@ -92,6 +92,18 @@ def test_a_frame_of_a_motion_that_stretches_is_told(document, tmp_path):
     found["file_frames"].append(folded)
     check = judged(found, tmp_path)
     assert check.valid
-    assert [finding.where for finding in check.findings if finding.code == "stretched"] == [
-        tuple(range(len(found["edges_vertices"])))
-    ]
+    (told,) = (finding for finding in check.findings if finding.code == "stretched")
+    assert told.where == tuple(range(len(found["edges_vertices"])))
+    assert told.sentence.startswith("Frame 3 is no state of the sheet: 40 of its edges are up to ")
+
+
+def test_all_frames_that_stretch_are_told_in_one_sentence(document, tmp_path):
+    found, _ = copied(document)
+    whole = np.array(found["file_frames"][0]["vertices_coords"])
+    for size in (1.01, 1.0, 1.03, 1.02):
+        frame = dict(found["file_frames"][0], vertices_coords=(size * whole).tolist())
+        found["file_frames"].append(frame)
+    told = [each for each in judged(found, tmp_path).findings if each.code == "stretched"]
+    assert len(told) == 1
+    assert told[0].sentence.startswith("3 of 4 frames are no states of the sheet: in frame 5, the ")
+    assert "take the frames out" in told[0].sentence

@@ -71,6 +71,33 @@ def test_a_vertex_of_the_folded_form_lifted_is_a_fault_of_all_that_hang_on_it():
     assert set(found["developability"]) <= {vertex, vertex - 1, vertex + 1, vertex - 9, vertex + 9}
 
 
+def with_diagonals(pattern: CreasePattern, letter: str) -> CreasePattern:
+    """``pattern`` with each quad cut by a diagonal of this ``letter``."""
+    a, b, c, d = pattern.faces_vertices.T
+    return replace(
+        pattern,
+        edges_vertices=np.concatenate([pattern.edges_vertices, np.stack([a, c], axis=1)]),
+        edges_assignment=np.append(pattern.edges_assignment, np.full(len(a), letter)),
+        edges_fold_angle=np.append(pattern.edges_fold_angle, np.zeros(len(a))),
+        faces_vertices=np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]),
+        grid=None,
+    )
+
+
+@pytest.mark.parametrize("letter", ["F", "J"])
+def test_edges_that_do_not_fold_are_no_creases_of_a_vertex(letter: str) -> None:
+    """Sectors run from crease to crease, and the angles of a sheet are those of its creases."""
+    whole = audit(regular()).measurements
+    cut = audit(with_diagonals(regular(), letter)).measurements
+    assert cut.max_flat_foldability < 1e-12
+    assert cut.quality.fold_angles == pytest.approx(whole.quality.fold_angles)
+
+
+def test_an_unassigned_edge_may_fold_and_counts_as_a_crease() -> None:
+    cut = with_diagonals(fitted("hypar").pattern, "U")
+    assert audit(cut).measurements.max_flat_foldability > 0.5
+
+
 def test_a_seam_that_gapes_is_a_fault_of_that_seam_alone():
     pattern = two_pieces()
     second = pattern.faces_vertices[pattern.pieces == 1]

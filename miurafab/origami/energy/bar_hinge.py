@@ -6,10 +6,10 @@ Each facet is split into triangles on its short diagonals. The energy of a shape
     c = (|d|^2 - L^2) / (2 L)
 
 over fold angles rho and bar vectors d. A bar of compliance delta = 0 does not stretch. Hinges are
-the diagonals (and edges assigned F), with stiffness k = k_f l and flat at rest, and the creases,
-with stiffness k = k_c l and at rest in the folded form. With k_c = 0, the default and the reading
-of Dudte et al., Nature Materials 15 (2016), only bent facets cost energy. The unit of length is the
-pattern's mean edge L and the unit of energy is k_f L, unless a material gives
+the diagonals (and edges of letters F and J), with stiffness k = k_f l and flat at rest, and the
+creases, with stiffness k = k_c l and at rest in the folded form. With k_c = 0, the default and the
+reading of Dudte et al., Nature Materials 15 (2016), only bent facets cost energy. The unit of
+length is the pattern's mean edge L and the unit of energy is k_f L, unless a material gives
 
     k of a diagonal = 0.55 D (l / t)^(1/3),   D = E t^3 / (12 (1 - nu^2))
     k of a crease   = share D l / L*
@@ -33,7 +33,7 @@ from scipy.sparse.csgraph import connected_components
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
 from miurafab.geometry.polygons import edge_lengths
-from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.crease_pattern import UNCREASED, CreasePattern
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.triangles import split_facets
 from miurafab.origami.invariants import interior_vertices
@@ -60,7 +60,7 @@ class BarHingeModel:
     ``points`` (V, 3) are the folded form. ``bars`` (B, 2) have rest ``lengths`` (B,) and
     ``compliance`` (B,); ``hinges`` (H, 4) of vertices u, v, a, b have ``stiffness`` (H,) and
     ``rest`` angles (H,). ``creases`` (C, 4) are the hinges, with stiffness or without, on the
-    pattern's edges ``creases_edges`` (C,) that have a facet on both sides and are not assigned F.
+    pattern's edges ``creases_edges`` (C,) that have a facet on both sides and fold (not F or J).
     Creases of different ``mechanisms`` (C,) fold independently of each other, since no stiffness
     and no chain of interior vertices joins them.
     ``unit_joule`` is None without a material. ``triangles`` (T, 3) are the parts of the facets.
@@ -161,7 +161,7 @@ def sheet_model(
     triangles, split = split_facets(points, pattern.faces_vertices)
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
     across = _hinges(triangles, pattern.edges_vertices[inner])
-    flat = pattern.edges_assignment[inner] == "F"
+    flat = np.isin(pattern.edges_assignment[inner], UNCREASED)
     if flat.all():
         raise PatternError("The pattern has no crease between two facets, so nothing folds.")
     diagonals = _hinges(triangles, split)
@@ -217,11 +217,12 @@ def flat_model(
 ) -> BarHingeModel:
     """The bars and hinges of ``pattern`` in its flat form, which its creases want to leave.
 
-    The rest of a crease is its fold angle; a crease of letter U has no stiffness, and one of letter
-    F that of a facet. ``crease_ratio`` is k_c / k_f, and a bar of rest length L has the compliance
-    ``softness`` L. ``hinges`` are first those that bend facets, then the creases with stiffness.
-    The unit of length is the mean edge. Raises :class:`~miurafab.errors.PatternError` for a pattern
-    without a mountain or valley between two facets, and for one of several pieces.
+    The rest of a crease is its fold angle; a crease of letter U has no stiffness, and an edge of
+    letter F or J that of a facet. ``crease_ratio`` is k_c / k_f, and a bar of rest length L has the
+    compliance ``softness`` L. ``hinges`` are first those that bend facets, then the creases with
+    stiffness. The unit of length is the mean edge. Raises
+    :class:`~miurafab.errors.PatternError` for a pattern without a mountain or valley between two
+    facets, and for one of several pieces.
     """
     if pattern.pieces_count > 1:
         raise PatternError(f"The pattern has {pattern.pieces_count} pieces; fold one of them.")
@@ -233,14 +234,14 @@ def flat_model(
     across = _hinges(triangles, pattern.edges_vertices[inner])
     diagonals = _hinges(triangles, split)
     _refuse_degenerate(points, pattern.edges_vertices, np.concatenate([diagonals, across]))
-    bending = np.concatenate([diagonals, across[letter == "F"]])
+    flat = np.isin(letter, UNCREASED)
+    bending = np.concatenate([diagonals, across[flat]])
     sprung = np.isin(letter, ("M", "V"))
     if not sprung.any():
         raise PatternError("The pattern has no mountain or valley between two facets.")
-    creased = letter != "F"
     hinges = np.concatenate([bending, across[sprung]])
     weights = np.concatenate([np.ones(len(bending)), np.full(int(sprung.sum()), crease_ratio)])
-    ruled = len(diagonals) + np.flatnonzero(rulings_among(pattern, inner[letter == "F"]))
+    ruled = len(diagonals) + np.flatnonzero(rulings_among(pattern, inner[flat]))
     weights[ruled] = crease_ratio
     goals = pattern.edges_fold_angle[inner[sprung]]
     bars = np.concatenate([pattern.edges_vertices, diagonals[:, :2]])
@@ -253,9 +254,9 @@ def flat_model(
         hinges=hinges,
         stiffness=weights * edge_lengths(points, hinges[:, :2]),
         rest=np.concatenate([np.zeros(len(bending)), goals]),
-        creases=across[creased],
-        creases_edges=inner[creased],
-        mechanisms=np.zeros(int(creased.sum()), dtype=np.int64),
+        creases=across[~flat],
+        creases_edges=inner[~flat],
+        mechanisms=np.zeros(int((~flat).sum()), dtype=np.int64),
         unit_mm=unit,
         triangles=triangles,
         ruled=ruled,
@@ -269,7 +270,7 @@ def rulings_among(pattern: CreasePattern, flat: Ints) -> Bools:
     points, edges = pattern.vertices_coords, pattern.edges_vertices
     letters = pattern.edges_assignment
     count = np.bincount(edges[np.isin(letters, ("M", "V"))].ravel(), minlength=len(points))
-    free = np.bincount(edges[np.isin(letters, ("U", "B", "C", "J"))].ravel(), minlength=len(points))
+    free = np.bincount(edges[np.isin(letters, ("U", "B", "C"))].ravel(), minlength=len(points))
     total = np.zeros((len(points), 2))
     folds = edges[np.isin(letters, ("M", "V"))]
     along = points[folds[:, 1]] - points[folds[:, 0]]
@@ -282,7 +283,7 @@ def rulings_among(pattern: CreasePattern, flat: Ints) -> Bools:
 
 def is_ruled(pattern: CreasePattern) -> bool:
     """Whether flat edges of ``pattern`` are rulings, so that its facets have to bend."""
-    flat = (pattern.edges_assignment == "F") & (pattern.edges_faces >= 0).all(axis=1)
+    flat = np.isin(pattern.edges_assignment, UNCREASED) & (pattern.edges_faces >= 0).all(axis=1)
     return bool(rulings_among(pattern, np.flatnonzero(flat)).any())
 
 

@@ -10,9 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from miurafab.errors import InputError
 from miurafab.geometry.polygons import edge_lengths
-from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.crease_pattern import UNCREASED, CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, Paper, sheet_model
 from miurafab.origami.energy.curve import EnergyCurve, energy_curve
 from miurafab.origami.energy.path import Progress
@@ -165,4 +167,4 @@ def part_of(on_progress: Progress | None, number: int, count: int) -> Progress |
 
 def _has_crease(pattern: CreasePattern) -> bool:
     inner = (pattern.edges_faces >= 0).all(axis=1)
-    return bool((inner & (pattern.edges_assignment != "F")).any())
+    return bool((inner & ~np.isin(pattern.edges_assignment, UNCREASED)).any())

@@ -21,6 +21,7 @@ import numpy as np
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats
+from miurafab.origami.crease_pattern import UNCREASED
 from miurafab.origami.energy.bar_hinge import BarHingeModel, flat_model, has_folds
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.ramp import Ramped, raised_diagonal
@@ -127,8 +128,8 @@ def certified(motion: FoldingMotion) -> tuple[FoldingMotion, RigidCertificate]:
         if not found.rigid:
             return motion, found
         worst = max(worst, found, key=lambda each: each.residual)
-    # a facet edge of letter F does not turn
-    angles[:, pattern.edges_assignment == "F"] = 0.0
+    # an edge within a facet does not turn
+    angles[:, np.isin(pattern.edges_assignment, UNCREASED)] = 0.0
     mismatch = loop_mismatch(pattern, place(pattern, angles))
     if mismatch.max(initial=0.0) > RIGID:
         return motion, replace(worst, rigid=False, residual=float(mismatch.max()))

@@ -1,8 +1,8 @@
 """A pattern of another program without its flat edges: what they part is one facet.
 
-Drawings hold lines that nobody folds (letter F): auxiliary lines, and creases of another state. A
-sheet moves as if they were not there. With them, a vertex in the middle of a facet adds bars that
-say the same twice, and a format that leaves such lines out would give another answer.
+Drawings hold lines that nobody folds (letters F and J): auxiliary lines, and creases of another
+state. A sheet moves as if they were not there. With them, a vertex in the middle of a facet adds
+bars that say the same twice, and a format that leaves such lines out would give another answer.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import signed_areas
-from miurafab.origami.crease_pattern import CreasePattern, restricted
+from miurafab.origami.crease_pattern import UNCREASED, CreasePattern, restricted
 from miurafab.origami.energy.bar_hinge import rulings_among
 from miurafab.origami.energy.triangles import split_facets
 from miurafab.origami.folding.kinematics import FoldingMotion
@@ -54,7 +54,7 @@ class Dissolved:
 
 
 def without_flat_edges(pattern: CreasePattern) -> Dissolved:
-    """``pattern`` with facets joined over edges of letter F where they make one polygon.
+    """``pattern`` with facets joined over edges of letters F and J where they make one polygon.
 
     A fitted sheet keeps its facets, as does a part in which a crease ends inside the joined facet.
     """
@@ -88,7 +88,7 @@ def _flat_edges(pattern: CreasePattern) -> Bools:
     ruling, about which the paper beside a curved crease bends.
     """
     inner = (pattern.edges_faces >= 0).all(axis=1)
-    flat = inner & (pattern.edges_assignment == "F") & (pattern.edges_fold_angle == 0)
+    flat = inner & np.isin(pattern.edges_assignment, UNCREASED) & (pattern.edges_fold_angle == 0)
     flat[np.flatnonzero(flat)] = ~rulings_among(pattern, np.flatnonzero(flat))
     return np.asarray(flat)
 

@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import connected_components
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.sparse import factor_symmetric
-from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.crease_pattern import UNCREASED, CreasePattern
 from miurafab.origami.invariants import corner_ring, interior_vertices
 
 
@@ -66,7 +66,7 @@ def fold_angle_multipliers(pattern: CreasePattern) -> Floats:
 
 
 class _Vertices(NamedTuple):
-    """n interior vertices at which d creases fold and all other edges are flat (letter F).
+    """n interior vertices at which d creases fold and all other edges are flat (F or J).
 
     Their creases ``spokes`` (n, d) counter-clockwise, the ``sectors`` (n, d) after each in radians,
     and their ``numbers`` (n,).
@@ -87,7 +87,7 @@ def _vertices_of(pattern: CreasePattern, degree: int) -> _Vertices:
     first = start[numbers]
     edge = pattern.faces_edges.reshape(-1)
     folds = np.isin(pattern.edges_assignment, ("M", "V"))
-    still = pattern.edges_assignment == "F"
+    still = np.isin(pattern.edges_assignment, UNCREASED)
     spokes = np.full((len(first), degree), -1, dtype=np.int64)
     at = np.zeros((len(first), degree))
     count, turned = np.zeros(len(first), dtype=np.int64), np.zeros(len(first))

@@ -10,7 +10,8 @@ A pattern of several pieces has the keys ``miurafab:pieces`` (the piece of each 
 ``miurafab:seams`` (pairs of border edges that meet in the folded form). Without the first, the
 parts of the pattern that do not touch are its pieces. ``miurafab:cells`` has the column and row of
 each facet where they do not fill the grid of ``miurafab:grid``. ``miurafab:unfolded`` is the
-residual to which a flat pattern fits that was computed from a folded form alone.
+residual to which a flat pattern fits that was computed from a folded form alone, and
+``miurafab:rounded`` that by which the two forms in a file of few digits differ.
 ``miurafab:angles`` is ``assumed`` where no fold angle is known and each fold is given as 180
 degrees.
 
@@ -58,6 +59,7 @@ from miurafab.origami.formats.fold_states import (
     flat_frame,
     folded_alone,
     folded_form,
+    folded_frame,
     further_frames,
     origin_of,
 )
@@ -72,7 +74,12 @@ from miurafab.origami.formats.target_frame import (
     target_kept,
     target_seal,
 )
-from miurafab.origami.formats.two_forms import with_its_own_form
+from miurafab.origami.formats.two_forms import (
+    ROUNDED,
+    told_of_rounding,
+    with_its_own_form,
+    with_its_rounding,
+)
 from miurafab.origami.unfold import with_angles_of_the_folded_form
 from miurafab.version import __version__
 
@@ -119,8 +126,9 @@ def fold_text(
     ):
         if numbers is not None:
             keys[f"miurafab:{name}"] = numbers.tolist()
-    if pattern.unfolded is not None:
-        keys["miurafab:unfolded"] = pattern.unfolded
+    for name, residual in (("unfolded", pattern.unfolded), ("rounded", pattern.rounded)):
+        if residual is not None:
+            keys[f"miurafab:{name}"] = residual
     if pattern.angles_assumed:
         keys["miurafab:angles"] = ASSUMED
     if pattern.target:
@@ -216,7 +224,8 @@ def parse_fold(document: Any) -> CreasePattern:
     if faces.max() >= len(flat):  # before something is made as large as that number
         raise PatternError("'faces_vertices' refers to a vertex that does not exist.")
     others = frames[:place] + frames[place + 1 :]
-    unfolded = _unfolded(document)
+    unfolded = _residual(document, "unfolded", ROUGHEST)
+    rounded = _residual(document, "rounded", ROUNDED)
     pattern = CreasePattern(
         vertices_coords=flat,
         edges_vertices=edges,
@@ -233,13 +242,20 @@ def parse_fold(document: Any) -> CreasePattern:
         target_kept=target_kept(document),
         angles_assumed=document.get("miurafab:angles") == ASSUMED,
         unfolded=unfolded,
-        told=() if unfolded is None else (told_of_unfolding(unfolded),),
+        rounded=rounded,
+        told=(
+            *(() if unfolded is None else (told_of_unfolding(unfolded),)),
+            *(() if rounded is None else (told_of_rounding(rounded),)),
+        ),
     )
     pattern = replace(pattern, faces_vertices=oriented(flat, faces))
     pattern.edges_faces  # noqa: B018 - facets that do not fit their edges are a fault of the file
     foreign = not any(name.startswith("miurafab:") for name in document)
     if pattern.folded_coords is not None and foreign:
-        pattern = with_its_own_form(pattern)
+        chosen = folded_frame(others)
+        assert chosen is not None
+        forms = (points_at(frame, "vertices_coords") for frame in (frames[place], chosen))
+        pattern = with_its_rounding(with_its_own_form(pattern), *forms)
     if pattern.folded_coords is not None and key.get("edges_foldAngle") is None:
         pattern = with_angles_of_the_folded_form(pattern)
     further = sum("foldedForm" in classes_of(frame) for frame in frames) > 1
@@ -283,14 +299,15 @@ def _grid(document: Mapping[str, Any], vertices: int) -> tuple[int, int] | None:
     return grid[0], grid[1]
 
 
-def _unfolded(document: Mapping[str, Any]) -> float | None:
-    residual = document.get("miurafab:unfolded")
+def _residual(document: Mapping[str, Any], name: str, most: float) -> float | None:
+    key = f"miurafab:{name}"
+    residual = document.get(key)
     if residual is None:
         return None
     if isinstance(residual, bool) or not isinstance(residual, int | float):
-        raise PatternError("'miurafab:unfolded' is not a number.")
-    if not 0 <= residual <= ROUGHEST:
-        raise PatternError(f"'miurafab:unfolded' is {residual}; it is from 0 to {ROUGHEST}.")
+        raise PatternError(f"'{key}' is not a number.")
+    if not 0 <= residual <= most:
+        raise PatternError(f"'{key}' is {residual}; it is from 0 to {most}.")
     return float(residual)
 
 

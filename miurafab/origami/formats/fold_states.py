@@ -80,7 +80,7 @@ def folded_form(
     frames: list[Mapping[str, Any]], vertices: int, factor: float, origin: Floats
 ) -> Floats | None:
     """The folded form (V, 3), mm, in ``frames``, relative to ``origin``; None without one."""
-    frame = _folded_frame(frames)
+    frame = folded_frame(frames)
     return None if frame is None else _points_of(frame, vertices, factor, origin)
 
 
@@ -94,7 +94,7 @@ def further_frames(document: Mapping[str, Any]) -> tuple[FurtherFrame, ...]:
     place, key = flat_frame(frames)
     flat = points_at(key, "vertices_coords")
     factor, origin = unit_mm(key, 1.0), origin_of(document)
-    chosen = _folded_frame(frames[:place] + frames[place + 1 :])
+    chosen = folded_frame(frames[:place] + frames[place + 1 :])
     return tuple(
         FurtherFrame(n, _points_of(frame, len(flat), factor, origin), _orders(frame, flat))
         for n, frame in enumerate(frames)
@@ -127,7 +127,7 @@ def _turn(corners: Floats) -> int:
     return 1 if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0 else -1
 
 
-def _folded_frame(frames: list[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+def folded_frame(frames: list[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """The first of ``frames`` of class foldedForm. A frame that says of itself that it is folded
     flat is another state of the sheet.
     """

@@ -18,6 +18,7 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import connected_parts, next_corners, reversed_faces, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
+from miurafab.origami.formats.two_forms import with_its_rounding
 from miurafab.origami.unfold import with_angles_of_the_folded_form
 from miurafab.origami.weld import welded
 
@@ -64,7 +65,9 @@ def _pattern(flat: Path, folded: Path, tolerance: float | None) -> CreasePattern
         folded_coords=shape,
         pieces=piece if pieces > 1 else None,
     )
-    if tolerance is not None:
+    if tolerance is None:
+        pattern = with_its_rounding(pattern, points, shape)
+    else:
         pattern = welded(pattern, tolerance)
     return with_angles_of_the_folded_form(pattern)
 

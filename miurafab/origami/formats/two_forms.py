@@ -2,7 +2,8 @@
 
 It may be drawn in another size; then it is taken at the size of the flat pattern. It may also be no
 form of this sheet: frames of an animation stretch the paper, and files of few digits round it. Such
-a form is left out and told of, and the flat pattern is folded by its letters.
+a form is left out and told of, and the flat pattern is folded by its letters. What a form differs
+by less, as the digits of its file explain, is told of and counts as exact.
 """
 
 from __future__ import annotations
@@ -12,12 +13,19 @@ from dataclasses import replace
 import numpy as np
 
 from miurafab.findings import Finding
+from miurafab.geometry.arrays import Floats
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami import invariants
 from miurafab.origami.crease_pattern import CreasePattern
 
 ROUNDED = 1e-4
 """Flat and folded form in a file of five digits differ by as much, as a part of an edge."""
+
+MOST_DECIMALS = 15
+"""Numbers of more decimals are taken as not rounded."""
+
+FEWEST_DIGITS = 1e-5
+"""A step between numbers, as a part of their range, that may come from rounding."""
 
 
 def with_its_own_form(pattern: CreasePattern) -> CreasePattern:
@@ -46,3 +54,41 @@ def with_its_own_form(pattern: CreasePattern) -> CreasePattern:
         f"those of the flat pattern by up to {left:.2g} mean edges or radians."
     )
     return replace(pattern, folded_coords=None, told=(*told, Finding("folded-form", says)))
+
+
+def with_its_rounding(pattern: CreasePattern, *forms: Floats) -> CreasePattern:
+    """``pattern`` with what the few digits of its file leave between its two forms, which are the
+    numbers of the ``forms`` (V, 2) or (V, 3) there; the pattern itself where its forms differ by
+    more than such digits explain, or by nothing.
+    """
+    if pattern.folded_coords is None:
+        return pattern
+    left = invariants.residuals(pattern).worst
+    if not invariants.exactness(pattern) < left <= ROUNDED:
+        return pattern
+    step = max(_step(form) / edge_lengths(form, pattern.edges_vertices).mean() for form in forms)
+    if left > invariants.ROUNDINGS * step:
+        return pattern
+    told = (*pattern.told, told_of_rounding(left))
+    return replace(pattern, rounded=left, told=told)
+
+
+def told_of_rounding(residual: float) -> Finding:
+    """What is told of two forms that differ by the rounding of their file."""
+    return Finding(
+        "rounded",
+        "The coordinates of the file have few digits: its flat pattern and its folded form differ "
+        f"by up to {residual:.2g} mean edges or radians, which is their rounding.",
+    )
+
+
+def _step(form: Floats) -> float:
+    """The step between the numbers of a ``form`` of few decimals, or of single precision; else 0.
+
+    Numbers with fewer than five digits, as those of a grid, are not taken as rounded.
+    """
+    rounded = [(10.0**-decimals, np.round(form, decimals)) for decimals in range(MOST_DECIMALS + 1)]
+    single = form.astype(np.float32)
+    rounded.append((float(np.spacing(np.abs(single).max())), single.astype(np.float64)))
+    step = next((step for step, numbers in rounded if (numbers == form).all()), 0.0)
+    return step if step <= FEWEST_DIGITS * np.ptp(form) else 0.0

@@ -33,8 +33,10 @@ def folded(pattern: CreasePattern) -> dict[tuple[float, ...], float]:
     return {round(float(t) / 5): float(a) for t, a in zip(turn, angle, strict=True)}
 
 
-def test_stray_lines_change_no_fold_angle_and_are_carried_along() -> None:
-    plain, stray = named_patterns.drawn(BASE), named_patterns.drawn(BASE + STRAY)
+@pytest.mark.parametrize("letter", ["F", "J"])
+def test_stray_lines_change_no_fold_angle_and_are_carried_along(letter: str) -> None:
+    lines = [(one, other, letter, angle) for one, other, _, angle in STRAY]
+    plain, stray = named_patterns.drawn(BASE), named_patterns.drawn(BASE + lines)
     assert len(stray.faces_vertices) > len(plain.faces_vertices)
     assert folded(stray) == pytest.approx(folded(plain), abs=1e-5)
     found = find_motion(stray, 6)
@@ -44,7 +46,7 @@ def test_stray_lines_change_no_fold_angle_and_are_carried_along() -> None:
     flat = edge_lengths(stray.vertices_coords, stray.edges_vertices)
     for frame in found.motion.frames:
         assert edge_lengths(frame, stray.edges_vertices) == pytest.approx(flat, abs=1e-9)
-    assert not found.motion.fold_angles[:, stray.edges_assignment == "F"].any()
+    assert not found.motion.fold_angles[:, stray.edges_assignment == letter].any()
 
 
 def test_what_is_joined_is_a_polygon() -> None:

@@ -91,3 +91,37 @@ def test_facets_of_a_form_folded_flat_lie_on_each_other() -> None:
     assert "amplitude" not in steep[0]
     through = mf.check(parse_fold(strip(folded(math.radians(150), math.radians(150)))))
     assert [f.code for f in through.findings if f.severity == "refusal"] == ["self-intersection"]
+
+
+def test_forms_of_few_digits_are_as_exact_as_those_and_told_so(tmp_path: Path) -> None:
+    rounded = np.round(folded(0.5, 1.0), 9)
+    document = strip(rounded)
+    read = parse_fold(document)
+    left = float(np.abs(rounded - folded(0.5, 1.0)).max())
+    assert left / 2 < read.rounded < 4 * left
+    assert [finding.code for finding in read.told] == ["rounded"]
+    checked = mf.check(read)
+    assert checked.valid
+    assert any(f"within {read.rounded:.2g} mean edges" in sentence for sentence in checked.proved)
+    # in another unit the numbers have all their digits, and what is known of them is kept
+    read.scaled(25.4).save(tmp_path / "strip.fold")
+    again = mf.load(tmp_path / "strip.fold")
+    assert again.rounded == read.rounded
+    assert mf.check(again).valid
+
+
+def test_forms_that_differ_by_more_than_their_digits_explain_are_refused() -> None:
+    form = np.round(folded(0.5, 1.0), 9)
+    form[3:5, 0] += 1e-6
+    read = parse_fold(strip(form))
+    assert read.rounded is None
+    assert not mf.check(read).valid
+    exact = folded(0.5, 1.0)
+    exact[3:5, 0] += 1e-9  # with all its digits
+    assert parse_fold(strip(exact)).rounded is None
+
+
+def test_forms_of_single_precision_are_as_exact_as_that() -> None:
+    read = parse_fold(strip(folded(0.5, 1.0).astype(np.float32).astype(np.float64)))
+    assert 1e-9 < read.rounded < 1e-6
+    assert mf.check(read).valid
