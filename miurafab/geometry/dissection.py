@@ -108,7 +108,7 @@ def _cut_all(
     number: Ints = np.zeros(len(nodes), dtype=np.int64)
     joins = _Joins.of(graph)
     count = 1
-    while len(nodes):
+    while True:
         # the unknowns of a part stand together
         first = np.flatnonzero(np.diff(number, prepend=-1))
         size = np.diff(first, append=len(nodes))

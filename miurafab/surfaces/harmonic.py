@@ -61,10 +61,9 @@ def _between(mesh: IntrinsicMesh, low: Ints, high: Ints) -> Floats:
     values = np.zeros(mesh.count)
     values[high] = 1.0
     free = np.setdiff1d(np.arange(mesh.count), np.concatenate([low, high]))
-    if len(free):
-        rows = mesh.laplacian[free]
-        right = -(rows[:, high] @ np.ones(len(high)))
-        values[free] = factor_symmetric(rows[:, free].tocsc()).solve(right)
+    rows = mesh.laplacian[free]
+    right = -(rows[:, high] @ np.ones(len(high)))
+    values[free] = factor_symmetric(rows[:, free].tocsc()).solve(right)
     return values
 
 

@@ -15,6 +15,7 @@ cannot be read as a mesh: ..."; files with no unit are in millimetres.
 from __future__ import annotations
 
 import io
+import itertools
 import zipfile
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -39,6 +40,7 @@ _3MF_UNITS_MM = {
 _3MF_ITEM = "{*}build/{*}item"
 _3MF_DEPTH = 16
 _3MF_LARGEST = 1 << 30
+_3MF_OBJECTS = 10_000
 
 
 def read_off(content: bytes) -> tuple[Floats, Ints]:
@@ -47,17 +49,20 @@ def read_off(content: bytes) -> tuple[Floats, Ints]:
     lines = [line for line in lines if line]
     if not lines or not lines[0][0].upper().endswith(b"OFF"):
         raise ValueError("it does not begin with OFF")
-    head, first = lines[0][0].upper(), lines[0][1:]
+    word, first = lines[0][0], lines[0][1:]
+    head = word.upper()[:-3]
     if b"BINARY" in first:
         raise ValueError("it is a binary OFF file; save it as text")
     lines = [first, *lines[1:]] if first else lines[1:]
     counts = [token for line in lines[:3] for token in line][:2]
-    if head.startswith((b"4", b"N4")) or b"n" in head:
+    if b"4" in head or word.endswith(b"nOFF"):
         raise ValueError("its vertices are not in three dimensions")
+    if len(counts) < 2:
+        raise ValueError("it does not tell how many vertices and faces it has")
     vertices, faces = int(counts[0]), int(counts[1])
     # the third count, of edges, is left out by some programs
     rest = lines[1:]
-    width = 3 + 3 * (b"N" in head) + 4 * head.startswith(b"C") + 2 * (b"ST" in head)
+    width = 3 + 3 * (b"N" in head) + 4 * (b"C" in head.replace(b"ST", b"")) + 2 * (b"ST" in head)
     if len(rest) >= vertices + faces and all(len(line) >= 3 for line in rest[:vertices]):
         points = np.array([line[:3] for line in rest[:vertices]], dtype=np.float64)
         by_line = rest[vertices : vertices + faces]
@@ -110,12 +115,10 @@ def read_ply_strips(content: bytes) -> tuple[Floats, Ints] | None:
     values = _ply_ascii(elements, body) if kind == "ascii" else _ply_binary(elements, body, kind)
     vertex = values["vertex"]
     points = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
-    strips = [
-        np.asarray(strip, dtype=np.int64) for strip in next(iter(values["tristrips"].values()))
-    ]
-    if not strips:
-        return points, np.zeros((0, 3), dtype=np.int64)
-    return points, np.concatenate([_strip_triangles(strip) for strip in strips])
+    held = next(kinds for name, _, kinds in elements if name == "tristrips")
+    lists = values["tristrips"][next(words[-1] for words in held if words[0] == "list")]
+    strips = [_strip_triangles(np.asarray(strip, dtype=np.int64)) for strip in lists]
+    return points, np.vstack([np.zeros((0, 3), dtype=np.int64), *strips])
 
 
 def _strip_triangles(strip: Ints) -> Ints:
@@ -194,7 +197,10 @@ def read_3mf(content: bytes) -> tuple[Floats, Ints]:
     parts: list[tuple[Floats, Ints]] = []
     for item in models[root].findall(_3MF_ITEM):
         path = _path_of(item, root)
-        parts += _placed(models, path, item.get("objectid", ""), _transform(item), 0)
+        placed = _placed(models, path, item.get("objectid", ""), _transform(item), 0)
+        parts += itertools.islice(placed, _3MF_OBJECTS + 1 - len(parts))
+        if len(parts) > _3MF_OBJECTS:
+            raise ValueError(f"it builds more than {_3MF_OBJECTS:,} objects")
     if not parts:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
@@ -208,26 +214,21 @@ def read_3mf(content: bytes) -> tuple[Floats, Ints]:
 def _placed(
     models: Mapping[str, ElementTree.Element], path: str, number: str, place: Floats, depth: int
 ) -> Iterator[tuple[Floats, Ints]]:
-    """The meshes of an object and of its components under the transform ``place`` (4, 3)."""
+    """An object and its components under the transform ``place`` (4, 3): the mesh of each, which
+    is empty for one that has components alone.
+    """
     if depth > _3MF_DEPTH:
         raise ValueError("its components are nested too deeply")
     for found in models[path].iterfind("{*}resources/{*}object"):
         if found.get("id") != number:
             continue
-        mesh = found.find("{*}mesh")
-        if mesh is not None:
-            points = np.array(
-                [[v.get(axis) for axis in "xyz"] for v in mesh.iterfind("{*}vertices/{*}vertex")],
-                dtype=np.float64,
-            ).reshape(-1, 3)
-            faces = np.array(
-                [
-                    [t.get(corner) for corner in ("v1", "v2", "v3")]
-                    for t in mesh.iterfind("{*}triangles/{*}triangle")
-                ],
-                dtype=np.int64,
-            ).reshape(-1, 3)
-            yield points @ place[:3] + place[3], faces
+        corners = found.iterfind("{*}mesh/{*}vertices/{*}vertex")
+        points = np.array([[v.get(axis) for axis in "xyz"] for v in corners], dtype=np.float64)
+        triangles = found.iterfind("{*}mesh/{*}triangles/{*}triangle")
+        faces = np.array(
+            [[t.get(corner) for corner in ("v1", "v2", "v3")] for t in triangles], dtype=np.int64
+        )
+        yield points.reshape(-1, 3) @ place[:3] + place[3], faces.reshape(-1, 3)
         for part in found.iterfind("{*}components/{*}component"):
             inner = _transform(part)
             both = np.concatenate([inner[:3] @ place[:3], inner[3:] @ place[:3] + place[3]])

@@ -91,8 +91,6 @@ def conformal(vertices: Floats, faces: Ints) -> Complexes:
     z[free] = parts[: len(free)] + 1j * parts[len(free) :]
     e1, e2 = z[faces[:, 1]] - z[faces[:, 0]], z[faces[:, 2]] - z[faces[:, 0]]
     laid = float((e1.conj() * e2).imag.sum())
-    if laid < 0:
-        z, laid = z.conj(), -laid
     scaled: Complexes = z * np.sqrt(area.sum() / max(laid, 1e-300))
     return scaled
 
@@ -121,12 +119,11 @@ def tutte(vertices: Floats, faces: Ints) -> Complexes:
     graph = sparse.coo_array((ones, (sides[:, 0], sides[:, 1])), shape=(count, count)).tocsr()
     graph = graph + graph.T
     free = np.setdiff1d(np.arange(count), loop)
-    if len(free):
-        degree = np.asarray(graph.sum(axis=1), dtype=np.float64).ravel()[free]
-        matrix = (sparse.diags_array(degree) - graph[free][:, free]).tocsc()
-        right = graph[free][:, loop] @ z[loop]
-        factor = factor_symmetric(matrix)
-        z[free] = factor.solve(right.real) + 1j * factor.solve(right.imag)
+    degree = np.asarray(graph.sum(axis=1), dtype=np.float64).ravel()[free]
+    matrix = (sparse.diags_array(degree) - graph[free][:, free]).tocsc()
+    right = graph[free][:, loop] @ z[loop]
+    factor = factor_symmetric(matrix)
+    z[free] = factor.solve(right.real) + 1j * factor.solve(right.imag)
     return z
 
 

@@ -30,8 +30,6 @@ Side = Literal["outer", "inner", "middle"]
 
 THICK = 2.2
 """The skin is where the thickness is less than this many times the median."""
-THIN = 0.7
-"""Rounded rims are thinner than this part of the median."""
 FACING_BACK = 0.5
 BEND = math.cos(math.radians(40))
 
@@ -41,8 +39,6 @@ LEAST_FACING = 0.95
 """This part of each skin looks at the other."""
 LEAST_RATIO = 0.8
 """The smaller skin has this part of the area of the larger at least."""
-LEAST_SLENDERNESS = 5.0
-"""The root of half the area over the thickness."""
 
 RAYS = 20_000
 """Of more triangles, evenly chosen ones send a ray, and the others take the nearest answer."""
@@ -91,19 +87,13 @@ def judge_plate(vertices: Floats, faces: Ints) -> Plate:
     smooth = np.einsum("fk,fk->f", normal[first], normal[second]) > BEND
     first, second = first[smooth], second[smooth]
     outer, inner = _two_largest(skin, first, second, area)
-    why_not = _why_not(outer, inner, hit, area, thickness)
-    if not why_not and not (
-        _is_sheet(vertices, faces[outer]) and _is_sheet(vertices, faces[inner])
-    ):
-        # the skins reach round a rounded rim, which is thin
-        outer, inner = _two_largest(skin & (through > THIN * thickness), first, second, area)
-        why_not = _why_not(outer, inner, hit, area, thickness)
-        if not why_not and not _is_sheet(vertices, faces[outer]):
-            why_not = "its skin has more than two borders or a handle"
+    why_not = _why_not(outer, inner, hit, area)
+    if not why_not and any(_handles(vertices, faces[side]) for side in (outer, inner)):
+        why_not = "its skin has a handle"
     return Plate(outer, inner, through, thickness, why_not)
 
 
-def _why_not(outer: Ints, inner: Ints, hit: Ints, area: Floats, thickness: float) -> str:
+def _why_not(outer: Ints, inner: Ints, hit: Ints, area: Floats) -> str:
     """Which limit the skins miss, as the rest of a sentence with the figures; empty for none."""
     large, small, whole = (float(area[part].sum()) for part in (outer, inner, slice(None)))
     if min(large, small) < LEAST_SKIN * whole:
@@ -124,11 +114,6 @@ def _why_not(outer: Ints, inner: Ints, hit: Ints, area: Floats, thickness: float
         return (
             f"one skin has {small / large:.2g} times the area of the other, and {LEAST_RATIO:g} is "
             "needed"
-        )
-    slender = math.sqrt(whole / 2) / thickness
-    if slender < LEAST_SLENDERNESS:
-        return (
-            f"it is {slender:.2g} times as wide as thick, and {LEAST_SLENDERNESS:g} times is needed"
         )
     return ""
 
@@ -167,9 +152,9 @@ def _two_largest(skin: Bools, first: Ints, second: Ints, area: Floats) -> tuple[
     return np.flatnonzero(skin & (label == best[0])), np.flatnonzero(skin & (label == best[1]))
 
 
-def _is_sheet(vertices: Floats, faces: Ints) -> bool:
+def _handles(vertices: Floats, faces: Ints) -> int:
     points, skin = one_sheet(*used_alone(vertices, faces), "the skin")
-    return classify(points, skin).kind in ("disk", "tube")
+    return classify(points, skin).handles
 
 
 def _weighted_median(values: Floats, weights: Floats) -> float:

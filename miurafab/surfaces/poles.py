@@ -152,8 +152,7 @@ def _cut_at(
             if above[a] * above[b] < 0:
                 polygon.append(cut(a, b))
         parts.extend([polygon[0], polygon[n], polygon[n + 1]] for n in range(1, len(polygon) - 1))
-    if added:
-        table = np.concatenate([table, np.array(added)])
+    table = np.vstack([table, *added])
     faces = np.concatenate([kept, np.array(parts, dtype=np.int64).reshape(-1, 3)])
     rest = [table[:, 3 + k] for k in range(len(distances))]
     return table[:, :3], faces, rest

@@ -141,13 +141,11 @@ def _path_data(element: ElementTree.Element) -> str:
 
 def _drawn(strokes: Iterable[tuple[str, tuple[tuple[float, float], ...]]]) -> Iterator[curves.Path]:
     """The curves of a pen's ``strokes``."""
-    curve: curves.Path | None = None
+    curve = curves.Path()
     for stroke, places in strokes:
         points = [(x, -y) for x, y in places]
         if stroke == "moveTo":
             curve = curves.Path(points[0])
-        elif curve is None:
-            continue
         elif stroke == "lineTo":
             curve.line_to(points[0])
         elif stroke == "curveTo":
@@ -158,7 +156,7 @@ def _drawn(strokes: Iterable[tuple[str, tuple[tuple[float, float], ...]]]) -> It
             if stroke == "closePath":
                 curve.close()
             yield curve
-            curve = None
+            curve = curves.Path(curve.start)  # where a stroke after a closed one begins
 
 
 def _longest(path: Path, found: Iterable[curves.Path]) -> list[list[float]]:

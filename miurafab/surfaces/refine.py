@@ -11,7 +11,6 @@ import numpy as np
 from miurafab.errors import TargetError
 from miurafab.geometry.arrays import Floats, Ints
 
-_ROUNDS = 24
 _MOST_FACES = 100_000
 """A mesh gets fewer, or four times as many as it has, unless it is a strip that is thousands of
 times as long as it is wide."""
@@ -20,7 +19,7 @@ times as long as it is wide."""
 def refine(vertices: Floats, faces: Ints, limit: float) -> tuple[Floats, Ints]:
     """The same surface with no edge longer than ``limit``; the first vertices are the old ones."""
     most = max(_MOST_FACES, 4 * len(faces))
-    for _ in range(_ROUNDS):
+    while True:
         count = len(vertices)
         tail, head = faces, np.roll(faces, -1, axis=1)
         keys = np.minimum(tail, head) * count + np.maximum(tail, head)
@@ -28,14 +27,13 @@ def refine(vertices: Floats, faces: Ints, limit: float) -> tuple[Floats, Ints]:
         a, b = unique // count, unique % count
         long = np.linalg.norm(vertices[a] - vertices[b], axis=1) > limit
         if not long.any():
-            break
+            return vertices, faces
         if len(faces) > most:
             raise TargetError("The mesh is too narrow for its length; cut it into shorter parts.")
         middle = np.full(len(unique), -1, dtype=np.int64)
         middle[long] = count + np.arange(int(long.sum()))
         vertices = np.concatenate([vertices, (vertices[a[long]] + vertices[b[long]]) / 2])
         faces = _split(vertices, faces, middle[place.reshape(-1, 3)])
-    return vertices, faces
 
 
 def _split(vertices: Floats, faces: Ints, middle: Ints) -> Ints:

@@ -24,6 +24,12 @@ def test_polygons_that_only_touch_share_no_area() -> None:
     assert found.place_of(np.array([3, 0, 0]), np.array([1, 3, 7])).tolist() == [1, -1, -1]
 
 
+def test_where_nothing_overlaps_no_pair_has_a_place() -> None:
+    found = shared_areas(*boxes((0, 0, 1, 1), (2, 0, 3, 1)), 1e-6)
+    assert found.pairs.shape == (0, 2)
+    assert found.place_of(np.array([0, 1]), np.array([1, 1])).tolist() == [-1, -1]
+
+
 def test_pairs_and_triples_are_those_of_a_search_over_all() -> None:
     rng = np.random.default_rng(5)
     low = rng.random((24, 2)) * 6

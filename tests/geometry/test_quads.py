@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from miurafab.geometry.quads import QuadCharts, QuadGrid
 
@@ -14,6 +15,12 @@ def test_a_whole_grid_has_the_numbering_and_topology_of_a_quad_grid() -> None:
         assert np.array_equal(getattr(charts, name), getattr(grid, name)), name
     assert np.array_equal(charts.lattice, np.argwhere(np.ones((4, 6)))[:, ::-1])
     assert len(charts.neighbouring_facets) == 5 * 2 + 4 * 3
+
+
+@pytest.mark.parametrize("sides", [(1, 4), (4, 1)])
+def test_a_grid_of_one_line_has_no_facet(sides: tuple[int, int]) -> None:
+    with pytest.raises(ValueError, match=f"{sides[0]} x {sides[1]} vertices has no facet"):
+        QuadGrid(*sides)
 
 
 def test_developability_is_asked_only_inside_a_chart() -> None:

@@ -86,6 +86,12 @@ def test_a_solver_factors_matrices_that_fall_apart(side):
     assert matrix @ SymmetricSolver().factor(matrix).solve(right) == pytest.approx(right)
 
 
+def test_a_solver_factors_a_matrix_without_joins():
+    numbers = np.arange(1.0, 501.0)
+    solution = SymmetricSolver().factor(sparse.diags_array(numbers).tocsc()).solve(np.ones(500))
+    assert solution == pytest.approx(1 / numbers)
+
+
 def test_an_empty_matrix_has_an_empty_solution():
     assert SymmetricSolver().factor(sparse.csc_array((0, 0))).solve(np.zeros(0)).shape == (0,)
 

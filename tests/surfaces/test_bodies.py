@@ -204,6 +204,27 @@ def test_the_poles_and_the_holes_are_the_users():
     assert np.abs(axis[:, :2]).max() < 0.5
 
 
+@pytest.mark.parametrize("poles", [[[-50, 0, 0], [-49, 0, 0]], [[-50, 0, 0], [-15, 0, 2]]])
+def test_holes_that_leave_no_tube_are_refused(poles):
+    """Holes of 12 mm on a bar of 4 mm: one in the other, and one that cuts the bar through."""
+    bar = trimesh.creation.box((100.0, 4.0, 4.0))
+    bar = Body(np.asarray(bar.vertices), np.asarray(bar.faces), "bar")
+    with pytest.raises(TargetError, match="bar is closed, and no two holes make a tube of it"):
+        body_surface(bar, poles=np.array(poles, dtype=float), hole=12.0)
+
+
+def test_a_hole_along_edges_cuts_no_triangle():
+    """The octahedron's lower half, by the levels of its corners."""
+    corners = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2]])
+    faces = np.concatenate([faces, faces[:, [1, 0, 2]] + [0, 0, 3]])
+    points, triangles = open_at(corners, faces, [1 - corners[:, 2]], 1.0)
+    assert len(points) == 5
+    assert {tuple(sorted(map(tuple, points[t].tolist()))) for t in triangles} == {
+        tuple(sorted(map(tuple, corners[t].tolist()))) for t in faces[4:]
+    }
+
+
 @pytest.fixture(scope="module")
 def sheet():
     """Six gores of a bent pipe."""

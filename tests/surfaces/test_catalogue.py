@@ -205,6 +205,28 @@ def test_an_arc_of_a_drawing_is_flattened_to_a_thousandth_of_its_size(
     assert np.abs(np.hypot(middle[:, 0] - 50, middle[:, 1]) - 30).max() < 2e-3 * 60
 
 
+def test_curves_and_closed_parts_of_a_drawing_are_drawn_as_svg_says(tmp_path: Path) -> None:
+    """A parabola of one control point, and a line from where the part before it was closed."""
+    path = tmp_path / "profile.svg"
+    path.write_text('<svg><path d="M 10 0 Q 30 -20 10 -40"/></svg>')
+    points = np.array(read_profile(path))
+    assert np.abs(points[:, 0] - (10 + points[:, 1] * (40 - points[:, 1]) / 40)).max() < 1e-9
+    assert points[[0, -1]].tolist() == [[10, 0], [10, 40]]
+    path.write_text('<svg><path d="M 10 0 h 5 v -5 Z L 90 -80"/></svg>')
+    assert read_profile(path) == [[10, 0], [90, 80]]
+    path.write_text('<svg><polygon points="10,0 50,0 50,-50"/></svg>')
+    assert read_profile(path) == [[10, 0], [50, 0], [50, 50], [10, 0]]
+
+
+def test_a_curve_of_too_many_points_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("miurafab.surfaces.profile_files.MOST_POINTS", 3)
+    (tmp_path / "p.svg").write_text('<svg><polyline points="1,0 2,1 3,0 4,1"/></svg>')
+    with pytest.raises(TargetError, match="holds a curve of more than 3 points"):
+        read_profile(tmp_path / "p.svg")
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
@@ -216,6 +238,9 @@ def test_an_arc_of_a_drawing_is_flattened_to_a_thousandth_of_its_size(
         ("p.svg", "<svg><path", "cannot be read as an SVG drawing"),
         ("p.svg", "<svg><path d='M 1 x'/></svg>", "cannot be read as an SVG drawing"),
         ("p.svg", "<svg/>", "holds no polyline, spline or arc"),
+        ("p.svg", "<svg><path d='M1 1 M2 2'/></svg>", "holds no polyline, spline or arc"),
+        ("p.svg", "<!DOCTYPE svg [<!ENTITY a 'b'>]><svg/>", "it declares XML entities"),
+        ("p.csv", "1,0\n1,1e10\n1.0000001,1e10\n", "too far apart, or too near each other"),
         (
             "p.svg",
             "<svg><g id='a' transform='scale(2)'><path d='M1 1 2 2'/></g></svg>",

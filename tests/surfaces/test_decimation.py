@@ -67,6 +67,15 @@ def test_a_small_mesh_stays_as_it_is():
     assert np.array_equal(same, faces)
 
 
+def test_a_strip_without_inner_vertices_stays_as_it_is():
+    vertices, faces = sheet(40)
+    strip = faces[(vertices[faces][..., 1] <= 1).all(axis=1)]
+    used, strip = np.unique(strip, return_inverse=True)
+    points, same = decimated(vertices[used], strip.reshape(-1, 3), 10)
+    assert np.array_equal(points, vertices[used])
+    assert np.array_equal(same, strip.reshape(-1, 3))
+
+
 def test_a_large_mesh_is_laid_flat_simplified_and_measured_whole(monkeypatch):
     vertices, faces = sheet(48)
     before = mesh.mesh_surface(vertices, faces)

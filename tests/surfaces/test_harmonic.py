@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mesh_shapes import ball, mesh, ring
 
+from miurafab.errors import TargetError
 from miurafab.surfaces.harmonic import CylinderMap, cylinder_map
 from miurafab.surfaces.intrinsic import intrinsic_mesh
 from miurafab.surfaces.parameterise import border_loops
@@ -43,6 +44,19 @@ def test_a_cylinder_is_its_own_map():
     assert np.abs(result.height - vertices[:, 2] / 3).max() < 1e-12
     assert off_turns(result.turns, turn) < 1e-12
     assert result.turned_over(faces) == 0
+
+
+def test_a_ring_of_one_row_has_borders_alone():
+    vertices, faces = round_about(lambda t: 1 + 0 * t, lambda t: 3 * t, 24, 2)
+    result = mapped(vertices, faces, vertices[:, 2])
+    assert result.height.tolist() == [0.0] * 24 + [1.0] * 24
+    assert off_turns(result.turns, np.tile(np.arange(24) / 24, 2)) < 1e-12
+
+
+def test_what_is_thousands_of_times_as_long_as_wide_is_not_divided_for_ever():
+    vertices = np.array([[0, 0, 0], [1e9, 0, 0], [1e9, 1, 0], [0, 1, 0.0]])
+    with pytest.raises(TargetError, match="too narrow for its length; cut it into shorter parts"):
+        refine(vertices, np.array([[0, 1, 2], [0, 2, 3]]), 1.0)
 
 
 def error_on_cone(cells):

@@ -176,6 +176,11 @@ FILES = {
     "empty.off.gz": (gzip.compress(b""), "cannot be read as a mesh: it does not begin with OFF"),
     "text.off.gz": (b"OFF 0 0 0", "cannot be unpacked: Not a gzipped file"),
     "short.off": (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n", "ends within face 1 of 1"),
+    "wild.off": (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n", "vertex that does not exist"),
+    "counts.off": (b"OFF\n3\n", "does not tell how many vertices and faces"),
+    "binary.off": (b"OFF BINARY\n\0\0\0\3", "is a binary OFF file; save it as text"),
+    "four.off": (b"C4OFF\n1 0 0\n0 0 0 1\n", "vertices are not in three dimensions"),
+    "any.off": (b"nOFF\n2\n3 1 0\n0 0\n1 0\n0 1\n3 0 1 2\n", "not in three dimensions"),
 }
 
 
@@ -227,6 +232,56 @@ def test_a_size_that_suggests_another_unit_is_a_remark(tmp_path, scale, noted):
     if noted:
         assert "millimetres" in surface.findings[0].sentence
         assert "`size`" in surface.findings[0].sentence
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "words"),
+    [
+        (np.eye(3), np.zeros((0, 3), dtype=int), "The mesh holds no triangles"),
+        (np.eye(3), [[0, 1, 3]], "a triangle refers to a vertex that does not exist"),
+        (np.diag([1, np.nan, 1]), [[0, 1, 2]], "vertex 1 has a coordinate that is not a finite"),
+        (1e101 * np.eye(3), [[0, 1, 2]], r"too large to be lengths \(1e\+101 mm\)"),
+    ],
+)
+def test_arrays_that_are_no_mesh(vertices, faces, words):
+    """Arrays of Python reach no reader of files, which refuses the like."""
+    with pytest.raises(TargetError, match=words):
+        mesh_surface(vertices, np.asarray(faces))
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        ({"rectangle": [1, 0, 0, 1], "rotate": 0, "stiffness": 0}, "rectangle is damaged"),
+        ({"rectangle": [0, 1, 0, 1], "rotate": 0, "stiffness": -1}, "rectangle is damaged"),
+        ({"rectangle": [0, 1, 0], "rotate": 0, "stiffness": 0}, "rectangle is damaged"),
+    ],
+)
+def test_a_damaged_note_of_the_rectangle_is_refused(place, words):
+    with pytest.raises(TargetError, match=words):
+        mesh_surface(*square(), place=place)
+
+
+def test_a_bow_too_thin_for_a_rectangle_is_refused():
+    """Three quarters of a ring, a hundredth of its diameter wide."""
+    turn = np.linspace(0, 1.5 * np.pi, 91)
+    radii = np.array([49.75, 50.25])[:, None]
+    points = np.stack([radii * np.cos(turn), radii * np.sin(turn), 0 * radii * turn], axis=-1)
+    a = np.arange(90)
+    faces = np.concatenate([np.stack([a, a + 92, a + 91], 1), np.stack([a, a + 1, a + 92], 1)])
+    for words, where in (
+        ("no rectangle fits into the mesh; it is too narrow", {}),
+        ("no rectangle fits into the mesh at this 'rotate'", {"rotate": 0.5}),
+        ("no rectangle fits into the mesh at this rotation", {"region": Region.read("0,1,0,1")}),
+    ):
+        with pytest.raises(TargetError, match=words):
+            mesh_surface(points.reshape(-1, 3), faces, "bow.stl", **where)
+
+
+def test_a_closed_mesh_takes_no_region():
+    ball = trimesh.creation.icosphere(1, 50.0)
+    with pytest.raises(TargetError, match=r"ball\.stl is closed .* leave them out"):
+        mesh_surface(np.asarray(ball.vertices), np.asarray(ball.faces), "ball.stl", rotate=0.0)
 
 
 def test_dirt_is_cleaned_away():

@@ -7,9 +7,11 @@ import importlib.util
 import io
 import json
 import struct
+import sys
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import get_args
 
 import numpy as np
@@ -22,7 +24,7 @@ import miurafab as mf
 from miurafab.errors import TargetError
 from miurafab.geometry.rays import first_hits
 from miurafab.surfaces.mesh import mesh_surface
-from miurafab.surfaces.mesh_files import read_mesh
+from miurafab.surfaces.mesh_files import FLATNESS, read_mesh
 from miurafab.surfaces.plates import Plate, Side, judge_plate
 from miurafab.surfaces.preparation import MeshReading, PreparedMesh, prepare
 from miurafab.surfaces.topology import classify, one_sheet
@@ -177,6 +179,42 @@ def test_a_body_is_no_plate_and_the_figure_says_why(name: str, words: str) -> No
     assert f"its {words}" in f"its {prepare(*mesh(name), name).why_no_plate.removeprefix('its ')}"
 
 
+def test_what_is_no_plate_is_told_by_its_figure() -> None:
+    """Closed figures: a tetrahedron's sides are 109 degrees apart, the skins of a pipe are as its
+    radii, and on a slab of 8 x 8 cells that is sheared by its thickness a row looks at the rim.
+    """
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
+    solid = trimesh.Trimesh(corners, [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], process=False)
+    slab = trimesh.creation.box((10.0, 10.0, 1.0)).subdivide().subdivide().subdivide()
+    slab.vertices = slab.vertices + slab.vertices[:, 2:] * [1.0, 0.0, 0.0]
+    pipe = trimesh.creation.annulus(7.5, 10.0, 60.0, sections=24)
+    for made, words in (
+        (solid, "no side of it faces another"),
+        (pipe, "one skin has 0.75 times the area of the other, and 0.8 is needed"),
+        (slab, "88 % of its skins face each other, and 95 % are needed"),
+    ):
+        assert judge_plate(np.asarray(made.vertices), np.asarray(made.faces)).why_not == words
+
+
+def test_a_plate_with_screw_holes_is_a_plate() -> None:
+    """A panel with four holes is a solid with four handles, and its skin a sheet with holes."""
+    places = np.array([(x, y) for x in (-60, 60) for y in (-60, 60)])
+    drilled = kept(
+        sheet(lambda u, v: 100 * np.stack([u, v, 0 * u], axis=-1), 41, 41),
+        lambda p: np.abs(p[:, None, :2] - places).max(axis=2).min(axis=1) > 9,
+    )
+    surface = mesh_surface(*plate(drilled, 6.0), "panel.stl")
+    told = [finding.sentence for finding in surface.findings]
+    assert told[0].startswith("panel.stl is a plate 6 mm thick; the target is its outer skin")
+    assert told[1] == "panel.stl: 4 small holes were filled (`holes` chooses)."
+    assert np.allclose(surface.triangles[..., 2], 3.0)
+    # a chest with a handle to it is none: a hollow ring, open at a small square
+    ring = trimesh.creation.torus(50.0, 20.0, 48, 24)
+    vertices, faces = np.asarray(ring.vertices), np.asarray(ring.faces)
+    opened = kept((vertices, faces), lambda p: np.arange(len(p)) > 1)
+    assert judge_plate(*plate(opened, 2.0)).why_not == "its skin has a handle"
+
+
 @pytest.mark.parametrize("part", [0.02, 0.1])
 def test_thin_is_accepted_and_thick_refused(part: float) -> None:
     made = disk(polar(lambda a: 0.9 + 0 * a, lambda x, y: -0.2 * (x**2 + y**2)), 14)
@@ -262,6 +300,10 @@ def test_polygons_over_several_lines_and_colours_behind_faces(tmp_path: Path) ->
         + "\n".join(f"{c} 0.1 0.2 0.3 1" for c in corners)
         + "\n"
         + "\n".join(f"4 {f}" for f in faces),
+        "all-of-it": "STCNOFF\n8 5 0\n"
+        + "\n".join(f"{c}\n0 0 1\n0.1 0.2 0.3 1\n0.5 0.5" for c in corners)
+        + "\n"
+        + "\n".join(f"4 {f}" for f in faces),
     }
     read = {}
     for name, text in texts.items():
@@ -307,6 +349,20 @@ def test_strips_of_a_ply_are_triangles_of_one_orientation(tmp_path: Path, kind: 
     )
     assert (normal[:, 2] > 0).all()
     assert classify(vertices, faces).kind == "disk"
+
+
+def test_strips_that_hold_no_triangle_are_left_out(tmp_path: Path) -> None:
+    """A number beside each list, as some programs write, a strip of two vertices, and no strip."""
+    header = PLY.format("binary_little_endian") + "element tristrips {}\n"
+    header += "property uchar smooth\nproperty list int int v\nend_header\n"
+    points = np.array(CORNERS.split(), dtype="<f4").tobytes()
+    strips = [struct.pack("<Bi4i", 1, 4, 0, 1, 2, 3), struct.pack("<Bi2i", 1, 2, 0, 1)]
+    path = tmp_path / "strips.ply"
+    for count, wanted in ((2, [[0, 1, 2], [3, 2, 1]]), (0, [])):
+        path.write_bytes(header.format(count).encode() + points + b"".join(strips[:count]))
+        vertices, faces, _ = read_mesh(path)
+        assert len(vertices) == 4
+        assert faces.tolist() == wanted
 
 
 def package(unit: str, models: dict[str, str]) -> bytes:
@@ -375,6 +431,51 @@ def test_a_3mf_package_is_read_in_its_unit_with_components_and_transforms(tmp_pa
     x, y, z = vertices.T
     assert np.allclose(read, np.stack([50 - y, x, z + 20], axis=1))
     assert (triangles == faces).all()
+
+
+def of_components(number: int, *parts: int) -> str:
+    inside = "".join(f'<component objectid="{part}"/>' for part in parts)
+    return f'<object id="{number}"><components>{inside}</components></object>'
+
+
+def built(resources: str, number: int) -> str:
+    return f'<resources>{resources}</resources><build><item objectid="{number}"/></build>'
+
+
+NO_BUILD = f"<resources>{object_of(1, np.eye(3), np.array([[0, 1, 2]]))}</resources>"
+PACKAGES = {
+    "holds no triangles": built("", 5),
+    "it builds no object": NO_BUILD,
+    "its components are nested too deeply": built(of_components(1, 1), 1),
+    "it builds more than 100 objects": built(
+        "".join(of_components(k, *[k + 1] * 10) for k in range(1, 9)), 1
+    ),
+}
+
+
+@pytest.mark.parametrize("words", PACKAGES)
+def test_a_3mf_package_that_builds_nothing_or_too_much_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    """An object in itself; one of ten objects of ten objects, and so on, which took for ever."""
+    monkeypatch.setattr("miurafab.surfaces.mesh_formats._3MF_OBJECTS", 100)
+    path = tmp_path / "part.3mf"
+    path.write_bytes(package("millimeter", {"3D/3dmodel.model": PACKAGES[words]}))
+    with pytest.raises(TargetError, match=words):
+        mf.design(path)
+
+
+def test_what_unpacks_to_too_much_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "part.3mf").write_bytes(package("millimeter", {"3D/3dmodel.model": NO_BUILD}))
+    monkeypatch.setattr("miurafab.surfaces.mesh_formats._3MF_LARGEST", 100)
+    with pytest.raises(TargetError, match=r"unpacks to more than .* simplify the mesh"):
+        read_mesh(tmp_path / "part.3mf")
+    (tmp_path / "part.off.gz").write_bytes(gzip.compress(b"OFF" + bytes(98)))
+    monkeypatch.setattr("miurafab.surfaces.mesh_files.LARGEST", 100)
+    with pytest.raises(TargetError, match=r"unpacks to more than .* simplify the mesh"):
+        read_mesh(tmp_path / "part.off.gz")
 
 
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "off", "glb", "3mf"])
@@ -568,6 +669,26 @@ def step_text(size: float, unit: str) -> str:
         + "\n".join(lines)
         + "\nENDSEC;\nEND-ISO-10303-21;\n"
     )
+
+
+def test_a_step_file_is_meshed_again_as_finely_as_its_size_asks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a stand-in for cascadio, which writes metres: a block of 200 mm."""
+    asked = []
+
+    def step_to_glb(step: str, glb: str, flatness: float, angle: float) -> None:
+        assert Path(step).read_text() == "ISO-10303-21;"
+        asked.append(flatness)
+        trimesh.creation.box((0.2, 0.1, 0.05)).export(glb)
+
+    monkeypatch.setitem(sys.modules, "cascadio", SimpleNamespace(step_to_glb=step_to_glb))
+    (tmp_path / "block.step").write_text("ISO-10303-21;")
+    vertices, faces, _ = read_mesh(tmp_path / "block.step")
+    assert np.ptp(vertices, axis=0) == pytest.approx([200, 100, 50])
+    assert len(faces) == 12
+    assert asked[1] == pytest.approx(FLATNESS * 200)
+    assert asked[1] < asked[0]
 
 
 @pytest.mark.parametrize(("unit", "factor"), [(".MILLI.", 1.0), ("$", 1000.0)])

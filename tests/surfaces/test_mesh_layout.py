@@ -73,6 +73,13 @@ def test_no_triangle_turns_over_however_crumpled_the_mesh(seed, count, noise):
     assert not turned_over(flat[:, 0] + 1j * flat[:, 1], faces).any()
 
 
+def test_a_polygon_of_border_alone_lies_on_its_circle():
+    v, f = square(2)
+    z = tutte(v, f)
+    assert np.abs(z) == pytest.approx(400 / (2 * np.pi))
+    assert z[f[0, 1]] / z[f[0, 0]] == pytest.approx(1j)
+
+
 def test_the_border_runs_with_its_triangles():
     _, f = square(4)
     (loop,) = border_loops(f)

@@ -162,6 +162,41 @@ def test_heights_that_are_no_surface_are_refused(heights, spacing, words):
         from_heights(heights, spacing)
 
 
+@pytest.mark.parametrize(
+    ("points", "words"),
+    [
+        (np.zeros((3, 9, 3)), "A grid of 9 x 3 points is too coarse; give 4 x 4 or more"),
+        (
+            np.where(np.arange(75).reshape(5, 5, 3) == 34, np.inf, 0),
+            "row 2, column 1 .* not finite",
+        ),
+    ],
+)
+def test_points_that_are_no_surface_are_refused(points, words):
+    with pytest.raises(TargetError, match=words):
+        from_points(points)
+
+
+def test_a_function_that_ends_between_the_probes_is_refused_there():
+    def function(u, v):
+        return np.where((u > 0.26) & (u < 0.4), np.nan, u * v)
+
+    with pytest.raises(TargetError, match=r"no finite value at u = 0\.\d+, v = "):
+        from_function(function, (0, 1, 0, 1))
+
+
+def test_a_target_that_cannot_be_used_is_told_and_a_damaged_one_refused(tmp_path: Path):
+    mesh = tmp_path / "mesh.off"
+    mesh.write_text("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    for path, words in ((mesh, "has changed since the fit"), (tmp_path / "a.off", "is not there")):
+        surface, (finding,) = described_surface({"mesh": str(path), "sha256": "0"})
+        assert surface is None
+        assert finding.sentence == f"Distances are left out: the target mesh {path} {words}."
+    for target in ({"surface": 3}, {"surface": "hypar", "parameters": [1]}, {"no": 1}):
+        with pytest.raises(PatternError, match="names neither a surface nor a mesh"):
+            described_surface(target)
+
+
 def test_a_point_cloud_is_refused_with_a_way_out(tmp_path: Path):
     file = tmp_path / "cloud.ply"
     trimesh.PointCloud(np.random.default_rng(0).random((50, 3))).export(file)
@@ -170,7 +205,13 @@ def test_a_point_cloud_is_refused_with_a_way_out(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    "target", [{"samples": 3}, {"samples": [[1]], "span": 1, "domain": 2}, {"vertices": [[0]]}]
+    "target",
+    [
+        {"samples": 3},
+        {"samples": [[1]], "span": 1, "domain": 2},
+        {"samples": [[[0, 0, 0]] * 4] * 3, "span": [0, 1, 0, 1], "domain": [0, 1, 0, 1]},
+        {"vertices": [[0]]},
+    ],
 )
 def test_a_damaged_description_is_refused(target):
     with pytest.raises(PatternError, match="damaged"):
