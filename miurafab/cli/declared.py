@@ -56,7 +56,7 @@ def option(
         )
 
     def read(type_: Any, tokens: Sequence[Token]) -> Any:
-        values = [_read(kind, token) for token in tokens]
+        values = [_read(kind, token, names) for token in tokens]
         return values if get_origin(type_) is list else values[-1]
 
     return Parameter(
@@ -71,11 +71,12 @@ def option(
     )
 
 
-def _read(kind: Kind, token: Token) -> Any:
+def _read(kind: Kind, token: Token, names: Sequence[str]) -> Any:
     try:
         return kind.read(token.value)
     except ValueError as fault:
-        name = (token.keyword or "").lstrip("-").replace("-", "_")
+        long = names[-1] if names else token.keyword or ""
+        name = long.lstrip("-").replace("-", "_")
         raise OptionError(name, str(fault)) from None
 
 

@@ -236,7 +236,9 @@ def _answer(
         sys.stdout.flush()
     elif line is None:
         console.line(f"  {said}")
-    elif state is not None:
+    elif state is None:
+        console.line(f"{line}: the port is being opened")
+    else:
         console.line(
             f"{line}: {state.state}, work {_xy(state.position)}, "
             f"machine {_xy(state.machine_position)}"

@@ -44,7 +44,7 @@ from miurafab.cli.console import Screen
 from miurafab.cli.declared import ARGUMENTS, EVERY_COMMAND, OPTIONS
 from miurafab.cli.help import HelpFormatter
 from miurafab.errors import DONE, EXIT_CODES, UsageError
-from miurafab.options import Choice
+from miurafab.options import Choice, Flag, Kind
 from miurafab.version import __version__
 
 DESIGN = Group("Design", sort_key=1)
@@ -210,10 +210,8 @@ def _sentence(error: CycloptsError) -> str:
         return f"{name} needs {label}: {error.argument.parameter.help}"
     if isinstance(error, CoercionError) and error.token and error.argument:
         names = error.argument.parameter.choices
-        if isinstance(names, tuple):
-            return _wrong_choice(
-                error.token.keyword or error.argument.name, error.token.value, names
-            )
+        kind = Choice(names) if isinstance(names, tuple) else Flag()
+        return _wrong_value(error.token.keyword or error.argument.name, error.token.value, kind)
     if isinstance(error, UnusedCliTokensError):
         return f"{name} takes no further argument '{unused[0]}'."
     return f"{name}: {str(error).rstrip('.')}."
@@ -229,11 +227,11 @@ def _unknown_option(word: str, path: Sequence[str]) -> str:
     return f"{' '.join(('miurafab', *path))} has no option {option}{_near(option, known)}."
 
 
-def _wrong_choice(label: str, value: str, names: tuple[str, ...]) -> str:
+def _wrong_value(label: str, value: str, kind: Kind) -> str:
     """In the words of the declaration, which is what Python and TOML files answer with."""
     fault = ""
     try:
-        Choice(names).check(value)
+        kind.read(value)
     except ValueError as error:
         fault = str(error)
     return f"{label} {fault}."

@@ -49,7 +49,7 @@ def pattern_lines(report: Mapping[str, Any]) -> list[dict[str, str]]:
     if report.get("facets") is not None:
         vertices = report.get("vertices") or 0
         lines.append(ReportLine("Facets", f"{report['facets']:,}", f"{vertices:,} vertices"))
-    if report.get("pieces", 1) > 1:
+    if (report.get("pieces") or 1) > 1:
         seams = f"{length_text(report['seam_mm'])} of seams"
         lines.append(ReportLine("Pieces", f"{report['pieces']:,}", seams))
     if report.get("seconds") is not None:

@@ -147,7 +147,7 @@ class Operator:
                 f"{self.sheet} is done: {result.lines} lines in {clock_text(result.seconds)}."
             )
             self.said += [finding.sentence for finding in result.findings]
-            if self.prepared is not None and self.number < len(self.prepared.jobs):
+            if self.number < self.count:
                 self.number += 1
                 self.said.append(f"The next is {self.sheet}.")
         elif outcome.action in _DONE:
@@ -194,11 +194,8 @@ class Operator:
     @property
     def sheet(self) -> str:
         """The next sheet in a word or two."""
-        if self.prepared is None:
-            return "no job"
-        count = len(self.prepared.jobs)
-        name = self.prepared.jobs[self.number - 1].name
-        return name if count == 1 else f"{name} (sheet {self.number} of {count})"
+        name = self._job().jobs[self.number - 1].name
+        return name if self.count == 1 else f"{name} (sheet {self.number} of {self.count})"
 
     def put_on(self, prepared: Prepared) -> None:
         """Take another job in place of that before; raises ``InputError`` for one that cannot be

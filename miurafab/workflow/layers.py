@@ -1,12 +1,13 @@
 """``miurafab layers`` as a function: the order of the layers of a pattern that is folded flat.
 
 A sheet that folds rigidly to its flat-folded end has its order in closed form, unless its facets
-pass through each other on the way there. For any other pattern that folds flat all orders are
-searched.
+pass through each other on the way there. For any other pattern that folds flat, such as one with
+unassigned creases, all orders are searched.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -138,7 +139,7 @@ class Layers(Shown):
         found = self.order
         pairs = "no order" if found is None else f"{len(found.above)} pairs of facets"
         if self.search is None:
-            return f"{pairs}, in closed form"
+            return pairs if found is None else f"{pairs}, in closed form"
         more = "" if self.search.complete else " and more"
         return f"{pairs}, orders found: {len(self.search.orders)}{more}"
 
@@ -182,10 +183,10 @@ def layers(pattern: PatternLike, **options: Any) -> Layers:
     """
     asked = read_options(LayerOptions, options)
     found = cut_open(movable_pattern(pattern))
-    try:
-        closed = layer_order(found)
-    except PatternError:
-        closed = None
+    closed = None
+    if "U" not in found.edges_assignment:  # by its motion an unassigned crease stays flat
+        with contextlib.suppress(PatternError):
+            closed = layer_order(found)
     if closed is not None and closed.known and asked.orders is None:
         return Layers(closed, None, found.told)
     try:

@@ -74,9 +74,7 @@ def _join(group: str) -> str:
 
 def _members(group: str) -> list[str] | None:
     """The users that are listed in ``group``; None where there is no such group."""
-    if sys.platform == "win32":
-        return None
-    import grp
+    import grp  # which Windows has not; there no port needs a group
 
     try:
         return grp.getgrnam(group).gr_mem
@@ -86,8 +84,6 @@ def _members(group: str) -> list[str] | None:
 
 def _is_in(group: str) -> bool:
     """Whether this process runs with ``group``."""
-    if sys.platform == "win32":
-        return False
     import grp
 
     return grp.getgrnam(group).gr_gid in (*os.getgroups(), os.getegid())

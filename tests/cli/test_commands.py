@@ -7,11 +7,14 @@ import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from command_line import sentence
+from cyclopts import CycloptsError
 
 import miurafab.cli
+from miurafab.cli import program
 from miurafab.cli.program import COMMANDS, app, examples
 from miurafab.errors import EXIT_CODES
 
@@ -144,10 +147,21 @@ def test_the_examples_name_commands_and_options_that_exist():
         (("completion", "tcsh"), "SHELL is 'tcsh'; it must be one of bash, zsh"),
         (("fit", "hypar", "-o", "x.fold", "--polish", "maybe"), "one of on, off."),
         (("fit", "hypar", "-o", "x.fold", "--close", "seem"), "--close is 'seem'; did you mean"),
+        (("fit", "hypar", "-o="), "--out is empty, not a path."),
+        (("cut", "job", "--dry-run=maybe"), "--dry-run is 'maybe'; it must be true or false."),
+        (("cut", "job", "--no-pause=2"), "--no-pause is '2'; it must be true or false."),
     ],
 )
 def test_a_mistake_in_the_command_line_is_one_sentence(run, arguments, named):
     assert named in sentence(run(*arguments), 2)
+
+
+def test_what_only_the_parser_knows_is_told_in_its_words(run, monkeypatch):
+    def refuse(*arguments, **how):
+        raise CycloptsError(msg="It is too long.")
+
+    monkeypatch.setattr(program, "app", SimpleNamespace(parse_args=refuse))
+    assert sentence(run("check", "x.fold"), 2) == "miurafab: miurafab: It is too long."
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from studios import KEY, Asked, Done, Waiting, request, saddle_obj, sentence
 
+import miurafab
 from miurafab.studio.core import PARTS
 from miurafab.studio.messages import TYPES
 
@@ -207,14 +208,14 @@ def test_a_fit_that_misses_a_limit_says_so(done):
 
 def test_where_no_sheet_was_found_there_is_nothing_to_lay_out(asked):
     asked.fit()
-    report = {"status": "stalled", "advice": "Ask for more --facets.", "facets": None}
+    report = miurafab.fit("hypar", facets="4x4", polish="off", timeout="0.000001").report()
     asked.orders[0].coming = [
         {"part": "pattern", "report": report, "findings": [], "files": {}},
         {"done": True},
     ]
     pattern = asked.state()["pattern"]
     assert pattern["headline"] == "No sheet was found."
-    assert pattern["advice"] == "Ask for more --facets."
+    assert "ended the search before an exact sheet was found" in pattern["advice"]
     assert not pattern["folding"]
     wanted = {"machine": "grbl-laser-400", "material": "card-250"}
     assert "no pattern" in sentence(asked.post("sheets", wanted))

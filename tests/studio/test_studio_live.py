@@ -110,6 +110,14 @@ def test_a_coarse_sheet_is_exact_and_told_without_the_slow_figures():
     assert np.array_equal(quick.pattern.vertices_coords, whole.pattern.vertices_coords)
 
 
+@pytest.mark.parametrize("size", ["100mm", "bed"])
+def test_where_no_sheet_is_found_there_is_no_picture(size):
+    told = coarsely("hypar", facets="4x4", size=size, timeout="0.000001")
+    assert (told["status"], told["headline"]) == ("stalled", "No sheet was found.")
+    assert (told["picture"], told["bed"]) == (None, None)
+    assert "ended the search before an exact sheet was found" in told["advice"]
+
+
 def test_what_is_told_of_the_bed_is_what_a_fit_to_the_bed_finds():
     largest = miurafab.fit("hypar", size="bed", facets=(8, 8), polish="off")
     side = float(np.ptp(largest.pattern.folded_coords, axis=0).max())

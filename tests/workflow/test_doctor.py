@@ -6,11 +6,13 @@ import importlib.metadata
 import importlib.util
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
 import webbrowser
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from packaging.requirements import Requirement
@@ -32,7 +34,12 @@ def installed(monkeypatch):
             raise importlib.metadata.PackageNotFoundError(name)
         return VERSIONS[name]
 
-    monkeypatch.setattr(importlib.metadata, "requires", lambda name: [*REQUIRED])
+    def requires(name):
+        if name != "miurafab":
+            version(name)
+        return [*REQUIRED]
+
+    monkeypatch.setattr(importlib.metadata, "requires", requires)
     monkeypatch.setattr(importlib.metadata, "version", version)
     return monkeypatch
 
@@ -155,17 +162,39 @@ def test_a_user_or_a_group_without_a_name_is_one_of_a_container(installed, tmp_p
     assert any("sudo chown -R $(id -u) " in problem for problem in mf.doctor().problems)
 
 
-def test_before_a_port_is_plugged_in_its_group_is_told(installed):
+@pytest.mark.skipif(os.name != "posix", reason="groups of POSIX")
+def test_before_a_port_is_plugged_in_its_group_is_told(installed, run):
+    import grp
+
+    groups = {"dialout": SimpleNamespace(gr_mem=[], gr_gid=-7)}
     installed.setattr(ports_module, "list_ports", list)
     installed.setattr(ports_module.sys, "platform", "linux")
     installed.setattr(ports_module.getpass, "getuser", lambda: "ada")
     installed.setattr(ports_module.os, "geteuid", lambda: 1000, raising=False)
-    installed.setattr(ports_module, "_members", {"dialout": []}.get)
-    installed.setattr(ports_module, "_is_in", lambda group: False)
+    installed.setattr(grp, "getgrnam", lambda name: groups[name])
     wanted = "to open it, join its group: sudo usermod -aG dialout ada, then log in again."
     assert any(note.endswith(wanted) for note in mf.doctor().notes)
-    installed.setattr(ports_module, "_is_in", lambda group: True)
+    groups["dialout"].gr_gid = os.getegid()
     assert any(note.endswith("a cable that carries data.") for note in mf.doctor().notes)
+    groups.clear()
+    shown = run("doctor").stdout
+    assert "Ports" not in shown
+    assert "with a cable that carries data." in " ".join(shown.split())
+    installed.setattr(ports_module.sys, "platform", "darwin")
+    assert any(note.endswith("the driver of its maker.") for note in mf.doctor().notes)
+
+
+def test_a_full_disk_and_profiles_that_do_not_load_are_problems(installed, tmp_path):
+    for kind, name in (("machines", "mine"), ("materials", "own")):
+        folder = tmp_path / "miurafab" / kind
+        folder.mkdir(parents=True)
+        (folder / f"{name}.toml").write_text("title = 3\n")
+    installed.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    installed.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=3_999_999))
+    machine, material, disk = mf.doctor().problems
+    assert machine.startswith("mine.toml")
+    assert material.startswith("own.toml")
+    assert disk.startswith("Only 3 MB are free on this disk; a job needs ")
 
 
 def test_profiles_that_cannot_be_written_are_a_problem(installed, tmp_path):

@@ -48,6 +48,8 @@ sheet of half the size does, measured on hypar, saddle and vase."""
 COARSER = 0.7
 LEAST_STEP, FINER = 1.2, 2.5
 """The next size over the last, at least and at most, where the last one failed."""
+NO_TIME = 1e-6
+"""The time in s for a first size where none is left."""
 BEYOND = 1.5
 """A prediction so many times the largest size with edges long enough ends the search. A hypar's
 prediction at 8 facets was 1.2 times what it took."""
@@ -77,7 +79,9 @@ def coarsest(
             limit = request.timeout
             left = None if limit is None else limit - (time.perf_counter() - started)
             if left is not None and left <= 0:
-                raise TimeoutError
+                if tried:
+                    raise TimeoutError
+                left = NO_TIME  # the first fit says what came of that
             # more pieces would hide that a size is too coarse
             pieces = request.pieces or 1
             size = replace(request, facets=(columns, rows), timeout=left, pieces=pieces)
@@ -90,9 +94,13 @@ def coarsest(
         first = _predicted(request, fit, request.timeout)
         best = _search(request, trial, tried, first)
     except KeyboardInterrupt:
-        best = _best_so_far(request, tried, "interrupted", INTERRUPTED)
+        found = _best_so_far(request, tried, "interrupted", INTERRUPTED)
+        if found is None:
+            raise
+        best = found
     except TimeoutError:
-        best = _best_so_far(request, tried, "infeasible", TIME_RAN_OUT)
+        found = _best_so_far(request, tried, "infeasible", TIME_RAN_OUT)
+        best = found or next(iter(tried.values()))  # which says that there is none
     if on_progress is not None:
         on_progress(1.0, "done")
     return replace(
@@ -226,14 +234,14 @@ def _hopeless(request: FitRequest, tried: Mapping[int, FitResult], size: int) ->
 
 def _best_so_far(
     request: FitRequest, tried: Mapping[int, FitResult], status: str, why: Finding
-) -> FitResult:
-    """The result to hand back after Ctrl-C or at the time limit, with ``why`` as its advice. Raises
-    ``KeyboardInterrupt`` where no size has a sheet.
+) -> FitResult | None:
+    """The result to hand back after Ctrl-C or at the time limit, with ``why`` as its advice; None
+    where no size has a sheet.
     """
     miss = _miss(request)
     sheets = [tried[n] for n in sorted(tried) if tried[n].pattern is not None]
     if not sheets:
-        raise KeyboardInterrupt
+        return None
     return replace(
         min(sheets, key=miss),
         status=status,

@@ -29,7 +29,7 @@ from miurafab.origami.folding.layers import (
 )
 from miurafab.origami.folding.order_search import broken_rules, search_layer_orders
 from miurafab.origami.formats.fold import read_fold
-from miurafab.workflow.layers import layers
+from miurafab.workflow.layers import layer_findings, layers
 
 SHEETS = ("plane", "hypar", "paraboloid", "cylinder")
 
@@ -164,6 +164,39 @@ def test_what_has_no_order_after_a_search_is_not_called_closed_form() -> None:
     found = layers(pattern_of(points, faces, {(k, k + 4): "MV"[k % 2] for k in range(4)}))
     assert (found.closed, found.exists) == (None, False)
     assert found.report()["method"] == "search"
+
+
+def test_a_map_with_unassigned_creases_is_not_taken_for_a_flat_sheet() -> None:
+    """By its motion no crease of it folds: that is no order of its layers."""
+    found = layers(grid(2, 2))
+    assert (found.report()["method"], found.exists, found.report()["pairs"]) == ("search", True, 6)
+    assert repr(found) == "<Layers 6 pairs of facets, orders found: 8>"
+    some = layers(strip("UUUU"), orders=5)
+    assert repr(some) == "<Layers 10 pairs of facets, orders found: 5 and more>"
+    assert [finding.code for finding in some.findings] == ["more-layer-orders"]
+    assert "more than 5 orders; the search ended there" in some.findings[0].sentence
+
+
+def test_a_closed_form_that_crosses_agrees_with_no_order_that_is_found() -> None:
+    crossing = layers(strip("VVV", angle=np.radians(120)))
+    assert (crossing.report()["agrees"], crossing.exists) == (False, True)
+    assert layers(strip("V"), orders=3).report()["agrees"] is True
+
+
+def test_a_pair_that_the_motion_does_not_order_is_told() -> None:
+    order = layer_order(strip("VM"))
+    (finding,) = layer_findings(replace(order, above=order.above * [0, 1, 1]))
+    assert finding.code == "undecided-layers"
+    assert finding.sentence.startswith("The order of 1 of 3 pairs of facets folded flat does not")
+
+
+def test_what_has_no_order_is_not_written(tmp_path: Path) -> None:
+    stiff = layers(fitted("hypar", 8, 8).pattern)
+    assert repr(stiff) == "<Layers no order>"
+    assert "<svg" not in stiff._repr_mimebundle_()["text/html"]
+    with pytest.raises(PatternError, match=r"x\.fold is not written, since the layers have no ord"):
+        stiff.save(tmp_path / "x.fold")
+    assert not (tmp_path / "x.fold").exists()
 
 
 def test_a_roll_that_grows_closes_without_crossing_if_its_inner_creases_lead() -> None:
