@@ -242,9 +242,7 @@ class _TrialBlock:
 
     def _says(self, operation: Operation, low: tuple[float, float], rise: float) -> None:
         """What is tried, in two lines: the strength above the feed."""
-        strength = _strength(operation)
-        if strength:
-            _write(self.engraved, strength, (low[0], low[1] + rise), 2.2)
+        _write(self.engraved, _strength(operation), (low[0], low[1] + rise), 2.2)
         _write(self.engraved, f"F{operation.feed_mm_min:g}", low, 2.2)
 
     def _flap(self, label: str, low: Points, turned: bool) -> Points:
@@ -300,9 +298,8 @@ def _ratio(rule: Perforation) -> str:
 
 
 def _strength(operation: Operation) -> str:
-    if operation.power is not None:
-        return f"{operation.power:.3g}W"
-    return "" if operation.force is None else f"S{operation.force}"
+    """In watts, or in what presses a pen or knife down: every column has one of them."""
+    return f"S{operation.force}" if operation.power is None else f"{operation.power:.3g}W"
 
 
 def _write(pen: _Pen, text: str, middle: Points | tuple[float, float], height: float) -> None:

@@ -28,6 +28,7 @@ from miurafab.fabrication.borders import OpenBorder, chosen
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.pieces import lattice_cells
 from miurafab.fabrication.seams import border_seams, shell_points
+from miurafab.fabrication.wording import count
 from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.unfold import with_angles_of_the_folded_form
@@ -55,8 +56,8 @@ def capped(pattern: CreasePattern, options: LayoutOptions) -> CreasePattern:
     before, after = (measure(each).self_intersections or 0 for each in (pattern, made))
     if after > before:
         raise LayoutError(
-            f"A cap would pass through the shell at {after - before} places; leave that border out "
-            "of `caps`, or give it tabs (`border_tabs`)."
+            f"A cap would pass through the shell at {count(after - before, 'place', 'places')}; "
+            "leave that border out of `caps`, or give it tabs (`border_tabs`)."
         )
     return made
 

@@ -19,7 +19,6 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from miurafab.errors import LayoutError
 from miurafab.geometry.arrays import Floats
 
 MITRE_LIMIT = 2.0
@@ -44,8 +43,6 @@ def allowance(kerf: float) -> float:
 def cut_lines(outlines: Sequence[Sequence[Floats]], kerf: float) -> list[list[Floats]]:
     """The closed cut lines (m, 2) in mm of each outline, whose rings (n, 2) are the outer one and
     those around holes: the outer line first, counter-clockwise. No line repeats its first point.
-
-    Raises :class:`~miurafab.errors.LayoutError` for rings that surround no area in one part.
     """
     if kerf == 0.0:
         return [list(rings) for rings in outlines]
@@ -53,8 +50,6 @@ def cut_lines(outlines: Sequence[Sequence[Floats]], kerf: float) -> list[list[Fl
     moved = shapely.buffer(polygons, kerf / 2, join_style="mitre", mitre_limit=MITRE_LIMIT)
     found = []
     for polygon in moved:
-        if polygon.is_empty or polygon.geom_type != "Polygon":
-            raise LayoutError("The outline of a patch surrounds no area in one part.")
         outer, *inner = shapely.get_rings(polygon)
         lines = [
             _without_specks(shapely.get_coordinates(ring)[:-1], kerf, hole=place > 0)

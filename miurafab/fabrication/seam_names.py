@@ -67,5 +67,6 @@ def _lines(edges: list[int], across: list[int]) -> list[tuple[int, list[int]]]:
 
 def _letters() -> Iterator[str]:
     """a, b, ... z, aa, ab, ..."""
-    for length in itertools.count(1):
-        yield from map("".join, itertools.product(LETTERS, repeat=length))
+    lengths = itertools.count(1)
+    rows = itertools.chain.from_iterable(itertools.product(LETTERS, repeat=n) for n in lengths)
+    return map("".join, rows)

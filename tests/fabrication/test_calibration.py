@@ -9,8 +9,9 @@ import pytest
 import shapely
 from flat_patterns import bed, card
 
-from miurafab.errors import LayoutError, ProfileError
+from miurafab.errors import LayoutError, OptionError, ProfileError
 from miurafab.fabrication.calibration import STRIPS, calibration_sheet, gauge_mark
+from miurafab.fabrication.calibration_ladder import begun
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.program import strokes
 from miurafab.posting.sections import post_sections
@@ -192,6 +193,41 @@ def test_a_bed_too_small_and_a_beam_without_settings_are_refused():
         calibration_sheet(bed(100, 100), card())
     with pytest.raises(ProfileError, match="no settings for a knife"):
         calibration_sheet(load_machine("grbl-knife-a3"), card())
+
+
+def test_what_is_not_made_is_not_on_the_coupon():
+    stock = card()
+    creases = {**stock.creases, "valley": dataclasses.replace(stock.creases["valley"], mode="none")}
+    sheet = calibration_sheet(bed(400, 400), dataclasses.replace(stock, creases=creases))
+    made = np.unique(sheet.toolpath.edge[sheet.toolpath.edge >= 0])
+    assert set(sheet.coupon.edges_assignment[made]) == {"M"}
+
+
+def test_settings_to_begin_with_follow_from_a_cut():
+    laser, knife = load_machine("grbl-laser-400"), load_machine("grbl-knife-a3")
+    watts = laser.tool.laser.power
+    for machine, power, feed, words in (
+        (laser, 5.0, None, "'feed' is missing"),
+        (laser, None, 300.0, "'power' is missing; give that of a cut to begin with, in watts"),
+        (laser, watts + 1, 300.0, f"'power' is {watts + 1:g} W; .* has {watts:g} W"),
+        (knife, 5.0, 300.0, "'power' is for a laser, and .* is a knife"),
+    ):
+        with pytest.raises(OptionError, match=words):
+            begun(card(), machine, power, feed)
+    first = begun(card(), laser, 5.0, 300.0)
+    assert first.operations["cut"] == Operation(300.0, 5.0)
+    assert first.operations["engrave"] == Operation(900.0, 1.0)
+    assert first.most_watts == pytest.approx(min(6.5, watts))
+    pressed = begun(card(), knife, None, 300.0)
+    assert pressed.beam == "knife"
+    assert pressed.operations["score"] == Operation(750.0)
+
+
+def test_a_tool_that_is_down_where_it_is_lifted_leaves_no_forces_to_try():
+    pen = load_machine("grbl-pen-a4")
+    pen = dataclasses.replace(pen, tool=dataclasses.replace(pen.tool, s_up=0, s_down=0))
+    with pytest.raises(ProfileError, match="lifted at S0 and down at S0, which leaves no forces"):
+        calibration_sheet(pen, load_material("card-250"))
 
 
 def test_what_is_scored_is_scored_on_the_coupon():

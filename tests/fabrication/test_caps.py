@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from flat_patterns import bed, card
@@ -95,7 +97,41 @@ def test_a_capped_shell_is_laid_out_and_one_end_may_bear_tabs():
     assert tabs == {0, 1, 2, 3}
 
 
+def test_a_cap_that_would_pass_through_the_shell_is_refused():
+    """A corner of the lower rim is drawn up through the flat polygon over the upper rim."""
+    pattern = prism(hexagon())
+    spike = pattern.folded_coords.copy()
+    spike[2] = [0.0, 0.0, 60.0]
+    made = replace(pattern, folded_coords=spike)
+    with pytest.raises(LayoutError, match="A cap would pass through the shell at 1 place;"):
+        capped(made, LayoutOptions(caps=(2,)))
+
+
+def test_caps_of_triangles_without_a_lattice():
+    """The walls of a prism, each cut into two triangles, stand in no columns and rows."""
+    pattern = prism(hexagon())
+    quads = pattern.faces_vertices
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    diagonals = quads[:, [0, 2]]
+    count = len(diagonals)
+    made = replace(
+        pattern,
+        faces_vertices=triangles,
+        edges_vertices=np.concatenate([pattern.edges_vertices, diagonals]),
+        edges_assignment=np.append(pattern.edges_assignment, ["F"] * count),
+        edges_fold_angle=np.append(pattern.edges_fold_angle, np.zeros(count)),
+        grid=None,
+        cells=None,
+    )
+    whole = capped(made, LayoutOptions(caps="all"))
+    assert whole.cells is None
+    assert open_borders(whole) == ()
+    assert audit(whole, None).valid
+
+
 def test_what_no_cap_closes_is_refused_by_its_number():
+    with pytest.raises(LayoutError, match="shaped by the folded form, which the pattern lacks"):
+        capped(replace(gores(), folded_coords=None), LayoutOptions(caps="all"))
     with pytest.raises(LayoutError, match=r"caps. names open border 3, but the shell has 2"):
         capped(gores(), LayoutOptions(caps=(3,)))
     c = 10 * np.array([(0, 0), (3, 0), (3, 1), (1, 1), (1, 2), (3, 2), (3, 3), (0, 3)])

@@ -9,6 +9,7 @@ import numpy as np
 import pypdf
 import pytest
 import shapely
+from flat_patterns import bed, miura
 from problems import regular
 from readers import POINT_MM, assert_same, read_dxf, read_hpgl, read_pdf, read_svg, segments
 from reportlab.pdfgen.canvas import Canvas
@@ -46,6 +47,15 @@ def layout():
     return lay_out(regular(33, 23), MACHINE, MATERIAL)
 
 
+@pytest.fixture(scope="module")
+def parted():
+    """A sheet of several patches on two beds, for what is told of glueing."""
+    options = LayoutOptions(max_patch_mm=(80.0, 60.0))
+    layout = lay_out(regular(17, 9), bed(150.0, 120.0), MATERIAL, options=options)
+    assert len(layout.patches) > 2 < layout.totals.tabs
+    return layout
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 def test_dxf(layout, version):
     for toolpath in layout.toolpaths:
@@ -53,6 +63,11 @@ def test_dxf(layout, version):
         assert_same(read_dxf(text), toolpath, 1e-3)
         if version == "R2010":
             assert ezdxf.read(io.StringIO(text)).header["$INSUNITS"] == 4
+
+
+def test_another_version_of_dxf_is_refused(layout):
+    with pytest.raises(ValueError, match=r"must be one of .*R12.*R2010.*, not 'R14'"):
+        sheet_dxf(layout.toolpaths[0], "R14", LETTERS)
 
 
 def test_svg(layout):
@@ -186,6 +201,17 @@ def test_blank_tiles_are_not_printed():
     assert len(pages) == 2
 
 
+def test_a_tile_without_strokes_is_pale_in_the_overview():
+    ends = np.array([[0, 0], [9, 9], [200, 200], [209, 209]], dtype=float)
+    path = Toolpath("one", 400.0, 400.0, ends, np.array([0, 2, 4]), *np.zeros((3, 2), int))
+    tiles = tiled_pdf((path,), np.array(["B"]), "t", Tiling("150x150mm"))
+    pages = pages_of(tiles)
+    assert "on 2 pages, 2 columns by 2 rows" in pages[0]
+    assert len(pages) == 3
+    content = pypdf.PdfReader(io.BytesIO(tiles)).pages[0].get_contents().get_data()
+    assert len(re.findall(rb" re f\*?\s", content)) == 2
+
+
 def test_no_page_is_a_sliver_and_none_repeats_its_neighbours():
     """A drawing just larger than a page is on two halves; a stroke in a strip alone asks for no
     page of its own."""
@@ -251,8 +277,8 @@ def labels_of(layout):
     return sorted({tab.label for patch in layout.patches for tab in patch.tabs})
 
 
-def test_the_guide_names_every_patch_and_tab(layout):
-    pattern = regular(33, 23)
+def test_the_guide_names_every_patch_and_tab(parted):
+    layout, pattern = parted, regular(17, 9)
     pages = pages_of(assembly_guide(layout, pattern, MACHINE, MATERIAL, "Test").pdf)
     overview = pages[0]
     for patch in layout.patches:
@@ -319,6 +345,48 @@ def test_the_guide_tells_how_both_sides_are_made():
     assert f"{scored:.2f} m scored" in words
 
 
+def test_the_guide_to_a_pattern_without_a_folded_form_shows_the_seams_on_the_flat_one(parted):
+    """A drawing of others may have none: each step of glueing is a map of the flat sheet."""
+    pattern = dataclasses.replace(regular(17, 9), folded_coords=None)
+    pages = pages_of(assembly_guide(parted, pattern, MACHINE, MATERIAL, "Test").pdf)
+    glue = "\n".join(pages[len(parted.sheets) + 1 :])
+    assert labels_in(glue) == labels_of(parted)
+    assert "Begin with" in glue
+    assert "Below each step is its seam, larger" not in glue
+
+
+def test_the_guide_to_patches_without_tabs_tells_where_tape_goes():
+    pattern = regular(17, 9)
+    options = LayoutOptions(max_patch_mm=(120.0, 90.0), tab_inset_mm=20.0)
+    layout = lay_out(pattern, MACHINE, MATERIAL, options=options)
+    assert layout.totals.tabs == 0
+    text = "\n".join(pages_of(assembly_guide(layout, pattern, MACHINE, MATERIAL, "Bare").pdf))
+    assert text.count("No tabs: use tape on the seam") == len(layout.patches) - 1
+    assert "Where tab a7 goes" not in text
+
+
+def test_the_guide_tells_the_fibres_of_each_sheet_and_which_back_is_its_own(tmp_path):
+    (tmp_path / "stock.toml").write_text(
+        "[[sheets]]\nname = 'card'\nwidth = 90\nheight = 80\nquantity = 9\ngrain = 'y'\n"
+        "[[sheets.defects]]\nx = 0\ny = 0\nwidth = 12\nheight = 3\n"
+    )
+    creases = {"mountain": Crease(), "valley": Crease("score"), "tab": Crease()}
+    material = dataclasses.replace(MATERIAL, creases=creases)
+    options = LayoutOptions(
+        two_sided=True,
+        nesting=NestingOptions(stock=tmp_path / "stock.toml"),
+    )
+    pattern = miura(6, 5)
+    layout = lay_out(pattern, MACHINE, material, options=options)
+    assert len(layout.backs) == len(layout.sheets) > 1
+    pages = pages_of(assembly_guide(layout, pattern, MACHINE, material, "Both").pdf)
+    for sheet in layout.sheets:
+        assert sheet.defects_mm
+        page = next(page for page in pages if page.startswith(f"Both: {sheet.name}"))
+        assert f"from 'card', fibres along the bed's {sheet.grain}" in page.replace("\n", " ")
+        assert f"First run {sheet.back}. Turn the sheet over" in page.replace("\n", " ")
+
+
 def test_power_is_told_for_lasers_alone():
     pattern = regular(9, 9)
     pen = load_machine("grbl-pen-a4")
@@ -369,8 +437,8 @@ def test_patches_side_by_side_have_colours_that_differ(number):
         assert np.abs(apart).max() > 0.1
 
 
-def test_each_patch_is_glued_onto_what_is_assembled(layout):
-    steps = assembly_order(layout, regular(33, 23))
+def test_each_patch_is_glued_onto_what_is_assembled(parted):
+    layout, steps = parted, assembly_order(parted, regular(17, 9))
     assert sorted(step.patch for step in steps) == list(range(len(layout.patches)))
     done = set()
     for step in steps:

@@ -66,6 +66,14 @@ def test_a_mitre_that_is_cut_off_ends_in_no_speck(kerf, apex):
     assert low[:, 1].max() <= -kerf / 2
 
 
+def test_a_chamfer_that_is_drawn_stays():
+    """Its ends are no mitre and no corner into the piece."""
+    outline = np.array([[0, 0], [20, 0], [20, 20], [0.02, 20], [0, 19.98]], dtype=float)
+    (line,) = cut_lines([[outline]], 0.2)[0]
+    assert len(line) == 5
+    assert shapely.distance(shapely.points(line), shapely.Polygon(outline)).min() >= 0.1 - 1e-9
+
+
 def test_waste_enclosed_by_a_narrow_mouth_is_cut_out_too():
     # A pocket whose mouth is 0.1 mm wide: with a kerf of 0.4 the mouth closes.
     outline = np.array(

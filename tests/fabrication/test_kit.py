@@ -282,6 +282,24 @@ def test_a_sheet_that_cannot_be_moved_is_shown_done_with_a_sentence():
     assert "could not be computed" in states.how
 
 
+def test_of_many_facets_the_finished_form_alone_is_shown(monkeypatch):
+    monkeypatch.setattr("miurafab.fabrication.kit.states.MOST_FACETS", 40)
+    pattern = regular(9, 7)
+    states = folded_states(pattern)
+    assert states.titles == ("Done",)
+    assert states.shapes[0] is pattern.folded_coords
+    assert states.how == "With more than 40 facets only the finished form is drawn."
+
+
+def test_many_rows_have_wedges_and_no_table_of_all(monkeypatch):
+    table = "from-to"
+    assert table in words_of(guide_of(regular(9, 7)).page)
+    monkeypatch.setattr("miurafab.fabrication.drawing.kit_sections._LISTED", 3)
+    page = words_of(guide_of(regular(9, 7)).page)
+    assert table not in page
+    assert "Wedge A: fold by" in page
+
+
 def test_a_tab_lies_in_the_plane_of_the_facet_over_it():
     pattern = regular(17, 13)
     layout = lay_out(pattern, MACHINE, MATERIAL, options=LayoutOptions(max_patch_mm=(120.0, 90.0)))
@@ -413,6 +431,28 @@ def test_the_ribs_of_a_jig_go_into_each_other():
             )
             assert here[1] == 0
             assert there[1] == pytest.approx(here[3])
+
+
+def test_ribs_that_do_not_meet_have_no_slot_for_each_other():
+    """A notch from the far rim: in the middle the shell ends at 0.4 of its length."""
+    pattern = regular(9, 7)
+    x, y = (pattern.vertices_coords / np.ptp(pattern.vertices_coords, axis=0)).T
+    x, y = x - x.min() - 0.5, y - y.min()
+    shell = 200 * np.column_stack([x, y * (0.4 + 1.2 * np.abs(x)), 0.1 * x * x])
+    jig = jig_of(dataclasses.replace(pattern, folded_coords=shell), 3.0)
+    floor = shapely.LineString([(-500, 0.01), (500, 0.01)])
+    reach = {rib.name: (rib.outline[:, 0].min(), rib.outline[:, 0].max()) for rib in jig.ribs}
+    along, across = ([rib for rib in jig.ribs if rib.name[0] == family] for family in "UV")
+    counts = []
+    for rib in across:
+        parts = shapely.Polygon(rib.outline).intersection(floor)
+        counts.append(shapely.get_num_geometries(parts) - 1)
+        assert counts[-1] == sum(
+            reach[other.name][0] < rib.place_mm < reach[other.name][1]
+            and reach[rib.name][0] < other.place_mm < reach[rib.name][1]
+            for other in along
+        )
+    assert 0 < min(counts) < max(counts) < 3
 
 
 def test_a_shell_that_closes_round_has_no_jig():

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.knife import ALIGNING_OFFSETS, axis_way, tip_way
+from miurafab.fabrication.knife_tip import overcuts, tip_moves
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.profiles import OPERATIONS, Knife
 
@@ -21,6 +22,25 @@ CUT = OPERATIONS.index("cut")
 KNIFE = Knife(0.25, math.radians(20), 0.0, None, ())
 MARGIN = 5.0
 TOLERANCE = 0.02
+
+
+def test_a_knife_without_offset_cuts_where_its_axis_goes():
+    start = np.array([[0.0, 0.0], [5.0, 0.0], [20.0, 1.0]])
+    end = np.array([[5.0, 0.0], [5.0, 9.0], [30.0, 1.0]])
+    moves, stroke = tip_moves(start, end, 0.0)
+    assert np.array_equal(moves, np.concatenate([start, end], axis=1))
+    assert stroke.tolist() == [0, 0, 1]
+
+
+def test_a_stroke_that_touches_its_start_on_its_way_is_not_closed():
+    """A 6 goes round and on; a square ends where it began, and goes on by the overcut."""
+    square = [(0, 0), (9, 0), (9, 9), (0, 9), (0, 0)]
+    for after, closed, short in (((-20, 0), 0, []), ((2, 0), 1, []), ((0.5, 0), 0, [0])):
+        points = np.array([*square, after], dtype=float)
+        moves = np.concatenate([points[:-1], points[1:]], axis=1)
+        beyond, found = overcuts(moves, np.zeros(5, dtype=np.int64), 2.0, 0.05)
+        assert beyond.sum() == closed
+        assert found.tolist() == short
 
 
 def toolpath(polylines: Sequence[Sequence[tuple[float, float]]]) -> Toolpath:

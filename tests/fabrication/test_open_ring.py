@@ -407,3 +407,20 @@ def test_a_design_says_where_its_ring_is_opened(tmp_path):
     file.write_text(file.read_text().replace("140mm", "150mm"))
     prepare(str(file), out=tmp_path / "job")
     assert miurafab.check_job(tmp_path / "job").valid
+
+
+def test_the_seams_of_a_ring_that_is_opened_are_those_of_its_new_ends():
+    pattern = tube()
+    closed = replace(pattern, seams=border_seams(pattern).edges)
+    made = open_ring(closed, 0, 5)
+    assert np.array_equal(made.seams, border_seams(replace(made, seams=None)).edges)
+    assert len(made.seams) == len(closed.seams)
+
+
+def test_edges_that_are_not_those_of_a_grid_are_told():
+    """One side is a diagonal: as many edges as a grid has, and not the same."""
+    pattern = tube()
+    ends = pattern.edges_vertices.copy()
+    ends[0] = pattern.faces_vertices[0, [0, 2]]
+    with pytest.raises(LayoutError, match="the facets of this pattern do not form a grid"):
+        open_ring(replace(pattern, edges_vertices=ends), 0, 5)

@@ -11,11 +11,12 @@ from miurafab.fabrication import plan as planning
 from miurafab.fabrication.layout import read_layout, write_layout
 from miurafab.fabrication.nesting import Problem, first_nesting, nest, nest_within, price
 from miurafab.fabrication.options import LayoutOptions, NestingOptions
+from miurafab.fabrication.partition.fit_box import Space
 from miurafab.fabrication.partition.patch_frame import framed_patches, sheet_space
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.partition.split import split
 from miurafab.fabrication.plan import plan_patches
-from miurafab.fabrication.plan_splits import dissolved, equal_blocks, smaller_rooms
+from miurafab.fabrication.plan_splits import dissolved, equal_blocks, smaller_rooms, tighter_rooms
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.stock import lay_stock
 
@@ -23,6 +24,20 @@ from miurafab.fabrication.stock import lay_stock
 def strip(columns: int, rows: int, cell: float):
     i, j = np.indices((rows + 1, columns + 1))
     return grid(np.stack([j * cell, i * cell], axis=-1))
+
+
+def test_rooms_are_parts_of_a_room_that_leave_something():
+    """A room of 10 mm has no three parts with 6 mm between; one with turns has all its sides."""
+    found = smaller_rooms(Space(10.0, 100.0), 6.0)
+    assert (2.0, 100.0) in {(each.width, each.height) for each in found}
+    assert min(min(each.width, each.height) for each in found) == 2.0
+    for turns, count in ((None, 2), ((0, 1), 3)):
+        rooms = tighter_rooms(Space(200.0, 100.0, turns))
+        assert len(rooms) == 4 * count
+        assert {each.turns for each in rooms} == {turns}
+        sides = {(each.width, each.height) for each in rooms}
+        assert ((190.0, 100.0) in sides) == (turns is not None)
+        assert {(190.0, 95.0), (200.0, 95.0)} <= sides
 
 
 def planned(pattern, machine, options=None):

@@ -17,6 +17,7 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.layout import SCHEMA, read_layout, write_layout
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.sheets import Layout, lay_out
+from miurafab.fabrication.toolpath import Toolpath
 from miurafab.profiles import OPERATIONS
 
 CUT, PERFORATE = OPERATIONS.index("cut"), OPERATIONS.index("perforate")
@@ -235,6 +236,31 @@ def test_a_layout_with_a_broken_value_is_refused(wrong):
     document["patches"][0]["outline_mm"] = wrong
     with pytest.raises(LayoutError, match="is not a layout"):
         read_layout(json.dumps(document))
+
+
+@pytest.mark.parametrize(
+    ("part", "key", "wrong", "words"),
+    [
+        ("patches", "label", "P1\n", "is not a plain text"),
+        ("tabs", "mate_patch", "P2", "'P2' is no mate of a tab"),
+        ("tabs", "mate_edge", True, "True is no mate of a tab"),
+    ],
+)
+def test_a_layout_with_a_wrong_name_or_mate_is_refused(part, key, wrong, words):
+    options = LayoutOptions(seam_columns=(2,))
+    layout = lay_out(miura(5, 3), MACHINE, card(), options=options)
+    document = json.loads(write_layout(layout, "p", "s"))
+    tabs = [tab for patch in document["patches"] for tab in patch["tabs"]]
+    {**document, "tabs": tabs}[part][0][key] = wrong
+    with pytest.raises(LayoutError, match=f"is not a layout that .*{words}"):
+        read_layout(json.dumps(document))
+
+
+def test_a_path_of_no_strokes_travels_nowhere():
+    codes = np.zeros(0, dtype=np.int64)
+    path = Toolpath("s", 9.0, 9.0, np.empty((0, 2)), np.zeros(1, dtype=np.int64), *[codes] * 3)
+    assert path.travel_mm == 0.0
+    assert path.length_of("cut") == 0.0
 
 
 def test_flat_edges_and_joins_are_not_perforated():

@@ -96,6 +96,11 @@ def options(**nesting) -> LayoutOptions:
     return LayoutOptions(nesting=NestingOptions(**nesting))
 
 
+def test_a_bed_without_room_within_its_margins_is_told():
+    with pytest.raises(LayoutError, match="The bed of 80 mm x 9 mm leaves nothing within margins"):
+        lay_stock(options(), bed(80.0, 9.0).bed, "none")
+
+
 def test_sheets_lose_their_margins_and_turn_with_their_grain(tmp_path):
     file = written(tmp_path, WHOLE)
     laid = lay_stock(options(stock=file, margin_mm=10.0), bed(260.0, 200.0).bed, "x")

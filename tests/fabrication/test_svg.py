@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import resvg_py
 from flat_patterns import bed, card, fan, miura, triangles, zigzag
+from piece_problems import gores
 from PIL import Image
 
 from miurafab.fabrication.drawing.layers import LAYERS, layers_of
@@ -20,6 +21,7 @@ from miurafab.fabrication.drawing.svg_canvas import SvgCanvas
 from miurafab.fabrication.drawing.views import edge_letters
 from miurafab.fabrication.sheets import lay_out
 from miurafab.origami.picture import CREASES, flat_svg
+from miurafab.origami.seam_lines import SEAM_WORDS, seam_lines
 from miurafab.profiles import OPERATIONS
 from miurafab.profiles.material import CREASE_KINDS, MODES, Crease
 
@@ -210,6 +212,23 @@ def test_the_picture_of_a_layout_shows_every_edge_once(pattern):
     assert legend == ["mountain", "valley", "border"]
     below = (2 * len(legend) + 1) * tall.max() / 45
     assert height == pytest.approx(tall[1] + 0.04 * tall.max() + below, abs=1e-3)
+
+
+def test_the_picture_of_a_layout_shows_both_sides_of_a_seam_with_one_number():
+    pattern = gores()
+    root = ElementTree.fromstring(layout_svg(pattern, lay_out(pattern, bed(400, 400), card())))
+    texts = [text.text for text in root.iter(SVG + "text")]
+    assert sorted(t for t in texts if t.isdecimal()) == sorted("11223344")
+    assert texts[-4:] == ["mountain", "valley", "border", SEAM_WORDS]
+    shown = {path.get("id"): path for path in root.iter(SVG + "path") if path.get("id")}
+    lines = seam_lines(pattern)
+    for line in lines:
+        path = shown[f"seam-{line.number}"]
+        assert path.get("stroke") == line.colour
+        assert len(strokes_of(path.get("d"))) == 2 * len(line.edges)
+    border = (pattern.edges_assignment == "B").sum()
+    sides = sum(line.edges.size for line in lines)
+    assert len(strokes_of(shown["border"].get("d"))) == border - sides
 
 
 def test_the_picture_of_a_pattern_shows_every_edge_once():

@@ -52,6 +52,14 @@ def _nearest(line, point):
     return shapely.get_coordinates(line.interpolate(line.project(point)))
 
 
+def test_a_fold_without_room_for_its_tick_is_told():
+    options = LayoutOptions(ticks_mm=3.0)
+    layout = lay_out(miura(2, 2, 4.0, 4.0), bed(150, 150), card(), options=options)
+    (told,) = (finding for finding in layout.findings if finding.code == "ticks")
+    assert told.sentence == "4 ends of folds have no room for a tick."
+    assert not layout.toolpaths[0].length_of("engrave")
+
+
 @pytest.mark.parametrize("marks", ["front", "back"])
 def test_ticks_lie_on_the_side_of_the_marks(marks):
     layout = lay_out(

@@ -10,10 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
+from flat_patterns import bed, card
+from piece_problems import gores
 from PIL import Image
 
 import miurafab
 from miurafab.fabrication.mates import seam_tabs
+from miurafab.fabrication.options import LayoutOptions
+from miurafab.fabrication.sheets import lay_out
 from miurafab.workflow.page import write_page
 from miurafab.workflow.preview import preview
 
@@ -36,6 +40,17 @@ def jobs(tmp_path_factory):
         job.write(folder)
         made[name] = job, folder
     return made
+
+
+def test_a_tab_on_an_open_border_has_no_mate():
+    options = LayoutOptions(border_tabs="all")
+    layout = lay_out(gores(), bed(400.0, 400.0), card(), options=options)
+    tabs = list(seam_tabs(layout, gores()))
+    alone = [tab for tab in tabs if tab.mate_mm is None]
+    assert len(alone) == layout.totals.border_tabs == 24
+    assert len(tabs) == layout.totals.tabs
+    every = [tab for patch in layout.patches for tab in patch.tabs]
+    assert {tab.number for tab in alone} == {tab.number for tab in every if tab.mate_edge is None}
 
 
 def turn(degrees):

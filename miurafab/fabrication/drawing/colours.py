@@ -39,7 +39,7 @@ def _srgb(lightness: float, chroma: float, hue: float) -> RGB:
 
 
 def _transferred(linear: float) -> float:
-    """A linear part of light as sRGB codes it (IEC 61966-2-1)."""
-    if linear <= 0.0031308:
-        return max(12.92 * linear, 0.0)
+    """A linear part of light as sRGB codes it (IEC 61966-2-1); no colour of a patch is so dark that
+    the code is a multiple of the light.
+    """
     return min(1.055 * math.pow(linear, 1 / 2.4) - 0.055, 1.0)

@@ -138,12 +138,10 @@ class GlueView:
         found: dict[int, list[tuple[str, Floats]]] = {}
         for number in step.tabs:
             patch, tab = self._numbered[number]
-            placed = self.glued(patch, tab)
-            if placed is None:
-                continue
-            found.setdefault(placed[0], []).append((tab.label, placed[1]))
+            mate, outline = self.glued(patch, tab)
+            found.setdefault(mate, []).append((tab.label, outline))
             if number in self.views.slots:
-                found[placed[0]].append(("", self._slot(number, placed[0])))
+                found[mate].append(("", self._slot(number, mate)))
         return found
 
     def _slot(self, number: int, mate: int) -> Floats:
@@ -177,10 +175,9 @@ class GlueView:
     def _numbered(self) -> dict[int, tuple[Patch, Tab]]:
         return {tab.number: (patch, tab) for patch in self.views.patches for tab in patch.tabs}
 
-    def glued(self, patch: Patch, tab: Tab) -> tuple[int, Floats] | None:
-        """The facet that a tab is joined to and the tab (n, 3) there; None on an open border."""
-        if tab.mate_edge is None:
-            return None
+    def glued(self, patch: Patch, tab: Tab) -> tuple[int, Floats]:
+        """The facet that a tab of a seam is joined to, and the tab (n, 3) there."""
+        assert tab.mate_edge is not None
         pattern, face_patch = self.pattern, self.views.face_patch
         beside, facing = pattern.edges_faces[[tab.edge, tab.mate_edge]].tolist()
         own = next(f for f in beside if f >= 0 and face_patch[f] == patch.id)

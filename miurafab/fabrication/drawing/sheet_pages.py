@@ -126,7 +126,7 @@ class SheetPages:
             yield from self.listed(placed, subtitle, scale, under)
             return
         # Cards below the drawing, and cards on a page of their own.
-        first = max(int((under - BOTTOM) // _CARD), 0) * 2
+        first = int((under - BOTTOM) // _CARD) * 2
 
         def front(canvas: Pen) -> None:
             heading(canvas, f"{self.title}: {sheet.name}", subtitle)
@@ -323,8 +323,6 @@ class SheetPages:
     def cards(self, canvas: Pen, patches: list[int], top: float) -> None:
         """The cards of the patches, in two columns."""
         rows = math.ceil(len(patches) / 2)
-        if not rows:
-            return
         width = (ROOM - 6) / 2
         beside = 0.4 * width
         height = min((top - BOTTOM) / rows, max(_CARD, beside * self.views.aspect + 14))

@@ -65,8 +65,7 @@ def sheet_svg(toolpath: Toolpath, letters: Letters = NO_LETTERS) -> str:
         layer.attribs["inkscape:label"] = kind.name
         strokes = np.flatnonzero(layer_of == number)
         for run in np.split(strokes, np.flatnonzero(np.diff(together[strokes])) + 1):
-            if len(run):
-                layer.add(drawing.path(d="".join(paths[s] for s in run.tolist())))
+            layer.add(drawing.path(d="".join(paths[s] for s in run.tolist())))
         drawing.add(layer)
     return _text(drawing)
 

@@ -115,9 +115,8 @@ def _of_caps(pattern: CreasePattern, pieces: Ints) -> Bools:
     """(E,) whether an edge is of a cap: a piece of triangles alone, beside pieces of others."""
     corners = (pattern.faces_vertices >= 0).sum(axis=1)
     round_ = np.bincount(pieces[corners > 3], minlength=int(pieces.max()) + 1) == 0
-    if round_.all():
-        return np.zeros(len(pattern.edges_vertices), dtype=bool)
-    return np.asarray(round_[pieces[pattern.edges_faces.max(axis=1)]])
+    caps = round_ & ~round_.all()
+    return np.asarray(caps[pieces[pattern.edges_faces.max(axis=1)]])
 
 
 def _line(pattern: CreasePattern, family: str, number: int, edges: Ints) -> CreaseLine:

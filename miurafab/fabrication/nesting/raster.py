@@ -34,6 +34,7 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.nesting.cells import Part, Raster
 from miurafab.fabrication.nesting.filling import FilledSheet, Rack, Rule
 from miurafab.fabrication.nesting.problem import Problem, Slot, cost, layout_faults, price
+from miurafab.fabrication.wording import count
 
 WORK = 4_000_000_000
 """The limit of the search in cells transformed: about 40 s on one core of 2020 (measured:
@@ -248,9 +249,9 @@ class _Search:
             FilledSheet(k, self.stock, raster).take(number, self.alike[number], (1.0, 1.0))
             for k, raster in enumerate(self.rasters(False))
         ):
-            count = sum(kind.quantity or 0 for kind in kinds)
+            there = count(sum(kind.quantity or 0 for kind in kinds), "sheet", "sheets")
             return (
-                f"The stock of {count} sheets is used up and patch {name} has no room; add a "
+                f"The stock of {there} is used up and patch {name} has no room; add a "
                 "sheet, or give one of them no quantity, for as many as it takes."
             )
         return (

@@ -89,19 +89,17 @@ def grow_patches(
     pattern: CreasePattern,
     reach: NDArray[np.float32],
     space: Space,
-    faces: Ints | None = None,
+    faces: Ints,
     most: int | None = None,
 ) -> Ints:
-    """(F,) patch ids from 0 of ``faces`` (default: all), -1 for other facets.
+    """(F,) patch ids from 0 of ``faces``, -1 for other facets.
 
     ``reach`` (F, D) are the support values of each facet with all tabs that may stand on it; every
     facet must fit ``space`` alone. ``most`` limits the number of facets of a patch.
     """
     total = len(pattern.faces_vertices)
-    free = np.ones(total, dtype=bool)
-    if faces is not None:
-        free = np.zeros(total, dtype=bool)
-        free[faces] = True
+    free = np.zeros(total, dtype=bool)
+    free[faces] = True
     growth = _Growth(pattern, reach, space, free, most or total)
     order = np.lexsort((np.arange(total), growth.rank.sum(axis=1)))
     patch = 0

@@ -20,8 +20,6 @@ Half-edge h of M edges leaves its node along edge h % M: the tail for h < M, the
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import scipy.sparse
 from scipy.sparse.csgraph import connected_components
@@ -152,7 +150,9 @@ def _meeting(partner: Ints, trail: Ints, at: Ints) -> tuple[Ints, Ints]:
     found = [np.empty((0, 2), dtype=np.int64)]
     node = at[pairs]
     # The pairs of a node are consecutive: each is compared with the next, the second next ...
-    for apart in itertools.count(1):
+    apart = 0
+    while True:
+        apart += 1
         same = np.flatnonzero(node[apart:] == node[:-apart])
         if not len(same):
             break

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import shapely
-from flat_patterns import facet_polygons, zigzag
+from flat_patterns import bed, card, facet_polygons, zigzag
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -25,6 +25,7 @@ from miurafab.fabrication.nesting import (
     raster,
     turned,
 )
+from miurafab.fabrication.sheets import lay_out
 
 ANY = (0, 90, 180, 270)
 
@@ -182,9 +183,10 @@ def test_any_stock_gets_a_sound_layout_or_a_clear_refusal(seeds, sizes, flaws, r
 
 
 def test_a_stock_that_does_not_suffice_is_told_with_the_patch_left_over():
-    asked = problem([rectangle(90, 90)] * 3, SheetKind(100.0, 100.0, ANY, 2))
-    with pytest.raises(LayoutError, match="The stock of 2 sheets is used up and patch P3 has no"):
-        nest(asked)
+    for there, words in ((2, "2 sheets is used up and patch P3"), (1, "1 sheet is used up and")):
+        asked = problem([rectangle(90, 90)] * 3, SheetKind(100.0, 100.0, ANY, there))
+        with pytest.raises(LayoutError, match=f"The stock of {words}"):
+            nest(asked)
 
 
 def test_a_patch_that_only_a_defect_keeps_off_is_told():
@@ -316,6 +318,24 @@ def test_the_bound_counts_area_and_patches_that_cannot_share():
     assert problem([rectangle(98, 98)] * 2, kinds).bound == 2
     kinds = [SheetKind(98.0, 98.0, ANY, 1), SheetKind(48.0, 98.0, ANY)]
     assert problem([rectangle(38, 38)] * 10, kinds).bound == 3
+    few = SheetKind(98.0, 98.0, ANY, 2)
+    assert problem([rectangle(48, 48)] * 40, few).bound == 2, "no more than there are"
+
+
+def test_a_search_that_reached_its_limit_is_told(monkeypatch):
+    def stopped(*given, **how):
+        return dataclasses.replace(nest(*given, **how), finished=False)
+
+    monkeypatch.setattr("miurafab.fabrication.plan.nest", stopped)
+    layout = lay_out(zigzag(4, 4), bed(300.0, 300.0), card())
+    (told,) = (each for each in layout.findings if each.code == "nesting-limit")
+    assert told.sentence.startswith("The nesting reached its limit of work before it had tried")
+
+
+def test_a_nesting_that_the_proof_refuses_is_none(monkeypatch):
+    monkeypatch.setattr(raster, "layout_faults", lambda *_: ["P1 lies on P2"])
+    with pytest.raises(LayoutError, match="The nesting cannot be used: P1 lies on P2"):
+        nest(problem([rectangle(8, 8)] * 2, SheetKind(90.0, 90.0, ANY)))
 
 
 GOOD = [Slot(0, 0, 0.0, 0.0, 0), Slot(0, 0, 50.0, 0.0, 0)]

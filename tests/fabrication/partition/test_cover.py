@@ -42,6 +42,19 @@ def test_a_frame_holds_points_exactly_if_some_turn_fits_them(points, width, heig
     assert (over <= 1e-9) == fits
 
 
+def test_a_row_of_rectangles_that_meets_no_facet_is_left_out():
+    shapes = np.concatenate([squares(9, 1, 10.0), squares(9, 1, 10.0) + np.array([0.0, 60.0])])
+    for rectangles in brickwork(shapes, (30.0, 20.0)):
+        away = np.abs(rectangles[:, 1] - 35.0)
+        assert away.min() > 10.0
+        assert away.max() < 40.0
+
+
+def test_one_rectangle_holds_every_shape_alone():
+    search = CoverSearch(squares(4, 3, 10.0), 60.0, 40.0)
+    assert search.needed(np.array([[20.0, 15.0, 0.0]])).tolist() == [12.0]
+
+
 def test_nearest_tells_the_frames_that_a_point_lies_deepest_in():
     rng = np.random.default_rng(1)
     rectangles = np.column_stack([rng.uniform(0, 900, (12, 2)), rng.uniform(0, 3, 12)])

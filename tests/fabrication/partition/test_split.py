@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import flat_patterns
 import numpy as np
@@ -16,8 +17,9 @@ from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.boundary import boundaries
 from miurafab.fabrication.partition.patch_outline import outline_patches
+from miurafab.fabrication.partition.pieces import lattice_cells
 from miurafab.fabrication.partition.region_growing import is_disk
-from miurafab.fabrication.partition.split import split
+from miurafab.fabrication.partition.split import check_facets, split
 from miurafab.fabrication.tab_choice import choose_tabs
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -31,6 +33,45 @@ CASES = {
     "triangles": triangles(3, 15, 520.0),
     "ring": triangles(4, 15, 520.0, hole=True),
 }
+
+
+def test_a_lattice_is_read_from_a_grid_in_order_alone():
+    """A facet too few, a facet that spans two cells, and a facet in another's place are none."""
+    pattern = miura(4, 3)
+    cells = lattice_cells(pattern)
+    assert cells.tolist() == [[x, y] for y in range(3) for x in range(4)]
+    order = np.random.default_rng(1).permutation(12)
+    mixed = replace(pattern, faces_vertices=pattern.faces_vertices[order])
+    assert np.array_equal(lattice_cells(mixed), cells[order])
+    wide = pattern.faces_vertices.copy()
+    wide[0, 2] += 1
+    twice = pattern.faces_vertices[[0, *range(11)]]
+    for faces in (pattern.faces_vertices[:-1], wide, twice):
+        assert lattice_cells(replace(pattern, faces_vertices=faces)) is None
+    assert lattice_cells(without_grid(pattern)) is None
+
+
+def test_facets_that_are_none_are_refused():
+    pattern = miura(2, 2)
+    none = replace(pattern, faces_vertices=np.empty((0, 4), dtype=np.int64))
+    with pytest.raises(LayoutError, match="has no facets; there is nothing to lay out"):
+        check_facets(none)
+    with pytest.raises(LayoutError, match=r"Edge \d+ of the pattern belongs to no facet"):
+        check_facets(replace(pattern, faces_vertices=pattern.faces_vertices[:3]))
+    clockwise = replace(pattern, faces_vertices=pattern.faces_vertices[:, ::-1])
+    line = replace(
+        pattern,
+        vertices_coords=np.concatenate([pattern.vertices_coords, [[-5.0, -5.0]]]),
+        edges_vertices=np.concatenate([pattern.edges_vertices, [[0, 9]]]),
+        edges_assignment=np.append(pattern.edges_assignment, "B"),
+        edges_fold_angle=np.append(pattern.edges_fold_angle, 0.0),
+        faces_vertices=np.concatenate([pattern.faces_vertices, [[0, 9, -1, -1]]]),
+        grid=None,
+    )
+    for number, wrong in ((0, clockwise), (4, line)):
+        words = f"Facet {number} is not a simple counter-clockwise polygon"
+        with pytest.raises(LayoutError, match=words):
+            check_facets(wrong)
 
 
 def assert_patches_are_sound(pattern, face_patch, width, height):
