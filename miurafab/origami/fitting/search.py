@@ -72,22 +72,21 @@ def coarsest(
     tried: dict[int, FitResult] = {}
 
     def trial(longer: int) -> FitResult:
-        if longer not in tried:
-            columns, rows = _shape(request, longer)
-            if on_progress is not None:
-                on_progress(1 - 0.8 ** len(tried), f"{columns}x{rows} facets")
-            limit = request.timeout
-            left = None if limit is None else limit - (time.perf_counter() - started)
-            if left is not None and left <= 0:
-                if tried:
-                    raise TimeoutError
-                left = NO_TIME  # the first fit says what came of that
-            # more pieces would hide that a size is too coarse
-            pieces = request.pieces or 1
-            size = replace(request, facets=(columns, rows), timeout=left, pieces=pieces)
-            tried[longer] = fit(size)
-            if tried[longer].status == "interrupted":
-                raise KeyboardInterrupt
+        columns, rows = _shape(request, longer)
+        if on_progress is not None:
+            on_progress(1 - 0.8 ** len(tried), f"{columns}x{rows} facets")
+        limit = request.timeout
+        left = None if limit is None else limit - (time.perf_counter() - started)
+        if left is not None and left <= 0:
+            if tried:
+                raise TimeoutError
+            left = NO_TIME  # the first fit says what came of that
+        # more pieces would hide that a size is too coarse
+        pieces = request.pieces or 1
+        size = replace(request, facets=(columns, rows), timeout=left, pieces=pieces)
+        tried[longer] = fit(size)
+        if tried[longer].status == "interrupted":
+            raise KeyboardInterrupt
         return tried[longer]
 
     try:

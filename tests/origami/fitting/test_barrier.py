@@ -1,5 +1,6 @@
 """A fit with the barrier that is asked for."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from miurafab.errors import OptionError
 from miurafab.origami.energy import tuning
 from miurafab.origami.energy.curve import energy_curve
+from miurafab.origami.fitting.fit import fit as fit_sheet
 from miurafab.origami.formats.files import load
 from miurafab.origami.verify import measure
 from miurafab.workflow.design import design
@@ -83,6 +85,98 @@ def test_an_interruption_gives_the_nearest_sheet_up_to_then():
     assert (result.status, result.is_valid) == ("interrupted", True)
     assert result.barrier == pytest.approx(energy_curve(result.pattern, 24).barrier)
     assert "interrupted" in result.advice
+
+
+@cache
+def small():
+    """The request and the fit of a small sheet, whose barrier is about 1e-3 k_f L."""
+    request = design("hypar", facets=(4, 4), size=120).request
+    return request, fit_sheet(request)
+
+
+@pytest.fixture
+def lawful(monkeypatch):
+    """Lets the barrier of the one fit be a law of the factor (None: no sheet); gives the factors
+    that are tried.
+    """
+
+    def by(barrier):
+        seen = []
+
+        def tried(request, fitted, factor):
+            seen.append(factor)
+            found = barrier(factor)
+            return found and tuning.Tried(factor, fitted, small()[1].measurements, found)
+
+        monkeypatch.setattr(tuning, "_tried", tried)
+        monkeypatch.setattr(tuning, "_families", lambda *_: [])
+        monkeypatch.setattr(tuning, "with_distances", lambda measured, *_: measured)
+        return seen
+
+    return by
+
+
+@pytest.mark.parametrize(
+    "barrier",
+    [lambda f: 1e-3 * f**2, lambda f: 1e-3 * f**0.7, lambda f: 1e-3 * (f**2 + f**5)],
+    ids=["square", "slow", "fast"],
+)
+@pytest.mark.parametrize("wanted", [1e-6, 3e-2])
+def test_a_barrier_that_grows_is_met_in_few_sheets(barrier, wanted, lawful):
+    request, result = small()
+    seen = lawful(barrier)
+    found = tuning.tuned(replace(request, barrier=wanted), result, None)
+    assert found.barrier == pytest.approx(wanted, rel=tuning.CLOSE)
+    assert found.status == "converged"
+    assert len(seen) <= 25
+
+
+@pytest.mark.parametrize(
+    ("barrier", "most"),
+    [
+        (lambda f: 1e-3, 31),  # which no factor changes
+        (lambda f: 1e-3 if f < 2 else 1.0, 33),  # which jumps over what is asked
+        (lambda f: -1e-9 if f < 1.5 else 1e-3, 31),  # which is none at first
+        (lambda f: 1e-3 if f == 1.0 else None, 7),  # of the fit alone
+    ],
+    ids=["constant", "jump", "none", "alone"],
+)
+def test_a_barrier_that_is_not_met_ends_the_search(barrier, most, lawful):
+    request, result = small()
+    seen = lawful(barrier)
+    found = tuning.tuned(replace(request, barrier=0.1), result, None)
+    assert found.status == "infeasible"
+    assert "No sheet with a barrier of 0.1 k_f L was found" in found.advice
+    assert 1 < len(seen) <= most
+
+
+def test_a_lost_way_and_a_fit_without_a_sheet_are_told(monkeypatch):
+    request, result = small()
+    request = replace(request, barrier=0.1)
+    none = replace(result, status="stalled", pattern=None, measurements=None)
+    assert tuning.tuned(request, none, None) is none
+    with pytest.raises(OptionError, match="'barrier' is for a sheet that is one whole grid"):
+        tuning.tuned(request, replace(result, pattern=replace(result.pattern, grid=None)), None)
+    monkeypatch.setattr(tuning, "_tried", lambda *_: None)
+    # of the other fits one has no sheet, and Ctrl-C ends another before there is any
+    found = tuning.tuned(request, result, lambda other: none)
+    assert found.status == "infeasible"
+    assert "The way to flat of the fitted sheet was lost." in found.advice
+    with pytest.raises(KeyboardInterrupt):
+        tuning.tuned(request, result, lambda other: replace(result, status="interrupted"))
+
+
+def test_a_sheet_beyond_a_limit_is_no_answer():
+    request, result = small()
+    inside = replace(request, max_deviation_mm=2 * result.deviation_mm)
+    one = tuning._tried(inside, result.pattern, 1.0)
+    assert one.barrier == pytest.approx(energy_curve(result.pattern, tuning.STEPS).barrier)
+    beyond = replace(request, max_deviation_mm=result.deviation_mm / 2)
+    assert tuning._tried(beyond, result.pattern, 1.0) is None
+    long = replace(request, min_edge_mm=2 * result.measurements.min_edge_mm)
+    assert tuning._tried(long, result.pattern, 1.0) is None
+    free = replace(request, size_mm=None)
+    assert tuning._tried(free, result.pattern, 1.0).pattern is result.pattern
 
 
 @pytest.mark.parametrize(
