@@ -324,9 +324,9 @@ def _wait(console: Console, keys: Keys, request: str) -> None:
 
 def _put_in(prepared: Prepared, number: int) -> str:
     """What to do before sheet ``number``, which is not the first."""
-    if prepared.jobs[number - 2].name == f"{prepared.jobs[number - 1].name}-back":
-        return "turn the sheet over, left to right, and lay it by its three holes"
-    return "put in fresh material"
+    from miurafab.workflow.material_change import put_in
+
+    return put_in(prepared.jobs[number - 2].name, prepared.jobs[number - 1].name)
 
 
 def _refuse(console: Console, prepared: Prepared) -> int:

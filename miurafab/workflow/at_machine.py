@@ -20,6 +20,7 @@ from miurafab.workflow.cut import Prepared
 from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.cut_sheets import frame_plan
 from miurafab.workflow.dry_run import clock_text
+from miurafab.workflow.material_change import put_in
 from miurafab.workflow.sheet_plans import beside, journal_path, plan_sheets
 from miurafab.workflow.timeline import SheetProgress, Timeline
 
@@ -255,9 +256,9 @@ class Operator:
             word = self.busy or ("" if state is None else state.state)
             raise InputError(f"The machine must be idle before a job is armed; it is in '{word}'.")
         if self.wants_material:
+            what = put_in(state.loaded or "", self._job().jobs[self.number - 1].name)
             raise PersonNeeded(
-                f"{state.loaded} has burnt on the sheet in the machine; put in fresh material and "
-                "say so first"
+                f"{state.loaded} has burnt on the sheet in the machine; {what} and say so first"
             )
         self.armed = True
         self.said.append(f"Armed. To burn: {self.describe()}.")

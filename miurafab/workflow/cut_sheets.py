@@ -36,7 +36,7 @@ from miurafab.profiles import MachineProfile
 from miurafab.workflow.alignment import align
 from miurafab.workflow.cut import Prepared, prepare
 from miurafab.workflow.cut_options import DEFAULT_OPTIONS, CutOptions
-from miurafab.workflow.material_change import at_pause, is_attended, needs_person
+from miurafab.workflow.material_change import at_pause, is_attended, needs_person, put_in
 from miurafab.workflow.sheet_plans import (
     beside,
     journal_path,
@@ -222,9 +222,10 @@ def cut_prepared(
                     with session.waits():
                         before_sheet(number, len(prepared.jobs))
                 elif done:
+                    name = prepared.jobs[number - 1].name
                     raise PersonNeeded(
-                        f"{prepared.jobs[number - 1].name} needs fresh material, and nobody is "
-                        f"here to put it in; then go on with `sheet` {number}. Done: "
+                        f"Before {name}, {put_in(done[-1].name, name)}; nobody is here to do so. "
+                        f"Then go on with `sheet` {number}. Done: "
                         f"{', '.join(sheet.name for sheet in done)}."
                     )
             if done:

@@ -23,7 +23,7 @@ from miurafab.machine.signals import StopSignals
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.cut_sheets import cut_sheet, head_after
-from miurafab.workflow.material_change import WAITS, MaterialChange
+from miurafab.workflow.material_change import WAITS, MaterialChange, is_other_side
 from miurafab.workflow.sheet_plans import journal_path, plan_sheets, start_findings
 
 _LOOK_S = 0.1
@@ -79,6 +79,12 @@ def share_sheets(
             raise InputError(
                 f"`{name}` is said of a sheet that lies at one machine; name its `port` alone."
             )
+    names = [job.name for job in prepared.jobs]
+    if any(map(is_other_side, names, names[1:])):
+        raise InputError(
+            f"{prepared.name} works its sheets from both sides, and each is turned over in one "
+            "machine; name one `port`."
+        )
     twice = {port for port in ports if ports.count(port) > 1 and port != "virtual"}
     if twice:
         raise InputError(f"The port {min(twice)} is named twice.")
@@ -202,6 +208,6 @@ def _begun_at(prepared: Prepared, plans: dict[int, JobPlan], port: str) -> deque
     begun: deque[int] = deque()
     for number, plan in plans.items():
         path = journal_path(prepared, prepared.jobs[number - 1])
-        if plan.resumption is not None and path is not None and read_journal(path)[-1].port == port:
+        if plan.resumption is not None and read_journal(path)[-1].port == port:
             begun.append(number)
     return begun

@@ -166,9 +166,8 @@ def _take_dashes(values: dict[str, Any], rule: Mapping[str, Any]) -> None:
     names = {"cut": "cut_mm", "gap": "gap_mm", "min_end": "min_end_mm"}
     values["perforation"].update({key: _mm(rule[name]) for key, name in names.items()})
     for kind in values.get("creases", {}).values():
-        if isinstance(kind, dict):
-            for key in names:
-                kind.pop(key, None)
+        for key in names:
+            kind.pop(key, None)
 
 
 def _mm(length: float) -> str:

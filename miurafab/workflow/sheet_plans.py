@@ -56,7 +56,7 @@ def plan_sheets(
             resumption = from_stroke(written, prepared.machine, options.from_stroke)
         if options.resume:
             path = journal_path(prepared, job)
-            runs = read_journal(path) if path is not None and path.exists() else []
+            runs = read_journal(path) if path.exists() else []
             begun = begun or bool(runs)
             if runs and runs[-1].ended == "done":
                 continue
@@ -147,7 +147,7 @@ def can_go_on(prepared: Prepared) -> bool:
     """Whether a sheet was begun and not ended, and its journal can be resumed."""
     for job in prepared.jobs:
         path = journal_path(prepared, job)
-        runs = read_journal(path) if path is not None and path.is_file() else []
+        runs = read_journal(path) if path.is_file() else []
         if runs and runs[-1].ended != "done" and runs[-1].line:
             try:
                 resume(job, prepared.machine, runs)
@@ -157,13 +157,12 @@ def can_go_on(prepared: Prepared) -> bool:
     return False
 
 
-def journal_path(prepared: Prepared, job: Job) -> Path | None:
+def journal_path(prepared: Prepared, job: Job) -> Path:
     """Where the journal of ``job`` is."""
     return beside(prepared, job, ".journal")
 
 
-def beside(prepared: Prepared, job: Job, suffix: str) -> Path | None:
-    """The file of ``job`` with ``suffix``; None if the job has no folder."""
-    if prepared.folder is None:
-        return None
+def beside(prepared: Prepared, job: Job, suffix: str) -> Path:
+    """The file of ``job`` with ``suffix``, in the folder of a job that is not refused."""
+    assert prepared.folder is not None
     return prepared.folder / f"{Path(job.name).stem}{suffix}"

@@ -7,7 +7,7 @@ import pytest
 from command_line import sentence
 
 from miurafab.fabrication.beam_findings import beam_findings
-from miurafab.profiles import load_machine, load_material
+from miurafab.profiles import load_machine, load_material, shipped_directory
 
 
 @pytest.fixture
@@ -127,3 +127,33 @@ def test_a_beam_without_settings_begins_with_a_power_and_a_feed_of_ones_own(run,
     assert list(mine.beams) == ["co2"]
     assert mine.on(load_machine("grbl-co2-k40")).most_watts == pytest.approx(5.2)
     assert "has some: leave it out" in sentence(run("calibrate", "-o", "x", *begin), 2)
+
+
+def test_a_blade_that_leaves_scores_out_tries_none(run, tmp_path):
+    """Of a card that nobody has cut with a knife, from its feed alone."""
+    knife = (shipped_directory("firmware_profiles") / "grbl-knife-a3.toml").read_text()
+    (tmp_path / "deep.toml").write_text(knife.replace("s_down", 'leave_out = ["score"]\ns_down'))
+    card = (shipped_directory("materials") / "card-250.toml").read_text()
+    (tmp_path / "new.toml").write_text(card[: card.index("[beams.knife")])
+    deep = ("--machine", "deep.toml", "--material", "new.toml", "-o", "trial")
+    assert "--power is for a laser" in sentence(
+        run("calibrate", *deep, "--power", "3W", "--feed", "600"), 2
+    )
+    made = run("calibrate", *deep, "--feed", "600")
+    assert made.returncode == 0, made.stderr
+    assert "squares" in made.stdout
+    assert "scores" not in made.stdout
+    add = ("materials", "add", "mine", "--from", "trial")
+    assert "'S1' is not on the sheet in trial, which has none" in sentence(
+        run(*add, "--score", "S1"), 2
+    )
+    assert run(*add, "--cell", "A1", "--quiet").returncode == 0
+    assert list(load_material(tmp_path / "mine.toml").beams) == ["knife"]
+
+
+def test_a_diode_without_settings_begins_with_its_wavelength(run, tmp_path):
+    foil = ("--machine", "grbl-laser-400", "--material", "polypropylene-04", "-o", "trial")
+    assert run("calibrate", *foil, "--power", "3W", "--feed", "600").returncode == 0
+    run("materials", "add", "mine", "--from", "trial", "--cut", "X1", "--quiet")
+    meant = load_material(tmp_path / "mine.toml").beams["diode"].meant
+    assert meant.wavelength == load_machine("grbl-laser-400").tool.laser.wavelength

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import nullcontext
 
 import pytest
 from command_line import sentence
@@ -14,8 +15,12 @@ from problems import saddle_mesh
 from sealing import seal
 
 import miurafab
+from miurafab.cli import cut
+from miurafab.cli.console import Console
 from miurafab.errors import PortError
+from miurafab.machine.keys import ConsoleKeys
 from miurafab.profiles import shipped_directory
+from miurafab.workflow.multi_machine import Shared
 
 DESIGN = """
 title = "Small saddle"
@@ -366,3 +371,41 @@ def test_the_end_of_the_input_is_no_person(run, three_sheets, monkeypatch):
     done = run("cut", "job", "--port", "virtual", "--pause", "--quiet")
     assert "Nobody pressed Enter" in sentence(done, 5)
     assert [path.name for path in three_sheets.glob("*.journal")] == ["sheet-01.journal"]
+
+
+class Typing:
+    """Keys that come one at a look."""
+
+    def __init__(self, *keys):
+        self.left = [*keys]
+
+    def pressed(self):
+        return self.left.pop(0) if self.left else ""
+
+
+@pytest.mark.parametrize("enter", ["\n", "\r"])
+def test_enter_is_looked_for_where_the_keyboard_can_be_looked_at(monkeypatch, capsys, enter):
+    """On Windows no signal ends a reading."""
+    waiting, typed = iter((True, False, True, False)), list(f"x{enter}q")
+    monkeypatch.setattr(cut, "_LOOK_S", 0.0)
+    cut._wait(Console(), ConsoleKeys(lambda: next(waiting), lambda: typed.pop(0)), "Press Enter.")
+    assert typed == ["q"]
+    assert capsys.readouterr().err == "Press Enter.\n"
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_machines_that_share_a_job_ask_for_enter_in_the_terminal(
+    run, three_sheets, monkeypatch, lost
+):
+    keys, asked = Typing("", "q", "" if lost else "\r"), []
+
+    def share(prepared, ports, *_, before_sheet, **how):
+        asked.append(before_sheet(2, ports[1], lambda: lost and not keys.left))
+        return tuple(Shared(f"sheet-0{n}", ports[0], True, "") for n in (1, 2, 3))
+
+    monkeypatch.setattr(cut, "_LOOK_S", 0.0)
+    monkeypatch.setattr("miurafab.machine.keys.terminal_keys", lambda: nullcontext(keys))
+    monkeypatch.setattr("miurafab.workflow.multi_machine.share_sheets", share)
+    done = run("cut", "job", "--port", "virtual", "--port", "virtual")
+    assert (done.returncode, asked) == (0, [not lost])
+    assert "Sheet 2 of 3 at virtual: put in fresh material there, press Enter." in done.stderr

@@ -13,7 +13,8 @@ import pytest
 from command_line import sentence
 
 import miurafab
-from miurafab.errors import EXIT_CODES, MiurafabError
+from miurafab.cli.ctrl_c import CtrlC
+from miurafab.errors import EXIT_CODES, InputError, MiurafabError
 from miurafab.version import __version__
 
 COMMANDS = {
@@ -114,6 +115,61 @@ def test_ctrl_c_is_one_line(run, monkeypatch):
         assert sentence(run(*call), 130) == "miurafab: Interrupted."
     answer = json.loads(run(*call, "--json").stdout)
     assert answer == {"error": "Interrupted.", "kind": "Interrupted"}
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (PermissionError(13, "Permission denied", "a.svg"), "a.svg: Permission denied."),
+        (OSError(28, "No space left on device"), "No space left on device."),
+        (OSError("It is gone"), "It is gone."),
+        (BrokenPipeError(32, "Broken pipe"), "Broken pipe."),
+    ],
+)
+def test_what_the_system_refuses_is_told_in_its_words(run, monkeypatch, state, error, told):
+    monkeypatch.setattr(miurafab, "convert", failing(error), raising=False)
+    assert sentence(run("convert", "x.fold", "x.svg"), 2) == f"miurafab: {told}"
+    assert not state.exists()
+
+
+def test_a_terminal_that_goes_away_as_a_failure_is_shown_does_not_hide_it(run, monkeypatch):
+    def convert(*arguments, **options):
+        try:
+            raise InputError("x.fold does not exist.")
+        except InputError:
+            try:
+                raise ValueError
+            except ValueError:
+                raise OSError(5, "Input/output error") from None
+
+    monkeypatch.setattr(miurafab, "convert", convert, raising=False)
+    assert sentence(run("convert", "x.fold", "x.svg"), 2) == "miurafab: x.fold does not exist."
+
+
+def test_ctrl_c_stays_ignored_where_it_is():
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with CtrlC() as ctrl_c:
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+            signal.raise_signal(signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        assert not ctrl_c.came
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_what_else_python_drops_is_reported_as_ever(monkeypatch):
+    class Thing:
+        def __del__(self):
+            raise ValueError("dropped")
+
+    reported = []
+    monkeypatch.setattr(sys, "unraisablehook", reported.append)
+    with CtrlC() as ctrl_c:
+        Thing()
+    assert [str(each.exc_value) for each in reported] == ["dropped"]
+    assert sys.unraisablehook == reported.append
+    assert not ctrl_c.came
 
 
 def test_an_interrupted_fit_writes_its_best_sheet(run, monkeypatch, tmp_path):

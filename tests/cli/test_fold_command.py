@@ -4,7 +4,10 @@ import json
 
 import pytest
 from command_line import sentence
+from PIL import Image
 from problems import fitted, regular
+
+from miurafab.origami.folding import thick_panels as thickness
 
 
 @pytest.fixture
@@ -48,6 +51,39 @@ def test_a_sheet_that_bends_says_so(run, stiff, tmp_path):
     assert quiet.stderr == ""
 
 
+def test_a_picture_that_moves_shows_the_strain(run, stiff, tmp_path):
+    seen = []
+    for colour in ("side", "strain"):
+        done = run("fold", stiff, "-o", "a.gif", "--steps", "2", "--colour", colour)
+        assert done.returncode == 0, done.stderr
+        with Image.open(tmp_path / "a.gif") as picture:
+            colours = picture.convert("RGB").getcolors(1 << 20)
+            seen.append((picture.n_frames, {colour for _, colour in colours}))
+    (frames, plain), (same, strained) = seen
+    assert frames == same
+    assert len(strained - plain) > 10
+
+
+def test_plates_that_are_strapped_or_meet_are_told(run, tmp_path):
+    sheet = fitted("hypar", 8, 8, 0.0).pattern
+    sheet.save(tmp_path / "sheet.fold")
+    thick = ("--steps", "4", "--thickness", "12mm", "--method", "bennett")
+    done = run("fold", "sheet.fold", *thick)
+    assert "patches 0 and 1: no hinge joins them; fold both and strap them together" in done.stdout
+    assert "strapped together keep the folded form and no longer move." in done.stdout
+    assert "patch 2: beyond 172 degrees plates 40 and 48 collide" in done.stdout
+
+
+def test_panels_that_meet_are_told(run, rigid, monkeypatch):
+    """They are cut back so that none does; here too little is."""
+    closing = thickness._closing
+    monkeypatch.setattr(thickness, "_closing", lambda pattern, angle: 0.9 * closing(pattern, angle))
+    done = run("fold", rigid, "--steps", "4", "--thickness", "1mm")
+    assert done.returncode == 1
+    assert "panels 0 and 1 collide" in done.stdout
+    assert "at a median fold angle of " in done.stdout
+
+
 @pytest.mark.parametrize("ending", ["fold", "glb"])
 def test_colours_by_strain_are_refused_where_there_are_none(run, stiff, tmp_path, ending):
     out = tmp_path / f"a.{ending}"
@@ -75,6 +111,8 @@ def test_frames_in_which_paper_meets_paper_are_told_in_runs(run, tmp_path):
     assert [line.split(",")[0] for line in lines] == [f"frames {frames[0]} to {frames[-1]}"]
     assert "median fold angle " in lines[0]
     assert f"the first being {' and '.join(map(str, contacts[0]['facets'][0]))}" in lines[0]
+    (line,) = [x for x in run("fold", tube, "--steps", "4").stdout.splitlines() if x[:5] == "frame"]
+    assert line.startswith("frame 3, median fold angle 135 degrees: up to 6 pairs of facets pass ")
 
 
 def test_thickness_decides_the_exit_code(run, rigid):

@@ -1,5 +1,6 @@
 """``miurafab machine`` and ``miurafab virtual``: answers, exit codes, one sentence."""
 
+import io
 import json
 import signal
 import subprocess
@@ -56,6 +57,12 @@ def test_backup_then_restore_changes_nothing(run, tmp_path):
 def test_jog_moves_by_lengths_with_units(run):
     done = run("machine", "jog", "--x", "1cm", "--port", "virtual", "--json")
     assert answer_of(done)["machine_position"] == [10.0, 0.0, 0.0]
+
+
+def test_what_the_console_heard_is_one_answer(run, monkeypatch):
+    monkeypatch.setattr(sys, "stdin", io.StringIO("$N\n"))
+    answer = answer_of(run("machine", "console", "--port", "virtual", "--json"))
+    assert answer["said"][1:] == ["$N0=", "$N1=", "ok"]
 
 
 def test_what_the_controller_refuses_is_exit_3(run):

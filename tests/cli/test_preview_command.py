@@ -88,6 +88,14 @@ def test_a_preview_and_a_dry_run_judge_in_the_same_words(run, name, codes):
     )
 
 
+def test_a_file_that_burns_nothing_has_no_bounds(run, tmp_path):
+    (tmp_path / "dark.nc").write_text("G21 G90\nG0 X10 Y10\nM2\n")
+    done = run("preview", "dark.nc", "--machine", "grbl-laser-400")
+    assert done.returncode == 0
+    (row,) = [line.split() for line in done.stdout.splitlines() if line.split()[:1] == ["dark"]]
+    assert row[-1] == "-"
+
+
 def test_what_cannot_be_forced_says_so(run, file):
     for code, words in (
         ("lines", "cannot be forced"),

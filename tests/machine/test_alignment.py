@@ -166,6 +166,16 @@ def test_marks_that_are_no_turn_and_no_shift_are_refused(prepared):
         align(prepared, None, marks_of(still)[:1])
 
 
+def test_what_cannot_be_turned_or_has_no_stroke_is_refused(prepared, tmp_path):
+    marks = marks_of(moved_by(0.0, 1.0, 1.0))
+    plotter = replace(prepared, machine=miurafab.load_machine("hpgl-cutter-a3"))
+    with pytest.raises(InputError, match="hpgl-cutter-a3 speaks hpgl, whose programs are not turn"):
+        align(plotter, None, marks)
+    (tmp_path / "dark.nc").write_text("G21 G90\nG0 X5 Y5\n")
+    with pytest.raises(InputError, match=r"dark\.nc burns nothing, so there is no sheet to align"):
+        align(prepare(str(tmp_path / "dark.nc")), None, marks)
+
+
 def test_marks_that_may_be_exchanged_are_doubted(prepared):
     still = marks_of(moved_by(0.0, 0.0, 0.0))
     assert "exchanged" not in str(align(prepared, None, still).aligned.finding)
@@ -182,6 +192,9 @@ def test_one_sheet_lies_at_one_place(prepared):
     second = align(job, [2], marks_of(moved_by(0.0, 1, 2)))
     assert second.jobs[0] == job.jobs[0]
     assert second.jobs[1] != job.jobs[1]
+    plans = dict(plan_sheets(second, None, CutOptions()))
+    assert plans[1].job == job.jobs[0]
+    assert plans[2].job == second.jobs[1]
 
 
 def test_the_words_of_the_command_line_and_of_python_are_one_declaration():

@@ -43,6 +43,27 @@ def test_a_file_of_ones_own_says_the_same(tmp_path, monkeypatch, tall):
     assert (made.tool.s_max, made.tool.s_min) == (wanted.tool.s_max, wanted.tool.s_min) == (130, 2)
 
 
+def test_a_laser_without_laser_mode_is_one_that_cut_asks_to_set(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    dump = tmp_path / "board.txt"
+    dump.write_text("$32=0\n$130=300\n")
+    _, made = mf.add_machine("mine", settings=dump, like="grbl-laser-400", **BEAM)
+    assert made.settings[32] == 1
+    assert made.bed.width_mm == 300
+
+
+def test_what_makes_no_machine_leaves_no_file(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    dump = tmp_path / "board.txt"
+    dump.write_text("$130=0\n")
+    pen = {"settings": dump, "like": "grbl-pen-a4"}
+    with pytest.raises(mf.OptionError, match="'beam' is for a laser, and this machine has a pen"):
+        mf.add_machine("mine", **pen, beam="diode")
+    with pytest.raises(mf.ProfileError, match="width"):
+        mf.add_machine("mine", **pen)
+    assert list(tmp_path.rglob("*.toml")) == []
+
+
 def test_the_practice_machine_of_a_profile_tells_what_the_profile_says(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     _, made = mf.add_machine("practice", port="virtual", like="grblhal-laser-600", **BEAM)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
+from miurafab.errors import PersonNeeded
 from miurafab.machine.known_controller import MachineState
 from miurafab.workflow import at_machine
 from miurafab.workflow.at_machine import Operator
@@ -48,6 +51,21 @@ def test_an_origin_that_is_moved_is_not_forgotten():
     process.state = replace(HERE, shift=(0.0, 0.0, 0.0))
     operator.take()
     assert list(operator.said) == []
+
+
+@pytest.mark.parametrize(
+    ("burnt", "what"),
+    [("line-back.nc", "turn the sheet over, left to right"), ("old.nc", "put in fresh material")],
+)
+def test_a_sheet_that_has_burnt_is_turned_over_or_changed(tmp_path, burnt, what):
+    job = tmp_path / "line.nc"
+    job.write_text("M4 S0\nG0 X5\nG1 X15 S500 F3000\nM5\n")
+    process = Held()
+    operator = Operator(process, prepare(job), CutOptions())
+    operator.busy, process.state = "", replace(HERE, loaded=burnt)
+    with pytest.raises(PersonNeeded, match=f"{burnt} has burnt on the sheet .*; {what}.* say so"):
+        operator.arm()
+    assert not operator.armed
 
 
 def test_what_will_burn_is_found_once_a_sheet(tmp_path, monkeypatch):

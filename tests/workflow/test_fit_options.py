@@ -14,6 +14,49 @@ from miurafab.workflow.design import design
 from miurafab.workflow.fit import fit
 
 
+def test_a_request_is_a_design():
+    request = design("hypar", facets="4x4").request
+    assert vars(design(request).request) == vars(request)
+    assert (design(request, size="25cm").request.size_mm, design(request).title) == (250, "design")
+
+
+@pytest.mark.parametrize(
+    ("target", "options", "why"),
+    [
+        ("hypar", {"qqq": 1}, r"surface 'hypar'|'hypar'; parameters are .*; options are facets"),
+        ("cloud/points.xyz", {}, r"'cloud/points\.xyz' cannot be a target: known files are \.toml"),
+        ({}, {}, "The target is not there"),
+        (np.zeros((3, 3, 4)), {}, r"shape \(3, 3, 4\); heights have the shape"),
+        (design("sphere"), {"close": "open"}, "'close' shapes the target; give it to 'design'"),
+    ],
+)
+def test_what_is_no_target_or_comes_too_late_is_refused(target, options, why):
+    with pytest.raises(InputError, match=why):
+        design(target, **options)
+
+
+def test_a_grid_of_points_is_a_surface():
+    x, y = np.meshgrid(np.linspace(0, 30, 5), np.linspace(0, 20, 4))
+    made = design(np.stack([x, y, 0.01 * x * y], axis=-1), facets="4x4")
+    assert made.title == "points"
+    near = made.request.surface.closest_point(np.array([[15.0, 10.0, 1.5], [30.0, 20.0, 6.0]]))
+    assert near == pytest.approx(np.array([[15.0, 10.0, 1.5], [30.0, 20.0, 6.0]]), abs=1e-6)
+
+
+def test_a_design_file_names_a_mesh_beside_it_and_nothing_that_a_mesh_has_not(tmp_path):
+    saddle_mesh(9).export(tmp_path / "saddle.stl")
+    file = tmp_path / "own.toml"
+    file.write_text('facets = "4x4"\n[target]\nmesh = "saddle.stl"\n')
+    made = design(str(file))
+    assert (made.request.facets, made.request.target["mesh"][-10:]) == ((4, 4), "saddle.stl")
+    file.write_text('[target]\nmesh = "saddle.stl"\nheight = 3\n')
+    with pytest.raises(InputError, match=r"own\.toml.*height"):
+        design(str(file))
+    file.write_text('[target]\nmesh = "gone.stl"\n')
+    with pytest.raises(InputError, match=r"gone\.stl does not exist"):
+        design(str(file))
+
+
 def test_values_and_text_ask_for_the_same():
     values = design("hypar", facets=(8, 6), size=250, amplitude=0.5, seed=np.int64(3))
     text = design("hypar", facets="8x6", size="25cm", amplitude="0.5", seed="3")

@@ -51,6 +51,14 @@ def developable(name: str) -> CreasePattern:
     return found
 
 
+def test_frames_of_a_wish_are_named_by_their_part_of_it(tmp_path: Path) -> None:
+    bare = replace(regular(3, 3), folded_coords=None)
+    angles = np.where(np.arange(len(bare.edges_vertices)) % 2, 0.8, 1.0) * bare.edges_fold_angle
+    folding = fold(replace(bare, edges_fold_angle=angles), 4)
+    folding.save(tmp_path / "wish.html")
+    assert "75% of the fold angles" in (tmp_path / "wish.html").read_text()
+
+
 @pytest.mark.parametrize("name", ["plane", "hypar", "sphere", "saddle", "cylinder"])
 def test_an_exact_sheet_goes_from_flat_to_flat_folded_without_meeting_itself(name: str) -> None:
     folding = fold(exact(name), 12)

@@ -92,6 +92,13 @@ def test_a_pattern_of_the_same_name_is_not_overwritten(tmp_path):
     with pytest.raises(InputError, match=r"p\.fold is no part of a job"):
         sheets(tmp_path / "p.fold").write(job)
     assert seen(job) == {"p.fold": b"another design"}
+    (job / "p.fold").write_bytes((tmp_path / "p.fold").read_bytes())  # the same design
+    made = sheets(tmp_path / "p.fold").write(job)
+    (job / "sheet-01.nc").unlink()
+    with pytest.raises(InputError, match=r"sheet-01\.nc is missing; make the job again"):
+        mf.read_job(made.path)
+    with pytest.raises(InputError, match="nowhere holds no whole job"):
+        mf.read_job(tmp_path / "nowhere")
 
 
 def test_a_file_is_no_directory(tmp_path):

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from small_jobs import known_toolpath, write_nc
 
-from miurafab.errors import WAITING, InputError, PersonNeeded
+from miurafab.errors import WAITING, InputError, JobStopped, PersonNeeded
 from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import NoKeys
 from miurafab.machine.planning import SendOptions
@@ -50,7 +50,7 @@ def test_a_person_is_needed_but_for_machines_that_feed_themselves(job):
 
 def test_where_nobody_is_the_job_ends_after_its_first_sheet_and_says_how_to_go_on(job):
     with pytest.raises(
-        PersonNeeded, match=r"sheet-02\.nc needs fresh material.*'sheet' 2"
+        PersonNeeded, match=r"Before sheet-02\.nc, put in fresh material; nobody .*'sheet' 2"
     ) as fault:
         cut_prepared(job, port="virtual", pause=True)
     assert fault.value.exit_code == WAITING
@@ -58,6 +58,35 @@ def test_where_nobody_is_the_job_ends_after_its_first_sheet_and_says_how_to_go_o
     (done,) = cut_prepared(job, port="virtual", sheets=[2], pause=True)
     assert ended(job) == ["done", "done"]
     assert done.result.lines > 0
+
+
+@pytest.fixture
+def both_sides(job):
+    """The back and the front of one sheet, and the next."""
+    names = ("sheet-01-back.nc", "sheet-01.nc", "sheet-02.nc")
+    jobs, seen = (
+        tuple(dataclasses.replace(each, name=name) for each, name in zip(of, called, strict=True))
+        for of, called in ((job.jobs, names), (job.dry_runs, [name[:-3] for name in names]))
+    )
+    return dataclasses.replace(job, jobs=jobs, dry_runs=seen)
+
+
+def test_a_sheet_that_is_worked_from_both_sides_is_turned_over_in_between(both_sides):
+    with pytest.raises(PersonNeeded, match=r"Before sheet-01\.nc, turn the sheet over, left to r"):
+        cut_prepared(both_sides, port="virtual", pause=True)
+    with pytest.raises(PersonNeeded, match=r"Before sheet-02\.nc, put in fresh material"):
+        cut_prepared(both_sides, port="virtual", sheets=[2, 3], pause=True)
+
+
+def test_the_two_sides_of_a_sheet_are_not_shared_out(both_sides, job):
+    whole = SimpleNamespace(most_power=1.0, edits=())
+    for ports, prepared, why in (
+        (["A", "B"], dataclasses.replace(both_sides, directory=whole), "from both sides"),
+        (["A", "B", "A"], dataclasses.replace(job, directory=whole), "port A is named twice"),
+        (["A", "B"], job, "is no job directory, so machines cannot share it"),
+    ):
+        with pytest.raises(InputError, match=why):
+            share_sheets(prepared, ports, None, CutOptions(), on_progress=lambda *a: None)
 
 
 def test_the_person_is_asked_before_each_further_sheet(job):
@@ -78,7 +107,7 @@ def test_a_resumed_job_asks_too(job):
     lines = journal.read_text().splitlines(keepends=True)
     journal.write_text("".join(lines[: len(lines) // 2]))
     options = CutOptions(send=SendOptions(at=(0.0, 0.0)), resume=True)
-    with pytest.raises(PersonNeeded, match=r"sheet-02\.nc needs fresh material"):
+    with pytest.raises(PersonNeeded, match=r"Before sheet-02\.nc, put in fresh material"):
         cut_prepared(job, port="virtual", options=options, pause=True)
     asked = []
     cut_prepared(
@@ -90,6 +119,14 @@ def test_a_resumed_job_asks_too(job):
     )
     assert asked == [2, 3]
     assert ended(job) == ["done"] * 3
+
+
+def test_whoever_resumes_at_a_sheet_that_was_not_begun_has_put_it_in(job):
+    cut_prepared(job, port="virtual", sheets=[1])
+    options = CutOptions(send=SendOptions(at=(0.0, 0.0)), resume=True)
+    with pytest.raises(PersonNeeded, match=r"Before sheet-03\.nc, put in fresh material"):
+        cut_prepared(job, port="virtual", options=options, pause=True)
+    assert ended(job) == ["done", "done"]
 
 
 def test_where_nobody_looks_at_a_frame_nothing_is_cut(job):
@@ -157,6 +194,25 @@ class NoSignals:
 
     def hold(self):
         pass
+
+
+def test_after_ctrl_c_no_machine_takes_another_sheet(job, monkeypatch):
+    class Interrupted(NoSignals):
+        reason = "Ctrl-C"
+
+        @property
+        def caught(self):
+            return "SIGINT" if ended(job) else None
+
+    def apart(machine, port, name, *, signals, virtual_speed):
+        return session_here(machine, "virtual", name, signals=NoSignals())
+
+    monkeypatch.setattr(multi_machine, "session_apart", apart)
+    monkeypatch.setattr(multi_machine, "suspending_signals", Interrupted)
+    job = dataclasses.replace(job, directory=SimpleNamespace(most_power=1.0, edits=()))
+    with pytest.raises(JobStopped, match="Ctrl-C"):
+        share_sheets(job, ["A"], None, CutOptions(), pause=False, on_progress=lambda *a: None)
+    assert ended(job) == ["done"]
 
 
 @pytest.mark.parametrize("name", ["align", "from_stroke"])

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from problems import saddle_mesh
 
 import miurafab as mf
 from miurafab.errors import InputError, LayoutError, PatternError
@@ -41,11 +42,21 @@ def test_it_is_neither_cut_nor_laid_out(run):
     done = run("cut", "hypar", *WORDS, "--port", "virtual")
     assert (done.returncode, done.stderr) == (1, "")
     assert done.stdout.startswith("hypar is not cut: The --timeout ended the search before")
+    assert prepare("hypar", options=NONE | {"size": "bed"}).refused
     prepared = prepare("hypar", options=NONE)
     with pytest.raises(InputError, match=f"hypar cannot be cut: The {WHY}"):
         prepared.chosen(None)
     with pytest.raises(PatternError, match=f"The fit found no sheet: The {WHY}"):
         mf.sheets(mf.fit("hypar", **NONE))
+
+
+def test_what_was_found_of_a_mesh_is_told_before(run, tmp_path):
+    mesh = saddle_mesh(9)
+    mesh.update_faces(~np.isin(np.arange(len(mesh.faces)), [60, 61, 62, 63]))
+    mesh.export(tmp_path / "torn.stl")
+    done = run("fit", "torn.stl", *WORDS, "-o", "x.fold")
+    assert done.returncode == 1
+    assert "the largest is the target, and 3 others with 2.7 %" in " ".join(done.stderr.split())
 
 
 def test_a_trade_off_lists_it_and_has_no_law(run, tmp_path):

@@ -15,6 +15,7 @@ import miurafab
 from miurafab.errors import GcodeError, InputError, ProfileError
 from miurafab.gcode.job import Job
 from miurafab.profiles import load_machine
+from miurafab.workflow import picture
 from miurafab.workflow.cut import prepare
 from miurafab.workflow.dry_run import LAYERS, clock_text, dry_run, length_text
 from miurafab.workflow.preview import preview
@@ -234,6 +235,26 @@ def test_what_is_no_job_is_refused(tmp_path):
     (folder / "sheet-02.nc").unlink()
     with pytest.raises(InputError, match=r"sheet-02\.nc does not exist"):
         preview(folder)
+
+
+def test_a_job_that_was_made_is_timed_as_a_board_is_set_and_told_while_it_is_drawn(tmp_path):
+    job = miurafab.sheets(regular(3, 3)).write(tmp_path / "job")
+    dump = tmp_path / "board.txt"
+    dump.write_text("$110=600\n$111=600\n")
+    usual, slow = miurafab.preview(job), miurafab.preview(job, settings=dump)
+    assert slow.seconds > 2 * usual.seconds
+    told = []
+    *pictures, page = slow.write(tmp_path / "seen", on_progress=lambda *now: told.append(now))
+    assert page.name == "preview.html"
+    assert [each.suffix for each in pictures] == [".png", ".svg"]
+    assert told[0] == (0.0, "pictures")
+
+
+def test_a_picture_of_megabytes_is_left_out_of_a_notebook(tmp_path, monkeypatch):
+    job = miurafab.sheets(regular(3, 3)).write(tmp_path / "job")
+    assert "image/svg+xml" in job._repr_mimebundle_()
+    monkeypatch.setattr(picture, "_MOST_MOVES", 3)
+    assert "image/svg+xml" not in job._repr_mimebundle_()
 
 
 def test_no_port_is_opened(tmp_path, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,20 @@ def test_the_ways_that_are_told_are_as_quick_as_told(tmp_path):
         made = mf.sheets(pattern, machine=knife, material=file)
         assert way.seconds == pytest.approx(made.seconds, rel=0.05)
         assert made.seconds < 0.95 * job.seconds
+
+
+def test_a_blade_in_line_that_scores_nothing_has_longer_dashes_alone(tmp_path):
+    """Its strokes need no cut that aligns it, and are all found again."""
+    knife = (shipped_directory("firmware_profiles") / "grbl-knife-a3.toml").read_text()
+    knife = knife.replace("s_down", 'leave_out = ["score"]\ns_down')
+    file = tmp_path / "deep.toml"
+    file.write_text(re.sub('offset = "[^"]*"', 'offset = "0mm"', knife))
+    job = mf.sheets(regular(5, 5), machine=file)
+    assert [way.change for way in job.quicker()] == ["dashes of 2.4 mm (cut)"]
+    job.write(tmp_path / "job")
+    checked = mf.check_job(tmp_path / "job")
+    assert checked.valid
+    assert [finding.code for finding in checked.findings] == ["no-target"]
 
 
 def test_the_table_of_docs_is_of_the_jobs_that_it_names(capsys, tmp_path):

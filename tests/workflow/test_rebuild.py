@@ -12,7 +12,7 @@ from piece_problems import gores, trimmed
 from problems import regular
 
 import miurafab as mf
-from miurafab.errors import InputError
+from miurafab.errors import InputError, PatternError
 from miurafab.fabrication.glue import glued_shell, laid_on
 from miurafab.fabrication.recover import RecoveredCorners
 from miurafab.geometry.polygons import facet_means
@@ -72,6 +72,16 @@ def test_only_the_job_of_a_laser_is_rebuilt(tmp_path):
     mf.sheets(regular(), machine="grbl-pen-a4").write(tmp_path)
     with pytest.raises(InputError, match="is for a pen"):
         mf.rebuild(tmp_path)
+
+
+def test_what_has_no_form_or_was_not_burnt_is_not_rebuilt(tmp_path):
+    mf.sheets(replace(regular(3, 3), folded_coords=None)).write(tmp_path / "flat")
+    with pytest.raises(PatternError, match="the pattern has no folded form to compare with"):
+        mf.rebuild(tmp_path / "flat")
+    mf.sheets(regular(3, 3)).write(tmp_path / "dark")
+    (tmp_path / "dark" / "sheet-01.nc").write_text("G21 G90\nG0 X5 Y5\n")
+    with pytest.raises(InputError, match="what was burnt does not fix the corners"):
+        mf.rebuild(tmp_path / "dark")
 
 
 def test_exact_corners_glue_to_the_exact_shell():

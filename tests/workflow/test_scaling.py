@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import miurafab as mf
-from miurafab.errors import OptionError
+from miurafab.errors import OptionError, PatternError
 from miurafab.fabrication.nesting import turned
+from miurafab.workflow.scaling import ScaleOptions, scaled
 
 UNIT = {
     "file_spec": 1.1,
@@ -42,6 +44,12 @@ def test_a_scale_and_a_size_are_two_ways_to_say_the_same(unit, tmp_path):
     np.testing.assert_array_equal(by_scale.vertices_coords, by_size.vertices_coords)
     with pytest.raises(OptionError, match="give one of them"):
         mf.convert(unit, tmp_path / "c.fold", scale=40, size=40)
+
+
+def test_a_pattern_without_extent_can_have_no_size(unit, tmp_path):
+    point = replace(mf.load(unit), vertices_coords=np.zeros((4, 3)))
+    with pytest.raises(PatternError, match="has no extent, so it can have no 'size'"):
+        scaled(point, ScaleOptions(size_mm=40.0))
 
 
 def test_a_scaled_sheet_keeps_its_proof_and_its_target(tmp_path):
