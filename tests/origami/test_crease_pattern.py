@@ -72,6 +72,12 @@ def test_a_pattern_without_pieces_is_one_piece_without_seams() -> None:
         ({"seams": np.array([[1, 1]])}, "Edge 1 is in two seams"),
         ({"edges_assignment": np.array(list("BVBBBBBB"))}, "Edge 1 is in a seam and is no border"),
         ({"cells": np.array([[0, 0]])}, "one column and row for each facet"),
+        ({"folded_coords": np.zeros((7, 3))}, "does not have one 3D point for each vertex"),
+        ({"edges_assignment": np.full(7, "B")}, "one assignment and angle for each edge"),
+        ({"edges_fold_angle": np.zeros(9)}, "one assignment and angle for each edge"),
+        ({"edges_vertices": np.array([[0, 8]] * 8)}, "edges_vertices refers to a vertex that"),
+        ({"faces_vertices": np.array([[0, 1, 2, -2]] * 2)}, "faces_vertices refers to a vertex"),
+        ({"grid": (3, 3)}, r"The grid \(3, 3\) does not have 8 vertices"),
     ],
 )
 def test_arrays_that_do_not_fit_are_refused_by_name(changes: dict[str, object], says: str) -> None:

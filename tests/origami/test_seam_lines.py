@@ -9,9 +9,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import shapely
+from matplotlib.figure import Figure
 from piece_problems import gores, trimmed, two_pieces, two_trimmed_pieces
 
-from miurafab.origami.picture import flat_svg
+from miurafab.origami.picture import flat_svg, pattern_svg
 from miurafab.origami.seam_lines import SEAM_WORDS, seam_lines
 
 CASES = {"gores": (gores(), 4), "two": (two_pieces(), 1), "trimmed": (two_trimmed_pieces(), 1)}
@@ -49,6 +50,23 @@ def test_each_seam_is_in_one_line_between_two_sides_of_two_pieces(pattern, count
 def test_a_pattern_without_seams_has_no_line():
     assert seam_lines(trimmed()) == ()
     assert SEAM_WORDS not in flat_svg(trimmed(), 400.0)
+
+
+def test_the_plot_numbers_both_sides_of_each_seam():
+    pattern = gores()
+    axes = Figure().add_subplot()
+    assert pattern.plot("flat", axes) is axes
+    assert sorted(text.get_text() for text in axes.texts) == sorted("11223344")
+    drawn = {each.get_label(): len(each.get_segments()) for each in axes.collections}
+    sides = sum(line.edges.size for line in seam_lines(pattern))
+    assert drawn["border"] == (pattern.edges_assignment == "B").sum() - sides
+    assert drawn[SEAM_WORDS.replace(": ", ":\n")] == 2 * len(seam_lines(pattern)[0].edges)
+    assert sum(drawn.values()) == len(pattern.edges_vertices)
+
+
+def test_the_picture_of_a_pattern_without_a_folded_form_is_the_flat_one():
+    pattern = replace(gores(), folded_coords=None)
+    assert pattern_svg(pattern, 640.0) == flat_svg(pattern, 320.0)
 
 
 def test_the_picture_shows_both_sides_in_one_colour_with_one_number():

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 import miurafab
 from miurafab.errors import InputError, TargetError
 from miurafab.origami.tradeoff import Sample, Tradeoff, cost, optimal_side, summarise
-from miurafab.origami.tradeoff_plot import SIZE, draw_tradeoff
+from miurafab.origami.tradeoff_plot import SIZE, draw_tradeoff, tradeoff_table
 
 SIDES = (6, 8, 12)
 
@@ -80,6 +80,31 @@ def test_sheets_that_were_not_found_are_listed_and_left_out():
     assert [s.status for s in found.samples] == ["converged", "stalled", "converged", "converged"]
     assert found.coefficient == pytest.approx(0.5)
     assert summarise(made((8, 12, 16), failed=(12,))).coefficient is None
+
+
+def test_two_sheets_make_no_law_and_no_plot(tmp_path):
+    found = summarise(made((8, 12)))
+    assert repr(found) == "<Tradeoff 2 sheets, 2 converged, no law>"
+    with pytest.raises(InputError, match="nothing to plot: fewer than three sheets were found"):
+        draw_tradeoff(found, Figure().subplots(1, 3))
+    found.save(tmp_path / "two.csv")
+    header, *rows = (tmp_path / "two.csv").read_text().splitlines()
+    assert "cost" not in header
+    assert [row.split(",")[:4] for row in rows] == [
+        ["64", "8", "8", "converged"],
+        ["144", "12", "12", "converged"],
+    ]
+
+
+def test_a_sheet_that_was_not_found_costs_nothing_in_the_table():
+    lines = tradeoff_table(summarise(made((8, 12, 16, 24), failed=(12,)))).splitlines()
+    assert lines[2] == "144,12,12,stalled" + "," * (lines[0].count(",") - 3)
+    assert all(line.split(",")[-1] for line in (lines[1], lines[3], lines[4]))
+
+
+def test_a_middle_that_lies_on_the_target_has_no_power():
+    flat = [replace(sample, hausdorff_midsurface_mm=0.0) for sample in made((8, 12, 16))]
+    assert summarise(flat).midsurface_exponent is None
 
 
 @pytest.fixture(scope="module")

@@ -290,3 +290,10 @@ def test_a_flat_sheet_over_a_plane_is_measured_by_hand():
     assert (found.coverage, found.overhang) == pytest.approx((1.0, 0.0))
     assert (found.facets, found.vertices, found.pieces, found.seam_mm) == (4, 9, 1, 0.0)
     assert found.min_edge_mm == pytest.approx(50.0)
+
+
+def test_an_audit_is_shown_with_what_is_wrong():
+    pattern = regular(5, 5)
+    assert repr(audit(pattern)) == "<Audit valid: 16 facets>"
+    scaled = replace(pattern, folded_coords=1.1 * pattern.folded_coords)
+    assert repr(audit(scaled)) == "<Audit invalid: isometry>"

@@ -83,7 +83,7 @@ class PieceEnergies(EnergyResult):
         if self.rigid:
             return "All pieces fold rigidly: no energy is stored on the way to flat."
         stable = sum(curve.bistable for _, curve in self.moving)
-        return f"{stable} of {len(self.curves)} pieces are bistable."
+        return f"{stable} of {len(self.curves)} pieces {'is' if stable == 1 else 'are'} bistable."
 
     def report(self) -> dict[str, Any]:
         """The curves' numbers, ready for JSON: one object for each piece."""

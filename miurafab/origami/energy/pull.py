@@ -174,7 +174,7 @@ class PullCurve(EnergyResult):
         said = (
             f"{abs(force):.3g} N {'pull' if pulled else 'push'} it to a strain of {self.strain:g}"
         )
-        if answer["yielded"]:
+        if answer["yielded"] and left is not None:
             said += f"; let go, it stays {abs(left):.3g} mm {'longer' if left > 0 else 'shorter'}"
         return said + "."
 

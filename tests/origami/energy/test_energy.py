@@ -18,13 +18,15 @@ from energy_problems import (
     nearly_foldable,
     part,
 )
+from matplotlib.figure import Figure
+from piece_problems import two_pieces
 from problems import CELL, fitted, regular
 from scipy.optimize import minimize_scalar
 
 from miurafab.errors import InputError, PatternError
 from miurafab.geometry.angles import sector_angles
 from miurafab.geometry.quads import QuadGrid
-from miurafab.origami.energy.bar_hinge import Paper, sheet_model
+from miurafab.origami.energy.bar_hinge import Paper, flat_model, sheet_model
 from miurafab.origami.energy.continuation import follow
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.energy.driven import Driven
@@ -35,6 +37,8 @@ from miurafab.origami.energy.path import (
     folding_path,
     pulled_path,
 )
+from miurafab.origami.energy.pieces import PieceEnergies
+from miurafab.origami.energy.plot import draw_pieces
 
 
 def angles_along(path):
@@ -467,6 +471,60 @@ def test_patterns_without_an_energy_are_refused(change, sentence):
     pattern = replace(regular(3, 3), **change)
     with pytest.raises(PatternError, match=sentence):
         energy_curve(pattern)
+
+
+def test_creases_that_are_not_folded_cannot_be_driven():
+    pattern = regular(3, 3)
+    flat = replace(pattern, folded_coords=np.pad(pattern.vertices_coords, ((0, 0), (0, 1))))
+    with pytest.raises(InputError, match="is folded by only 0 degrees, too little to drive"):
+        folding_path(flat)
+
+
+def test_what_has_no_flat_model_is_refused():
+    with pytest.raises(PatternError, match="has 2 pieces; fold one of them"):
+        flat_model(two_pieces())
+    with pytest.raises(PatternError, match="no mountain or valley between two facets"):
+        flat_model(replace(regular(3, 3), edges_assignment=np.full(12, "F")))
+
+
+def curve_of(pattern):
+    return energy_curve(pattern, 12)
+
+
+def test_the_verdicts_of_curves_and_of_pieces():
+    rigid, snap = curve_of(regular(5, 5)), curve_of(nearly_foldable("hypar", None))
+    lost = replace(snap, path=replace(snap.path, converged=False))
+    soft = replace(snap, barrier=0.0, barrier_angle=None, stable=snap.stable[:1])
+    assert rigid.verdict().startswith("It folds rigidly")
+    assert snap.verdict().startswith("It is bistable")
+    assert soft.verdict() == "It is not bistable: there is no barrier on the way to flat."
+    end = math.degrees(abs(snap.path.drives[-1]))
+    assert lost.verdict().startswith(f"The path was lost at {end:.1f} degrees")
+    for curves, words in (
+        ((rigid, None, rigid), "All pieces fold rigidly: no energy is stored on the way to flat."),
+        ((snap, soft, None), "1 of 3 pieces is bistable."),
+        ((snap, lost), f"Piece 1: {lost.verdict()}"),
+    ):
+        both = PieceEnergies(curves, (4,) * len(curves))
+        assert both.verdict() == words
+        assert repr(both) == f"<PieceEnergies {len(curves)} pieces, {words}>"
+
+
+@pytest.mark.parametrize("rigid", [True, False])
+def test_the_plot_of_pieces_marks_each_barrier(rigid):
+    soft = curve_of(regular(5, 5))
+    axes = Figure().add_subplot()
+    if rigid:
+        draw_pieces([(0, soft), (2, soft)], axes, "two")
+        assert axes.get_title() == "two: all pieces fold rigidly, without energy"
+        assert axes.get_ylim() == (-1, 1)
+        assert len(axes.lines) == 2
+    else:
+        snap = curve_of(nearly_foldable("hypar", None))
+        draw_pieces([(0, soft), (1, snap)], axes, "two")
+        (marker,) = (line for line in axes.lines if line.get_marker() == "^")
+        assert marker.get_ydata() == [snap.barrier]
+        assert [text.get_text() for text in axes.get_legend().texts] == ["piece 0", "piece 1"]
 
 
 def test_degenerate_patterns_are_refused_by_name():

@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from piece_problems import two_pieces
 from problems import regular
 
@@ -15,6 +16,7 @@ from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import Paper
 from miurafab.origami.energy.pull import pull
+from miurafab.origami.energy.pull_plot import draw_pull
 from miurafab.origami.fitting.fit import FitRequest, fit
 from miurafab.origami.folding.kinematics import rigid_motion
 from miurafab.origami.piece import pieces_of
@@ -150,6 +152,29 @@ def test_the_verdict_tells_pull_from_push():
     assert pushed.verdict().startswith(f"{-force:.3g} N push it to a strain of -0.1")
     pulled = pull(hypar(), PAPER, strain=0.25, steps=6, cycles=1)
     assert f"it stays {pulled.report()['set_mm']:.3g} mm longer" in pulled.verdict()
+
+
+def test_creases_that_keep_their_rest_leave_no_set():
+    pulled = pull(hypar(), PAPER, strain=0.25, steps=6, cycles=1)
+    stiff = replace(pulled, slips=np.zeros_like(pulled.slips))
+    assert stiff.verdict() == f"{pulled.report()['force_n']:.3g} N pull it to a strain of 0.25."
+
+
+def test_the_plot_names_few_cycles_and_draws_many():
+    one = pull(hypar(), PAPER, strain=0.1, steps=4, cycles=1)
+    for count in (3, 9):
+        many = replace(
+            one,
+            **{
+                name: np.concatenate([getattr(one, name)] * count)
+                for name in ("distances", "forces", "loading", "works", "stored", "dissipated")
+            },
+            cycles=np.repeat(np.arange(count) + 1, len(one.cycles)),
+        )
+        axes = Figure().add_subplot()
+        draw_pull(many, axes, "hypar")
+        assert len(axes.lines) == count + 1
+        assert (axes.get_legend() is None) == (count > 8)
 
 
 def test_a_sheet_that_is_pulled_over_its_barrier_is_held_back():

@@ -16,11 +16,11 @@ from miurafab.origami.energy.bar_hinge import flat_model
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.seed import linear_seed
 from miurafab.origami.folding.angles_csv import contacts
-from miurafab.origami.folding.certificate import certified
+from miurafab.origami.folding.certificate import RigidCertificate, certified
 from miurafab.origami.folding.from_flat import fold_from_flat, ramp_parts
 from miurafab.origami.folding.judge_motion import median_fold, motion_findings
 from miurafab.origami.folding.kinematics import CLOSED_FORM, FROM_FLAT, facet_strain
-from miurafab.origami.folding.motion import find_motion
+from miurafab.origami.folding.motion import FoundMotion, find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
 from miurafab.origami.folding.ramp_walk import FIRMER
 
@@ -266,3 +266,57 @@ def test_free_creases_have_a_median_fold_angle_too() -> None:
     freed = replace(motion, pattern=replace(motion.pattern, edges_assignment=free))
     assert median_fold(motion, 0) == median_fold(freed, 0) == 0
     assert median_fold(freed, 4) == pytest.approx(median_fold(motion, 4))
+
+
+def test_the_verdict_of_a_way_from_flat_is_told_by_its_figures() -> None:
+    motion, good = ramp_motion(named_patterns.waterbomb_base(), 3)
+    assert motion_findings(FoundMotion(motion, None, good), ()) == ()
+    frames = len(motion.frames)
+    bad = replace(
+        good,
+        complete=False,
+        touching=True,
+        wrong_edges=np.array([5, 7]),
+        wrong_signs=0.25,
+        unstable=np.where(np.arange(frames) > 1, 2, 0),
+        strain=np.full(frames, 3e-3),
+        angle_error=math.radians(60),
+    )
+    short = replace(motion, states=np.linspace(0.0, 0.5, frames))
+    told = {each.code: each for each in motion_findings(FoundMotion(short, None, bad), ())}
+    assert {code: finding.sentence for code, finding in told.items()} == {
+        "way-lost": "The motion ends at 50% of the fold angles: beyond, no balance was found in "
+        "which no facet passes through another.",
+        "wrong-signs": "25.0% of the folds end on the other side than their letter tells, the "
+        "first being edge 5.",
+        "stretched": "On the way a side changes its length by up to 0.003: paper that does not "
+        "stretch would lock.",
+        "unstable": f"In {frames - 2} of {frames} positions the sheet is not stable and would snap "
+        "away.",
+        "held-back": "Creases stay 60 degrees away, in the mean, from the fold angles asked for: "
+        "these do not go together.",
+    }
+    assert told["wrong-signs"].where == (5, 7)
+    free = replace(bad, touching=False)
+    (lost, *_) = motion_findings(FoundMotion(short, None, free), ())
+    assert lost.sentence.endswith("beyond, no balance was found.")
+    # its facets bend, although a shape with flat facets is near, with other fold angles
+    near = RigidCertificate(False, float(motion.states[1]), 0.0, math.radians(3.0))
+    (bent,) = motion_findings(FoundMotion(motion, None, None, near), ())
+    assert bent.code == "bent-facets"
+    assert "a crease is turned by 3 degrees more" in bent.sentence
+
+
+def test_what_does_not_fold_has_no_motion_to_certify() -> None:
+    motion, _ = ramp_motion(named_patterns.waterbomb_base(), 2)
+    still = replace(motion, fold_angles=np.zeros_like(motion.fold_angles))
+    with pytest.raises(PatternError, match="No crease of the pattern moves"):
+        certified(still)
+
+
+def test_the_way_from_flat_tells_how_far_it_is() -> None:
+    told: list[tuple[float, str]] = []
+    pattern = named_patterns.waterbomb_base()
+    parts = ramp_parts(pattern, 3)
+    fold_from_flat(pattern, parts, on_progress=lambda *each: told.append(each))
+    assert told == [(k / 3, f"step {k} of 3") for k in (1, 2, 3)]
