@@ -26,6 +26,7 @@ _FLAGS = (
     "--disable-sync",
     "--disable-background-networking",
     "--disable-component-update",
+    "--disable-gpu-compositing",
     "--hide-scrollbars",
     "--window-size=1400,1000",
     "--remote-debugging-pipe",
