@@ -74,8 +74,8 @@ class SymmetricSolver:
         ):
             return matrix.data
         known, wanted = _keys(mine), _keys(matrix)
-        at = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
-        if not np.array_equal(known[at], wanted):
+        at = np.searchsorted(known, wanted)
+        if not np.array_equal(np.append(known, -1)[at], wanted):
             return None
         numbers = np.zeros(len(known))
         numbers[at] = matrix.data

@@ -84,13 +84,14 @@ def unmeasured(folds: MeasuredFolds, pattern: CreasePattern) -> Iterator[Finding
     inner = (pattern.edges_faces >= 0).all(axis=1)
     lost = np.flatnonzero(inner & ~folds.known)
     if len(lost):
-        says = f"Of {len(lost)} edges no fold angle is measured: a facet beside them has no area."
+        which = "one edge" if len(lost) == 1 else f"{len(lost)} edges"
+        says = f"Of {which} no fold angle is measured: a facet beside has no area."
         yield Finding("not-proven", says, tuple(lost.tolist()))
     closed = np.flatnonzero(folds.known & ~folds.signed)
     if len(closed):
+        which = "One edge folds" if len(closed) == 1 else f"{len(closed)} edges fold"
         says = (
-            f"{len(closed)} edges fold by 180 degrees, where the folded form does not tell "
-            "mountains from valleys."
+            f"{which} by 180 degrees, where the folded form does not tell mountains from valleys."
         )
         yield Finding("not-proven", says, tuple(closed.tolist()))
 

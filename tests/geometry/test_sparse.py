@@ -86,6 +86,13 @@ def test_a_solver_factors_matrices_that_fall_apart(side):
     assert matrix @ SymmetricSolver().factor(matrix).solve(right) == pytest.approx(right)
 
 
+def test_a_solver_that_expects_no_entries_learns_them():
+    solver = SymmetricSolver()
+    solver.expect(sparse.csc_array((3, 3)))
+    matrix = sparse.diags_array([1.0, 2.0, 4.0]).tocsc()
+    assert solver.factor(matrix).solve(np.ones(3)) == pytest.approx([1.0, 0.5, 0.25])
+
+
 def test_a_solver_factors_a_matrix_without_joins():
     numbers = np.arange(1.0, 501.0)
     solution = SymmetricSolver().factor(sparse.diags_array(numbers).tocsc()).solve(np.ones(500))

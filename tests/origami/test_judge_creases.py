@@ -317,3 +317,23 @@ def test_a_drawing_of_opaque_folds_does_not_say_that_it_folds_flat(tmp_path) -> 
         assert checked.valid == valid
         told = [finding.sentence for finding in checked.findings]
         assert any("must be equal" in sentence for sentence in told)
+
+
+def test_folds_that_are_all_given_as_0_degrees_prove_nothing() -> None:
+    pattern = replace(regular(5, 5), folded_coords=None, grid=None)
+    still = replace(pattern, edges_fold_angle=np.zeros(len(pattern.edges_vertices)))
+    said = [each.sentence for each in audit(still).findings if each.code == "not-proven"]
+    assert "The file gives every fold as 0 degrees, so no size is known." in said
+
+
+def test_beside_a_facet_without_area_no_fold_is_measured() -> None:
+    """The first facet is a point in the folded form: its two inner edges have no angle there."""
+    pattern = regular(4, 4)
+    folded = pattern.folded_coords.copy()
+    folded[pattern.faces_vertices[0]] = folded[0]
+    told = [each for each in audit(replace(pattern, folded_coords=folded)).findings
+            if "no fold angle is measured" in each.sentence]  # fmt: skip
+    assert len(told) == 1
+    inner = (pattern.edges_faces >= 0).all(axis=1) & (pattern.edges_faces == 0).any(axis=1)
+    assert told[0].where == tuple(np.flatnonzero(inner).tolist())
+    assert told[0].sentence == ("Of 2 edges no fold angle is measured: a facet beside has no area.")

@@ -107,3 +107,11 @@ def test_all_frames_that_stretch_are_told_in_one_sentence(document, tmp_path):
     assert len(told) == 1
     assert told[0].sentence.startswith("3 of 4 frames are no states of the sheet: in frame 5, the ")
     assert "take the frames out" in told[0].sentence
+
+
+def test_a_frame_of_ordered_layers_that_is_not_folded_flat_is_told(document, tmp_path):
+    """The folded form itself with the orders of the flat-folded state: all lengths are right."""
+    found, frame = copied(document)
+    frame["vertices_coords"] = found["file_frames"][0]["vertices_coords"]
+    (told,) = (each for each in judged(found, tmp_path).findings if each.code == "frame")
+    assert "orders its facets and is not the sheet folded flat" in told.sentence

@@ -28,7 +28,7 @@ from miurafab.origami.invariants import interior_vertices
 def waiting_folds(pattern: CreasePattern) -> Ints:
     """The edges (n,) of mountains and valleys of ``pattern`` that cannot turn at first.
 
-    Edges of letter U turn to either side. Raises ``RuntimeError`` if the solver fails.
+    Edges of letter U turn to either side. The program has a solution: no crease may turn.
     """
     inner = (pattern.edges_faces >= 0).all(axis=1)
     sign = np.select([pattern.edges_assignment == "M", pattern.edges_assignment == "V"], [-1, 1], 0)
@@ -61,6 +61,5 @@ def waiting_folds(pattern: CreasePattern) -> Ints:
         bounds=[(0, 1)] * count + [(0, None)] * rest,
         method="highs",
     )
-    if best.x is None:
-        raise RuntimeError(best.message)
+    assert best.x is not None
     return np.asarray(folds[best.x[:count] < 0.5])

@@ -276,7 +276,7 @@ def facet_tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
     own = np.arange(facets)
     wanted = np.minimum(own, previous) * facets + np.maximum(own, previous)
     crease = np.zeros(facets, dtype=np.int64)
-    if len(joined):
+    if len(joined):  # else all are first facets, which hang on no crease
         place_in = np.searchsorted(keys, wanted, sorter=order).clip(max=len(order) - 1)
         crease = joined[order[place_in]]
     return previous, crease, depth

@@ -112,6 +112,8 @@ class _PathReader:
             elif not command:
                 raise PatternError(f"the path '{self.text[:40]}' begins with a number.")
             kind, relative = command.upper(), command.islower()
+            if kind != "M" and not corners:
+                raise PatternError(f"the path '{self.text[:40]}' does not begin with an M.")
             if kind in "CSQTA":
                 if len(corners) > 1:
                     yield Polyline(np.array(corners))
@@ -130,8 +132,6 @@ class _PathReader:
                 corners, self.start = [to], to
                 command = "l" if relative else "L"
             else:
-                if not corners:
-                    corners = [self.at]
                 corners.append(to)
             self.at = to
         if len(corners) > 1:

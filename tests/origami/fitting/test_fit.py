@@ -12,10 +12,14 @@ import pytest
 from problems import assert_mountains_and_valleys, fitted
 from scipy.spatial import cKDTree
 
-from miurafab.errors import InputError
-from miurafab.origami.fitting.fit import FitRequest, FitResult, fit
+from miurafab.errors import InputError, PatternError
+from miurafab.origami.fitting.fit import FitRequest, FitResult, _no_sheet, fit
 from miurafab.origami.fitting.reduction import about_z
+from miurafab.origami.fitting.request import BED
+from miurafab.origami.fitting.result import Attempt
 from miurafab.origami.fitting.score import ENOUGH
+from miurafab.origami.fitting.seed import Corrugation
+from miurafab.origami.fitting.starts import corrugations_of
 from miurafab.origami.verify import audit
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface
 
@@ -256,11 +260,41 @@ def test_a_target_that_bends_too_much_ends_with_a_reason() -> None:
         ({"max_aspect": 0.5}, "'max_aspect' is 0.5"),
         ({"min_angle": 1.7}, "'min_angle' is 97.4.* deg; it must be between 0 deg and 90 deg"),
         ({"min_angle": math.pi / 2}, "90 degrees"),
+        ({"pieces": 0}, "'pieces' is 0; it must be auto or a whole number from 1 on"),
+        ({"poles": (1.0, 2.0, 3.0) * 2}, "'poles' is '1,2,3,1,2,3'; the two points must differ"),
+        ({"cut_columns": (3, 3)}, "'cut_columns' is '3,3'; write columns from 1 on, each under"),
+        ({"facets": (1000, 1000)}, "'facets' is 1000x1000; in all there may be 400,000"),
     ],
 )
 def test_requests_that_make_no_sense_name_the_option(changes: dict[str, object], word: str) -> None:
     with pytest.raises(InputError, match=word):
         request("hypar", **changes)
+
+
+def test_a_bed_is_no_size_without_a_machine() -> None:
+    with pytest.raises(InputError, match="'size' is bed, which only 'fit' and 'cut' know"):
+        fit(request("hypar", size_mm=BED))
+
+
+def test_a_fit_without_a_sheet_is_shown_with_its_reason() -> None:
+    tried = Attempt("sheet", "u", Corrugation(0.5, 0.5), 3e-4, 9, "stalled")
+    told = _no_sheet((tried, replace(tried, residual=2e-3)), None)
+    assert "No exact sheet was found in 2 attempts (best residual 3.0e-04)" in told.sentence
+    none = FitResult("stalled", told.sentence, None, None, (tried,), 9, 0.1)
+    assert repr(none) == "<FitResult stalled: no sheet in 1 attempts>"
+    assert not none.is_valid
+    with pytest.raises(PatternError, match="There is no sheet to draw: No exact sheet was found"):
+        none.plot()
+
+
+@pytest.mark.parametrize("given", [{}, {"zigzag": 0.4}, {"amplitude": 0.6}])
+def test_corrugations_keep_what_the_request_fixes(given: dict[str, float]) -> None:
+    found = corrugations_of(request("hypar", **given))
+    assert len(found) == len(set(found)) > 1
+    for name, value in given.items():
+        assert [getattr(each, name) for each in found] == pytest.approx([value] * len(found))
+    both = corrugations_of(request("hypar", zigzag=0.4, amplitude=0.6))
+    assert both == [Corrugation(0.6, 0.4)]
 
 
 def interrupting(calls: int) -> Callable[[float, str], None]:

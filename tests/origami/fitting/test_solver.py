@@ -66,6 +66,30 @@ def test_an_empty_set_is_a_result_and_not_an_exception() -> None:
     assert found.reason in {"the residual stalled", "the iterations ran out"}
 
 
+def test_what_goes_wrong_on_the_way_is_a_reason() -> None:
+    def nowhere(x: Floats) -> tuple[Floats, sparse.csr_array]:
+        """The slope of a length that is 0."""
+        return np.ones(1), sparse.csr_array([[np.nan]])
+
+    def root(x: Floats) -> tuple[Floats, sparse.csr_array]:
+        """log(x), of which a step from 4 leads below 0."""
+        with np.errstate(invalid="ignore"):
+            return np.log(x), sparse.diags_array(1 / x).tocsr()
+
+    def square(x: Floats) -> tuple[Floats, sparse.csr_array]:
+        return x**2, sparse.diags_array(2 * x).tocsr()
+
+    for rows, start, most, reason in (
+        (nowhere, 1.0, 60, "the linear system became singular"),
+        (root, 4.0, 60, "a facet or edge degenerated"),
+        (square, 1.0, 5, "the iterations ran out"),
+    ):
+        found = project(rows, np.array([start]), max_iterations=most)
+        assert (found.converged, found.reason) == (False, reason)
+    assert found.iterations == 5
+    assert found.x == pytest.approx(2.0**-5)
+
+
 def test_a_step_is_never_longer_than_the_cap() -> None:
     seen: list[Floats] = []
 

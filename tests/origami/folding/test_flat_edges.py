@@ -62,6 +62,41 @@ def test_what_is_joined_is_a_polygon() -> None:
     assert without_flat_edges(bent).pattern is bent
 
 
+def squares(creased: set[tuple[tuple[int, int], tuple[int, int]]]) -> CreasePattern:
+    """3 x 3 squares; the sides between the ``creased`` pairs of cells are folds, others flat."""
+    lines = named_patterns.border((0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0))
+    for x in range(3):
+        for y in range(3):
+            for dx, dy in ((1, 0), (0, 1)):
+                if max(x + dx, y + dy) < 3:
+                    pair = ((x, y), (x + dx, y + dy))
+                    start = (float(x + dx), float(y + dy))
+                    letter = "M" if pair in creased else "J"
+                    angle = 90.0 if letter == "M" else 0.0
+                    lines.append((start, (start[0] + dy, start[1] + dx), letter, angle))
+    return named_patterns.drawn(lines)
+
+
+def sides_of(*cells: tuple[int, int]) -> set[tuple[tuple[int, int], tuple[int, int]]]:
+    around = [((x, y), (x + dx, y + dy)) for x, y in cells for dx, dy in ((1, 0), (0, 1))]
+    return {*around, *(((x - dx, y - dy), (x, y)) for x, y in cells
+                       for dx, dy in ((1, 0), (0, 1)))}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("creased", "facets"),
+    [
+        (set(), 1),
+        (sides_of((1, 1)), 9),  # a ring round one facet is no polygon
+        (sides_of((0, 0), (1, 1)), 9),  # nor are seven facets that touch in a corner
+        ({((0, 1), (1, 1))}, 9),  # nor is a sheet in whose middle a crease ends
+        ({((0, y), (1, y)) for y in range(3)}, 2),
+    ],
+)
+def test_facets_are_joined_over_flat_edges_if_they_make_a_polygon(creased, facets) -> None:
+    assert len(without_flat_edges(squares(creased)).pattern.faces_vertices) == facets
+
+
 def test_creases_cut_in_two_by_a_stray_line_keep_the_closed_form() -> None:
     """At a vertex of two creases in a line both fold alike; flat edges do not count."""
     lines = named_patterns.border((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (0.0, 2.0))

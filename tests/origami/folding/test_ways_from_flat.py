@@ -6,8 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import named_patterns
+import numpy as np
 import pytest
 
+from miurafab.errors import PatternError
 from miurafab.origami.folding import motion
 from miurafab.origami.folding.motion import find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
@@ -49,3 +51,56 @@ def test_folds_that_go_astray_with_contact_alone_make_no_sequence(
     assert found.verdict is not None
     assert not found.verdict.touching
     assert len(found.motion.frames) == 5
+
+
+@pytest.mark.parametrize("frames", [1, 3])
+def test_the_way_next_to_the_folded_form_is_shown_where_that_from_flat_is_lost(
+    frames: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A way of one frame shows nothing, so that the reason is told instead."""
+    pattern = named_patterns.waterbomb_base()
+    way, _ = ramp_motion(pattern, 4)
+    part = replace(
+        way, frames=way.frames[:frames], states=way.states[:frames],
+        fold_angles=way.fold_angles[:frames],
+    )  # fmt: skip
+
+    def lost(*given: Any) -> Any:
+        raise PatternError("The way is lost.")
+
+    monkeypatch.setattr(motion, "_bent", lambda *given: part)
+    monkeypatch.setattr(motion, "_from_flat", lost)
+    if frames == 1:
+        with pytest.raises(PatternError, match="The way is lost"):
+            motion._find(pattern, 4, None)
+    else:
+        assert motion._find(pattern, 4, None).motion is part
+
+
+def test_flat_facets_that_touch_leave_the_way_on_which_bent_ones_do_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pattern = named_patterns.waterbomb_base()
+    way, verdict = ramp_motion(pattern, 4)
+    touching = replace(verdict, touching=True)
+    monkeypatch.setattr(motion, "ramp_motion", lambda *given, **more: (way, touching))
+    flat = replace(way)
+    monkeypatch.setattr(motion, "certified", lambda found: (flat, None))
+    for met, shown in (([0], way), ([], flat)):
+        monkeypatch.setattr(motion, "contacts", lambda found, met=met: met if found is flat else [])
+        assert motion._from_flat(pattern, 4, None, None).motion is shown
+
+
+def test_a_pattern_that_folds_in_a_sequence_is_told_by_its_folds() -> None:
+    _, verdict = ramp_motion(named_patterns.waterbomb_base(), 2)
+    none = np.empty(0, dtype=np.int64)
+    few = np.array([3, 4])
+    away = replace(verdict, wrong_edges=none, waiting_edges=none, angle_error=0.5, folds=8)
+    wrong = replace(away, wrong_edges=few, wrong_signs=0.25, waiting_edges=few)
+    assert "creases stay 29 degrees away from their fold angles. All of them could begin" in str(
+        motion._sequence(away)
+    )
+    said = str(motion._sequence(wrong))
+    assert "25% of its folds end on the other side than their letter tells, the first" in said
+    assert "With flat facets 2 of its 8 folds cannot begin from flat" in said
+    assert "the first being edge 3" in said

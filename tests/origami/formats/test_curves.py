@@ -145,6 +145,16 @@ def test_the_curves_of_a_dxf_are_followed_as_another_reader_reads_them() -> None
     assert total == 7
 
 
+def test_a_curve_whose_points_are_one_has_no_shape() -> None:
+    """Two curves alike beside it become as many lines each."""
+    course = "M 10 10 C 20 40 60 40 70 10 M 10 60 C 20 90 60 90 70 60 M 5 5 C 5 5 5 5 5 5"
+    lines = parse_svg(f'<svg><path d="{course}" stroke="red"/></svg>')
+    one, other = np.split(lines.ends[:-1], 2)
+    assert (lines.ends[-1] == [5.0, -5.0]).all()
+    assert len(one) > 1
+    assert np.abs(other - one - [0.0, -50.0]).max() < 1e-9
+
+
 def test_what_a_drawing_holds_besides_lines_is_told() -> None:
     def draw(space) -> None:
         space.add_lwpolyline([(0, 0), (9, 0), (9, 9), (0, 9)], close=True)

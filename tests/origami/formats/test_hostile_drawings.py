@@ -61,6 +61,8 @@ NO_NUMBER = "not a finite number"
         ("svg", svg(f'<g transform="scale(1e308)">{SQUARE}<circle r="9" stroke="red"/></g>'), FAR),
         ("svg", svg(f'<g transform="rotate(1e999)">{SQUARE}</g>'), NO_NUMBER),
         ("svg", svg(SQUARE.replace("black", "hsl(1e999,1,1)")), NO_NUMBER),
+        ("svg", path("L 50 50"), "path 'L 50 50' does not begin with an M"),
+        ("svg", path("Q 50 50 100 100"), "does not begin with an M"),
         ("svg", path("M0 0 A 1e308 1e308 0 0 1 100 100"), FAR),
         ("svg", path("M0 0 A 1e-308 1e308 45 0 1 100 100"), FAR),
         ("svg", path("M0 0 A 1 1 1e999 0 1 100 100"), NO_NUMBER),

@@ -219,7 +219,7 @@ def test_an_svg_transform_moves_as_another_reader_moves(transform: str) -> None:
 def test_what_is_no_line_in_a_drawing_draws_nothing() -> None:
     parts = (
         '<circle r="0"/><ellipse rx="3"/><polyline points="1 2"/><path d="M3 4"/><path d=""/>'
-        '<path d="A0 5 0 0 1 3 4"/>'  # an arc without a radius is a line
+        '<path d="M0 0A0 5 0 0 1 3 4"/>'  # an arc without a radius is a line
     )
     drawing = f'<svg stroke="red">{parts}<line x2="5"/></svg>'
     assert parse_svg(drawing).ends.tolist() == [[[0, 0], [3, -4]], [[0, 0], [5, 0]]]

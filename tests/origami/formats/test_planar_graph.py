@@ -10,7 +10,9 @@ from problems import regular
 
 from miurafab.errors import PatternError
 from miurafab.origami.formats.crease_lines import CreaseLines, lines_of
+from miurafab.origami.formats.line_crossings import lines_cross
 from miurafab.origami.formats.planar_graph import (
+    enclosed_facets,
     faces_of_plane_graph,
     pattern_from_lines,
 )
@@ -92,6 +94,24 @@ def test_what_is_no_pattern_is_refused() -> None:
     loose = [(letter, *(0.5 + 0.25 * at for at in ends)) for letter, *ends in SQUARE]
     with pytest.raises(PatternError, match=r"at \(0.5, 0.5\), lies loose inside a facet"):
         pattern_from_lines(drawn(*SQUARE, *loose))
+
+
+def test_edges_of_a_file_that_enclose_nothing_or_too_much_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    ring = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+    assert enclosed_facets(points, ring, np.full(4, "B")).tolist() == [[0, 1, 2, 3]]
+    with pytest.raises(PatternError, match="refers to a vertex that does not exist"):
+        enclosed_facets(points[:3], ring, np.full(4, "B"))
+    with pytest.raises(PatternError, match="'edges_vertices' encloses no facet"):
+        enclosed_facets(points, ring[:3], np.full(3, "B"))
+    assert not lines_cross(points[:3], ring)
+    assert not lines_cross(np.where(points == 1.0, np.nan, points), ring)
+    assert lines_cross(points, np.array([[0, 2], [1, 3]]))
+    monkeypatch.setattr("miurafab.origami.formats.planar_graph._MOST_CORNERS", 3)
+    with pytest.raises(PatternError, match="more than 4 corners, too many beside 1 others"):
+        enclosed_facets(points, ring, np.full(4, "B"))
 
 
 def test_parts_that_lie_apart_are_pieces() -> None:
