@@ -13,7 +13,7 @@ Marlin and HPGL machines only take jobs; the rest is done at their panel.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from miurafab.errors import ControllerError, JobStopped, MachineError, PersonNeeded
@@ -344,7 +344,8 @@ class MachineSession:
         session = self.conversation
         if session.connection.in_flight:
             return False
-        self._note(session.wait_status())
+        with suppress(ControllerError):  # one that is silent may move on
+            self._note(session.wait_status())
         return not self._at_risk
 
     # Jobs

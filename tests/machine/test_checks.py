@@ -6,8 +6,9 @@ import pytest
 from wires import BANNER, FakeWire
 
 from miurafab.errors import GcodeError, MiurafabError
+from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
-from miurafab.machine.planning import JobPlan, SendOptions, plan_job
+from miurafab.machine.planning import JobPlan, SendOptions, passed_checks, plan_job
 from miurafab.machine.preflight import CHECKS
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
@@ -112,3 +113,11 @@ def test_a_line_that_cannot_be_sent_is_refused_whatever_is_forced(
     with pytest.raises(GcodeError, match=r"job\.nc, line 2") as caught:
         plan_job(Job("job.nc", "G0 X1\n" + text), MACHINE, options)
     assert "overrides" not in str(caught.value)
+
+
+def test_what_could_not_be_read_is_not_said_to_fit_the_bed() -> None:
+    """Though the place of the head is known."""
+    options = SendOptions(at="front-left", check_mode=True)
+    assert passed_checks(options, MACHINE, None) == {"m3", "program"}
+    small = parse_program(Job("line.nc", "G21 G90\nM4 S0\nG1 X5 S10 F600\n"))
+    assert passed_checks(options, MACHINE, small) == {"m3", "program", "bounds"}

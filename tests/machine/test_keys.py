@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import random
+import select
 import signal
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from subprocess import PIPE, Popen
@@ -31,6 +33,7 @@ from miurafab.machine.keys import (
     ConsoleKeys,
     NoKeys,
     Typed,
+    suspend_here,
     terminal_keys,
 )
 from miurafab.machine.planning import SendOptions, plan_job
@@ -98,6 +101,14 @@ def test_a_resume_while_the_hold_still_brakes_is_not_lost(keys: list[tuple[float
     assert result.seconds == pytest.approx(undisturbed.seconds + 0.3, abs=0.4)
     assert wire.commands.count(b"!") == 1
     assert wire.commands.count(b"~") == 2
+
+
+@pytest.mark.parametrize("after", [0.12, 0.25])
+def test_a_resume_after_the_hold_came_to_rest_is_sent_once(after: float) -> None:
+    """Although the last report was of the braking."""
+    wire, result = run((4.0, " "), (4.0 + after, "r"))
+    assert isinstance(result, StreamResult)
+    assert wire.commands.count(b"~") == 1
 
 
 @pytest.mark.parametrize("keys", [[(4.0, "q")], [(4.0, " "), (6.0, "q")]])
@@ -252,6 +263,56 @@ def test_the_terminal_is_left_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None
             assert keys.pressed() == " r"
             assert termios.tcgetattr(terminal)[3] != before[3]
         assert termios.tcgetattr(terminal) == before
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """Standard input is a terminal, in the foreground."""
+    master, descriptor = os.openpty()
+    with os.fdopen(descriptor) as stdin, os.fdopen(master, "rb", buffering=0):
+        monkeypatch.setattr(sys, "stdin", stdin)
+        monkeypatch.setattr(os, "tcgetpgrp", lambda descriptor: os.getpgrp())
+        yield descriptor
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
+def test_in_the_background_and_after_the_end_no_key_is_read(
+    terminal: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Reading in the background would stop the whole process."""
+    with terminal_keys() as keys:
+        monkeypatch.setattr(os, "read", lambda descriptor, size: b"")
+        monkeypatch.setattr(select, "select", lambda *ready: ready)
+        assert keys.pressed() == ""
+        monkeypatch.setattr(os, "read", lambda descriptor, size: pytest.fail("it was read"))
+        monkeypatch.setattr(os, "tcgetpgrp", lambda descriptor: -1)
+        assert keys.pressed() == ""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
+@pytest.mark.parametrize("foreground", [True, False])
+def test_a_suspended_program_leaves_the_terminal_as_shells_want_it(
+    terminal: int, monkeypatch: pytest.MonkeyPatch, foreground: bool
+) -> None:
+    import termios
+
+    seen = []
+
+    def stop(process: int, number: int) -> None:
+        seen.append((process, number, termios.tcgetattr(terminal)[3] & termios.ECHO))
+
+    monkeypatch.setattr(os, "kill", stop)
+    with terminal_keys():
+        raw = termios.tcgetattr(terminal)
+        if not foreground:  # bg: the terminal is another program's by now
+            monkeypatch.setattr(os, "tcgetpgrp", lambda descriptor: -1)
+        suspend_here()
+        assert seen == [(os.getpid(), signal.SIGSTOP, termios.ECHO)]
+        assert (termios.tcgetattr(terminal) == raw) == foreground
+    with Path(os.devnull).open() as nothing:
+        monkeypatch.setattr(sys, "stdin", nothing)
+        suspend_here()
+    assert len(seen) == 2
 
 
 def test_a_dark_frame_never_arms_and_a_pointer_is_weak() -> None:

@@ -152,6 +152,23 @@ def test_noise_is_mended_and_not_only_noticed() -> None:
     assert done >= 6
 
 
+class Torn(Wire):
+    """Every copy of one line is damaged."""
+
+    def write(self, data: bytes) -> None:
+        super().write(data.replace(b"X10Y10", b"X11Y10"))
+
+
+def test_a_line_that_never_gets_through_ends_the_job_dark() -> None:
+    device = new_device()
+    with pytest.raises(
+        ControllerError, match=r"never got line \d+ undamaged .*; look at the cable"
+    ):
+        send(dashes(4), Torn(device))
+    assert_dark(device)
+    assert burnt(device) == []
+
+
 def test_an_answer_that_is_lost_is_asked_for_and_nothing_is_made_twice() -> None:
     device = new_device()
 

@@ -73,6 +73,33 @@ def test_every_stroke_is_cut_though_the_cutter_is_slower_than_the_wire(tmp_path:
     assert run.line == ROWS + 3
 
 
+class Keys:
+    """Space at 2 s of the cutter's time, r at 30 s."""
+
+    def __init__(self, device: VirtualPlotter) -> None:
+        self._device, self._due = device, [(2.0, " "), (30.0, "r")]
+
+    def pressed(self) -> str:
+        if self._due and self._device.now >= self._due[0][0]:
+            return self._due.pop(0)[1]
+        return ""
+
+
+def test_space_hands_nothing_over_until_r() -> None:
+    device = new_device()
+    told: list[tuple[float, int]] = []
+
+    def note(now: Progress) -> None:
+        if now.state == "Hold" and 4.0 < device.now < 30.0:
+            told.append((device.now, now.lines_acknowledged))
+
+    send(strokes(), device, keys=Keys(device), on_progress=note)
+    assert len({lines for _, lines in told}) == 1
+    assert told[-1][0] - told[0][0] > 20
+    device.advance(300.0)
+    assert drawn(device) == WHOLE
+
+
 def test_the_transcript_holds_what_was_handed_over_and_what_the_cutter_said(tmp_path: Path) -> None:
     job, device = strokes(speed=3), new_device()
     send(job, device, transcript_path=tmp_path / "t")

@@ -5,8 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 import os
+import re
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -174,6 +176,79 @@ def test_ctrl_x_ends_the_homing_before_a_job_at_once() -> None:
     assert b"$H\n\x18" in wire.sent
     assert 0 <= wire.reset_at - begun - 0.5 <= 0.011
     assert here.state.state in ("Alarm", "Idle")
+
+
+class Blow(Pressed):
+    """Something that happens to the controller at its time, or a key that is none of the list."""
+
+    def __init__(self, wire: Wire, blow: Callable[[], object]) -> None:
+        super().__init__(wire)
+        self._blow = blow
+
+    def pressed(self) -> str:
+        if super().pressed():
+            self._blow()
+            return "z"
+        return ""
+
+
+@pytest.mark.parametrize(
+    ("blow", "told"),
+    [
+        (lambda wire: wire.device.receive(b"\x84"), "The jog ended in state Door"),
+        (lambda wire: wire.device.press_limit("X"), "did not answer a status query"),
+    ],
+    ids=["a lid", "a limit"],
+)
+def test_a_jog_that_ends_elsewhere_is_told_and_not_left_to_go_on(
+    blow: Callable[[Wire], object], told: str
+) -> None:
+    """It would go on when the lid is shut; after a hard limit GRBL is deaf until a reset."""
+    wire = Wire(VirtualGrbl(virtual_settings(MACHINE) | {21: 1}, baud=115_200))
+    keys = Blow(wire, lambda: blow(wire))
+    here = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
+    here.open()
+    keys.press(wire.now() + 0.5)
+    with pytest.raises(ControllerError, match=told):
+        here.jog(x=30, feed_mm_min=1000)
+    assert wire.sent.count(b"\x18") == 1
+    wire.device.advance(30.0)
+    assert wire.device.position[0] < 20
+
+
+def test_a_controller_that_hangs_in_a_line_is_reset() -> None:
+    device = VirtualGrbl(virtual_settings(MACHINE), baud=115_200, faults=parse_faults(["hang@10s"]))
+    here = MachineSession(wire := Wire(device), StopSignals(), PortSetup.of(MACHINE))
+    here.open()
+    here.conversation.pause(10.5)
+    with pytest.raises(ControllerError, match="did not answer 'G4P1' within 180 s"):
+        here.say("G4 P1")
+    assert b"\x18" in wire.sent
+
+
+def test_nothing_typed_and_keys_that_are_none_send_nothing() -> None:
+    here, wire = session()
+    here._keys = Blow(wire, lambda: None)
+    here.open()
+    wire.sent = b""
+    here.say("  ")
+    here._keys.press(wire.now())
+    here.watch(0.3)
+    assert wire.sent == b""
+
+
+class Reticent(Wire):
+    """To a board whose reports never tell the overrides."""
+
+    def read(self, timeout: float) -> bytes:
+        return re.sub(rb"\|Ov:[0-9,]*", b"", super().read(timeout))
+
+
+def test_a_board_that_never_tells_its_overrides_is_opened_and_taken_as_written() -> None:
+    wire = Reticent(VirtualGrbl(virtual_settings(MACHINE), baud=115_200, greets=False))
+    here = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    assert here.open().overrides == (100, 100, 100)
+    assert here.jog(x=5).position[0] == 5.0
 
 
 class Hammered(Pressed):
@@ -429,6 +504,7 @@ def test_a_storm_of_arrows_queues_up_nothing_and_changes_nothing() -> None:
 def test_another_direction_cancels_first() -> None:
     pad = JogPad()
     pad.press(1.0, 0.0, 0.0)
+    assert pad.next_order(0.0, None, True, {}) is None  # where it stands is not told yet
     order = pad.next_order(0.0, (0.0, 0.0), True, {})
     assert order is not None
     assert order.startswith(b"$J=G21G91X1.000F")

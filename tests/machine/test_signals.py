@@ -34,6 +34,16 @@ def test_a_signal_whose_exception_was_dropped_is_raised_by_the_next_check() -> N
             signals.check()
 
 
+def test_news_for_a_block_that_has_ended_are_dropped_and_are_no_ctrl_c() -> None:
+    StopSignals().interrupt(RuntimeError("before"))
+    with StopSignals() as signals:
+        with pytest.raises(RuntimeError, match="in time"), signals.raising():
+            signals.interrupt(RuntimeError("in time"))
+        signals.interrupt(RuntimeError("late"))
+        signals.check()
+        assert signals.caught is None
+
+
 def test_a_wire_that_must_not_be_torn_is_interrupted_only_by_the_check() -> None:
     with StopSignals() as signals:
         signals.at_once = False
