@@ -70,12 +70,11 @@ class Ramped(Balance):
     It is the one array that changes, by :meth:`accept`. ``pairs`` are those that touch or may.
     """
 
-    last: Floats = field(default_factory=lambda: np.empty(0))
+    last: Floats = field(init=False)
     pairs: TouchPairs = NO_PAIRS
 
     def __post_init__(self) -> None:
-        if not len(self.last):
-            object.__setattr__(self, "last", np.zeros(len(self.model.hinges)))
+        object.__setattr__(self, "last", np.zeros(len(self.model.hinges)))
 
     def angles(self, points: Floats) -> Floats:
         """(H,) the fold angles at ``points`` (V, 3), counted on from the last state."""

@@ -39,6 +39,7 @@ from miurafab.origami.energy.path import (
 )
 from miurafab.origami.energy.pieces import PieceEnergies
 from miurafab.origami.energy.plot import draw_pieces
+from miurafab.origami.energy.ramp import REACH, nearing
 
 
 def angles_along(path):
@@ -557,6 +558,21 @@ def test_a_path_that_cannot_be_followed_is_a_result():
     assert not path.converged
     assert 1 <= len(path.drives) < 11
     assert len(path.coords) == len(path.energies) == len(path.loads) == len(path.drives)
+
+
+def test_a_shape_that_is_no_number_is_no_solution():
+    model = sheet_model(regular(3, 3))
+    driven = Driven(model, np.array([0, 8]))
+    lost = driven.rest._replace(points=np.full_like(driven.rest.points, np.nan))
+    with np.errstate(invalid="ignore"):
+        assert not solve(driven, lost, 1.0).converged
+
+
+def test_a_motion_that_turns_a_sheet_inside_out_comes_as_near_as_can_be():
+    points = np.random.default_rng(1).normal(size=(20, 3))
+    assert nearing(points, points + np.arange(3)) == pytest.approx(0.0, abs=1e-12)
+    assert nearing(points, 0.9 * points) == pytest.approx(0.1 * REACH)
+    assert nearing(points, -points) == np.inf
 
 
 def test_failure_of_one_solve_is_a_result():

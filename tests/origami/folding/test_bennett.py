@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import itertools
 import json
+import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -316,6 +317,28 @@ def test_what_has_no_shifted_hinges_is_refused() -> None:
         thick_plates(developable, 4.0)
     with pytest.raises(InputError, match="greater than zero"):
         thick_plates(regular(), 0.0)
+    with pytest.raises(PatternError, match="its layers have no order in which it closes"):
+        bennett_heights(strip("VVV", angle=math.radians(120)))
+
+
+def test_patches_are_made_smaller_until_each_has_plates(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where none of any size has, that is told."""
+    tried: list[int] = []
+
+    def few(pattern: CreasePattern, thickness: float) -> tuple | None:
+        tried.append(len(pattern.faces_vertices))
+        return made(pattern, thickness) if tried[-1] <= most else None
+
+    made, pattern = plates_module._mechanism, exact("plane", 6)
+    monkeypatch.setattr(plates_module, "_mechanism", few)
+    most = 9
+    found = thick_plates(pattern, 4.0)
+    assert [len(patch.facets) for patch in found.patches] == [9] * 4
+    assert tried == sorted(tried, reverse=True)
+    assert tried[0] == 36
+    most = 0
+    with pytest.raises(PatternError, match="neither for the whole sheet, slit or"):
+        thick_plates(pattern, 4.0)
 
 
 def test_plates_are_written_as_solids_that_move(tmp_path: Path) -> None:

@@ -274,3 +274,8 @@ def test_boxes_meet_as_all_pairs_do(seed, count, spread):
         if (low[a] <= high[b]).all() and (low[b] <= high[a]).all()
     ]  # fmt: skip
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == expected
+
+
+def test_a_pattern_without_a_folded_form_has_no_contacts_to_look_for():
+    with pytest.raises(ValueError, match="no folded form"):
+        self_intersections(replace(regular(), folded_coords=None))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from problems import fitted, regular
@@ -14,6 +16,13 @@ from miurafab.origami.folding.kinematics import rigid_motion
 
 def test_a_rigid_motion_takes_no_energy() -> None:
     energies = facet_energies(rigid_motion(regular(), [0.2, 1.0, 3.0]))
+    assert energies is not None
+    assert np.abs(energies).max() < 1e-20
+
+
+def test_flat_facets_take_no_energy_without_a_folded_form_either() -> None:
+    flat = replace(regular(), folded_coords=None)
+    energies = facet_energies(rigid_motion(flat, [0.2, 1.0]))
     assert energies is not None
     assert np.abs(energies).max() < 1e-20
 

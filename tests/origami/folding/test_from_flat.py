@@ -8,6 +8,7 @@ from dataclasses import replace
 import named_patterns
 import numpy as np
 import pytest
+from problems import regular
 
 from miurafab.errors import PatternError
 from miurafab.geometry.polygons import edge_lengths
@@ -19,10 +20,16 @@ from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.certificate import RigidCertificate, certified
 from miurafab.origami.folding.from_flat import fold_from_flat, ramp_parts
 from miurafab.origami.folding.judge_motion import median_fold, motion_findings
-from miurafab.origami.folding.kinematics import CLOSED_FORM, FROM_FLAT, facet_strain
+from miurafab.origami.folding.kinematics import (
+    CLOSED_FORM,
+    FROM_FLAT,
+    facet_strain,
+    rigid_motion,
+)
 from miurafab.origami.folding.motion import FoundMotion, find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
 from miurafab.origami.folding.ramp_walk import FIRMER
+from miurafab.origami.formats.fold_frames import frame_titles
 
 RIGID = {
     "waterbomb base": named_patterns.waterbomb_base,
@@ -312,6 +319,28 @@ def test_what_does_not_fold_has_no_motion_to_certify() -> None:
     still = replace(motion, fold_angles=np.zeros_like(motion.fold_angles))
     with pytest.raises(PatternError, match="No crease of the pattern moves"):
         certified(still)
+
+
+def test_frames_whose_loops_do_not_close_are_no_rigid_motion(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The projection is not believed: the facets are placed anew at its fold angles."""
+    motion, _ = ramp_motion(named_patterns.waterbomb_base(), 2)
+    assert certified(motion)[1].rigid
+    monkeypatch.setattr(
+        "miurafab.origami.folding.certificate.loop_mismatch", lambda *given: np.array([0.0, 1e-3])
+    )
+    same, told = certified(motion)
+    assert same is motion
+    assert (told.rigid, told.residual) == (False, 1e-3)
+
+
+def test_frames_that_are_all_folded_flat_are_called_so() -> None:
+    motion = rigid_motion(regular(), [math.inf])
+    assert frame_titles(motion) == ["folded flat"]
+    titles = frame_titles(rigid_motion(regular(), [0.0, 1.0, math.inf]))
+    assert (titles[0], titles[2]) == ("flat", "folded flat")
+    assert titles[1].startswith("edge ")
 
 
 def test_the_way_from_flat_tells_how_far_it_is() -> None:

@@ -122,6 +122,21 @@ def test_facets_that_hang_on_nothing_are_refused() -> None:
         rigid_motion(replace(pattern, edges_assignment=cut), [1.0])
 
 
+def test_one_facet_stands_still_and_a_loose_vertex_is_refused() -> None:
+    motion = rigid_motion(regular(2, 2), [0.5, 1.0])
+    assert motion.is_rigid
+    assert np.ptp(motion.frames, axis=0).max() < 1e-12
+    pattern = regular(3, 3)
+    loose = replace(
+        pattern,
+        vertices_coords=np.concatenate([pattern.vertices_coords, [[1.0, 1.0]]]),
+        folded_coords=None,
+        grid=None,
+    )
+    with pytest.raises(PatternError, match="Vertex 9 of the pattern belongs to no facet"):
+        rigid_motion(loose, [1.0])
+
+
 @pytest.mark.parametrize("name", EXACT)
 def test_mountains_and_valleys_alone_tell_the_motion(name: str) -> None:
     pattern = fitted(name, flat_foldable=0.0).pattern

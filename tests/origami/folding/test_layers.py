@@ -157,6 +157,13 @@ def test_a_roll_of_equal_stamps_passes_through_itself_and_has_no_order() -> None
     assert (rolled.complete, rolled.orders) == (True, ())
 
 
+def test_one_facet_lies_on_nothing() -> None:
+    order = layer_order(regular(2, 2))
+    assert order.known
+    assert len(order.face_orders()) == 0
+    assert order.levels.tolist() == [0]
+
+
 def test_what_has_no_order_after_a_search_is_not_called_closed_form() -> None:
     """A square with a square hole, folded on its diagonals, closes as no frame can."""
     points = [[0, 0], [3, 0], [3, 3], [0, 3], [1, 1], [2, 1], [2, 2], [1, 2]]
