@@ -213,6 +213,23 @@ def test_holes_that_leave_no_tube_are_refused(poles):
         body_surface(bar, poles=np.array(poles, dtype=float), hole=12.0)
 
 
+def test_of_many_gores_the_best_pair_of_poles_is_taken():
+    """With 12 gores asked for, no pair is as good as the first with few, so all are compared."""
+    made = ball(lambda p: p * [30, 33, 55] + 6 * p[:, :1] * p[:, 1:] @ np.eye(2, 3), 2)
+    body = Body(*made, "pebble")
+    surface = body_surface(body, pieces=12)
+    assert surface.gores == 12
+    pairs = pole_candidates(*made, HeatDistance(*made))
+    assert len(pairs) > 2
+    ranks = []
+    for pair in pairs:
+        try:
+            ranks.append(body_surface(body, pieces=12, poles=made[0][pair]).figures.rank)
+        except TargetError:
+            continue
+    assert surface.figures.rank <= min(ranks)
+
+
 def test_a_hole_along_edges_cuts_no_triangle():
     """The octahedron's lower half, by the levels of its corners."""
     corners = np.concatenate([np.eye(3), -np.eye(3)])

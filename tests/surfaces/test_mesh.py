@@ -15,7 +15,7 @@ from problems import saddle_mesh
 from miurafab.errors import InputError, TargetError
 from miurafab.origami.formats.fold import read_fold
 from miurafab.surfaces.mesh import MeshChart, load_mesh, mesh_surface
-from miurafab.surfaces.placement import Region
+from miurafab.surfaces.placement import ANGLES, Region
 from miurafab.surfaces.surface import tangents
 from miurafab.workflow.design import design
 from miurafab.workflow.patterns import check
@@ -276,6 +276,22 @@ def test_a_bow_too_thin_for_a_rectangle_is_refused():
     ):
         with pytest.raises(TargetError, match=words):
             mesh_surface(points.reshape(-1, 3), faces, "bow.stl", **where)
+
+
+def test_a_rectangle_that_reaches_over_a_ragged_border_is_made_smaller(monkeypatch):
+    """As if the border cut all rectangles of the lattice, of every angle, but not smaller ones."""
+    whole = mesh_surface(*square(21)).domain
+    asked = []
+
+    def ragged(frame, faces, domain):
+        asked.append(domain)
+        return len(asked) > len(ANGLES)
+
+    monkeypatch.setattr("miurafab.surfaces.mesh.covered", ragged)
+    smaller = mesh_surface(*square(21)).domain
+    assert smaller.width == pytest.approx(0.95 * whole.width)
+    assert smaller.height == pytest.approx(0.95 * whole.height)
+    assert len(asked) == len(ANGLES) + 2  # and once more when the surface is made
 
 
 def test_a_closed_mesh_takes_no_region():

@@ -8,7 +8,7 @@ import pytest
 from miurafab.errors import TargetError
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.surfaces.mesh import MeshChart, lay_out
-from miurafab.surfaces.outline import WholeMesh, whole_mesh
+from miurafab.surfaces.outline import STIFFER, WholeMesh, whole_mesh
 from miurafab.surfaces.placement import turned
 from miurafab.surfaces.surface import tangents
 
@@ -98,6 +98,26 @@ def test_the_tangents_are_the_differences_of_the_points(panel: WholeMesh) -> Non
     uv = target.domain.lattice(6, 6).reshape(-1, 2)
     for tangent, expected in zip(target.tangents(uv), tangents(target, uv), strict=True):
         assert tangent == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("even", [0, 2, 9])
+def test_the_spline_is_as_stiff_as_it_takes_to_be_even_beyond_the_outline(
+    even: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And no stiffer than the stiffest that is tried."""
+    seen: list[float] = []
+
+    def judged(target: WholeMesh) -> bool:
+        seen.append(target.stiffness)
+        return len(seen) > even
+
+    monkeypatch.setattr("miurafab.surfaces.outline._even_beyond", judged)
+    chart = lay_out(*squares([[0, 0]]), "square")[0]
+    tried = [0.0, *STIFFER]
+    assert whole_mesh(chart).stiffness == tried[min(even, len(tried) - 1)]
+    assert seen == tried[: even + 1]
+    stiff = whole_mesh(chart, 1.0)
+    assert stiff.stiffness == 1.0
 
 
 def test_a_layout_that_lies_over_itself_is_refused() -> None:

@@ -57,8 +57,6 @@ class Candidate:
 
     def with_distances(self) -> Measurements:
         """The measurements with the distances to the target."""
-        if self.measurements.coverage is not None:
-            return self.measurements
         return with_distances(self.measurements, self.pattern, self.surface)
 
     @property

@@ -50,6 +50,16 @@ def test_a_row_of_rectangles_that_meets_no_facet_is_left_out():
         assert away.max() < 40.0
 
 
+def test_a_cover_that_never_settles_is_none(monkeypatch):
+    relaxation = Relaxation(squares(4, 3, 10.0), 60.0, 40.0)
+    rectangle = np.array([[20.0, 15.0, 0.0]])
+    assert relaxation.settled(rectangle)[1] < 1e-6
+    left = iter(range(1, 9))
+    monkeypatch.setattr(relaxation, "_left_out", lambda _: np.array([next(left)]))
+    assert relaxation.settled(rectangle)[1] == np.inf
+    assert next(left) == 5
+
+
 def test_one_rectangle_holds_every_shape_alone():
     search = CoverSearch(squares(4, 3, 10.0), 60.0, 40.0)
     assert search.needed(np.array([[20.0, 15.0, 0.0]])).tolist() == [12.0]

@@ -114,6 +114,14 @@ def test_pieces_that_keep_the_directions_of_the_pattern_fit_as_they_are(name, tu
         assert (np.ptp(piece.cut_lines[0], axis=0) <= sizes).all(axis=1).any()
 
 
+def test_a_sheet_of_very_many_facets_is_split_by_every_second_direction(monkeypatch):
+    monkeypatch.setattr("miurafab.fabrication.partition.split._MANY", 100)
+    pattern = miura(24, 20)
+    face_patch = split(pattern, 190.0, 140.0, card())
+    assert face_patch.max() > 0
+    assert_patches_are_sound(pattern, face_patch, 190.0, 140.0)
+
+
 def test_a_facet_larger_than_a_patch_may_be_is_named():
     options = LayoutOptions(max_patch_mm=(12.0, 8.0))
     with pytest.raises(LayoutError, match=r"Facet 0 .* fit a patch of 12 mm x 8 mm; .* larger"):

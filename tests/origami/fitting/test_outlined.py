@@ -12,7 +12,7 @@ from mesh_shapes import mesh
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.fit import fit
-from miurafab.origami.fitting.outlined import OutlinedLattice, angles_of
+from miurafab.origami.fitting.outlined import OutlinedLattice, _in_one_piece, angles_of
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.fitting.starts import starts_elsewhere, starts_for
@@ -143,3 +143,9 @@ def test_a_rectangle_is_fitted_where_it_is_asked_for(petal: MeshSurface) -> None
     last_resorts = starts_elsewhere(FitRequest(facets=(8, 8), surface=petal), 1)
     assert last_resorts[0].way == "sheet"
     assert all(start.place for start in last_resorts)
+
+
+def test_of_cells_that_hang_together_in_two_parts_the_larger_is_kept() -> None:
+    cells = np.array([[1, 0, 1, 1], [0, 1, 0, 1], [1, 0, 0, 1]], dtype=bool)
+    assert _in_one_piece(cells).tolist() == [[0, 0, 1, 1], [0, 0, 0, 1], [0, 0, 0, 1]]
+    assert _in_one_piece(cells[:, 2:]).tolist() == cells[:, 2:].tolist()
