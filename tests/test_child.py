@@ -1,6 +1,7 @@
 """Nothing from the working directory is run: not by the command, and not by a process it starts."""
 
 import multiprocessing
+import os
 import subprocess
 import sys
 import time
@@ -79,6 +80,16 @@ def test_the_processes_of_a_pool(trap):
         running = pool.submit(abs, -2)
     assert running.result() == 2
     assert not trap.exists()
+
+
+def test_what_the_environment_said_before_it_says_again(monkeypatch):
+    for before in ("0", None):
+        monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
+        if before is not None:
+            monkeypatch.setenv("PYTHONSAFEPATH", before)
+        with pytest.raises(KeyError), safe_path():
+            raise KeyError(os.environ["PYTHONSAFEPATH"])
+        assert os.environ.get("PYTHONSAFEPATH") == before
 
 
 def test_the_command_itself(trap):

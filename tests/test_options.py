@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
 import pytest
 
 from miurafab.errors import OptionError, spell_options
@@ -14,6 +15,7 @@ from miurafab.options import (
     check_options,
     declared,
     length,
+    number,
     option,
     read_options,
 )
@@ -31,6 +33,7 @@ class Outer:
     side: str = option(Choice(("left", "right")), "Where.", default="left")
     whole: bool = option(Flag(), "All of it.", default=False)
     inner: Inner = field(default_factory=Inner)
+    scale: float = option(number(), "How large.", default=1.0)
 
     def __post_init__(self) -> None:
         check_options(self)
@@ -41,6 +44,9 @@ def test_text_and_numbers_are_read_in_mm_and_degrees():
     assert read_options(Outer, given) == Outer(12.7, 4, "right", True, Inner(math.radians(30)))
     assert read_options(Outer, {"gap": 3, "tilt": "0.5rad"}) == Outer(3.0, inner=Inner(0.5))
     assert read_options(Outer, {"gap": None}) == Outer()
+    assert read_options(Outer, {"gap": np.float32(2.5), "scale": np.int16(-3)}) == Outer(
+        2.5, scale=-3.0
+    )
 
 
 @pytest.mark.parametrize(
@@ -55,6 +61,8 @@ def test_text_and_numbers_are_read_in_mm_and_degrees():
         ({"side": "rigth"}, "'side' is 'rigth'; did you mean 'right'"),
         ({"whole": "maybe"}, "'whole' is 'maybe'; it must be true or false"),
         ({"gpa": 1}, "'gpa' is not an option; did you mean 'gap'"),
+        ({"scale": math.inf}, "'scale' is inf; it must be a finite number"),
+        ({"gap": np.True_}, "'gap' is .*True.*, not a length"),
     ],
 )
 def test_what_cannot_be_taken_is_refused_by_name(given, words):
@@ -84,7 +92,7 @@ def test_a_message_names_the_option_as_its_reader_writes_it():
 
 def test_a_declaration_tells_all_that_is_shown():
     options = declared(Outer)
-    assert list(options) == ["gap", "count", "side", "whole", "tilt"]
+    assert list(options) == ["gap", "count", "side", "whole", "tilt", "scale"]
     gap = options["gap"]
     assert (gap.default, gap.default_text, gap.group, gap.field) == (2.0, "2 mm", "Room", "gap_mm")
     assert options["whole"].default_text == ""

@@ -1,6 +1,7 @@
 """Whatever is written takes the place of what was there, whole or not at all."""
 
 import ast
+import errno
 import json
 import os
 import shutil
@@ -16,7 +17,16 @@ from problems import regular
 
 import miurafab
 from miurafab.errors import InputError
-from miurafab.files import new_folder, write_bytes, write_draft, write_text
+from miurafab.files import (
+    Reading,
+    as_path,
+    new_file,
+    new_folder,
+    sync_folder,
+    write_bytes,
+    write_draft,
+    write_text,
+)
 from miurafab.profiles.own import OwnDefaults, write_defaults
 from miurafab.workflow.fold import fold
 from miurafab.workflow.job_files import LAYOUT, job_files, settle_job
@@ -317,3 +327,34 @@ def test_nothing_else_writes_files():
                 if called in WRITE_CALLS or opens or _is_os_open(node.func):
                     others.setdefault(name, []).append(f"{node.lineno}: {called}")
     assert {name: where for name, where in others.items() if name not in BESIDES} == {}
+
+
+def test_a_name_that_no_system_takes_is_refused_and_a_folder_is_no_file(tmp_path):
+    for path in ("a" * 256, "/".join(["folder"] * 900)):
+        with pytest.raises(InputError, match=r"The job is '.{40}'\.\.\., which is too long"):
+            as_path(path, "The job")
+    (tmp_path / "a.fold").mkdir()
+    with pytest.raises(InputError, match=r"a\.fold is a folder and not a file"):
+        new_file(tmp_path / "a.fold", "The pattern", (".fold",))
+
+
+def test_a_file_for_which_memory_does_not_do_is_named():
+    with (
+        pytest.raises(InputError, match=r"a\.fold is not FOLD: it asks for more memory than there"),
+        Reading("a.fold", "FOLD", InputError),
+    ):
+        raise MemoryError
+
+
+def test_a_file_system_that_syncs_no_folders_is_no_failure(tmp_path, monkeypatch):
+    for number in (errno.EINVAL, errno.EIO):
+
+        def refused(opened, number=number):
+            raise OSError(number, os.strerror(number))
+
+        monkeypatch.setattr(os, "fsync", refused)
+        if number == errno.EINVAL:
+            sync_folder(tmp_path)
+        else:
+            with pytest.raises(OSError, match=os.strerror(errno.EIO)):
+                sync_folder(tmp_path)

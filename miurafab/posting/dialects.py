@@ -28,7 +28,6 @@ from miurafab.posting.text import trimmed
 from miurafab.profiles import OPERATIONS, Knife, MachineProfile, Material
 from miurafab.profiles.beam import SHALLOW, Operation
 
-_GRBL = ("grbl-1.1", "grbl-0.9", "grblhal", "fluidnc")
 _LASER_MODE_IS_SETTING_32 = ("grbl-1.1", "grblhal")
 
 
@@ -62,11 +61,6 @@ def words_of(machine: MachineProfile, material: Material) -> Words:
     Raises :class:`~miurafab.errors.ProfileError` for a machine that G-code is not written for.
     """
     kind, dialect = machine.tool.kind, machine.dialect
-    if dialect not in _GRBL and dialect != "marlin":
-        raise ProfileError(
-            f"{machine.name}: G-code is written for {', '.join(_GRBL)} and marlin, not for the "
-            f"dialect '{dialect}'; choose another machine."
-        )
     operations = material.on(machine).operations
     feed = tuple(trimmed(operations[name].feed_mm_min) for name in OPERATIONS)
     if kind == "laser":

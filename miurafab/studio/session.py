@@ -276,11 +276,12 @@ class Bench:
     def _take_part(self, task: Task, part: News) -> None:
         if part["part"] == "pattern":
             self._new_pattern(task, part)
-        elif part["part"] == "motion" and self.pattern is not None:
+        elif part["part"] == "motion":
+            assert self.pattern is not None
             self.pattern["files"] |= self._put_down(task.id, part.get("files", {}))
             self.pattern["findings"] += self.plain_findings(part.get("findings", []))
             self.pattern |= {"folding": False, "still": part.get("missing", "")}
-        elif part["part"] == "job":
+        else:
             self._new_job(task, part)
 
     def _new_pattern(self, task: Task, part: News) -> None:

@@ -84,6 +84,8 @@ def test_a_wrong_stock_file_is_refused_by_name(tmp_path, old, new, complaint):
 
 
 def test_an_empty_or_missing_stock_file_is_told(tmp_path):
+    with pytest.raises(InputError, match=r"stock.toml: 'sheets' must be tables \[\[sheets\]\]"):
+        read_stock(written(tmp_path, "sheets = 3"))
     with pytest.raises(InputError, match=r"stock.toml holds no sheet; write one under \[\[sheets"):
         read_stock(written(tmp_path, ""))
     with pytest.raises(InputError, match="'sheet' is not a known key; did you mean 'sheets'"):

@@ -298,6 +298,7 @@ def test_connections_have_a_number_and_a_time():
         book.add(wire, "10.0.0.1")
     book.more_time(pairs[1][0], IDLE_S)
     book.remove(pairs[2][0])
+    book.more_time(pairs[2][0], IDLE_S)  # its request was still being answered
     clock.now += STRANGER_S + 1
     book.shut_late()
     assert pairs[0][1].recv(1) == b""
@@ -403,6 +404,13 @@ def test_a_whole_network_of_ipv6_is_one_address_and_a_right_password_clears_it()
     assert lock.guess("10.0.0.1", "wrong") > 0.0
 
 
+def test_no_number_of_addresses_takes_more_memory(monkeypatch):
+    monkeypatch.setattr("miurafab.studio.password._MOST_ADDRESSES", 2)
+    lock = CheapLock(PASSWORD, Clock())
+    assert [lock.guess(f"10.0.{n}.1", "wrong") for n in range(4)] == [None] * 4
+    assert sorted(lock._each) == ["10.0.2.1", "10.0.3.1"]
+
+
 def test_a_password_is_one_in_each_spelling_of_unicode():
     lock = PasswordLock("Gruß aus Köln")
     assert lock.guess("10.0.0.1", "Gruß aus Köln") == 0.0
@@ -481,6 +489,10 @@ def test_a_certificate_is_made_once_and_its_key_is_its_owners_alone(tmp_path, mo
     assert (certificate.not_valid_after_utc - certificate.not_valid_before_utc).days == 366
     assert tls_of(Hosting("127.0.0.1", PASSWORD))[1] == known  # kept for the next start
     assert tls_of(Hosting("localhost", PASSWORD))[1] != known
+    with monkeypatch.context() as soon:  # it ends within that time
+        soon.setattr("miurafab.studio.certificate._RENEWED_DAYS", 367)
+        renewed = tls_of(Hosting("localhost", PASSWORD))[1]
+    assert tls_of(Hosting("localhost", PASSWORD))[1] == renewed
     here, there = socket.socketpair()
     trusted = ssl.create_default_context(cafile=file)
     ends = []

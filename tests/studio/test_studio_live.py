@@ -76,8 +76,11 @@ def test_a_process_that_ends_is_an_error_and_the_next_question_starts_one(live, 
     begun[0].on_end("It ended again.")  # the old one has no say any more
     begun[1].on_line({"number": number, "answer": {}})
     assert live.answer(number) == {"answer": {}}
+    begun[1].on_end("It has answered.")
+    assert live.answer(number) == {"answer": {}}
+    live.ask({})
     live.stop()
-    assert begun[1].stopped
+    assert begun[2].stopped
 
 
 def test_a_process_that_hangs_is_left_for_a_new_one(live, begun, monkeypatch):
