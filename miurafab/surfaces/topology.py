@@ -67,9 +67,11 @@ def one_sheet(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
     """
     _, uses = edges_of(faces)
     if (uses > 2).any():
+        count = int((uses > 2).sum())
+        which = "one edge has" if count == 1 else f"{count} edges have"
         raise TargetError(
-            f"{name} is not a surface: {int((uses > 2).sum())} edges have more than two triangles; "
-            "remove the inner walls or duplicate triangles."
+            f"{name} is not a surface: {which} more than two triangles; remove the inner walls or "
+            "duplicate triangles."
         )
     faces = _oriented(faces, name)
     corner = np.arange(3 * len(faces)).reshape(-1, 3)

@@ -13,6 +13,7 @@ from piece_problems import gores, trimmed, two_pieces, two_trimmed_pieces
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.assembly import assembly_order
+from miurafab.fabrication.glue import _joined
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.partition.pieces import full_grid, hanging_together
@@ -173,3 +174,17 @@ def test_a_whole_piece_is_a_grid_and_a_trimmed_one_is_not():
         np.testing.assert_array_equal(cells[..., 1], row)
     for piece in hanging_together(two_trimmed_pieces()):
         assert full_grid(piece.pattern) is None
+
+
+def test_a_piece_of_which_no_seam_is_measured_has_no_place_in_the_shell():
+    pattern = two_pieces()
+    shell = pattern.folded_coords.copy()
+    other = np.unique(pattern.faces_vertices[pattern.pieces == 1])
+    moved = shell.copy()
+    moved[other] += [5.0, -3.0, 8.0]
+    assert _joined(pattern, pattern.pieces, moved.copy()) == pytest.approx(shell)
+    moved[np.intersect1d(other, pattern.seam_vertices)] = np.nan
+    lost = _joined(pattern, pattern.pieces, moved.copy())
+    assert np.isnan(lost[other]).all()
+    one = np.setdiff1d(np.arange(len(shell)), other)
+    assert np.array_equal(lost[one], shell[one])

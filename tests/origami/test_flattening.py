@@ -12,7 +12,7 @@ from problems import fitted, regular
 import miurafab as mf
 from miurafab.errors import PatternError
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.formats.fold import fold_text, parse_fold
+from miurafab.origami.formats.fold import fold_text, parse_fold, read_further_frames
 
 
 def form(points, faces, **keys) -> dict:
@@ -243,3 +243,13 @@ def test_a_facet_that_begins_with_three_corners_in_line_is_not_flat_for_that() -
     points = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0.5], [1, 2, 0], [0, 1, 0.5]]
     with pytest.raises(PatternError, match="Facet 0 is not flat"):
         parse_fold(form(points, [(0, 1, 2, 3, 4, 5)]))
+
+
+def test_a_file_of_a_folded_form_alone_is_checked_and_has_no_further_frames(tmp_path) -> None:
+    path = tmp_path / "alone.fold"
+    path.write_text(json.dumps(form_of(regular(5, 5))))
+    assert read_further_frames(path) == ()
+    checked = mf.check(path)
+    assert checked.valid, checked.findings
+    assert checked.measurements.facets == 16
+    assert not any("further frames" in sentence for sentence in checked.proved)

@@ -222,7 +222,7 @@ def test_of_many_gores_the_best_pair_of_poles_is_taken():
     pairs = pole_candidates(*made, HeatDistance(*made))
     assert len(pairs) > 2
     ranks = []
-    for pair in pairs:
+    for pair in pairs[:2]:
         try:
             ranks.append(body_surface(body, pieces=12, poles=made[0][pair]).figures.rank)
         except TargetError:

@@ -110,7 +110,18 @@ def handle(v, f):
     return torus.vertices, faces[(faces != 0).all(axis=1)]
 
 
+def book(v, f):
+    """Three pages at a spine; the first two joined at their outer edges, the others above."""
+    turn = np.radians([0, 100, 220])
+    outer = 50 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    low, high = (np.column_stack([outer, np.full(3, z)]) for z in (0.0, 50.0))
+    points = np.concatenate([[[0, 0, 0], [0, 0, 50.0]], low, high])
+    pages = [t for k in (2, 3, 4) for t in ([0, k, k + 3], [0, k + 3, 1])]
+    return points, np.array([*pages, [2, 3, 6], [2, 6, 5], [1, 6, 7]])
+
+
 REFUSED = {
+    book: "is not a surface: one edge has more than two triangles",
     nan: "vertex .* not a finite number",
     infinite: "vertex .* not a finite number",
     confetti: "450 separate pieces, and the largest has only",

@@ -43,7 +43,7 @@ def test_a_frame_holds_points_exactly_if_some_turn_fits_them(points, width, heig
 
 
 def test_a_row_of_rectangles_that_meets_no_facet_is_left_out():
-    shapes = np.concatenate([squares(9, 1, 10.0), squares(9, 1, 10.0) + np.array([0.0, 60.0])])
+    shapes = np.concatenate([squares(40, 1, 10.0), squares(40, 1, 10.0) + np.array([0.0, 60.0])])
     for rectangles in brickwork(shapes, (30.0, 20.0)):
         away = np.abs(rectangles[:, 1] - 35.0)
         assert away.min() > 10.0

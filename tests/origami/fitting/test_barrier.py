@@ -10,6 +10,7 @@ from miurafab.errors import OptionError
 from miurafab.origami.energy import tuning
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.fitting.fit import fit as fit_sheet
+from miurafab.origami.fitting.scaling import with_residual, worst_residual
 from miurafab.origami.formats.files import load
 from miurafab.origami.verify import measure
 from miurafab.workflow.design import design
@@ -164,6 +165,15 @@ def test_a_lost_way_and_a_fit_without_a_sheet_are_told(monkeypatch):
     assert "The way to flat of the fitted sheet was lost." in found.advice
     with pytest.raises(KeyboardInterrupt):
         tuning.tuned(request, result, lambda other: replace(result, status="interrupted"))
+
+
+def test_residuals_that_are_not_found_are_no_sheet(monkeypatch):
+    pattern = small()[1].pattern
+    half = worst_residual(pattern) / 2
+    assert worst_residual(with_residual(pattern, half)) == pytest.approx(half)
+    monkeypatch.setattr("miurafab.origami.fitting.scaling.scaled_residuals", lambda *_: None)
+    with pytest.raises(ArithmeticError, match=r"no sheet with residuals up to 0\.01 was found"):
+        with_residual(pattern, 0.01)
 
 
 def test_a_sheet_beyond_a_limit_is_no_answer():

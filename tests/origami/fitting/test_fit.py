@@ -21,6 +21,7 @@ from miurafab.origami.fitting.score import ENOUGH
 from miurafab.origami.fitting.seed import Corrugation
 from miurafab.origami.fitting.starts import corrugations_of
 from miurafab.origami.verify import audit
+from miurafab.surfaces.analytic import GeneralizedCylinder
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface
 
 NAMED = [name for name in CATALOGUE if name != "helicoid"]
@@ -285,6 +286,24 @@ def test_a_fit_without_a_sheet_is_shown_with_its_reason() -> None:
     assert not none.is_valid
     with pytest.raises(PatternError, match="There is no sheet to draw: No exact sheet was found"):
         none.plot()
+
+
+def test_borders_that_meet_and_are_no_seams_are_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "miurafab.origami.fitting.candidate.unlisted_seams", lambda pattern: [(0, 1), (2, 3)]
+    )
+    result = fit(request("hypar", 4, 4, polish="off", amplitude=0.5, zigzag=0.5))
+    assert result.status == "infeasible"
+    assert "2 pairs of border edges meet in the folded form and are no seams" in result.advice
+
+
+def test_a_cylinder_without_polish_is_answered_by_its_closed_forms_or_by_a_sheet() -> None:
+    """No limit that it misses is met by the rest of the search, without polish, either."""
+    name = next(n for n in CATALOGUE if isinstance(make_surface(n, {})[0], GeneralizedCylinder))
+    result = fit(request(name, 4, 4, polish="off", max_deviation_mm=1e-9))
+    assert result.status == "infeasible"
+    assert {attempt.way for attempt in result.attempts} > {"direct"}
+    assert not result.polished
 
 
 @pytest.mark.parametrize("given", [{}, {"zigzag": 0.4}, {"amplitude": 0.6}])

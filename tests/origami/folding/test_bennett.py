@@ -31,9 +31,10 @@ from miurafab.origami.folding.bennett import (
 )
 from miurafab.origami.folding.kinematics import fold_angles_at, place, states_between
 from miurafab.origami.folding.plates import ThickPlates, thick_plates
-from miurafab.origami.folding.slits import blocks_of, facet_cells
+from miurafab.origami.folding.slits import blocks_of, facet_cells, opened_by, slit_sheets
 from miurafab.origami.folding.thick_panels import LEAST_USEFUL, thick_panels
 from miurafab.origami.invariants import interior_vertices
+from miurafab.origami.piece import piece_of
 
 STATES = np.geomspace(0.1, 10.0, 10)
 
@@ -319,6 +320,24 @@ def test_what_has_no_shifted_hinges_is_refused() -> None:
         thick_plates(regular(), 0.0)
     with pytest.raises(PatternError, match="its layers have no order in which it closes"):
         bennett_heights(strip("VVV", angle=math.radians(120)))
+
+
+def test_a_small_sheet_is_slit_in_the_ways_that_leave_blocks_of_two() -> None:
+    """4 x 2 facets: no more than two blocks along, and one across."""
+    cells = facet_cells(exact("plane", 4))[:8]
+    pattern = piece_of(exact("plane", 4), np.arange(8)).pattern
+    found = list(slit_sheets(pattern, cells))
+    assert found
+    for slit, edges, seams in found:
+        assert slit.pieces_count == 1
+        assert len(seams) == 1
+        cut = len(slit.edges_vertices) - len(pattern.edges_vertices)
+        assert cut == len(seams[0].slits)
+        assert len(edges) == len(slit.edges_vertices)
+        assert len(seams[0].hinges) + cut == 2
+    whole = replace(seams[0], slits=())
+    nothing = np.zeros(len(slit.edges_vertices)), np.zeros(8)
+    assert opened_by(pattern, slit, *nothing, whole) == 0.0
 
 
 def test_patches_are_made_smaller_until_each_has_plates(monkeypatch: pytest.MonkeyPatch) -> None:
