@@ -80,6 +80,13 @@ def test_a_file_of_four_decimals_is_unfolded_to_its_digits(tmp_path) -> None:
     assert not mf.check(parse_fold(worse)).valid
 
 
+def test_evening_brings_the_sheet_nearer_to_its_folded_form(monkeypatch) -> None:
+    document = form_of(regular(7, 7), decimals=3)
+    usual = parse_fold(document).unfolded
+    monkeypatch.setattr("miurafab.origami.flattening._ROUNDS", 1)
+    assert parse_fold(document).unfolded > usual
+
+
 def test_letters_tell_from_which_side_a_sheet_is_seen() -> None:
     """A ridge whose letter says valley is a valley seen from below."""
     points = [[0, 0, 0], [1, 0, 0], [1, 1, 0.4], [0, 1, 0]]

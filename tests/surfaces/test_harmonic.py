@@ -120,6 +120,26 @@ def test_corners_have_no_jump_inside_a_triangle():
     assert corners[1] == pytest.approx([0.05, -0.05, 0.5])
 
 
+def test_a_spike_that_leans_over_ends_in_a_triangle_glued_to_itself():
+    """The angles round its tip add up to so little that flips leave one triangle there."""
+    turn = 2 * np.pi * np.arange(3) / 3
+    inner, outer = (
+        np.stack([r * np.cos(turn + a), r * np.sin(turn + a), 0 * turn], axis=1)
+        for r, a in ((1.0, 0.0), (3.0, 0.5))
+    )
+    vertices = np.concatenate([[[-5.0, -2.5, 1.0]], inner, outer])
+    after = np.array([2, 3, 1])
+    k = np.array([1, 2, 3])
+    spike = np.stack([0 * k, k, after], axis=1)
+    strip = [np.stack([k, k + 3, after], axis=1), np.stack([after, k + 3, after + 3], axis=1)]
+    made = intrinsic_mesh(vertices, np.concatenate([spike, *strip]))
+    corners = np.sort(made.faces, axis=1)
+    assert (np.diff(corners, axis=1) == 0).any()
+    assert (made.faces == 0).sum() == 1
+    assert made.weights[made.mates >= 0].min() > 0
+    assert np.abs(made.laplacian @ np.ones(7)).max() < 1e-12
+
+
 @pytest.fixture(scope="module")
 def stretched():
     """A ball of oblique triangles."""

@@ -145,6 +145,13 @@ def test_a_rectangle_is_fitted_where_it_is_asked_for(petal: MeshSurface) -> None
     assert all(start.place for start in last_resorts)
 
 
+def test_a_rectangle_that_was_asked_for_is_no_last_resort(petal: MeshSurface) -> None:
+    asked = FitRequest(facets=(4, 4), surface=petal, edge="rectangle", amplitude=0.6, zigzag=0.6)
+    places = {start.place for start in starts_elsewhere(asked, 1)}
+    assert places
+    assert "a rectangle of the mesh" not in places
+
+
 def test_of_cells_that_hang_together_in_two_parts_the_larger_is_kept() -> None:
     cells = np.array([[1, 0, 1, 1], [0, 1, 0, 1], [1, 0, 0, 1]], dtype=bool)
     assert _in_one_piece(cells).tolist() == [[0, 0, 1, 1], [0, 0, 0, 1], [0, 0, 0, 1]]
