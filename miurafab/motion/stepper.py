@@ -130,11 +130,11 @@ class Processor:
         self.start(now, cycles)
         while True:
             done, change = self.finish(), stepper.change
-            if done is not None and (change is None or done < change):
+            if change is None or (done is not None and done < change):
+                assert done is not None  # only an interrupt takes all of the time
                 return done
-            if change is not None:
-                self.note(change)
-                stepper.run_to(change)
+            self.note(change)
+            stepper.run_to(change)
 
 
 def steps_taken(move: Move, micro: int) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ from contextlib import nullcontext
 
 import pytest
 from command_line import sentence
-from problems import saddle_mesh
+from problems import regular, saddle_mesh
 from sealing import seal
 
 import miurafab
@@ -20,6 +20,7 @@ from miurafab.cli.console import Console
 from miurafab.errors import PortError
 from miurafab.machine.keys import ConsoleKeys
 from miurafab.profiles import shipped_directory
+from miurafab.workflow import cut as cut_module
 from miurafab.workflow.multi_machine import Shared
 
 DESIGN = """
@@ -381,6 +382,13 @@ class Typing:
 
     def pressed(self):
         return self.left.pop(0) if self.left else ""
+
+
+def test_a_job_in_memory_is_written_and_is_then_one_of_a_directory(tmp_path):
+    made = miurafab.sheets(regular(3, 3))
+    prepared = cut_module.prepare(made, out=tmp_path / "own")
+    assert (prepared.folder, len(prepared.jobs)) == (tmp_path / "own", 1)
+    assert (tmp_path / "own" / "sheet-01.nc").is_file()
 
 
 @pytest.mark.parametrize("enter", ["\n", "\r"])

@@ -38,6 +38,13 @@ def test_recorded_jobs_are_timed_as_the_firmware_ran_them(name: str, within: flo
     assert found.beam_on_seconds == pytest.approx(MEASURED[name]["laser_on_seconds"], rel=within)
 
 
+def test_a_constant_beam_is_switched_where_the_head_stands() -> None:
+    """A G1 without way waits for the motion before it, and sets the power."""
+    text = "M3 S500\nG1 X5 F600\nG1 X5 S0\nG1 X25\nM5\n"
+    assert time(text).beam_on_seconds == pytest.approx(0.5, abs=0.05)
+    assert time(text.replace("G1 X5 S0\n", "")).beam_on_seconds == pytest.approx(2.5, abs=0.05)
+
+
 def test_one_move_takes_its_trapezoid() -> None:
     assert time("G1 X100 F6000").seconds == pytest.approx(1.1, rel=1e-3)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import signal
+import threading
 import warnings
 from dataclasses import replace
 
@@ -19,6 +21,7 @@ import miurafab
 from miurafab.errors import InputError, TargetError
 from miurafab.origami.tradeoff import Sample, Tradeoff, cost, optimal_side, summarise
 from miurafab.origami.tradeoff_plot import SIZE, draw_tradeoff, tradeoff_table
+from miurafab.workflow.tradeoff import _deaf_children
 
 SIDES = (6, 8, 12)
 
@@ -30,6 +33,31 @@ def made(sides, c=0.5, a=1.7, b=-0.2, failed=()) -> list[Sample]:
         else Sample(n, n, "converged", 0.8, 0.6, 100 * c / n, c / n, 0.01, a + b / n, 1.0)
         for n in sides
     ]
+
+
+def test_a_plane_has_no_law_of_its_middle(run) -> None:
+    """Which lies on it with any number of facets."""
+    words = ("--sides", "4,6,8", "--workers", "1", "--polish", "off")
+    done = run("tradeoff", "plane", *words)
+    assert done.returncode == 0
+    assert "distance = 48" in done.stdout
+    assert "mid-surface" not in done.stdout
+
+
+def test_ctrl_c_while_processes_are_started_comes_when_they_are() -> None:
+    started = []
+    with pytest.raises(KeyboardInterrupt), _deaf_children():
+        started.append(signal.raise_signal(signal.SIGINT))
+    assert started == [None]
+    other = threading.Thread(target=lambda: started.append(list(_other_thread())))
+    other.start()
+    other.join()
+    assert started[1:] == [["there"]]
+
+
+def _other_thread():
+    with _deaf_children():  # only the main thread may have handlers
+        yield "there"
 
 
 @given(

@@ -113,7 +113,8 @@ def _perform(machine: Machine, action: Action) -> Routine:
         if not checking:
             machine.requests.add(RealtimeRequest.HOLD)
             yield from realtime(machine)
-    elif isinstance(action, ProgramEnd):
+    else:
+        assert isinstance(action, ProgramEnd)
         yield from _end_program(machine)
 
 

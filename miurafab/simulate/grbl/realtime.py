@@ -177,7 +177,7 @@ def _start(machine: Machine) -> Routine:
     if machine.state is FirmwareState.DOOR and Suspend.DOOR_AJAR not in suspend:
         if Suspend.RESTORED in suspend:
             machine.state = FirmwareState.IDLE
-        elif Suspend.RETRACTED in suspend:
+        else:  # all is out by then
             suspend.add(Suspend.RESTORING)
     held = machine.state is FirmwareState.HOLD and Suspend.HELD in suspend
     if machine.state is not FirmwareState.IDLE and not held:

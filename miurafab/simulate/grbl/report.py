@@ -182,8 +182,6 @@ def _status_with_commas(
 def _state(machine: Machine) -> str:
     state, suspend = machine.state, machine.suspend
     if state is FirmwareState.HOLD:
-        if Suspend.JOG_CANCEL in suspend:
-            return FirmwareState.JOG.value
         return f"Hold:{0 if Suspend.HELD in suspend else 1}"
     if state is FirmwareState.DOOR:
         if Suspend.RESTORING in suspend:

@@ -341,3 +341,75 @@ def test_buttons_are_the_realtime_commands() -> None:
 def test_an_unhomed_machine_may_use_its_whole_bed() -> None:
     device = ready(LASER | {110: 60000, 120: 5000, 130: 40, 21: 1})
     assert "|Pn:" not in play(device, "G0X39", 2.0, b"?", "G0X-39", 2.0, b"?")
+
+
+@pytest.mark.parametrize(
+    ("settings", "line", "state"),
+    [({22: 1}, "", "Alarm"), ({20: 0}, "$C", "Check"), ({}, "$SLP", "Sleep")],
+)
+def test_a_hold_or_a_door_changes_nothing_where_nothing_moves(
+    settings: dict[int, float], line: str, state: str
+) -> None:
+    device = ready(settings)
+    play(device, line, 0.5)
+    assert states(play(device, b"!", 0.2, b"?", b"\x84", 0.2, b"?")) == [state, state]
+
+
+def test_a_locked_controller_may_sleep_and_is_locked_again() -> None:
+    device = ready({22: 1})
+    assert states(play(device, "$SLP", 0.5, b"?")) == ["Sleep"]
+    output = play(device, b"\x18", 0.5, b"?")
+    assert output.startswith(BANNER + LOCK)
+    assert states(output) == ["Alarm"]
+
+
+def test_the_power_is_changed_in_a_hold_of_a_spindle_that_turns_on() -> None:
+    device = ready()
+    play(device, "G91", "M3S500", "G1X10F100", 0.3, b"!", 0.5)
+    assert "|FS:0,550|" in play(device, b"\x9a", 0.1, b"?")
+    assert (device.state, device.beam_on) == ("Hold", True)
+
+
+def test_one_axis_is_not_homed_and_switches_are_found_without_going_back() -> None:
+    device = ready({22: 1})
+    assert play(device, "$HX") == "error:3\r\n"
+    device = ready({22: 1, 25: 1000, 27: 0, 130: 4, 131: 4, 132: 4})
+    assert states(play(device, "$H", 20.0, b"?")) == ["Idle"]
+    assert device.position == (0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["G4P2"],
+        ["G1X-50F100", "G38.2X-60F100"],  # before the probe
+        ["G38.2X-60F100"],
+        ["G1X-10F100", "G1X-900"],  # in the hold before the alarm of a soft limit
+    ],
+)
+def test_a_reset_ends_whatever_is_waited_for(lines: list[str]) -> None:
+    device = ready({20: 1, 22: 1, 25: 1000, 27: 1, 130: 200, 131: 4, 132: 4})
+    play(device, "$H", 60.0, "G91", *lines, 0.01)
+    output = play(device, b"\x18", 3.0, b"?")
+    moved = len(lines) > 1 or lines[0] != "G4P2"
+    assert ("ALARM:3" in output) == moved
+    assert states(output) == (["Alarm"] if moved else ["Idle"])
+    at = device.position
+    play(device, 2.0)
+    assert device.position == at
+
+
+def test_a_feed_that_is_cut_in_mid_move_brakes_over_the_moves_that_follow() -> None:
+    """They are entered faster than they may be made; nowhere it brakes harder than it can."""
+    device = ready({110: 6000, 111: 6000, 120: 100, 121: 100, 11: 1})
+    play(device, "G91")
+    device.receive(b"G1X1F6000\n" * 12)
+    play(device, 0.2, *[b"\x92", 0.002] * 9)
+    places = [device.position[0]]
+    while device.state == "Run":
+        device.advance(0.05)
+        places.append(device.position[0])
+    assert device.position == pytest.approx((12, 0, 0), abs=1e-3)
+    speeds = [(b - a) / 0.05 for a, b in pairwise(places)]
+    assert max(speeds) > 25
+    assert max(abs(b - a) for a, b in pairwise(speeds)) < 100 * 0.05 + 0.5
