@@ -28,9 +28,10 @@ from miurafab.files import (
     write_text,
 )
 from miurafab.profiles.own import OwnDefaults, write_defaults
+from miurafab.workflow import whole_folder
 from miurafab.workflow.fold import fold
 from miurafab.workflow.job_files import LAYOUT, job_files, settle_job
-from miurafab.workflow.whole_folder import STAGING
+from miurafab.workflow.whole_folder import ORDER, STAGING
 
 ROOT = Path(__file__).parent.parent
 PATTERN = regular(3, 3)
@@ -358,3 +359,52 @@ def test_a_file_system_that_syncs_no_folders_is_no_failure(tmp_path, monkeypatch
         else:
             with pytest.raises(OSError, match=os.strerror(errno.EIO)):
                 sync_folder(tmp_path)
+
+
+@pytest.fixture
+def unfinished(tmp_path):
+    """A folder whose writer died before it had moved its file up."""
+    (tmp_path / STAGING).mkdir()
+    (tmp_path / STAGING / "sheet-01.nc").write_text("new")
+    order = {"first": [], "remove": [], "put": ["sheet-01.nc"]}
+    (tmp_path / STAGING / ORDER).write_text(json.dumps(order))
+    return tmp_path
+
+
+def test_a_reader_waits_for_a_writer_and_not_for_ever(unfinished, monkeypatch):
+    monkeypatch.setattr(whole_folder, "_LOOK_S", 0.01)
+    with whole_folder._locked(unfinished):
+        monkeypatch.setattr(whole_folder, "_PATIENCE_S", 0.03)
+        with pytest.raises(InputError, match="is being written by another miurafab; wait until"):
+            settle_job(unfinished)
+        monkeypatch.setattr(whole_folder, "_PATIENCE_S", 20.0)
+        reading = threading.Thread(target=settle_job, args=(unfinished,))
+        reading.start()
+    reading.join()
+    assert (unfinished / "sheet-01.nc").read_text() == "new"
+
+
+def test_a_lock_that_its_holder_has_just_removed_is_taken_anew(unfinished, monkeypatch):
+    same, seen = os.path.samestat, []
+
+    def once_another(one, other):
+        seen.append(len(seen) > 0 and same(one, other))
+        if len(seen) == 2:
+            raise FileNotFoundError
+        return seen[-1]
+
+    monkeypatch.setattr(os.path, "samestat", once_another)
+    settle_job(unfinished)
+    assert seen[:3] == [False, True, True]
+    assert (unfinished / "sheet-01.nc").read_text() == "new"
+
+
+def test_a_disk_that_takes_no_lock_is_named(unfinished, monkeypatch):
+    import fcntl
+
+    def refused(opened, how):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", refused)
+    with pytest.raises(InputError, match=r"was not finished, and .* cannot be written: No locks"):
+        settle_job(unfinished)

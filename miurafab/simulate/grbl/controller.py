@@ -300,8 +300,8 @@ class VirtualGrbl:
 
     def _pump(self) -> None:
         """Move the output of the UART into the cable."""
-        if self._cable is not None:
-            self._cable.reply(self._machine.uart.take_dated(self._machine.now))
+        assert self._cable is not None
+        self._cable.reply(self._machine.uart.take_dated(self._machine.now))
 
     def _run_events(self, target: int, stop_at_line: bool) -> int:
         """Process all events up to ``target``, without faults; returns the time reached."""

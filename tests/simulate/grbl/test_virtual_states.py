@@ -343,6 +343,21 @@ def test_an_unhomed_machine_may_use_its_whole_bed() -> None:
     assert "|Pn:" not in play(device, "G0X39", 2.0, b"?", "G0X-39", 2.0, b"?")
 
 
+@pytest.mark.parametrize("at", [0.001, 0.015, 0.03])
+def test_a_main_program_that_hangs_goes_on_where_it_was(at: float) -> None:
+    """What is on its way to the port is still said."""
+    whole = play(ready(), "$$", 2.0)
+    device = ready()
+    device.receive(b"$$\n")
+    device.advance(at)
+    device.freeze(0.5)
+    device.advance(0.4)
+    begun = device.take_output().decode()
+    assert whole.startswith(begun)
+    assert begun.endswith("ok\r\n") == (at == 0.03)
+    assert begun + play(device, 2.0) == whole
+
+
 @pytest.mark.parametrize(
     ("settings", "line", "state"),
     [({22: 1}, "", "Alarm"), ({20: 0}, "$C", "Check"), ({}, "$SLP", "Sleep")],
