@@ -31,10 +31,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from miurafab.errors import PatternError
-from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
+from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import UNCREASED, CreasePattern
 from miurafab.origami.energy.hinges import hinge_angles
+from miurafab.origami.energy.ruled import loose_diagonals, plumpness, rulings_among
 from miurafab.origami.energy.triangles import split_facets
 from miurafab.origami.invariants import interior_vertices
 
@@ -47,8 +48,6 @@ CREASE_RATIO = 0.01
 SOFTNESS = 0.1
 """The compliance of a bar over its length, in k_f, so that a sheet does not lock on its way from
 flat: 1 / (1000 k_c). Ten times softer is too soft, a hundred times stiffer locks."""
-IN_LINE = 1e-3
-"""Radians; two folds that meet with a smaller turn are one straight crease."""
 FACET_BENDING = 0.55
 """C_B of Filipov et al. 2017, for quads whose sides do not stretch."""
 
@@ -242,6 +241,8 @@ def flat_model(
     hinges = np.concatenate([bending, across[sprung]])
     weights = np.concatenate([np.ones(len(bending)), np.full(int(sprung.sum()), crease_ratio)])
     ruled = len(diagonals) + np.flatnonzero(rulings_among(pattern, inner[flat]))
+    if len(ruled):
+        ruled = np.concatenate([loose_diagonals(pattern, split), ruled])
     weights[ruled] = crease_ratio
     goals = pattern.edges_fold_angle[inner[sprung]]
     bars = np.concatenate([pattern.edges_vertices, diagonals[:, :2]])
@@ -250,7 +251,7 @@ def flat_model(
         points=points,
         bars=bars,
         lengths=lengths,
-        compliance=softness * lengths,
+        compliance=softness * lengths * (plumpness(points, triangles, bars) if len(ruled) else 1.0),
         hinges=hinges,
         stiffness=weights * edge_lengths(points, hinges[:, :2]),
         rest=np.concatenate([np.zeros(len(bending)), goals]),
@@ -261,30 +262,6 @@ def flat_model(
         triangles=triangles,
         ruled=ruled,
     )
-
-
-def rulings_among(pattern: CreasePattern, flat: Ints) -> Bools:
-    """(n,) which of the ``flat`` edges (n,) are rulings: they come to an interior vertex at which
-    two folds meet that are not in line. There the facets have to bend.
-    """
-    points, edges = pattern.vertices_coords, pattern.edges_vertices
-    letters = pattern.edges_assignment
-    count = np.bincount(edges[np.isin(letters, ("M", "V"))].ravel(), minlength=len(points))
-    free = np.bincount(edges[np.isin(letters, ("U", "B", "C"))].ravel(), minlength=len(points))
-    total = np.zeros((len(points), 2))
-    folds = edges[np.isin(letters, ("M", "V"))]
-    along = points[folds[:, 1]] - points[folds[:, 0]]
-    along /= np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)[:, None]
-    np.add.at(total, folds[:, 0], along)
-    np.add.at(total, folds[:, 1], -along)
-    bent = (count == 2) & (free == 0) & (np.linalg.norm(total, axis=1) > IN_LINE)
-    return np.asarray(bent[edges[flat]].any(axis=1))
-
-
-def is_ruled(pattern: CreasePattern) -> bool:
-    """Whether flat edges of ``pattern`` are rulings, so that its facets have to bend."""
-    flat = np.isin(pattern.edges_assignment, UNCREASED) & (pattern.edges_faces >= 0).all(axis=1)
-    return bool(rulings_among(pattern, np.flatnonzero(flat)).any())
 
 
 def _refuse_degenerate(points: Floats, edges: Ints, hinges: Ints) -> None:

@@ -47,6 +47,8 @@ MAX_ITERATIONS = 25
 SHORTEST_STEP = 1.0 / 64
 ROUNDING = 1e-13
 """A residual up to this is rounding, and is not lowered further."""
+ROUNDINGS = 8
+"""So many roundings of a coordinate add up in one component of F."""
 ENOUGH = 0.1
 """A step must lower the residual by this part of the reduction in a linear problem."""
 
@@ -254,6 +256,29 @@ class Balance:
         return float(self.moments(np.zeros(len(self.hinges)), 0.0)[1].max(initial=1.0))
 
     @cached_property
+    def tolerance(self) -> float:
+        """The limit of every component of F: ``TOLERANCE``, or more where rounding leaves more.
+
+        At a distance D from the origin a coordinate is rounded by eps D, with eps = 2.2e-16. That
+        turns a hinge over a wing of height h by eps D / h, and so changes its forces by
+        k eps D / h^2. A bar of length L pulls by eps D / (delta L) more.
+        """
+        model = self.model
+        stiffness = self.moments(np.zeros(len(self.hinges)), 0.0)[1]
+        start, end, *wings = (model.points[ends] for ends in self.hinges.T)
+        along = end - start
+        length = np.linalg.norm(along, axis=1)
+        across = [np.linalg.norm(vector_product(along, wing - start), axis=1) for wing in wings]
+        height = np.minimum(*across) / length
+        soft = model.compliance > 0
+        most = max(
+            float((stiffness / height**2).max(initial=0.0)),
+            float((1.0 / (model.compliance * model.lengths)[soft]).max(initial=0.0)),
+        )
+        reach = float(np.abs(model.points).max())
+        return max(TOLERANCE, ROUNDINGS * 2.2e-16 * reach * most / self.stiffest)
+
+    @cached_property
     def assembly(self) -> Assembly:
         """The sums over hinges, bars and the driven quantity."""
         stencils = (self.hinges, self.model.bars, self.drive_stencil[None])
@@ -283,9 +308,9 @@ def stretch_blocks(block: Floats) -> Floats:
     return np.stack([block, -block, -block, block], axis=1).reshape(-1, 2, 2, 3, 3)
 
 
-def _iterations_left(before: float, now: float) -> float:
-    """How many iterations follow if each lowers the residual as the last one did."""
-    return 0.0 if now <= TOLERANCE else math.log(TOLERANCE / now) / math.log(now / before)
+def _iterations_left(before: float, now: float, limit: float) -> float:
+    """How many iterations to the ``limit`` follow if each lowers the residual as the last one."""
+    return 0.0 if now <= limit else math.log(limit / now) / math.log(now / before)
 
 
 def solve(
@@ -307,7 +332,7 @@ def solve(
     residual = driven.residual(state, target)
     size = driven.size(residual)
     for _ in range(MAX_ITERATIONS):
-        if size <= TOLERANCE:
+        if size <= driven.tolerance:
             if factored is not None and size > ROUNDING:
                 nearer = state.plus(driven.step(factored, residual), 1.0)
                 if driven.size(driven.residual(nearer, target)) < size:
@@ -334,7 +359,7 @@ def solve(
                 break
             length /= 2
         if better:
-            stale = _iterations_left(size, rest) > PATIENCE
+            stale = _iterations_left(size, rest, driven.tolerance) > PATIENCE
             state, residual, size = trial, left, rest
         elif fresh:
             break

@@ -17,6 +17,7 @@ with mu after Levenberg and Marquardt. So it only ever lowers the energy.
 from __future__ import annotations
 
 import copy
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -186,6 +187,9 @@ def descend(
         if down.force <= force or mu > GREATEST_MU or leashed:
             break
         step = down.step(mu)
+        if step is None:
+            mu *= BLUNTER
+            continue
         step *= min(1.0, LARGEST_MOVE / np.abs(step).max())
         while np.isfinite(leash) and nearing(start, points + step) > leash:
             leashed = True
@@ -223,16 +227,17 @@ class _Downhill:
         """The largest component of the gradient."""
         return float(np.abs(self._gradient).max(initial=0.0))
 
-    def step(self, mu: float) -> Floats:
+    def step(self, mu: float) -> Floats | None:
         """The step (V, 3) of Newton with ``mu``, or that of Gauss and Newton where K with ``mu`` is
-        not definite.
+        not definite; None where rounding leaves neither definite.
         """
         ramped = self._ramped
-        try:
-            factor = ramped.definite(raised_diagonal(self._exact, mu))
-        except RuntimeError:
-            factor = ramped.definite(raised_diagonal(self._loose, mu))
-        return ramped.assembly.vectors(-factor.solve(self._gradient))
+        for whole in (True, False):
+            matrix = self._exact if whole else self._loose
+            with suppress(RuntimeError):
+                factor = ramped.definite(raised_diagonal(matrix, mu))
+                return ramped.assembly.vectors(-factor.solve(self._gradient))
+        return None
 
     @cached_property
     def _exact(self) -> sparse.csc_array:

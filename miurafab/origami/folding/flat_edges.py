@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import UNCREASED, CreasePattern, restricted
-from miurafab.origami.energy.bar_hinge import rulings_among
+from miurafab.origami.energy.ruled import rulings_among
 from miurafab.origami.energy.triangles import split_facets
 from miurafab.origami.folding.kinematics import FoldingMotion
 

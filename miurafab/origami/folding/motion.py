@@ -24,7 +24,8 @@ import numpy as np
 from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cut_open import cut_open
-from miurafab.origami.energy.bar_hinge import SOFTNESS, is_ruled
+from miurafab.origami.energy.bar_hinge import SOFTNESS
+from miurafab.origami.energy.ruled import is_ruled
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.certificate import RigidCertificate, certified

@@ -14,9 +14,10 @@ import numpy as np
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.energy.bar_hinge import SOFTNESS, has_folds, is_ruled
+from miurafab.origami.energy.bar_hinge import SOFTNESS, has_folds
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.pieces import part_of
+from miurafab.origami.energy.ruled import is_ruled
 from miurafab.origami.folding.first_order import waiting_folds
 from miurafab.origami.folding.from_flat import RampPath, fold_from_flat, ramp_parts
 from miurafab.origami.folding.kinematics import FROM_FLAT, FoldingMotion

@@ -50,6 +50,8 @@ of a drawing of few digits, whose lines would not quite meet, that which leaves 
 and the fewest edges short."""
 SHORT = 1e-3
 """Shorter edges, as parts of the median line, may be left where lines were to meet."""
+SHORT_CURVED = 0.25
+"""The same as a part of the tolerance of curves."""
 
 _AT_ONCE = 1_000_000
 """Corners of facets that are compared with a point in one step."""
@@ -94,6 +96,7 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
 def _nearness(lines: CreaseLines) -> tuple[float, tuple[Finding, ...]]:
     """The distance within which ends meet, mm, and what is told of it."""
     median = float(np.median(_lengths(lines)))
+    short = max(SHORT * median, SHORT_CURVED * lines.curve_tolerance)
     chosen, least, refused = None, len(lines.ends) + 1, None
     for share in TOLERANCES:
         try:
@@ -101,7 +104,7 @@ def _nearness(lines: CreaseLines) -> tuple[float, tuple[Finding, ...]]:
         except PatternError as fault:
             refused = refused or fault
             continue
-        lost = drawn.lost + int((drawn.lengths < SHORT * median).sum())
+        lost = drawn.lost + int((drawn.lengths < short).sum())
         if lost < least:
             chosen, least = share, lost
         if not least:

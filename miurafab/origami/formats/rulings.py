@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,6 +43,12 @@ AHEAD = 0.3
 """The least cosine of the angle of a side of a curve with its chord, for rulings across the chord.
 """
 
+GRAZING = math.cos(math.radians(12.0))
+"""The largest cosine of the angle of a ruling with a side where it begins or ends."""
+
+ASIDE = math.cos(math.radians(70.0))
+"""The least cosine of the angle between a ruling and the way across its crease."""
+
 _CLOSE = 0.25
 """An end of a ruling this near to a corner, as a part of the line that it starts from, is there."""
 
@@ -56,8 +63,7 @@ def rulings(pattern: CreasePattern, curved: Bools) -> Floats:
         corners = face[face >= 0]
         sides = edges[: len(corners)]
         if len(corners) > 3 and (curved & folds)[sides].any():
-            facet = _Facet(pattern.vertices_coords, corners, curved[sides], folds[sides])
-            facets.append(facet)
+            facets.append(_Facet(pattern.vertices_coords, corners, sides, curved, folds))
     axes: dict[int, Floats] = {}
     alone = []
     for facet in facets:
@@ -74,18 +80,23 @@ def rulings(pattern: CreasePattern, curved: Bools) -> Floats:
         for vertex, axis in facet.blocked():
             if vertex not in many:
                 axes.setdefault(vertex, axis)
+    ends: dict[int, list[Floats]] = {}
     for facet in alone:
-        found += facet.rays(axes, seen)
+        found += facet.rays(axes, seen, ends)
     return np.array(found).reshape(-1, 2, 2)
 
 
 class _Facet:
-    """A facet of the ``corners`` (k,) whose sides from corner to corner are ``curved`` and
-    ``folds`` (k,). Curved folds meet at the ``bent`` (k,) ones.
+    """A facet of the ``corners`` (k,) whose sides from corner to corner are the edges ``numbers``
+    (k,), of which some are ``curved`` and ``folds`` (E,). Curved folds meet at the ``bent`` (k,)
+    corners.
     """
 
-    def __init__(self, points: Floats, corners: Ints, curved: Bools, folds: Bools) -> None:
-        self.corners, self.curved = corners, curved
+    def __init__(
+        self, points: Floats, corners: Ints, numbers: Ints, curved: Bools, folds: Bools
+    ) -> None:
+        self.corners, self.numbers = corners, numbers
+        self.curved, folds = curved[numbers], folds[numbers]
         self.places = p = points[corners]
         self.sides = np.stack([p, np.roll(p, -1, axis=0)], axis=1)
         self.along = self.sides[:, 1] - p
@@ -94,7 +105,7 @@ class _Facet:
         self.before = np.roll(unit, 1, axis=0)
         turn = np.abs(np.arctan2(_cross(self.before, unit), (self.before * unit).sum(axis=1)))
         both = folds & np.roll(folds, 1)
-        self.bent = both & (curved | np.roll(curved, 1)) & (turn < BEND)
+        self.bent = both & (self.curved | np.roll(self.curved, 1)) & (turn < BEND)
         across = np.stack([-self.before[:, 1] - unit[:, 1], self.before[:, 0] + unit[:, 0]], axis=1)
         self.inward = across / np.maximum(np.linalg.norm(across, axis=1), 1e-9)[:, None]
 
@@ -142,7 +153,7 @@ class _Facet:
         found: list[tuple[int, Floats]] = []
         for run in self._runs():
             hits = [(corner, self._hit(corner, self.inward[corner])) for corner in run.tolist()]
-            rays = np.array([[self.places[at], hit[0]] for at, hit in hits if hit is not None])
+            rays = np.array([[self.places[at], hit.end] for at, hit in hits if hit is not None])
             if not any(_crossed(ray, rays).any() for ray in rays):
                 continue
             sides = np.append(run[0] - 1, run)
@@ -153,15 +164,36 @@ class _Facet:
                 found += [(vertex, normal) for vertex in self.corners[run].tolist()]
         return found
 
-    def _hit(self, corner: int, direction: Floats) -> tuple[Floats, int] | None:
-        near = _CLOSE * min(self.length[corner], self.length[corner - 1])
+    def _near(self, corner: int) -> float:
+        return _CLOSE * float(min(self.length[corner], self.length[corner - 1]))
+
+    def _hit(self, corner: int, direction: Floats) -> _Hit | None:
+        near = self._near(corner)
         return _first_hit(self.places, self.along, self.curved, corner, direction, near)
 
-    def rays(self, axes: Mapping[int, Floats], seen: set[tuple[int, int]]) -> list[Floats]:
+    def _grazes(self, corner: int, hit: _Hit) -> bool:
+        """Whether a ruling from ``corner`` runs almost along a side where it begins or ends."""
+        ray = hit.end - self.places[corner]
+        ray /= np.linalg.norm(ray)
+        starts = [self.unit[corner], -self.unit[corner - 1]]
+        if hit.corner >= 0:
+            ends = [self.unit[hit.corner], -self.unit[hit.corner - 1]]
+        else:
+            ends = [self.unit[hit.side], -self.unit[hit.side]]
+        beside = [*(ray @ side for side in starts), *(-ray @ side for side in ends)]
+        return bool(max(beside) > GRAZING)
+
+    def rays(
+        self,
+        axes: Mapping[int, Floats],
+        seen: set[tuple[int, int]],
+        ends: dict[int, list[Floats]],
+    ) -> list[Floats]:
         """The rulings that begin at bent corners: along the one of ``axes`` of their vertex, or
-        across the crease. ``seen`` holds the pairs of vertices that are joined already.
+        across the crease. ``seen`` holds the pairs of vertices that are joined already, and
+        ``ends`` the ends of rulings in each edge; both take in what is found.
         """
-        p, count = self.places, len(self.places)
+        p = self.places
         rays = []
         for corner in np.flatnonzero(self.bent).tolist():
             direction = self.inward[corner]
@@ -169,32 +201,85 @@ class _Facet:
             if axis is not None:
                 direction = math.copysign(1.0, float(axis @ direction)) * axis
             hit = self._hit(corner, direction)
-            if hit is not None:
-                end, at = hit
-                rays.append((float(np.linalg.norm(end - p[corner])), corner, at, end))
+            if hit is not None and not self._grazes(corner, hit):
+                rays.append((float(np.linalg.norm(hit.end - p[corner])), corner, hit))
         kept: list[Floats] = []
-        for _, corner, at, end in sorted(rays, key=lambda ray: ray[:2]):
-            one = int(self.corners[corner])
-            if at >= 0:
-                other = int(self.corners[at])
-                pair = (min(one, other), max(one, other))
-                apart = abs(at - corner) not in (0, 1, count - 1)
-                if not apart or pair in seen:
-                    continue
-            ray = np.stack([p[corner], end])
-            others = np.concatenate([self.sides, np.array(kept).reshape(-1, 2, 2)])
-            if _crossed(ray, others).any():
-                continue
-            if at >= 0:
-                seen.add(pair)
-            kept.append(ray)
+        reached: set[int] = set()
+        free: list[_Hit] = []
+        for _, corner, hit in sorted(rays, key=lambda ray: ray[:2]):
+            if hit.corner < 0:
+                hit = self._joined(corner, hit, ends)
+            if self._is_open(corner, hit, kept, seen):
+                kept.append(np.stack([p[corner], hit.end]))
+                reached |= {corner, hit.corner}
+                free += [hit] if hit.corner < 0 else []
+        for corner in np.flatnonzero(self.bent).tolist():
+            goals = [] if corner in reached else self._instead(corner, free)
+            found = next((goal for goal in goals if self._is_open(corner, goal, kept, seen)), None)
+            if found is not None:
+                kept.append(np.stack([p[corner], found.end]))
+                reached.add(found.corner)
         return kept
+
+    def _joined(self, corner: int, hit: _Hit, ends: dict[int, list[Floats]]) -> _Hit:
+        """``hit`` moved to an end of another ruling in its side that is near, or told in ``ends``
+        as a new one.
+        """
+        there = ends.setdefault(int(self.numbers[hit.side]), [])
+        away = [float(np.linalg.norm(hit.end - other)) for other in there]
+        if away and min(away) <= self._near(corner):
+            return hit._replace(end=there[int(np.argmin(away))])
+        there.append(hit.end)
+        return hit
+
+    def _is_open(
+        self, corner: int, hit: _Hit, kept: list[Floats], seen: set[tuple[int, int]]
+    ) -> bool:
+        """Whether nothing stands between ``corner`` and ``hit``, and they are not joined yet; then
+        they are among those ``seen``.
+        """
+        ray = np.stack([self.places[corner], hit.end])
+        others = np.concatenate([self.sides, np.array(kept).reshape(-1, 2, 2)])
+        pair = (corner, -1)
+        if hit.corner >= 0:
+            one, other = int(self.corners[corner]), int(self.corners[hit.corner])
+            pair = (min(one, other), max(one, other))
+            apart = abs(hit.corner - corner) not in (0, 1, len(self.corners) - 1)
+            if not apart or pair in seen:
+                return False
+        if _crossed(ray, others).any():
+            return False
+        if hit.corner >= 0:
+            seen.add(pair)
+        return True
+
+    def _instead(self, corner: int, free: list[_Hit]) -> list[_Hit]:
+        """Where a ruling from ``corner`` may end if its own way is blocked: corners of the facet,
+        and ``free`` ends of other rulings, those first that are nearest to its direction.
+        """
+        goals = [*(_Hit(place, at, -1) for at, place in enumerate(self.places)), *free]
+        start, ahead = self.places[corner], self.inward[corner]
+        ranked = []
+        for number, goal in enumerate(goals):
+            ray = goal.end - start
+            length = float(np.linalg.norm(ray))
+            if length > 0 and ray @ ahead >= ASIDE * length and not self._grazes(corner, goal):
+                ranked.append((-float(ray @ ahead) / length, number))
+        return [goals[number] for _, number in sorted(ranked)]
+
+
+class _Hit(NamedTuple):
+    """Where a ruling ends: the point, the corner of its facet there, -1 for none, and the side."""
+
+    end: Floats
+    corner: int
+    side: int
 
 
 def _first_hit(
     p: Floats, along: Floats, curved: Bools, corner: int, inward: Floats, close: float
-) -> tuple[Floats, int] | None:
-    """Where the ray from ``corner`` first meets another side, and the corner there, -1 for none."""
+) -> _Hit | None:
+    """Where the ray from ``corner`` first meets another side."""
     with np.errstate(divide="ignore", invalid="ignore"):
         offset = p - p[corner]
         turn = _cross(np.broadcast_to(inward, along.shape), along)
@@ -209,8 +294,8 @@ def _first_hit(
     nearer = side if place[side] < 0.5 else (side + 1) % len(p)
     end = p[corner] + far[side] * inward
     if curved[side] or float(np.linalg.norm(p[nearer] - end)) <= close:
-        return p[nearer], nearer
-    return end, -1
+        return _Hit(p[nearer], nearer, side)
+    return _Hit(end, -1, side)
 
 
 def _crossed(ray: Floats, others: Floats) -> Bools:

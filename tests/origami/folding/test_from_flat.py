@@ -9,12 +9,16 @@ import named_patterns
 import numpy as np
 import pytest
 from problems import regular
+from scipy import sparse
 
 from miurafab.errors import PatternError
 from miurafab.geometry.polygons import edge_lengths
+from miurafab.geometry.sparse import Factor
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import flat_model
+from miurafab.origami.energy.equilibrium import TOLERANCE
 from miurafab.origami.energy.hinges import hinge_angles
+from miurafab.origami.energy.ramp import Ramped, descend
 from miurafab.origami.energy.seed import linear_seed
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.certificate import RigidCertificate, certified
@@ -349,3 +353,37 @@ def test_the_way_from_flat_tells_how_far_it_is() -> None:
     parts = ramp_parts(pattern, 3)
     fold_from_flat(pattern, parts, on_progress=lambda *each: told.append(each))
     assert told == [(k / 3, f"step {k} of 3") for k in (1, 2, 3)]
+
+
+def test_a_balance_is_found_where_rounding_lets_no_force_fall_further() -> None:
+    """A strip that is a hundredth as wide as its neighbours has forces of 1e-9 from rounding."""
+    ends = (0.0, 1.0, 2.0, 2.01, 3.0)
+    lines = named_patterns.border((0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (0.0, 1.0))
+    lines += [
+        ((x, 0.0), (x, 1.0), letter, 90.0) for x, letter in zip(ends[1:4], "VMV", strict=True)
+    ]
+    thin = Ramped(flat_model(named_patterns.drawn(lines)))
+    assert 1e-10 < thin.tolerance < 1e-6
+    plain = Ramped(flat_model(named_patterns.drawn([*lines[:5], *lines[6:]])))
+    assert plain.tolerance == TOLERANCE
+
+
+def test_a_descent_goes_on_where_rounding_leaves_no_matrix_definite(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It raises mu until one is."""
+    model = flat_model(named_patterns.flat_only(regular(4, 4)))
+    ramped = Ramped(model)
+    definite, refused = Ramped.definite, []
+
+    def unwilling(self: Ramped, matrix: sparse.csc_array) -> Factor:
+        if len(refused) < 6:
+            refused.append(matrix)
+            raise RuntimeError("the matrix is not positive definite")
+        return definite(self, matrix)
+
+    monkeypatch.setattr(Ramped, "definite", unwilling)
+    raised = model.points + [[0.0, 0.0, 1e-2]] * (np.arange(len(model.points)) % 2)[:, None]
+    ended = descend(ramped, raised, 0.1, 1e-6, 200)
+    assert len(refused) == 6
+    assert ended.force <= 1e-6

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 import miurafab as mf
 from miurafab.errors import OptionError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.ruled import bent_corners
 from miurafab.origami.flat_folding import vertex_folds
 from miurafab.origami.folding import from_flat
 from miurafab.origami.folding.motion import find_motion
@@ -331,3 +332,34 @@ def test_rulings_between_a_curve_and_its_enlargements_meet_in_one_point() -> Non
     assert np.abs(normal @ point - offsets).max() < 1e-6
     top = pattern.vertices_coords[:, 1].max()
     assert point[1] - top == pytest.approx(60, abs=1e-6)  # above the sheet, where sizes vanish
+
+
+UNLIKE = ("M0 60 C20 60 25 85 50 85 S80 60 100 60", "M0 40 C30 40 35 50 50 30 S70 15 100 40")
+
+
+def test_every_corner_of_curves_that_are_not_alike_is_ruled_on_both_sides_and_folds() -> None:
+    """Rulings across one of these curves would cross those of the other, or run along a side; then
+    they go to another corner. A corner without one locks (this drawing was "lost" at once)."""
+    pattern = drawn_curves(*UNLIKE)
+    creased = np.isin(pattern.edges_assignment, ("M", "V"))
+    bent = bent_corners(pattern)
+    assert bent.sum() > 20
+    for face, edges in zip(pattern.faces_vertices, pattern.faces_edges, strict=True):
+        corners = face[face >= 0]
+        folds = creased[edges[: len(corners)]]
+        assert not (bent[corners] & folds & np.roll(folds, 1)).any()
+    found = find_motion(pattern, 4)
+    assert found.verdict is not None
+    assert found.verdict.complete
+    assert found.verdict.wrong_signs == 0
+    assert np.degrees(np.abs(found.motion.fold_angles[-1]).max()) > 90
+
+
+def test_curves_that_nearly_meet_leave_no_edges_finer_than_their_tolerance_tells() -> None:
+    """Two curves end beside the end of a line, 0.05 mm off where a curve may be 0.3 mm off."""
+    curves = "M0 50 C 10 50 20 30 40 30 S 50 40 60 49.95 L 100 50"
+    other = "M0 60 C 10 60 20 80 40 80 S 50 60 60 50"
+    pattern = drawn_curves(curves, other)
+    ends = pattern.vertices_coords[pattern.edges_vertices]
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min() > 0.075
+    assert "joined-ends" in [finding.code for finding in pattern.told]
