@@ -41,6 +41,7 @@ def test_the_barrier_is_what_was_asked(barrier, tmp_path):
 def test_a_higher_barrier_takes_a_larger_residual(monkeypatch):
     """Of the scaled sheets of one fit; a fit within a limit may have less residual and more."""
     monkeypatch.setattr(tuning, "LIMITS", ())
+    monkeypatch.setattr(tuning, "FAIRNESS", ())
     sheets = [asked.__wrapped__(barrier) for barrier in (1e-6, 5e-3)]
     worst = [sheet.measurements.max_flat_foldability for sheet in sheets]
     assert worst == sorted(worst)
@@ -58,6 +59,7 @@ def test_a_barrier_out_of_reach_is_told_with_what_there_is():
 def test_sheets_without_balance_end_the_search_with_what_there_is(monkeypatch):
     """On the way up to 0.01 a sheet is tried whose folded form is in no balance."""
     monkeypatch.setattr(tuning, "LIMITS", ())
+    monkeypatch.setattr(tuning, "FAIRNESS", ())
     result = fit("hypar:height=1", facets=(8, 8), barrier=1e-2)
     assert result.status == "infeasible"
     assert 1e-3 < result.barrier < 1e-2
@@ -204,8 +206,8 @@ def test_what_does_not_go_with_a_barrier_is_said(options, part):
 
 
 def test_fairness_gives_a_closer_sheet_with_the_same_barrier(monkeypatch):
-    found = asked(1e-3, "sphere")
     monkeypatch.setattr(tuning, "LIMITS", ())
+    found = asked.__wrapped__(1e-3, "sphere")
     monkeypatch.setattr(tuning, "FAIRNESS", ())
     scaled = asked.__wrapped__(1e-3, "sphere")
     assert (found.status, scaled.status) == ("converged", "converged")
@@ -215,7 +217,8 @@ def test_fairness_gives_a_closer_sheet_with_the_same_barrier(monkeypatch):
 
 def test_limits_on_the_residual_give_a_closer_sheet_with_the_same_barrier(monkeypatch):
     """eps_ff is tuned: from rougher residuals a high barrier is nearer to the target."""
-    found = asked(1e-3)
+    monkeypatch.setattr(tuning, "FAIRNESS", ())
+    found = asked.__wrapped__(1e-3)
     monkeypatch.setattr(tuning, "LIMITS", ())
     without = asked.__wrapped__(1e-3)
     assert (found.status, without.status) == ("converged", "converged")
