@@ -29,12 +29,12 @@ from miurafab.fabrication.options import Chosen
 from miurafab.fabrication.seams import Seams, border_seams, shell_points
 from miurafab.fabrication.tabs import (
     TabRegions,
-    base_first,
     clip_convex,
     edge_axes,
     inset_of,
     not_slender,
     not_steeper,
+    with_base,
 )
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import edge_lengths
@@ -136,7 +136,7 @@ def open_tabs(pattern: CreasePattern, edges: Ints, material: Material) -> TabReg
         normal = np.column_stack([way * np.sin(half[:, end]), -np.cos(half[:, end])])
         limit = inset + end * length * normal[:, 0]
         points, sides = clip_convex(points, sides, normal, limit)
-        points, sides = base_first(points, sides)
+        sides = with_base(points, sides)
     points, sides = not_steeper(points, sides, np.full(count, material.tabs.max_angle))
     points, sides = not_slender(points, sides)
     _, last, frame = edge_axes(pattern, edges, faces)

@@ -19,11 +19,11 @@ from miurafab.fabrication.seams import Seams
 from miurafab.fabrication.tabs import (
     NO_LIMIT,
     TabRegions,
-    base_first,
     clip_convex,
     in_mate,
     in_plane,
     tab_regions,
+    with_base,
 )
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import edge_lengths
@@ -54,7 +54,7 @@ def double_tabs(
     limit = np.where((slot < other.count[:, None]) & (size > 0), limit, NO_LIMIT)
     for k in range(1, image.shape[1]):
         points, count = clip_convex(points, count, normal[:, k], limit[:, k])
-    points, count = base_first(points, np.where(other.count >= 3, count, 0))
+    count = with_base(points, np.where(other.count >= 3, count, 0))
     points, count = _without_specks(points, count)
     slot = np.arange(points.shape[1])
     back = np.where(slot < count[:, None], (1 - slot) % np.maximum(count, 1)[:, None], slot)

@@ -218,12 +218,12 @@ def tab_regions(
         shared = other[:, k] & bearing[mate, k]
         limit = offset[:, k] + inset * np.linalg.norm(towards, axis=1)
         points, sides = clip_convex(points, sides, towards, np.where(shared, limit, NO_LIMIT))
-    points, sides = base_first(points, sides)
+    sides = with_base(points, sides)
     # If the facet is not convex at an end of its side, the line of the side continues inside it;
-    # what is found there stands beside the side.
+    # what is found there stands wholly beside the side.
     length = edge_lengths(pattern.vertices_coords, ends_of)
-    beside = (points[:, 0, 0] < -1e-9) | (points[:, 1, 0] > length + 1e-9)
-    sides = np.where(beside, 0, sides)
+    middle = (points[:, 0, 0] + points[:, 1, 0]) / 2
+    sides = np.where((middle > 0) & (middle < length), sides, 0)
     if not full_facet:
         largest = np.full(count, material.tabs.max_angle)
         if raised is not None:
@@ -278,7 +278,7 @@ def not_steeper(points: Floats, count: Ints, angle: Floats) -> tuple[Floats, Int
         # Only sides that are too steep are cut: elsewhere the clip would double the corner.
         steep = (count >= 3) & (np.einsum("nk,nk->n", beyond, normal) < limit - 1e-9)
         points, count = clip_convex(points, count, normal, np.where(steep, limit + 1e-9, NO_LIMIT))
-        points, count = base_first(points, count)
+        count = with_base(points, count)
     return points, count
 
 
@@ -316,15 +316,9 @@ def clip_convex(points: Floats, count: Ints, normal: Floats, limit: Floats) -> t
     return np.take_along_axis(handed, order[..., None], axis=1), total
 
 
-def base_first(points: Floats, count: Ints) -> tuple[Floats, Ints]:
-    """The polygons with their base, the two corners on y = 0, as first side; those without a
-    base are left without corners.
+def with_base(points: Floats, count: Ints) -> Ints:
+    """The ``count`` of corners of the polygons that still have their base, the first two corners on
+    y = 0; 0 for the others. A clip cuts the base at its ends, or takes all of it.
     """
-    slot = np.arange(points.shape[1])
-    real = slot < count[:, None]
-    on_line = real & (points[..., 1] == 0.0)
-    start = np.where(on_line, points[..., 0], np.inf).argmin(axis=1)
-    count = np.where(on_line.sum(axis=1) == 2, count, 0)
-    turn = (slot + start[:, None]) % np.maximum(count, 1)[:, None]
-    turn = np.where(slot < count[:, None], turn, slot)
-    return np.take_along_axis(points, turn[..., None], axis=1), count
+    based = (count >= 3) & (points[:, :2, 1] == 0.0).all(axis=1)
+    return np.where(based, count, 0)

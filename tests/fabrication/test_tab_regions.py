@@ -543,3 +543,17 @@ def test_a_double_tab_without_its_other_half_is_not_kept():
     kept = np.array([True, True, False, True, False, False, True, False])
     assert pairs.edge[:3].tolist() == pairs.edge[3:6].tolist()
     assert in_pairs(pairs, kept).tolist() == [True, False, False, True, False, False, True, False]
+
+
+def test_slots_keep_clear_of_the_ticks_that_are_asked_for():
+    pattern, patches, material = miura(3, 1, a=30.0, b=20.0), np.arange(3), card()
+    bases = []
+    for ticks in (None, 3.0):
+        options = LayoutOptions(join="slots", ticks_mm=ticks)
+        tabs, _, _ = choose_tabs(pattern, patches, material, options)
+        alone = slotted_tabs(
+            pattern, tabs.seams, material, None, np.full(len(tabs), False), ticks or 0.0
+        )
+        np.testing.assert_allclose(tabs.points, alone.points, atol=1e-9)
+        bases.append(np.linalg.norm(tabs.points[:, 1] - tabs.points[:, 0], axis=1))
+    assert not np.isclose(*bases).any()
