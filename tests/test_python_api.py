@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import subprocess
 import sys
+from dataclasses import replace
 
 import matplotlib as mpl
 import numpy as np
@@ -184,6 +185,12 @@ WRONG = {
     "tradeoff": lambda sheet: mf.tradeoff("hypar", 3),
     "sheets(machine)": lambda sheet: mf.sheets(sheet, machine=3),
     "sheets(option)": lambda sheet: mf.sheets(sheet, gapp=3),
+    "sheets(changed machine)": lambda sheet: mf.sheets(
+        sheet, machine=replace(mf.load_machine("grbl-laser-400"), title="Mine")
+    ),
+    "sheets(changed material)": lambda sheet: mf.sheets(
+        sheet, material=replace(mf.load_material("card-250"), kerf_mm=0.3)
+    ),
     "preview(3)": lambda sheet: mf.preview(3),
     "preview(pattern)": lambda sheet: mf.preview(sheet),
     "cut(port)": lambda sheet: mf.cut(sheet.pattern, port=5),
