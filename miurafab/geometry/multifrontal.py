@@ -63,30 +63,35 @@ class _Front:
 
 
 class FrontalPlan:
-    """The order of elimination of a symmetric ``pattern``, and where each number goes."""
+    """The order of elimination of a symmetric ``pattern``, and where each number goes.
 
-    def __init__(self, pattern: sparse.csc_array) -> None:
-        separators = dissect(pattern)
+    The order is that of the nested dissection, or that of ``parts``, the unknowns that are
+    eliminated together.
+    """
+
+    def __init__(self, pattern: sparse.csc_array, parts: list[Ints] | None = None) -> None:
+        self.parts = [s.columns for s in dissect(pattern)] if parts is None else parts
         count = pattern.shape[0]
-        self.order: Ints = np.concatenate(
-            [np.zeros(0, dtype=np.int64), *(s.columns for s in separators)]
-        )
+        self.order: Ints = np.concatenate([np.zeros(0, dtype=np.int64), *self.parts])
         place = np.empty(count, dtype=np.int64)
         place[self.order] = np.arange(count)
         self.fronts: list[_Front] = []
+        self.work = 0.0
         indptr = pattern.indptr.astype(np.int64)
+        ends = np.cumsum([len(columns) for columns in self.parts])
+        below: list[list[int]] = [[] for _ in self.parts]
         start = 0
-        for separator in separators:
-            columns = separator.columns
+        for index, columns in enumerate(self.parts):
             size = len(columns)
             end = start + size
+            children = below[index]
             counts = indptr[columns + 1] - indptr[columns]
             source = np.repeat(indptr[columns], counts) + places_in_runs(counts)
             row = place[pattern.indices[source]]
             column = np.repeat(np.arange(size), counts)
             lower = row >= start + column
             source, row, column = source[lower], row[lower], column[lower]
-            later = [self.fronts[child].border for child in separator.children]
+            later = [self.fronts[child].border for child in children]
             border = np.unique(np.concatenate([row, *later]))
             border = border[np.searchsorted(border, end) :]
             own = row < end
@@ -101,10 +106,13 @@ class FrontalPlan:
                     source[~own],
                     [
                         _handover(child, self.fronts[child].border, start, end, border)
-                        for child in separator.children
+                        for child in children
                     ],
                 )
             )
+            if len(border):  # it is passed on to where the first of its unknowns is eliminated
+                below[int(np.searchsorted(ends, border[0], side="right"))].append(index)
+            self.work += float(size) * (size + len(border)) ** 2
             start = end
 
     def factor(self, numbers: Floats) -> FrontalFactor:

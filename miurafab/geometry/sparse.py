@@ -20,6 +20,10 @@ from scipy.sparse.linalg import SuperLU, splu
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.multifrontal import FrontalPlan
 
+MORE_WORK = 1.5
+"""A pattern that has grown gets an order of its own if in the old order its factor takes so many
+times the work that the factor took as the order was made."""
+
 
 class Factor(Protocol):
     """A factored matrix of n rows."""
@@ -35,12 +39,12 @@ class SymmetricSolver:
     The order of elimination, and where each number of a matrix goes, are kept from call to call.
     SciPy's products leave out entries that happen to be zero, so patterns of the same problem
     differ a little: a matrix with fewer entries is filled up with zeros, and new entries join the
-    pattern for all calls that follow. A matrix of another size begins anew.
+    pattern for all calls that follow, in the same order of elimination as long as that is good for
+    them (``MORE_WORK``). A matrix of another size begins anew.
     """
 
     def __init__(self) -> None:
-        self._pattern = sparse.csc_array((0, 0))
-        self._plan = FrontalPlan(self._pattern)
+        self.expect(sparse.csc_array((0, 0)))
 
     @property
     def size(self) -> int:
@@ -51,6 +55,7 @@ class SymmetricSolver:
         """Plan for matrices whose entries are among those of ``pattern``."""
         self._pattern = _ones(pattern)
         self._plan = FrontalPlan(self._pattern)
+        self._work = self._plan.work
 
     def factor(self, matrix: sparse.csc_array) -> Factor:
         """The factor of ``matrix``, which stores both triangles, with sorted indices.
@@ -61,10 +66,19 @@ class SymmetricSolver:
             self.expect(matrix)
         numbers = self._filled_up(matrix)
         if numbers is None:
-            self.expect(self._pattern + _ones(matrix))
+            self._grow(_ones(matrix))
             numbers = self._filled_up(matrix)
             assert numbers is not None
         return self._plan.factor(numbers)
+
+    def _grow(self, more: sparse.csc_array) -> None:
+        """Plan for the entries of ``more`` as well."""
+        pattern = _ones(self._pattern + more)
+        plan = FrontalPlan(pattern, self._plan.parts)
+        if plan.work > MORE_WORK * self._work:
+            self.expect(pattern)
+        else:
+            self._pattern, self._plan = pattern, plan
 
     def _filled_up(self, matrix: sparse.csc_array) -> Floats | None:
         """The numbers of ``matrix`` at the entries of the pattern; None if it lacks entries."""

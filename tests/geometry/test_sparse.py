@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from miurafab.geometry import multifrontal
 from miurafab.geometry.dissection import dissect
 from miurafab.geometry.sparse import SymmetricSolver, factor_symmetric, minimum_degree
 
@@ -97,6 +98,35 @@ def test_a_solver_factors_a_matrix_without_joins():
     numbers = np.arange(1.0, 501.0)
     solution = SymmetricSolver().factor(sparse.diags_array(numbers).tocsc()).solve(np.ones(500))
     assert solution == pytest.approx(1 / numbers)
+
+
+def test_a_pattern_that_grows_keeps_its_order_while_that_is_good_for_it(monkeypatch):
+    """Couplings of neighbours' neighbours, one by one, and then of many unknowns far apart."""
+    made = []
+
+    def counted(pattern):
+        made.append(pattern.nnz)
+        return dissect(pattern)
+
+    monkeypatch.setattr(multifrontal, "dissect", counted)
+    side, solver = 24, SymmetricSolver()
+    matrix = positive_definite(side, 3)
+    random = np.random.default_rng(8)
+    right = random.normal(size=(side**2, 2))
+
+    def coupled(one, other):
+        both = np.concatenate([one, other]), np.concatenate([other, one])
+        more = sparse.coo_array((np.full(2 * len(one), 1e-3), both), shape=matrix.shape)
+        return (matrix + more.tocsc()).tocsc()
+
+    for place in [None, 50, 201, 333, 402, 505]:
+        if place is not None:
+            matrix = coupled(np.array([place]), np.array([place + 3]))
+        assert matrix @ solver.factor(matrix).solve(right) == pytest.approx(right)
+    assert len(made) == 2  # of no matrix, and of the first
+    matrix = coupled(*random.permutation(side**2)[:400].reshape(2, -1))
+    assert matrix @ solver.factor(matrix).solve(right) == pytest.approx(right)
+    assert len(made) == 3
 
 
 def test_an_empty_matrix_has_an_empty_solution():
