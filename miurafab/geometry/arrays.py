@@ -24,6 +24,16 @@ def places_in_runs(counts: Ints) -> Ints:
     return np.arange(counts.sum()) - np.repeat(run_starts(counts), counts)
 
 
+def places_among(known: Ints, wanted: Ints) -> Ints:
+    """(n,) the place of each of ``wanted`` (n,) among the ``known`` (m,), which ascend; -1 where it
+    is none of them.
+    """
+    if not len(known):
+        return np.full(len(wanted), -1, dtype=np.int64)
+    at = np.searchsorted(known, wanted).clip(max=len(known) - 1)
+    return np.asarray(np.where(known[at] == wanted, at, -1))
+
+
 def vector_product(a: Floats, b: Floats) -> Floats:
     """(..., 3) the vector product of ``a`` and ``b``, of which the last axis holds x, y, z.
 

@@ -30,7 +30,7 @@ from scipy import sparse
 
 from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.sparse import Factor, SymmetricSolver, factor_symmetric
-from miurafab.origami.energy.assembly import Assembly
+from miurafab.origami.energy.assembly import NO_TOUCH, Assembly, Touch
 from miurafab.origami.energy.bar_hinge import BarHingeModel
 from miurafab.origami.energy.hinges import hinge_derivatives, hinge_gradients
 
@@ -108,20 +108,6 @@ class Drive(NamedTuple):
     hessian: Floats
 
 
-class Touch(NamedTuple):
-    """n springs between four vertices each: their ``stencils`` (n, 4), and the ``forces`` (n, 4, 3)
-    and ``stiffness`` (n, 4, 4, 3, 3), gradient and Hessian of their energy; the stiffness may be
-    left out.
-    """
-
-    stencils: Ints
-    forces: Floats
-    stiffness: Floats
-
-
-NO_TOUCH = Touch(np.empty((0, 4), dtype=np.int64), np.empty((0, 4, 3)), np.empty((0, 4, 4, 3, 3)))
-
-
 @dataclass(frozen=True, eq=False)
 class Balance:
     """The forces of a model and what drives it; this class drives nothing.
@@ -184,9 +170,8 @@ class Balance:
         along = model.bar_vectors(points)
         pull = (state.forces / model.lengths)[:, None] * along
         drive = self.drive(points, target)
-        push = self.touch(points, stiff=False)
         force = self._gather(bend, pull, state.mu * drive.gradient)
-        force += self.assembly.scattered(push.stencils, push.forces)
+        force += self.assembly.scattered(self.touch(points, stiff=False))
         strain = model.strains_of(along) - model.compliance * state.forces
         return Residual(force, strain, drive.value - target)
 
@@ -223,9 +208,8 @@ class Balance:
         drive = self.drive(points, target)
         across = drive.gradient[:, None, :, None] * drive.gradient[None, :, None, :]
         held = state.mu * drive.hessian + across / EPS
-        matrix = self.assembly.matrix([blocks, stretch_blocks(block), held[None]])
-        touch = self.touch(points)
-        return self.assembly.joined(matrix, touch.stencils, touch.stiffness)
+        groups = [blocks, stretch_blocks(block), held[None]]
+        return self.assembly.matrix(groups, self.touch(points))
 
     def factored(self, matrix: sparse.csc_array) -> Factor:
         """The factor of a ``matrix`` of :attr:`assembly`: by Cholesky, five times as fast, where

@@ -27,13 +27,9 @@ from scipy import sparse
 
 from miurafab.geometry.arrays import Floats
 from miurafab.geometry.sparse import Factor
-from miurafab.origami.energy.equilibrium import (
-    NO_TOUCH,
-    Balance,
-    EquilibriumState,
-    Touch,
-    stretch_blocks,
-)
+from miurafab.origami.energy.assembly import NO_TOUCH, Touch
+from miurafab.origami.energy.bar_hinge import BarHingeModel
+from miurafab.origami.energy.equilibrium import Balance, EquilibriumState, stretch_blocks
 from miurafab.origami.energy.hinges import hinge_angles, hinge_gradients
 from miurafab.origami.energy.touch_pairs import REACH
 from miurafab.origami.energy.touching import (
@@ -87,8 +83,14 @@ class Ramped(Balance):
 
     def with_pairs(self, pairs: TouchPairs) -> Ramped:
         """The same model with ``pairs``. It shares ``last``."""
-        made = copy.copy(self)  # with what is known of the sums
-        object.__setattr__(made, "pairs", pairs)
+        made = copy.copy(self)  # the sums as well, even if nothing has asked for them yet
+        vars(made).update(pairs=pairs, assembly=self.assembly, _solver=self._solver)
+        return made
+
+    def made_of(self, model: BarHingeModel) -> Ramped:
+        """``model``, whose springs join the same vertices, with the sums of this one."""
+        made = Ramped(model)
+        vars(made).update(assembly=self.assembly, _solver=self._solver)
         return made
 
     def touch(self, points: Floats, *, stiff: bool = True, definite: bool = False) -> Touch:
@@ -131,15 +133,14 @@ class Ramped(Balance):
         bend = moment[:, None, None] * turn
         pulls = np.stack([-pull, pull], axis=1)
         gradient = self.assembly.gather([bend, pulls, np.zeros((0, 3))])
-        gradient += self.assembly.scattered(push.stencils, push.forces)
+        gradient += self.assembly.scattered(push)
         outer = turn[:, :, None, :, None] * turn[:, None, :, None, :]
         block = bars[:, :, None] * bars[:, None, :] / model.compliance[:, None, None]
         block += (np.maximum(forces, 0.0) / model.lengths)[:, None, None] * np.eye(3)
         bent = slope[:, None, None, None, None] * outer
         stretched = stretch_blocks(block)
         none = np.zeros((1, 0, 0, 3, 3))
-        matrix = self.assembly.matrix([bent, stretched, none])
-        return gradient, self.assembly.joined(matrix, push.stencils, push.stiffness)
+        return gradient, self.assembly.matrix([bent, stretched, none], push)
 
     def definite(self, matrix: sparse.csc_array) -> Factor:
         """The factor of ``matrix``. Raises ``RuntimeError`` where it is not positive definite."""

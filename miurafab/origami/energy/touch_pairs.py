@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints, places_among
 from miurafab.geometry.nearest import tree_of
 from miurafab.origami.energy.touching import HEIGHT, TouchPairs, gaps
 
@@ -61,9 +61,8 @@ class NearPairs:
         near = np.flatnonzero(distance <= reach)
         keys, stencils, edges = keys[near], stencils[near], edges[near]
         height = np.full(len(near), HEIGHT)
-        if len(self._low):
-            at = np.searchsorted(self._low, keys).clip(max=len(self._low) - 1)
-            height = np.where(self._low[at] == keys, self._heights[at], height)
+        at = places_among(self._low, keys)
+        height[at >= 0] = self._heights[at[at >= 0]]
         weight = np.where(edges, _crossing(points, stencils), 1.0)
         return keys, TouchPairs(stencils, edges, height, weight, points, distance[near])
 
@@ -91,6 +90,10 @@ class NearPairs:
         apart = np.linalg.norm(middle[one] - middle[other], axis=1)
         near = apart <= half[one] + half[other] + reach
         one, other = one[near], other[near]
+        low, high = ends.min(axis=1), ends.max(axis=1)
+        beside = np.maximum(low[one] - high[other], low[other] - high[one])
+        near = (beside <= reach).all(axis=1)
+        one, other = one[near], other[near]
         free = self._apart(self._edges[one], self._edges[other])
         return one[free], other[free]
 
@@ -98,7 +101,7 @@ class NearPairs:
         """(n,) whether what has the vertices ``one`` (n, k) and ``other`` (n, 4 - k) is a pair."""
         common = (one[:, :, None] == other[:, None, :]).any(axis=(1, 2))
         keys = self._keys(np.concatenate([one, other], axis=1))
-        return np.asarray(~common & ~np.isin(keys, self._hinges))
+        return np.asarray(~common & (places_among(self._hinges, keys) < 0))
 
     def _keys(self, corners: Ints) -> Ints:
         """(n,) a number for each set of four vertices (n, 4)."""

@@ -25,13 +25,14 @@ something would pass through something else, so that nothing ever does.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from miurafab.geometry.arrays import Bools, Floats, Ints
-from miurafab.origami.energy.equilibrium import Touch
+from miurafab.origami.energy.assembly import Touch
 
 HEIGHT = 0.02
 """h, in mean edges."""
@@ -45,20 +46,25 @@ NEARER, LEFT, LOOKS = 0.9, 0.2, 40
 """Of a way: the part of what is certainly free that is gone before the next look, the part of the
 distance that has to be left, and the most looks."""
 
-_INSIDE = np.array(
+_SLOPES: Floats = np.expand_dims(
+    [[[0.0, 1, -1, 0], [0, 1, 0, -1]], [[1, -1, 0, 0], [0, 0, -1, 1]]], -1
+)
+"""The slopes of the parts, of a vertex over a triangle and of edges that cross."""
+_SIDES: Floats = np.array(
     [
-        [[1.0, -1, 0, 0], [0, 1, -1, 0], [0, 1, 0, -1]],
-        [[-1.0, 0, 1, 0], [1, -1, 0, 0], [0, 0, -1, 1]],
+        [
+            [[1.0, -1, 0, 0], [1, 0, -1, 0], [1, 0, 0, -1], [1, 0, 0, -1]],
+            [[0, 1, -1, 0], [0, 0, 1, -1], [0, -1, 0, 1], [0, -1, 0, 1]],
+        ],
+        [
+            [[-1.0, 0, 1, 0], [0, -1, 1, 0], [-1, 0, 1, 0], [-1, 0, 0, 1]],
+            [[0, 0, -1, 1], [0, 0, -1, 1], [1, -1, 0, 0], [1, -1, 0, 0]],
+        ],
     ]
 )
-"""The base and both slopes of the parts, of a vertex over a triangle and of edges that cross."""
-_SIDES = (
-    np.array([[[1.0, -1, 0, 0], [1, 0, -1, 0], [1, 0, 0, -1]]] * 2),
-    np.array([[[-1.0, 0, 1, 0], [0, -1, 1, 0], [-1, 0, 1, 0], [-1, 0, 0, 1]]] * 2),
-)
-_SIDES[0][1] = [[0, 1, -1, 0], [0, 0, 1, -1], [0, -1, 0, 1]]
-_SIDES[1][1] = [[0, 0, -1, 1], [0, 0, -1, 1], [1, -1, 0, 0], [1, -1, 0, 0]]
-"""The bases and slopes with one place: a vertex and a side, or an end of an edge and the other."""
+"""The bases and slopes with one place: a vertex and a side, the third of which stands twice, and an
+end of an edge and the other edge.
+"""
 
 
 class Gap(NamedTuple):
@@ -107,19 +113,24 @@ class TouchPairs:
 
     def closing(self, moves: Floats) -> Floats:
         """(n,) by how much ``moves`` (V, 3) of the vertices can bring pairs nearer, at most."""
-        own = moves[self.stencils]
-        own = own - own.mean(axis=1, keepdims=True)
-        far = np.sqrt(np.einsum("nck,nck->nc", own, own))
-        other = np.maximum(far[:, 2], far[:, 3])
-        on_edges = np.maximum(far[:, 0], far[:, 1]) + other
-        return np.asarray(np.where(self.edges, on_edges, far[:, 0] + np.maximum(far[:, 1], other)))
+        own = _corners(moves, self.stencils)
+        own -= own.sum(axis=1, keepdims=True) / 4
+        far = np.sqrt(_dot(own, own))
+        other = np.maximum(far[2], far[3])
+        one = np.where(self.edges, np.maximum(far[0], far[1]), np.maximum(far[1], other))
+        return np.asarray(np.where(self.edges, other, far[0]) + one)
 
     def nearer_than(self, within: Floats | float, points: Floats) -> tuple[Ints, Gap]:
         """The numbers of the pairs nearer than ``within`` at ``points`` (V, 3), and their gaps."""
-        if not len(self.edges):
-            return np.empty(0, dtype=np.int64), NO_GAP
-        may = np.flatnonzero(self.distance - self.closing(points - self.seen) < within)
-        it = gaps(points, self.stencils[may], self.edges[may])
+        moves = points - self.seen
+        may = np.flatnonzero(self.distance - most_closing(moves) < within)
+        if not len(may):
+            return may, NO_GAP
+        pairs = self.those(may)
+        limit = within[may] if isinstance(within, np.ndarray) else within
+        near = np.flatnonzero(pairs.distance - pairs.closing(moves) < limit)
+        may = may[near]
+        it = gaps(points, pairs.stencils[near], pairs.edges[near])
         limit = within[may] if isinstance(within, np.ndarray) else within
         live = np.flatnonzero(it.distance < limit)
         return may[live], Gap(*(array[live] for array in it))
@@ -141,55 +152,64 @@ NO_PAIRS = TouchPairs(
 )
 
 
+def most_closing(moves: Floats) -> float:
+    """By how much ``moves`` (V, 3) of the vertices can bring any pair nearer, at most."""
+    apart = moves - moves.mean(axis=0)
+    # a mean of four vertices is within this of the mean of all, and each is within 3/2 of it
+    return 3 * math.sqrt(float(np.einsum("vx,vx->v", apart, apart).max(initial=0.0)))
+
+
 def gaps(points: Floats, stencils: Ints, edges: Bools) -> Gap:
     """The nearest points of pairs at ``points`` (V, 3)."""
-    corners = points[stencils]
-    crossing = len(edges) - int(edges.sum())  # vertices and triangles stand first
-    parts = (_gaps(corners[:crossing], 0), _gaps(corners[crossing:], 1))
-    return Gap(*(np.concatenate(both) for both in zip(*parts, strict=True)))
+    return _gaps(_corners(points, stencils), edges)
 
 
-def _gaps(corners: Floats, kind: int) -> Gap:
-    """The nearest points of pairs of one kind with ``corners`` (n, 4, 3)."""
-    count = len(corners)
+def _gaps(x: Floats, edges: Bools) -> Gap:
+    """The nearest points of pairs with the corners ``x`` (3, 4, n)."""
+    count = x.shape[2]
     if not count:
         return NO_GAP
-    x = corners.transpose(1, 2, 0).reshape(4, -1)  # coordinates in rows
-    base, slopes = _INSIDE[kind][0], _INSIDE[kind][1:]
-    u, first, second = (_INSIDE[kind] @ x).reshape(3, 3, count)
+    u = np.where(edges, x[:, 2] - x[:, 0], x[:, 0] - x[:, 1])
+    first = np.where(edges, x[:, 0], x[:, 1]) - np.where(edges, x[:, 1], x[:, 2])
+    second = np.where(edges, x[:, 3] - x[:, 2], x[:, 1] - x[:, 3])
     d11, d12, d22 = _dot(first, first), _dot(first, second), _dot(second, second)
     p1, p2 = _dot(u, first), _dot(u, second)
     det = d11 * d22 - d12 * d12
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         s, t = (d12 * p2 - d22 * p1) / det, (d12 * p1 - d11 * p2) / det
-        least = np.minimum(s, t)
-        last = 1 - (np.maximum(s, t) if kind else s + t)
-        free = (det > SLENDER * d11 * d22) & (np.minimum(least, last) > 0)
+        last = 1 - np.where(edges, np.maximum(s, t), s + t)
+        free = (det > SLENDER * d11 * d22) & (np.minimum(np.minimum(s, t), last) > 0)
     s, t = np.where(free, s, 0.0), np.where(free, t, 0.0)
-    part = base[:, None] + slopes[0][:, None] * s + slopes[1][:, None] * t
-    slope = np.where(free, slopes[:, :, None], 0.0)
+    part = np.stack(
+        [
+            np.where(edges, s - 1, 1.0),
+            np.where(edges, -s, s + t - 1),
+            np.where(edges, 1 - t, -s),
+            np.where(edges, t, -t),
+        ]
+    )
+    slope = np.where(edges, _SLOPES[1], _SLOPES[0]) * free
     rest = np.flatnonzero(~free)
     if len(rest):
-        own = x.reshape(4, 3, count)[..., rest].reshape(4, -1)
-        part[:, rest], slope[0][:, rest] = _on_sides(own, len(rest), kind)
-    direction = np.einsum("kn,kxn->nx", part, x.reshape(4, 3, count))
-    distance = np.sqrt(np.einsum("nx,nx->n", direction, direction))
-    return Gap(distance, direction, part.T, slope.transpose(2, 0, 1))
+        part[:, rest], slope[0][:, rest] = _on_sides(x[..., rest], edges[rest])
+    direction = (part * x).sum(axis=1)
+    distance = np.sqrt(_dot(direction, direction))
+    return Gap(distance, direction.T, part.T, slope.transpose(2, 0, 1))
 
 
-def _on_sides(x: Floats, count: int, kind: int) -> tuple[Floats, Floats]:
-    """The parts (4, n) of pairs with corners ``x`` (4, 3 n) whose nearest points have one place or
+def _on_sides(x: Floats, edges: Bools) -> tuple[Floats, Floats]:
+    """The parts (4, n) of pairs with corners ``x`` (3, 4, n) whose nearest points have one place or
     none, and its slopes (4, n); zero where it ends at a corner.
     """
-    bases, slopes = _SIDES[kind]
-    u, along = (bases @ x).reshape(-1, 3, count), (slopes @ x).reshape(-1, 3, count)
+    u, along = (np.where(edges, _SIDES[1, k] @ x, _SIDES[0, k] @ x) for k in (0, 1))
     with np.errstate(invalid="ignore", divide="ignore"):
-        at = np.clip(-(u * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
-    u += at[:, None] * along
-    side = np.argmin((u * u).sum(axis=1), axis=0)
-    place = at[side, np.arange(count)]
-    slope = slopes[side].T
-    return bases[side].T + slope * place, slope * ((place > 0) & (place < 1))
+        at = np.clip(-_dot(u, along) / _dot(along, along), 0.0, 1.0)
+    u += at * along
+    side = np.argmin(_dot(u, u), axis=0)
+    place = at[side, np.arange(len(side))]
+    kind = edges.astype(np.int64)
+    base, slope = (_SIDES[kind, k, side].T for k in (0, 1))
+    return base + slope * place, slope * ((place > 0) & (place < 1))
 
 
 def touch(
@@ -200,6 +220,7 @@ def touch(
 
     With ``definite`` the stiffness leaves out the curvature of the distances.
     """
+    soon = pairs.stencils
     live, it = pairs.touching(points)
     pairs = pairs.those(live)
     normal = it.direction / it.distance[:, None]
@@ -210,13 +231,13 @@ def touch(
     slope = STIFFNESS * pairs.weight * (2 * log + (4 + near / d) * near / d)
     forces = push[:, None, None] * gradient
     if not stiff:
-        return Touch(pairs.stencils, forces, np.empty((0, 4, 4, 3, 3)))
+        return Touch(pairs.stencils, forces, np.empty((0, 4, 4, 3, 3)), soon)
     outer = gradient[:, :, None, :, None] * gradient[:, None, :, None, :]
     stiffness = slope[:, None, None, None, None] * outer
     if not definite:
         curved = _curvature(points[pairs.stencils], it, normal)
         stiffness += push[:, None, None, None, None] * curved
-    return Touch(pairs.stencils, forces, stiffness)
+    return Touch(pairs.stencils, forces, stiffness, soon)
 
 
 def touch_energy(points: Floats, pairs: TouchPairs) -> float:
@@ -232,14 +253,19 @@ def _curvature(corners: Floats, it: Gap, normal: Floats) -> Floats:
     legs = it.slopes @ corners
     c = it.part[:, :, None, None] * legs[:, None]
     c += it.slopes.transpose(0, 2, 1)[..., None] * it.direction[:, None, None]
+    slid = c.transpose(0, 1, 3, 2).reshape(-1, 12, 2)
     square = legs @ legs.transpose(0, 2, 1)
     for place in (0, 1):  # one that is not free does not slide
         square[:, place, place] += ~it.slopes[:, place].any(axis=1)
-    slid = np.linalg.solve(square[:, None], c)
+    adjoint = np.empty_like(square)
+    adjoint[:, 0, 0], adjoint[:, 1, 1] = square[:, 1, 1], square[:, 0, 0]
+    adjoint[:, 0, 1] = adjoint[:, 1, 0] = -square[:, 0, 1]
+    adjoint /= (square[:, 0, 0] * square[:, 1, 1] - square[:, 0, 1] ** 2)[:, None, None]
     across = np.eye(3) - normal[:, :, None] * normal[:, None, :]
     parts = it.part[:, :, None] * it.part[:, None, :]
     curved = parts[..., None, None] * across[:, None, None]
-    curved -= np.einsum("nkix,nliy->nklxy", c, slid)
+    sliding = slid @ adjoint @ slid.transpose(0, 2, 1)
+    curved -= sliding.reshape(-1, 4, 3, 4, 3).swapaxes(2, 3)
     return np.asarray(curved / it.distance[:, None, None, None, None])
 
 
@@ -247,33 +273,55 @@ def free_way(points: Floats, step: Floats, pairs: TouchPairs) -> float:
     """The part of the ``step`` (V, 3) from ``points`` (V, 3), at most 1, on which all ``pairs``
     keep a fifth of their distance.
 
-    Each pair is followed by conservative advancement: it cannot come nearer by more than its
-    vertices move beyond their mean.
+    Each pair is followed by conservative advancement, from one time to the next up to which it is
+    certain to stay apart.
     """
-    certain = pairs.distance - pairs.closing(points - pairs.seen)
+    moves = points - pairs.seen
+    kept = NEARER * (1 - LEFT)
+    pairs = pairs.those(kept * (pairs.distance - most_closing(moves)) < most_closing(step))
     speed = pairs.closing(step)
-    may = np.flatnonzero(NEARER * (1 - LEFT) * certain < speed)
+    may = np.flatnonzero(kept * (pairs.distance - pairs.closing(moves)) < speed)
     if not len(may):
         return 1.0
-    pairs, speed = pairs.those(may), speed[may]
-    distance = gaps(points, pairs.stencils, pairs.edges).distance
-    left = np.maximum(LEFT * distance, np.minimum(distance, CLOSEST))
-    at, least = np.zeros(len(speed)), 1.0
+    edges, at, least = pairs.edges[may], np.zeros(len(may)), 1.0
+    start, going = (_corners(each, pairs.stencils[may]) for each in (points, step))
+    it = _gaps(start, edges)
+    left = np.maximum(LEFT * it.distance, np.minimum(it.distance, CLOSEST))
     for _ in range(LOOKS):
-        with np.errstate(divide="ignore"):  # what does not move comes no nearer
-            at = at + NEARER * np.maximum(distance - left, 0.0) / speed
-        going = np.flatnonzero(at < least)
-        if not len(going):
+        at = at + NEARER * _free_time(start + at * going, going, it, left, edges)
+        on = np.flatnonzero(at < least)
+        if not len(on):
             return least
-        at, speed, left, pairs = at[going], speed[going], left[going], pairs.those(going)
-        corners = points[pairs.stencils] + at[:, None, None] * step[pairs.stencils]
-        numbers = np.arange(4 * len(at)).reshape(-1, 4)
-        distance = gaps(corners.reshape(-1, 3), numbers, pairs.edges).distance
-        ended = distance <= 1.5 * left
+        at, left, edges, start, going = at[on], left[on], edges[on], start[..., on], going[..., on]
+        it = _gaps(start + at * going, edges)
+        ended = it.distance <= 1.5 * left
         least = min(least, float(at[ended].min(initial=least)))
     return min(least, float(at.min()))
 
 
+def _free_time(x: Floats, going: Floats, it: Gap, left: Floats, edges: Bools) -> Floats:
+    """(n,) how long pairs with corners ``x`` (3, 4, n), which move by ``going`` (3, 4, n) in the
+    time 1, certainly stay farther from each other than ``left`` (n,).
+
+    A pair is never nearer than its corners are along any one direction. Along that of its distance
+    they are just as far.
+    """
+    normal = (it.direction / it.distance[:, None]).T[:, None]
+    far, fast = ((normal * each).sum(axis=0) for each in (x, going))
+    apart, speed = (
+        np.where(edges, each[[2, 2, 3, 3]] - each[[0, 1, 0, 1]], each[0] - each[[1, 2, 3, 3]])
+        for each in (far, fast)
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        time = np.where(speed < 0, np.maximum(apart - left, 0.0) / -speed, np.inf)
+    return np.asarray(np.where(it.distance > CLOSEST, time.min(axis=0), 0.0))
+
+
+def _corners(points: Floats, stencils: Ints) -> Floats:
+    """(3, 4, n) the coordinates of the ``stencils`` (n, 4) among ``points`` (V, 3)."""
+    return np.ascontiguousarray(points.T).take(stencils.T, axis=1)
+
+
 def _dot(a: Floats, b: Floats) -> Floats:
-    """(n,) the products of the columns of ``a`` and ``b`` (3, n)."""
+    """The products of ``a`` and ``b`` (3, ...), over the first axis."""
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])

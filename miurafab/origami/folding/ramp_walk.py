@@ -97,8 +97,9 @@ class RampWalk:
         firmer = np.where(model.rest == 0, FIRMER, 1.0) * model.stiffness
         firmer[model.ruled] = model.stiffness[model.ruled]
         hard = replace(model, compliance=np.zeros_like(model.compliance), stiffness=firmer)
-        self._stiff = Ramped(hard)
-        self._half = Ramped(replace(hard, compliance=HALF_WAY * model.compliance))
+        self._stiff = self._soft.made_of(hard)
+        half = replace(hard, compliance=HALF_WAY * model.compliance)
+        self._half = self._soft.made_of(half)
         self._known: list[Known] = []
         self._factored: Factored | None = None
         self._step = FIRST

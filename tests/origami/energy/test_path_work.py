@@ -7,7 +7,7 @@ import pytest
 from problems import fitted
 
 from miurafab.origami.energy import equilibrium
-from miurafab.origami.energy.assembly import Assembly
+from miurafab.origami.energy.assembly import Assembly, Touch
 from miurafab.origami.energy.continuation import LONGEST, Known, Walk
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.energy.driven import Driven
@@ -87,3 +87,21 @@ def test_the_matrix_is_the_sum_of_its_blocks_in_the_order_of_elimination():
     assert matrix.toarray() == pytest.approx(dense[inner], abs=1e-14)
     assert matrix.nnz == stored[inner].sum()
     assert matrix.has_sorted_indices
+    loose, soon = (np.stack([rng.permutation(30)[:4] for _ in range(k)]) for k in (6, 9))
+    pushes = rng.normal(size=(6, 4, 4, 3, 3))
+    held = assembly.matrix(blocks, Touch(loose, np.empty((6, 4, 3)), pushes, soon))
+    met = stored.copy()
+    for vertices in np.concatenate([loose, soon]):
+        at = (vertices[:, None] * 3 + np.arange(3)).ravel()
+        met[np.ix_(at, at)] = True
+    pushed = dense.copy()
+    for vertices, block in zip(loose, pushes, strict=True):
+        at = (vertices[:, None] * 3 + np.arange(3)).ravel()
+        pushed[np.ix_(at, at)] += block.swapaxes(1, 2).reshape(12, 12)
+    assert held.toarray() == pytest.approx(pushed[inner], abs=1e-14)
+    assert held.nnz == met[inner].sum() > matrix.nnz
+    again = assembly.matrix(
+        blocks, Touch(soon, np.empty((9, 4, 3)), np.zeros((9, 4, 4, 3, 3)), soon)
+    )
+    assert again.toarray() == pytest.approx(dense[inner], abs=1e-14)
+    assert np.array_equal(again.indices, held.indices)
