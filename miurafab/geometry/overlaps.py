@@ -53,15 +53,21 @@ class SharedAreas:
 
         ``polygons`` are those of :func:`polygons_of`.
         """
+        pair, third = self.mutual()
+        common = wide(shapely.intersection(self.areas[pair], polygons[third]), least_width)
+        return np.column_stack([self.pairs[pair], third])[common]
+
+    def mutual(self) -> tuple[Ints, Ints]:
+        """(t,), (t,) the triples of which each two share an area: a pair, and the third polygon,
+        which has the largest number.
+        """
         first, second = self.pairs.T
-        counts = np.bincount(first, minlength=len(polygons))
+        counts = np.bincount(first, minlength=int(self.pairs.max(initial=-1)) + 1)
         each = counts[second]  # the pairs that begin with the second polygon of a pair
         pair = np.repeat(np.arange(len(first)), each)
         third = second[np.repeat(run_starts(counts)[second], each) + places_in_runs(each)]
         closed = self.place_of(first[pair], third) >= 0
-        pair, third = pair[closed], third[closed]
-        common = wide(shapely.intersection(self.areas[pair], polygons[third]), least_width)
-        return np.column_stack([self.pairs[pair], third])[common]
+        return pair[closed], third[closed]
 
 
 def polygons_of(points: Floats, faces: Ints) -> NDArray[np.object_]:

@@ -141,6 +141,17 @@ def half_tangents(pattern: CreasePattern) -> Floats:
     return np.asarray(np.tan(np.clip(target, -np.pi + 1e-15, np.pi - 1e-15) / 2))
 
 
+def _nothing_folds(pattern: CreasePattern) -> PatternError:
+    free = int((pattern.edges_creased & (pattern.edges_assignment == "U")).sum())
+    if not free:
+        return PatternError("No crease of the pattern has a fold angle, so nothing folds.")
+    return PatternError(
+        f"All {free} creases of the pattern are unassigned (U), so it is not known to which side "
+        "they fold: give mountains the letter M and valleys V. 'miurafab layers' looks for the "
+        "ways to fold it flat."
+    )
+
+
 def states_between(pattern: CreasePattern, steps: int, last: float = np.inf) -> Floats:
     """(steps + 1,) states from flat through 1 to ``last``, in even steps of the median fold angle.
 
@@ -149,7 +160,7 @@ def states_between(pattern: CreasePattern, steps: int, last: float = np.inf) -> 
     """
     half = np.abs(half_tangents(pattern))
     if not (half > 0).any():
-        raise PatternError("No crease of the pattern has a fold angle, so nothing folds.")
+        raise _nothing_folds(pattern)
     speed = float(np.median(half[half > 0]))
     middling, end = 2 * np.arctan(speed), 2 * np.arctan(last * speed)
     if last <= 1.0 or steps < 2:

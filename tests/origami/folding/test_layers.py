@@ -27,6 +27,7 @@ from miurafab.origami.folding.layers import (
     known_layer_order,
     layer_order,
 )
+from miurafab.origami.folding.motion import find_motion
 from miurafab.origami.folding.order_search import broken_rules, search_layer_orders
 from miurafab.origami.formats.fold import read_fold
 from miurafab.workflow.layers import layer_findings, layers
@@ -261,6 +262,22 @@ def test_no_order_is_claimed_for_what_does_not_fold_flat(tmp_path: Path) -> None
     bent[len(bent) // 2] += 0.5
     with pytest.raises(PatternError, match="does not fold"):
         search_layer_orders(replace(regular(), vertices_coords=bent, folded_coords=None))
+
+
+def test_more_layers_than_can_be_searched_are_refused_by_their_number(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stamps = strip("MVMV")
+    monkeypatch.setattr(order_search, "MOST_TRIPLES", 9)
+    with pytest.raises(InputError, match=r"5 facets .* in 10 pairs and 10 triples, .* up to 9"):
+        layers(stamps, orders=1)
+
+
+def test_a_pattern_of_unassigned_creases_is_told_to_need_letters() -> None:
+    stamps = strip("UU")
+    flat = replace(stamps, edges_fold_angle=np.zeros(len(stamps.edges_vertices)))
+    with pytest.raises(PatternError, match="All 2 creases of the pattern are unassigned"):
+        find_motion(flat, 4)
 
 
 def test_search_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
