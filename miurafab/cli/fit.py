@@ -26,7 +26,7 @@ EXAMPLES = (
     "miurafab fit sphere --facets 12x12 --size 150mm -o sphere.fold",
     "miurafab fit hypar --facets 8x8 --size bed --machine grbl-pen-a4 -o h.fold",
     "miurafab fit hypar --min-edge 4mm --max-deviation 2mm -o coarsest.fold",
-    "miurafab fit hypar --facets 8x8 --barrier 1e-4 -o snaps.fold",
+    "miurafab fit hypar --facets 6x6 --barrier 1e-4 -o snaps.fold",
 )
 
 RigidOption = Annotated[bool, option(Flag(), "The same as --flat-foldable exact.")]

@@ -12,7 +12,7 @@ import miurafab
 from miurafab.errors import InputError, LayoutError, ProfileError
 from miurafab.profiles import shipped_directory
 
-TARGETS = {"hypar": 14, "sphere": 12, "log-spiral": 12, "saddle.stl": 12}
+TARGETS = {"hypar": 10, "sphere": 8, "log-spiral": 10, "saddle.stl": 8}
 """Each with its facets along both sides."""
 
 
