@@ -126,6 +126,7 @@ RULES = {
         "note", "a sheet that does not reach the flat-folded end, so that it has no layer order"
     ),
     "cannot-fold-flat": Rule("refusal", "mountains and valleys that no order of layers satisfies"),
+    "rough-layers": Rule("note", "layers of a drawing whose rounded facets miss each other"),
     "more-layer-orders": Rule("note", "a search that ended before all layer orders were found"),
     "way-lost": Rule("warning", "a motion that ends before its creases are where they shall be"),
     "wrong-signs": Rule("warning", "creases that end on the other side than their letter tells"),

@@ -21,7 +21,12 @@ from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.cut_open import cut_open
 from miurafab.origami.folding.layers import LayerOrder, layer_order
-from miurafab.origami.folding.order_search import MOST, LayerSearch, search_layer_orders
+from miurafab.origami.folding.order_search import (
+    DRAWN_WIDTH,
+    MOST,
+    LayerSearch,
+    search_layer_orders,
+)
 from miurafab.origami.formats.fold import write_fold
 from miurafab.workflow.patterns import PatternLike, movable_pattern
 
@@ -79,6 +84,13 @@ class Layers(Shown):
                 "layers keeps its facets from passing through each other."
             )
             findings += (Finding("cannot-fold-flat", sentence),)
+        if self.search is not None and self.search.folded.mismatch > DRAWN_WIDTH:
+            sentence = (
+                "Folded flat, facets of the drawing miss each other by up to "
+                f"{self.search.folded.mismatch:.2g} mean edges, as its vertices are rounded; "
+                "overlaps that are not much wider are left out."
+            )
+            findings += (Finding("rough-layers", sentence),)
         if self.search is not None and not self.search.complete:
             sentence = (
                 f"There are more than {len(self.search.orders)} orders; the search ended there "

@@ -30,10 +30,18 @@ from miurafab.errors import InputError
 from miurafab.geometry.arrays import Floats, Ints, places_in_runs, run_starts
 from miurafab.geometry.overlaps import crossing, polygons_of
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.flat_folding import ROUGH
 from miurafab.origami.folding.layers import FlatFolded, LayerOrder, folded_flat
+from miurafab.origami.invariants import corner_ring, interior_vertices, kawasaki_residual
 
 DRAWN_WIDTH = 3e-3
 """The least width, in mean edges, of an overlap in a drawing, and how far a drawing may miss."""
+
+DRAWN_MISS = 0.03
+"""By how much the facets of a drawing may miss each other at most, mean edges."""
+
+WIDER = 1.25
+"""The least width of an overlap, over what facets miss each other by."""
 
 MOST = 100
 """So many orders are looked for, if not told otherwise."""
@@ -96,7 +104,7 @@ def search_layer_orders(
     """
     letters = pattern.edges_assignment
     turn = np.select([letters == "M", np.isin(letters, ("V", "U"))], [-np.pi, np.pi], 0.0)
-    folded = folded_flat(pattern, turn, width, width)
+    folded = _folded(pattern, turn, width)
     solvers = _solvers()
     rules = _Rules(folded)
     found: list[LayerOrder] = []
@@ -112,6 +120,24 @@ def search_layer_orders(
             solver.add_clause((-chosen).tolist())
             more = bool(pairs) and solver.solve()
     return LayerSearch(folded, tuple(found), not more, rules.counts())
+
+
+def _folded(pattern: CreasePattern, turn: Floats, width: float) -> FlatFolded:
+    """``pattern`` folded flat by the angles ``turn`` (E,).
+
+    In a large drawing the rounding of its digits adds up along loops of facets. So where each
+    vertex meets Kawasaki's condition as a drawing does, facets may miss each other by more than
+    ``width``, and overlaps count that are wider than what they miss.
+    """
+    flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
+    inner, ring = interior_vertices(pattern), corner_ring(pattern, flat)
+    off = kawasaki_residual(ring, inner, turn != 0) if len(inner) else np.zeros(1)
+    if off.max() > ROUGH:
+        return folded_flat(pattern, turn, width, width)
+    folded = folded_flat(pattern, turn, width, DRAWN_MISS)
+    if folded.mismatch <= width:
+        return folded
+    return folded_flat(pattern, turn, WIDER * folded.mismatch, DRAWN_MISS)
 
 
 def broken_rules(order: LayerOrder) -> int:

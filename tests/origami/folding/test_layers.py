@@ -28,7 +28,12 @@ from miurafab.origami.folding.layers import (
     layer_order,
 )
 from miurafab.origami.folding.motion import find_motion
-from miurafab.origami.folding.order_search import broken_rules, search_layer_orders
+from miurafab.origami.folding.order_search import (
+    DRAWN_MISS,
+    DRAWN_WIDTH,
+    broken_rules,
+    search_layer_orders,
+)
 from miurafab.origami.formats.fold import read_fold
 from miurafab.workflow.layers import layer_findings, layers
 
@@ -278,6 +283,24 @@ def test_a_pattern_of_unassigned_creases_is_told_to_need_letters() -> None:
     flat = replace(stamps, edges_fold_angle=np.zeros(len(stamps.edges_vertices)))
     with pytest.raises(PatternError, match="All 2 creases of the pattern are unassigned"):
         find_motion(flat, 4)
+
+
+def test_a_drawing_of_few_digits_folds_flat_as_its_vertices_do() -> None:
+    """Facets of a large rounded sheet miss each other by more than each vertex is off."""
+    sheet = exact("plane", 8)
+    edge = edge_lengths(sheet.vertices_coords, sheet.edges_vertices).mean()
+    off = np.random.default_rng(3).uniform(-1.0, 1.0, sheet.vertices_coords.shape)
+    rounded = sheet.vertices_coords + 1e-3 * edge * off
+    drawn = replace(sheet, vertices_coords=rounded, folded_coords=None, grid=None, target={})
+    search = search_layer_orders(drawn, 2)
+    assert DRAWN_WIDTH < search.folded.mismatch < DRAWN_MISS
+    assert (len(search.orders), search.complete) == (1, True)
+    told = [finding.code for finding in layers(drawn, orders=2).findings]
+    assert "rough-layers" in told
+    bent = rounded.copy()
+    bent[4 * 9 + 4] += 0.1 * edge  # no rounding any more
+    with pytest.raises(PatternError, match="does not fold flat"):
+        search_layer_orders(replace(drawn, vertices_coords=bent), 2)
 
 
 def test_search_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
