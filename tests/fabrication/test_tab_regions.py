@@ -557,3 +557,14 @@ def test_slots_keep_clear_of_the_ticks_that_are_asked_for():
         np.testing.assert_allclose(tabs.points, alone.points, atol=1e-9)
         bases.append(np.linalg.norm(tabs.points[:, 1] - tabs.points[:, 0], axis=1))
     assert not np.isclose(*bases).any()
+
+
+def test_tabs_of_joined_borders_alone_stand_at_their_own_sides():
+    """No seam of one patch is an edge that two facets share."""
+    pattern = shaken(3)
+    seams = all_seams(pattern, np.zeros(len(pattern.faces_vertices), dtype=np.int64))
+    assert (seams.edges[:, 0] != seams.edges[:, 1]).all()
+    tabs = tab_regions(pattern, seams, card())
+    assert tabs.usable.any()
+    for k in range(len(seams)):
+        np.testing.assert_allclose(tabs.polygon(k), moved(pattern, tabs, k), atol=1e-7)
