@@ -241,7 +241,7 @@ class Balance:
 
     @cached_property
     def tolerance(self) -> float:
-        """The limit of every component of F: ``TOLERANCE``, or more where rounding leaves more.
+        """What may be left of each component of F: ``TOLERANCE``, or what rounding leaves.
 
         At a distance D from the origin a coordinate is rounded by eps D, with eps = 2.2e-16. That
         turns a hinge over a wing of height h by eps D / h, and so changes its forces by
@@ -292,9 +292,9 @@ def stretch_blocks(block: Floats) -> Floats:
     return np.stack([block, -block, -block, block], axis=1).reshape(-1, 2, 2, 3, 3)
 
 
-def _iterations_left(before: float, now: float, limit: float) -> float:
-    """How many iterations to the ``limit`` follow if each lowers the residual as the last one."""
-    return 0.0 if now <= limit else math.log(limit / now) / math.log(now / before)
+def _iterations_left(before: float, now: float) -> float:
+    """How many iterations follow if each lowers the residual as the last one did."""
+    return 0.0 if now <= TOLERANCE else math.log(TOLERANCE / now) / math.log(now / before)
 
 
 def solve(
@@ -309,14 +309,15 @@ def solve(
     """The equilibrium near ``guess`` with what is driven at ``target``.
 
     ``factored`` is an earlier K to start with. A step that does not lower the largest component of
-    F is repeated with a new K, then shortened. With ``definite`` the iteration ends where K is not
+    F is repeated with a new K, then shortened; where none lowers it any more, what is left may be
+    rounding (:attr:`Balance.tolerance`). With ``definite`` the iteration ends where K is not
     definite, and in any case after so many ``factors``. Failure is a result, not an exception.
     """
     state, fresh, made = guess, False, 0
     residual = driven.residual(state, target)
     size = driven.size(residual)
     for _ in range(MAX_ITERATIONS):
-        if size <= driven.tolerance:
+        if size <= TOLERANCE:
             if factored is not None and size > ROUNDING:
                 nearer = state.plus(driven.step(factored, residual), 1.0)
                 if driven.size(driven.residual(nearer, target)) < size:
@@ -343,7 +344,7 @@ def solve(
                 break
             length /= 2
         if better:
-            stale = _iterations_left(size, rest, driven.tolerance) > PATIENCE
+            stale = _iterations_left(size, rest) > PATIENCE
             state, residual, size = trial, left, rest
         elif fresh:
             break
@@ -352,4 +353,4 @@ def solve(
         if stale:
             factored = None
         fresh = False
-    return Solution(state, None, False)
+    return Solution(state, None, size <= driven.tolerance)
