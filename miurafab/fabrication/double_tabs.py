@@ -90,5 +90,5 @@ def in_pairs(tabs: TabRegions, kept: Bools) -> Bools:
     pairs = np.sort(tabs.seams.edges[joined], axis=1)
     _, which = np.unique(pairs, axis=0, return_inverse=True)
     whole = np.bincount(which.reshape(-1), kept[joined]) == 2
-    found[joined] &= whole[which.reshape(-1)]
+    found[joined] = whole[which.reshape(-1)]
     return found
