@@ -381,8 +381,8 @@ def _why_not_opened(port: str, fault: Exception) -> str:
         return _in_use(port)
     if number == errno.EACCES or "Access is denied" in text:
         return (
-            f"The port {port} may not be opened by this user, or another program has it; on Linux "
-            "add yourself to its group with 'sudo usermod -a -G dialout $USER' and log in again."
+            f"The port {port} may not be opened by this user, or another program has it; end that "
+            "program, or let 'miurafab doctor' tell the command that gives you the port."
         )
     if number == errno.ENOENT or "FileNotFoundError" in text:
         return _no_such_port(port)
