@@ -568,6 +568,8 @@ def test_tabs_of_joined_borders_alone_stand_at_their_own_sides():
     assert tabs.usable.any()
     for k in range(len(seams)):
         np.testing.assert_allclose(tabs.polygon(k), moved(pattern, tabs, k), atol=1e-7)
+
+
 def test_a_tab_with_just_enough_glue_stays_as_it_is():
     pattern, patches, material = miura(3, 1, a=30.0, b=20.0), np.arange(3), card()
     usual, _, _ = choose_tabs(pattern, patches, material)
