@@ -80,15 +80,17 @@ def _glued(
         full = options.full_facet
         return tab_regions(pattern, seams, material, bearing, full_facet=full, raised=raised)
 
+    def too_weak(tabs: TabRegions) -> Bools:
+        return tabs.glue < material.tabs.min_area_mm2
+
     tabs = made(seams)
-    weak = tabs.glue < material.tabs.min_area_mm2
+    weak = too_weak(tabs)
     unusual = np.full(len(seams), False)
     if weak.any():
         better = made(seams.swapped(weak)).glue > tabs.glue * LARGER
         swapped = weak & better & free[face_patch[seams.faces[:, 1]]]
         tabs = made(seams.swapped(swapped))
-        weak = tabs.glue < material.tabs.min_area_mm2
-        weak &= free[face_patch[tabs.own_face]]
+        weak = too_weak(tabs) & free[face_patch[tabs.own_face]]
         tabs = made(tabs.seams, weak)
         unusual = swapped | weak
     return tabs, unusual
