@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs, run_starts
 from miurafab.geometry.boxes import meeting_pairs
 
+_AT_ONCE = 1_000
+"""So many pairs are looked at together to count triples."""
+
 
 @dataclass(frozen=True, eq=False)
 class SharedAreas:
@@ -61,11 +64,25 @@ class SharedAreas:
         """(t,), (t,) the triples of which each two share an area: a pair, and the third polygon,
         which has the largest number.
         """
+        return self._mutual(0, len(self.pairs))
+
+    def has_more_triples(self, most: int) -> bool:
+        """Whether :meth:`mutual` finds more than ``most``, without the memory that all take."""
+        found = 0
+        for start in range(0, len(self.pairs), _AT_ONCE):
+            found += len(self._mutual(start, start + _AT_ONCE)[0])
+            if found > most:
+                return True
+        return False
+
+    def _mutual(self, start: int, end: int) -> tuple[Ints, Ints]:
+        """The part of :meth:`mutual` for the pairs from ``start`` up to ``end``."""
         first, second = self.pairs.T
         counts = np.bincount(first, minlength=int(self.pairs.max(initial=-1)) + 1)
-        each = counts[second]  # the pairs that begin with the second polygon of a pair
-        pair = np.repeat(np.arange(len(first)), each)
-        third = second[np.repeat(run_starts(counts)[second], each) + places_in_runs(each)]
+        middle = second[start:end]
+        each = counts[middle]  # the pairs that begin with the second polygon of a pair
+        pair = np.repeat(np.arange(start, start + len(middle)), each)
+        third = second[np.repeat(run_starts(counts)[middle], each) + places_in_runs(each)]
         closed = self.place_of(first[pair], third) >= 0
         return pair[closed], third[closed]
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+import pytest
 import shapely
 
+from miurafab.geometry import overlaps
 from miurafab.geometry.overlaps import crossing, polygons_of, shared_areas
 
 
@@ -51,6 +53,18 @@ def test_pairs_and_triples_are_those_of_a_search_over_all() -> None:
     ]
     assert len(triples) > 10
     assert sorted(found.triples(shapes, 1e-6).tolist()) == triples
+
+
+@pytest.mark.parametrize("at_once", [1, 7, 1_000])
+def test_more_triples_than_a_number_are_told_without_all(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(overlaps, "_AT_ONCE", at_once)
+    found = shared_areas(*boxes(*[(0, 0, 1, 1)] * 9), 1e-6)
+    count = 9 * 8 * 7 // 6
+    assert len(found.mutual()[0]) == count
+    assert found.has_more_triples(count - 1)
+    assert not found.has_more_triples(count)
 
 
 def test_a_line_on_the_border_does_not_cross() -> None:

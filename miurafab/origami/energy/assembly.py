@@ -85,7 +85,7 @@ class Assembly:
             total += group @ block.reshape(-1, 9)
         keys = self._keys(*_block_ends(touch.stencils))
         entries = self._met(keys, touch.soon)
-        if len(entries.keys) > len(known):
+        if len(keys) or len(entries.keys) > len(known):
             whole = np.zeros((len(entries.keys), 9))
             whole[np.searchsorted(entries.keys, known)] = total
             at = 9 * np.searchsorted(entries.keys, keys)[:, None] + np.arange(9)

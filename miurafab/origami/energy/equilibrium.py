@@ -49,6 +49,8 @@ ROUNDING = 1e-13
 """A residual up to this is rounding, and is not lowered further."""
 ROUNDINGS = 8
 """So many roundings of a coordinate add up in one component of F."""
+COARSEST = 1e-8
+"""No component of F that is larger passes for rounding, however thin a facet is."""
 ENOUGH = 0.1
 """A step must lower the residual by this part of the reduction in a linear problem."""
 
@@ -241,7 +243,8 @@ class Balance:
 
     @cached_property
     def tolerance(self) -> float:
-        """What may be left of each component of F: ``TOLERANCE``, or what rounding leaves.
+        """What may be left of each component of F: ``TOLERANCE``, or what rounding leaves, up to
+        ``COARSEST``.
 
         At a distance D from the origin a coordinate is rounded by eps D, with eps = 2.2e-16. That
         turns a hinge over a wing of height h by eps D / h, and so changes its forces by
@@ -260,7 +263,8 @@ class Balance:
             float((1.0 / (model.compliance * model.lengths)[soft]).max(initial=0.0)),
         )
         reach = float(np.abs(model.points).max())
-        return max(TOLERANCE, ROUNDINGS * 2.2e-16 * reach * most / self.stiffest)
+        rounding = ROUNDINGS * 2.2e-16 * reach * most / self.stiffest
+        return max(TOLERANCE, min(rounding, COARSEST))
 
     @cached_property
     def assembly(self) -> Assembly:
@@ -346,11 +350,11 @@ def solve(
         if better:
             stale = _iterations_left(size, rest) > PATIENCE
             state, residual, size = trial, left, rest
-        elif fresh:
-            break
+        elif fresh:  # no step lowers it any more
+            return Solution(state, factored, size <= driven.tolerance)
         else:
             stale = True
         if stale:
             factored = None
         fresh = False
-    return Solution(state, None, size <= driven.tolerance)
+    return Solution(state, None, False)

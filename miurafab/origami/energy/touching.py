@@ -113,12 +113,7 @@ class TouchPairs:
 
     def closing(self, moves: Floats) -> Floats:
         """(n,) by how much ``moves`` (V, 3) of the vertices can bring pairs nearer, at most."""
-        own = _corners(moves, self.stencils)
-        own -= own.sum(axis=1, keepdims=True) / 4
-        far = np.sqrt(_dot(own, own))
-        other = np.maximum(far[2], far[3])
-        one = np.where(self.edges, np.maximum(far[0], far[1]), np.maximum(far[1], other))
-        return np.asarray(np.where(self.edges, other, far[0]) + one)
+        return _closing(_corners(moves, self.stencils), self.edges)
 
     def nearer_than(self, within: Floats | float, points: Floats) -> tuple[Ints, Gap]:
         """The numbers of the pairs nearer than ``within`` at ``points`` (V, 3), and their gaps."""
@@ -304,7 +299,8 @@ def _free_time(x: Floats, going: Floats, it: Gap, left: Floats, edges: Bools) ->
     time 1, certainly stay farther from each other than ``left`` (n,).
 
     A pair is never nearer than its corners are along any one direction. Along that of its distance
-    they are just as far.
+    they are just as far, but for the rounding of a direction between edges that are nearly
+    parallel; so the time in which they could come that near in any way counts where it is longer.
     """
     normal = (it.direction / it.distance[:, None]).T[:, None]
     far, fast = ((normal * each).sum(axis=0) for each in (x, going))
@@ -313,8 +309,19 @@ def _free_time(x: Floats, going: Floats, it: Gap, left: Floats, edges: Bools) ->
         for each in (far, fast)
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        time = np.where(speed < 0, np.maximum(apart - left, 0.0) / -speed, np.inf)
-    return np.asarray(np.where(it.distance > CLOSEST, time.min(axis=0), 0.0))
+        time = np.where(speed < 0, (apart - left) / -speed, np.where(apart < left, 0.0, np.inf))
+        anyhow = (it.distance - left) / _closing(going, edges)
+    time = np.maximum(time.min(axis=0), np.maximum(anyhow, 0.0))
+    return np.asarray(np.where(it.distance > CLOSEST, time, 0.0))
+
+
+def _closing(moves: Floats, edges: Bools) -> Floats:
+    """(n,) by how much ``moves`` (3, 4, n) of their corners can bring pairs nearer, at most."""
+    own = moves - moves.sum(axis=1, keepdims=True) / 4
+    far = np.sqrt(_dot(own, own))
+    other = np.maximum(far[2], far[3])
+    one = np.where(edges, np.maximum(far[0], far[1]), np.maximum(far[1], other))
+    return np.asarray(np.where(edges, other, far[0]) + one)
 
 
 def _corners(points: Floats, stencils: Ints) -> Floats:

@@ -214,12 +214,11 @@ class _Rules:
         self._add("letters", len(units), units)
 
     def _circles(self) -> None:
-        triples = len(self.shared.mutual()[1])
-        if triples > MOST_TRIPLES:
+        if self.shared.has_more_triples(MOST_TRIPLES):
             raise InputError(
                 f"Folded flat, {len(self.shapes)} facets lie on each other in "
-                f"{len(self.shared.pairs):,} pairs and {triples:,} triples, and orders of layers "
-                f"are searched up to {MOST_TRIPLES:,} triples: search in a part of the pattern."
+                f"{len(self.shared.pairs):,} pairs and more than {MOST_TRIPLES:,} triples, the "
+                "most with which orders of layers are searched: search in a part of the pattern."
             )
         a, b, c = self.shared.triples(self.shapes, self.folded.width).T
         ab, bc, ca = self._above(a, b), self._above(b, c), self._above(c, a)

@@ -15,8 +15,9 @@ from miurafab.geometry.arrays import Floats
 from miurafab.geometry.dissection import Separator, dissect
 from miurafab.geometry.sparse import Factor, SymmetricSolver
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.bar_hinge import BarHingeModel
 from miurafab.origami.energy.continuation import follow
-from miurafab.origami.energy.equilibrium import solve
+from miurafab.origami.energy.equilibrium import COARSEST, TOLERANCE, solve
 from miurafab.origami.energy.ramp import Ramped
 from miurafab.origami.energy.touch_pairs import PARALLEL, REACH, NearPairs
 from miurafab.origami.energy.touching import (
@@ -143,6 +144,73 @@ def test_a_step_ends_before_anything_passes_through_anything() -> None:
     along = np.zeros((4, 3))
     along[0] = 0.3, 0.1, -2e-4
     assert free_way(through, along, pair_at(through, False)) == 1.0
+
+
+@pytest.mark.parametrize("sine", [1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
+def test_edges_that_are_nearly_parallel_neither_pass_nor_stick(sine: float) -> None:
+    """The direction of their distance is known to few digits."""
+    random = np.random.default_rng(2)
+    for _ in range(60):
+        gap, shift = 10 ** random.uniform(-4, -1.5), random.uniform(-0.4, 0.4)
+        across = sine / 2
+        points = np.array([[-0.5, 0, 0], [0.5, 0, 0], [-0.5, -across, gap], [0.5, across, gap]])
+        points[2:, 0] += shift
+        step = np.zeros((4, 3))
+        speed = gap * 10 ** random.uniform(-0.5, 1, 4) * random.choice([-1, 1], 4)
+        step[:, 2] = speed * [1, 1, -1, -1]
+        at = shift + 0.5
+        nearer = step[:2, 2] @ [1 - at, at] - step[2:, 2].mean()
+        turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+        placed = points @ turn.T + random.normal(size=3)
+        way = free_way(placed, step @ turn.T, pair_at(placed, True))
+        assert way > 1e-3
+        assert gap - way * nearer > 0
+
+
+FAN = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]])
+FAN_BARS = np.array([[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1]])
+FAN_HINGES = np.array([[0, 2, 3, 1], [0, 3, 4, 2], [0, 4, 1, 3], [0, 1, 2, 4]])
+
+
+def fan(rest: list[float], last: float = 1.0) -> BarHingeModel:
+    """Four triangles about a vertex; the last corner lies so far from it."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -last, 0]])
+    lengths = np.linalg.norm(points[FAN_BARS[:, 0]] - points[FAN_BARS[:, 1]], axis=1)
+    return BarHingeModel(
+        points, FAN_BARS, lengths, 0.1 * lengths, FAN_HINGES, np.full(4, 0.01), np.array(rest),
+        creases=FAN_HINGES, triangles=FAN,
+    )  # fmt: skip
+
+
+def test_what_was_not_iterated_is_no_balance_however_thin_a_facet_is() -> None:
+    """Only where no step lowers the forces any more, what is left may be rounding."""
+    ramped = Ramped(fan([3.0, 0, 0, 0], last=1e-6))
+    assert ramped.tolerance == COARSEST
+    start = ramped.state(ramped.model.points)
+    assert TOLERANCE < ramped.size(ramped.residual(start, 1e-9)) < COARSEST
+    assert not solve(ramped, start, 1e-9, factors=0).converged
+
+
+def test_the_stiffness_of_what_touches_counts_between_neighbours_too() -> None:
+    """All corners of two opposite edges about a vertex are joined by bars and hinges anyway."""
+    model = fan([3.0, 3, 3, -3])
+    near = np.array(
+        [[0, 0, 0], [0, 0.3, 0.9], [0, -0.3, 0.2], [0.012, -0.3, 0.9], [0.01, 0.3, 0.2]]
+    )
+    pairs = NearPairs(FAN, FAN_BARS, FAN_HINGES, model.points).at(near)
+    ramped = Ramped(model).with_pairs(pairs)
+    assert pairs.stencils[pairs.touching(near)[0]].tolist() == [[1, 2, 3, 4]]
+    ramped.accept(near)
+    matrix = ramped.stiffness(ramped.state(near), 1.0).toarray()
+    e, slopes = 1e-6, np.zeros_like(matrix)
+    for column, place in enumerate(ramped.assembly.free):
+        forces = []
+        for way in (e, -e):
+            moved = near.copy()
+            moved.ravel()[place] += way
+            forces.append(ramped.residual(ramped.state(moved), 1.0).force)
+        slopes[:, column] = (forces[0] - forces[1]) / (2 * e)
+    np.testing.assert_allclose(matrix, slopes, atol=1e-6)
 
 
 def test_what_was_far_from_each_other_is_found_when_it_comes_near() -> None:
