@@ -27,7 +27,7 @@ from miurafab.geometry.polygons import (
 )
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.invariants import Residuals
+from miurafab.origami.invariants import EXACT, Residuals
 from miurafab.origami.unfold import FLAT_ANGLE
 
 _ROUNDINGS = 64
@@ -75,7 +75,7 @@ def measured_folds(pattern: CreasePattern, found: Residuals) -> MeasuredFolds:
     with np.errstate(invalid="ignore", divide="ignore"):
         angle[inner] = fold_angles(points, pattern.edges_vertices[inner], left, right)
         low = areas / lengths[inner]
-        within[inner] = FLAT_ANGLE + _ROUNDINGS * (found.exact + off) * lengths.mean() / low
+        within[inner] = FLAT_ANGLE + _ROUNDINGS * (EXACT + off) * lengths.mean() / low
     return MeasuredFolds(angle, within)
 
 

@@ -112,13 +112,18 @@ def read_ply_strips(content: bytes) -> tuple[Floats, Ints] | None:
                 raise ValueError(f"it is too short for {words[2]} of '{words[1]}'")
         elif words[:1] == ["property"] and elements:
             elements[-1][2].append(words[1:])
+    strips = [kinds for name, _, kinds in elements if name == "tristrips"]
+    if not strips:  # a comment named them
+        return None
+    named = [words[-1] for words in strips[0] if words[0] == "list"]
+    if not named:
+        raise ValueError("its element 'tristrips' has no list")
     values = _ply_ascii(elements, body) if kind == "ascii" else _ply_binary(elements, body, kind)
     vertex = values["vertex"]
     points = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
-    held = next(kinds for name, _, kinds in elements if name == "tristrips")
-    lists = values["tristrips"][next(words[-1] for words in held if words[0] == "list")]
-    strips = [_strip_triangles(np.asarray(strip, dtype=np.int64)) for strip in lists]
-    return points, np.vstack([np.zeros((0, 3), dtype=np.int64), *strips])
+    lists = values["tristrips"][named[0]]
+    made = [_strip_triangles(np.asarray(strip, dtype=np.int64)) for strip in lists]
+    return points, np.vstack([np.zeros((0, 3), dtype=np.int64), *made])
 
 
 def _strip_triangles(strip: Ints) -> Ints:

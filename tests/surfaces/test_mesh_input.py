@@ -706,3 +706,15 @@ def test_a_step_file_is_meshed_in_millimetres_or_names_what_it_needs(
     x, y, z = vertices.T / factor
     assert np.ptp(x) == pytest.approx(100, abs=1e-3)
     assert np.abs(z - x * y / 200).max() < 0.05
+
+
+def test_strips_that_are_only_named_or_have_no_list_are_told(tmp_path: Path) -> None:
+    whole = "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    comment = "comment made from tristrips\n"
+    file = tmp_path / "comment.ply"
+    file.write_text(PLY.format("ascii") + comment + whole + CORNERS + "3 0 1 2\n3 1 3 2\n")
+    assert len(read_mesh(file)[1]) == 2
+    bare = tmp_path / "bare.ply"
+    bare.write_text(PLY.format("ascii") + "element tristrips 1\nend_header\n" + CORNERS + "\n")
+    with pytest.raises(TargetError, match="its element 'tristrips' has no list"):
+        read_mesh(bare)

@@ -10,8 +10,8 @@ A pattern of several pieces has the keys ``miurafab:pieces`` (the piece of each 
 ``miurafab:seams`` (pairs of border edges that meet in the folded form). Without the first, the
 parts of the pattern that do not touch are its pieces. ``miurafab:cells`` has the column and row of
 each facet where they do not fill the grid of ``miurafab:grid``. ``miurafab:unfolded`` is the
-residual to which a flat pattern fits that was computed from a folded form alone, and
-``miurafab:rounded`` that by which the two forms in a file of few digits differ.
+residual to which a flat pattern fits that was computed from a folded form alone; it is believed
+where that computation gives the same flat pattern.
 ``miurafab:angles`` is ``assumed`` where no fold angle is known and each fold is given as 180
 degrees.
 
@@ -63,7 +63,11 @@ from miurafab.origami.formats.fold_states import (
     further_frames,
     origin_of,
 )
-from miurafab.origami.formats.folded_only import told_of_unfolding, unfolded_pattern
+from miurafab.origami.formats.folded_only import (
+    is_unfolded,
+    told_of_unfolding,
+    unfolded_pattern,
+)
 from miurafab.origami.formats.line_crossings import lines_cross
 from miurafab.origami.formats.planar_graph import enclosed_facets, oriented, pattern_from_lines
 from miurafab.origami.formats.target_frame import (
@@ -74,12 +78,7 @@ from miurafab.origami.formats.target_frame import (
     target_kept,
     target_seal,
 )
-from miurafab.origami.formats.two_forms import (
-    ROUNDED,
-    told_of_rounding,
-    with_its_own_form,
-    with_its_rounding,
-)
+from miurafab.origami.formats.two_forms import with_its_own_form, with_its_rounding
 from miurafab.origami.unfold import with_angles_of_the_folded_form
 from miurafab.version import __version__
 
@@ -126,9 +125,8 @@ def fold_text(
     ):
         if numbers is not None:
             keys[f"miurafab:{name}"] = numbers.tolist()
-    for name, residual in (("unfolded", pattern.unfolded), ("rounded", pattern.rounded)):
-        if residual is not None:
-            keys[f"miurafab:{name}"] = residual
+    if pattern.unfolded is not None:
+        keys["miurafab:unfolded"] = pattern.unfolded
     if pattern.angles_assumed:
         keys["miurafab:angles"] = ASSUMED
     if pattern.target:
@@ -225,7 +223,6 @@ def parse_fold(document: Any) -> CreasePattern:
         raise PatternError("'faces_vertices' refers to a vertex that does not exist.")
     others = frames[:place] + frames[place + 1 :]
     unfolded = _residual(document, "unfolded", ROUGHEST)
-    rounded = _residual(document, "rounded", ROUNDED)
     pattern = CreasePattern(
         vertices_coords=flat,
         edges_vertices=edges,
@@ -242,20 +239,21 @@ def parse_fold(document: Any) -> CreasePattern:
         target_kept=target_kept(document),
         angles_assumed=document.get("miurafab:angles") == ASSUMED,
         unfolded=unfolded,
-        rounded=rounded,
-        told=(
-            *(() if unfolded is None else (told_of_unfolding(unfolded),)),
-            *(() if rounded is None else (told_of_rounding(rounded),)),
-        ),
+        told=() if unfolded is None else (told_of_unfolding(unfolded),),
     )
     pattern = replace(pattern, faces_vertices=oriented(flat, faces))
     pattern.edges_faces  # noqa: B018 - facets that do not fit their edges are a fault of the file
     foreign = not any(name.startswith("miurafab:") for name in document)
-    if pattern.folded_coords is not None and foreign:
+    if pattern.unfolded is not None and not is_unfolded(pattern):
+        pattern = replace(pattern, unfolded=None, told=())
+    if pattern.folded_coords is not None:
         chosen = folded_frame(others)
         assert chosen is not None
-        forms = (points_at(frame, "vertices_coords") for frame in (frames[place], chosen))
-        pattern = with_its_rounding(with_its_own_form(pattern), *forms)
+        pattern = with_its_rounding(
+            with_its_own_form(pattern) if foreign else pattern,
+            points_at(frames[place], "vertices_coords"),
+            points_at(chosen, "vertices_coords"),
+        )
     if pattern.folded_coords is not None and key.get("edges_foldAngle") is None:
         pattern = with_angles_of_the_folded_form(pattern)
     further = sum("foldedForm" in classes_of(frame) for frame in frames) > 1

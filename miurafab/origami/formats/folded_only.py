@@ -35,6 +35,9 @@ from miurafab.origami.formats.fold_keys import (
 )
 from miurafab.origami.judge_creases import measured_folds
 
+SAME = 1e-9
+"""Flat patterns that are the same but for rounding differ by as much, in mean edges."""
+
 _TURNED_OVER = math.radians(170)
 """A fold beyond this angle may be of either sign by the rounding of a file."""
 
@@ -103,6 +106,20 @@ def unfolded_pattern(frame: Mapping[str, Any], factor: float) -> CreasePattern:
         pattern = replace(pattern, faces_vertices=reversed_faces(pattern.faces_vertices))
     laid = flattened(pattern)
     return _with_folds(laid, signs, sheet)
+
+
+def is_unfolded(pattern: CreasePattern) -> bool:
+    """Whether the flat pattern of ``pattern`` is what its folded form gives when it is unfolded."""
+    if pattern.folded_coords is None:
+        return False
+    try:
+        laid = flattened(pattern)
+    except PatternError:
+        return False
+    if laid.faces_vertices.shape != pattern.faces_vertices.shape:
+        return False
+    flat = np.column_stack([laid.vertices_coords, np.zeros(len(laid.vertices_coords))])
+    return invariants.residuals(replace(pattern, folded_coords=flat)).worst <= SAME
 
 
 def told_of_unfolding(residual: float, more: str = "") -> Finding:

@@ -24,6 +24,9 @@ ROUNDED = 1e-4
 MOST_DECIMALS = 15
 """Numbers of more decimals are taken as not rounded."""
 
+STEPS = 16
+"""So many steps between numbers, over the shortest edge, add up in a residual."""
+
 FEWEST_DIGITS = 1e-5
 """A step between numbers, as a part of their range, that may come from rounding."""
 
@@ -56,30 +59,28 @@ def with_its_own_form(pattern: CreasePattern) -> CreasePattern:
     return replace(pattern, folded_coords=None, told=(*told, Finding("folded-form", says)))
 
 
-def with_its_rounding(pattern: CreasePattern, *forms: Floats) -> CreasePattern:
+def with_its_rounding(pattern: CreasePattern, flat: Floats, folded: Floats) -> CreasePattern:
     """``pattern`` with what the few digits of its file leave between its two forms, which are the
-    numbers of the ``forms`` (V, 2) or (V, 3) there; the pattern itself where its forms differ by
+    numbers ``flat`` and ``folded`` (V, 2) or (V, 3) there; the pattern itself where they differ by
     more than such digits explain, or by nothing.
     """
     if pattern.folded_coords is None:
         return pattern
+    forms = flat, folded
+    shortest = [edge_lengths(form, pattern.edges_vertices).min() for form in forms]
+    if not min(shortest) > 0:
+        return pattern
+    explained = max(_step(form) / side for form, side in zip(forms, shortest, strict=True))
+    if explained == 0.0:
+        return pattern
     left = invariants.residuals(pattern).worst
-    if not invariants.exactness(pattern) < left <= ROUNDED:
+    if not invariants.exactness(pattern) < left <= min(ROUNDED, STEPS * explained):
         return pattern
-    step = max(_step(form) / edge_lengths(form, pattern.edges_vertices).mean() for form in forms)
-    if left > invariants.ROUNDINGS * step:
-        return pattern
-    told = (*pattern.told, told_of_rounding(left))
-    return replace(pattern, rounded=left, told=told)
-
-
-def told_of_rounding(residual: float) -> Finding:
-    """What is told of two forms that differ by the rounding of their file."""
-    return Finding(
-        "rounded",
+    says = (
         "The coordinates of the file have few digits: its flat pattern and its folded form differ "
-        f"by up to {residual:.2g} mean edges or radians, which is their rounding.",
+        f"by up to {left:.2g} mean edges or radians, which is their rounding."
     )
+    return replace(pattern, rounded=left, told=(*pattern.told, Finding("rounded", says)))
 
 
 def _step(form: Floats) -> float:

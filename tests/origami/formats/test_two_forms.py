@@ -103,11 +103,13 @@ def test_forms_of_few_digits_are_as_exact_as_those_and_told_so(tmp_path: Path) -
     checked = mf.check(read)
     assert checked.valid
     assert any(f"within {read.rounded:.2g} mean edges" in sentence for sentence in checked.proved)
-    # in another unit the numbers have all their digits, and what is known of them is kept
-    read.scaled(25.4).save(tmp_path / "strip.fold")
+    # what we write of it has the same digits; in another unit it has all, and only claims
+    read.save(tmp_path / "strip.fold")
     again = mf.load(tmp_path / "strip.fold")
     assert again.rounded == read.rounded
     assert mf.check(again).valid
+    read.scaled(25.4).save(tmp_path / "inches.fold")
+    assert not mf.check(tmp_path / "inches.fold").valid
 
 
 def test_forms_that_differ_by_more_than_their_digits_explain_are_refused() -> None:
@@ -125,3 +127,15 @@ def test_forms_of_single_precision_are_as_exact_as_that() -> None:
     read = parse_fold(strip(folded(0.5, 1.0).astype(np.float32).astype(np.float64)))
     assert 1e-9 < read.rounded < 1e-6
     assert mf.check(read).valid
+
+
+@pytest.mark.parametrize("name", ["rounded", "unfolded"])
+def test_what_a_file_claims_of_its_digits_is_not_believed(name: str) -> None:
+    """Full digits, 5e-5 off: neither rounding nor the flat pattern of that folded form."""
+    form = folded(0.5, 1.0)
+    form[3:5, 0] += 5e-5 / 3
+    honest = parse_fold(strip(form, **{"miurafab:scale": 1.0}))
+    claimed = parse_fold(strip(form, **{"miurafab:scale": 1.0, f"miurafab:{name}": 1e-4}))
+    assert not mf.check(honest).valid
+    assert not mf.check(claimed).valid
+    assert (claimed.rounded, claimed.unfolded, claimed.told) == (None, None, ())
