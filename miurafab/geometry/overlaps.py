@@ -12,7 +12,14 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs, run_starts
+from miurafab.geometry.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    places_among,
+    places_in_runs,
+    run_starts,
+)
 from miurafab.geometry.boxes import meeting_pairs
 
 _AT_ONCE = 1_000
@@ -46,10 +53,7 @@ class SharedAreas:
         keys = self.pairs[:, 0] * base + self.pairs[:, 1]
         low, high = np.minimum(one, other), np.maximum(one, other)
         wanted = np.where((low >= 0) & (high < base), low * base + high, -1)
-        if not len(keys):
-            return np.full(len(wanted), -1, dtype=np.int64)
-        found = np.searchsorted(keys, wanted).clip(max=len(keys) - 1)
-        return np.where(keys[found] == wanted, found, -1)
+        return places_among(keys, wanted)
 
     def triples(self, polygons: NDArray[np.object_], least_width: float) -> Ints:
         """(t, 3) the triples of polygons with a common area, each in rising order.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Floats, Ints, places_among
 from miurafab.geometry.multifrontal import FrontalPlan
 
 MORE_WORK = 1.5
@@ -88,8 +88,8 @@ class SymmetricSolver:
         ):
             return matrix.data
         known, wanted = _keys(mine), _keys(matrix)
-        at = np.searchsorted(known, wanted)
-        if not np.array_equal(np.append(known, -1)[at], wanted):
+        at = places_among(known, wanted)
+        if (at < 0).any():
             return None
         numbers = np.zeros(len(known))
         numbers[at] = matrix.data

@@ -113,7 +113,12 @@ class TouchPairs:
 
     def closing(self, moves: Floats) -> Floats:
         """(n,) by how much ``moves`` (V, 3) of the vertices can bring pairs nearer, at most."""
-        return _closing(_corners(moves, self.stencils), self.edges)
+        own = _corners(moves, self.stencils)
+        own -= own.sum(axis=1, keepdims=True) / 4
+        far = np.sqrt(_dot(own, own))
+        other = np.maximum(far[2], far[3])
+        one = np.where(self.edges, np.maximum(far[0], far[1]), np.maximum(far[1], other))
+        return np.asarray(np.where(self.edges, other, far[0]) + one)
 
     def nearer_than(self, within: Floats | float, points: Floats) -> tuple[Ints, Gap]:
         """The numbers of the pairs nearer than ``within`` at ``points`` (V, 3), and their gaps."""
@@ -278,25 +283,29 @@ def free_way(points: Floats, step: Floats, pairs: TouchPairs) -> float:
     may = np.flatnonzero(kept * (pairs.distance - pairs.closing(moves)) < speed)
     if not len(may):
         return 1.0
-    edges, at, least = pairs.edges[may], np.zeros(len(may)), 1.0
+    edges, speed, at, least = pairs.edges[may], speed[may], np.zeros(len(may)), 1.0
     start, going = (_corners(each, pairs.stencils[may]) for each in (points, step))
     it = _gaps(start, edges)
     left = np.maximum(LEFT * it.distance, np.minimum(it.distance, CLOSEST))
     for _ in range(LOOKS):
-        at = at + NEARER * _free_time(start + at * going, going, it, left, edges)
+        at = at + NEARER * _free_time(start + at * going, going, it, left, edges, speed)
         on = np.flatnonzero(at < least)
         if not len(on):
             return least
-        at, left, edges, start, going = at[on], left[on], edges[on], start[..., on], going[..., on]
+        at, left, edges, speed = at[on], left[on], edges[on], speed[on]
+        start, going = start[..., on], going[..., on]
         it = _gaps(start + at * going, edges)
         ended = it.distance <= 1.5 * left
         least = min(least, float(at[ended].min(initial=least)))
     return min(least, float(at.min()))
 
 
-def _free_time(x: Floats, going: Floats, it: Gap, left: Floats, edges: Bools) -> Floats:
+def _free_time(
+    x: Floats, going: Floats, it: Gap, left: Floats, edges: Bools, fastest: Floats
+) -> Floats:
     """(n,) how long pairs with corners ``x`` (3, 4, n), which move by ``going`` (3, 4, n) in the
-    time 1, certainly stay farther from each other than ``left`` (n,).
+    time 1 and so come nearer by ``fastest`` (n,) at most, certainly stay farther from each other
+    than ``left`` (n,).
 
     A pair is never nearer than its corners are along any one direction. Along that of its distance
     they are just as far, but for the rounding of a direction between edges that are nearly
@@ -310,18 +319,9 @@ def _free_time(x: Floats, going: Floats, it: Gap, left: Floats, edges: Bools) ->
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         time = np.where(speed < 0, (apart - left) / -speed, np.where(apart < left, 0.0, np.inf))
-        anyhow = (it.distance - left) / _closing(going, edges)
+        anyhow = (it.distance - left) / fastest
     time = np.maximum(time.min(axis=0), np.maximum(anyhow, 0.0))
     return np.asarray(np.where(it.distance > CLOSEST, time, 0.0))
-
-
-def _closing(moves: Floats, edges: Bools) -> Floats:
-    """(n,) by how much ``moves`` (3, 4, n) of their corners can bring pairs nearer, at most."""
-    own = moves - moves.sum(axis=1, keepdims=True) / 4
-    far = np.sqrt(_dot(own, own))
-    other = np.maximum(far[2], far[3])
-    one = np.where(edges, np.maximum(far[0], far[1]), np.maximum(far[1], other))
-    return np.asarray(np.where(edges, other, far[0]) + one)
 
 
 def _corners(points: Floats, stencils: Ints) -> Floats:

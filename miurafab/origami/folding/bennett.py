@@ -124,7 +124,7 @@ def bennett_heights(pattern: CreasePattern) -> BennettHeights:
     # the stubs of linprog know dense matrices alone
     found = linprog(cost, apart, inequal, equal, limits, bounds)  # type: ignore[call-overload]
     axis = np.zeros(len(pattern.edges_vertices))
-    if found.x is None:  # all heights 0 are a solution, so the solver failed: no plates are known
+    if found.status != 0:  # all heights 0 are a solution, so the solver failed: no plates are known
         return BennettHeights(pattern, axis, np.zeros(facets), 0.0, free)
     # the program closes the loops to a tolerance, the projection to rounding
     solved = found.x[: len(edges) + vertices]
