@@ -222,7 +222,7 @@ def parse_fold(document: Any) -> CreasePattern:
     if faces.max() >= len(flat):  # before something is made as large as that number
         raise PatternError("'faces_vertices' refers to a vertex that does not exist.")
     others = frames[:place] + frames[place + 1 :]
-    unfolded = _residual(document, "unfolded", ROUGHEST)
+    unfolded = _unfolded(document)
     pattern = CreasePattern(
         vertices_coords=flat,
         edges_vertices=edges,
@@ -297,15 +297,14 @@ def _grid(document: Mapping[str, Any], vertices: int) -> tuple[int, int] | None:
     return grid[0], grid[1]
 
 
-def _residual(document: Mapping[str, Any], name: str, most: float) -> float | None:
-    key = f"miurafab:{name}"
-    residual = document.get(key)
+def _unfolded(document: Mapping[str, Any]) -> float | None:
+    residual = document.get("miurafab:unfolded")
     if residual is None:
         return None
     if isinstance(residual, bool) or not isinstance(residual, int | float):
-        raise PatternError(f"'{key}' is not a number.")
-    if not 0 <= residual <= most:
-        raise PatternError(f"'{key}' is {residual}; it is from 0 to {most}.")
+        raise PatternError("'miurafab:unfolded' is not a number.")
+    if not 0 <= residual <= ROUGHEST:
+        raise PatternError(f"'miurafab:unfolded' is {residual}; it is from 0 to {ROUGHEST}.")
     return float(residual)
 
 
