@@ -38,6 +38,9 @@ class DurableFile:
             raise InputError(f"The {noun} {path} is a link; remove it.")
         if path.is_fifo():  # whose opening would wait for ever
             raise InputError(f"The {noun} {path} is a pipe; remove it.")
+        for above in path.parents:
+            if above.exists() and not above.is_dir():
+                raise InputError(f"The {noun} {path} cannot be written: {above} is not a folder.")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             new = not append or not path.exists()

@@ -15,14 +15,15 @@ cannot be read as a mesh: ..."; files with no unit are in millimetres.
 from __future__ import annotations
 
 import io
-import itertools
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
+from miurafab.errors import shown
 from miurafab.geometry.arrays import Floats, Ints
 
 _PLY_TYPES = {
@@ -41,6 +42,7 @@ _3MF_ITEM = "{*}build/{*}item"
 _3MF_DEPTH = 16
 _3MF_LARGEST = 1 << 30
 _3MF_OBJECTS = 10_000
+_3MF_TRIANGLES = 20_000_000
 
 
 def read_off(content: bytes) -> tuple[Floats, Ints]:
@@ -54,14 +56,14 @@ def read_off(content: bytes) -> tuple[Floats, Ints]:
     if b"BINARY" in first:
         raise ValueError("it is a binary OFF file; save it as text")
     lines = [first, *lines[1:]] if first else lines[1:]
-    counts = [token for line in lines[:3] for token in line][:2]
     if b"4" in head or word.endswith(b"nOFF"):
         raise ValueError("its vertices are not in three dimensions")
+    counts, rest = _off_counts(lines)
     if len(counts) < 2:
         raise ValueError("it does not tell how many vertices and faces it has")
-    vertices, faces = int(counts[0]), int(counts[1])
-    # the third count, of edges, is left out by some programs
-    rest = lines[1:]
+    vertices, faces = counts[:2]
+    if min(vertices, faces) < 0:
+        raise ValueError(f"it tells of {vertices} vertices and {faces} faces")
     width = 3 + 3 * (b"N" in head) + 4 * (b"C" in head.replace(b"ST", b"")) + 2 * (b"ST" in head)
     if len(rest) >= vertices + faces and all(len(line) >= 3 for line in rest[:vertices]):
         points = np.array([line[:3] for line in rest[:vertices]], dtype=np.float64)
@@ -81,6 +83,22 @@ def read_off(content: bytes) -> tuple[Floats, Ints]:
             raise ValueError(f"it ends within face {len(polygons)} of {faces}")
         at += 1 + corners
     return points, _fans(polygons)
+
+
+def _off_counts(lines: list[list[bytes]]) -> tuple[list[int], list[list[bytes]]]:
+    """The counts of vertices, faces and edges, over any number of lines, and the lines after them.
+
+    Some programs leave out the third, of edges: then a line of coordinates follows on the second.
+    """
+    counts: list[int] = []
+    for at, line in enumerate(lines):
+        if len(counts) == 2 and len(line) > 1:
+            return counts, lines[at:]
+        own = 3 - len(counts)
+        counts += [int(token) for token in line[:own]]
+        if len(counts) == 3:
+            return counts, [line[own:], *lines[at + 1 :]] if line[own:] else lines[at + 1 :]
+    return counts, []
 
 
 def _fans(polygons: list[list[bytes]]) -> Ints:
@@ -199,15 +217,21 @@ def read_3mf(content: bytes) -> tuple[Floats, Ints]:
     if not roots:
         raise ValueError("it builds no object")
     root = roots[0]
+    objects: dict[tuple[str, str], _PackedObject] = {}
+    for path, model in models.items():
+        for found in model.iterfind("{*}resources/{*}object"):
+            number = found.get("id", "")
+            if objects.setdefault((path, number), _PackedObject(found)).element is not found:
+                raise ValueError(f"two of its objects are called '{shown(number)}'")
     parts: list[tuple[Floats, Ints]] = []
-    for item in models[root].findall(_3MF_ITEM):
-        path = _path_of(item, root)
-        placed = _placed(models, path, item.get("objectid", ""), _transform(item), 0)
-        parts += itertools.islice(placed, _3MF_OBJECTS + 1 - len(parts))
+    triangles = 0
+    for part in _placed(objects, root, models[root].iterfind(_3MF_ITEM), np.eye(4, 3), 0):
+        parts.append(part)
+        triangles += len(part[1])
         if len(parts) > _3MF_OBJECTS:
             raise ValueError(f"it builds more than {_3MF_OBJECTS:,} objects")
-    if not parts:
-        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
+        if triangles > _3MF_TRIANGLES:
+            raise ValueError(f"it builds more than {_3MF_TRIANGLES:,} triangles; simplify the mesh")
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
     unit = models[root].get("unit", "millimeter")
     points = np.concatenate([vertices for vertices, _ in parts]) * _3MF_UNITS_MM[unit]
@@ -216,30 +240,50 @@ def read_3mf(content: bytes) -> tuple[Floats, Ints]:
     )
 
 
-def _placed(
-    models: Mapping[str, ElementTree.Element], path: str, number: str, place: Floats, depth: int
-) -> Iterator[tuple[Floats, Ints]]:
-    """An object and its components under the transform ``place`` (4, 3): the mesh of each, which
-    is empty for one that has components alone.
-    """
-    if depth > _3MF_DEPTH:
-        raise ValueError("its components are nested too deeply")
-    for found in models[path].iterfind("{*}resources/{*}object"):
-        if found.get("id") != number:
-            continue
-        corners = found.iterfind("{*}mesh/{*}vertices/{*}vertex")
+class _PackedObject:
+    """An object of a 3MF package, whose mesh is read once, however often it is built."""
+
+    def __init__(self, element: ElementTree.Element) -> None:
+        self.element = element
+
+    @cached_property
+    def mesh(self) -> tuple[Floats, Ints]:
+        """Its own vertices and triangles, none of an object that has components alone."""
+        corners = self.element.iterfind("{*}mesh/{*}vertices/{*}vertex")
         points = np.array([[v.get(axis) for axis in "xyz"] for v in corners], dtype=np.float64)
-        triangles = found.iterfind("{*}mesh/{*}triangles/{*}triangle")
+        triangles = self.element.iterfind("{*}mesh/{*}triangles/{*}triangle")
         faces = np.array(
             [[t.get(corner) for corner in ("v1", "v2", "v3")] for t in triangles], dtype=np.int64
         )
-        yield points.reshape(-1, 3) @ place[:3] + place[3], faces.reshape(-1, 3)
-        for part in found.iterfind("{*}components/{*}component"):
-            inner = _transform(part)
-            both = np.concatenate([inner[:3] @ place[:3], inner[3:] @ place[:3] + place[3]])
-            yield from _placed(
-                models, _path_of(part, path), part.get("objectid", ""), both, depth + 1
-            )
+        return points.reshape(-1, 3), faces.reshape(-1, 3)
+
+    def components(self) -> Iterator[ElementTree.Element]:
+        """The references to the objects that it consists of."""
+        return self.element.iterfind("{*}components/{*}component")
+
+
+def _placed(
+    objects: Mapping[tuple[str, str], _PackedObject],
+    path: str,
+    references: Iterable[ElementTree.Element],
+    place: Floats,
+    depth: int,
+) -> Iterator[tuple[Floats, Ints]]:
+    """The meshes of the objects that ``references`` of the model file ``path`` name, and of their
+    components, under the transform ``place`` (4, 3); empty for one that has components alone.
+    """
+    if depth > _3MF_DEPTH:
+        raise ValueError("its components are nested too deeply")
+    for part in references:
+        there, number = _path_of(part, path), part.get("objectid", "")
+        if (there, number) not in objects:  # each would take time, and count as no object
+            raise ValueError(f"it refers to object '{shown(number)}', which it does not hold")
+        found = objects[there, number]
+        inner = _transform(part)
+        both = np.concatenate([inner[:3] @ place[:3], inner[3:] @ place[:3] + place[3]])
+        points, faces = found.mesh
+        yield points @ both[:3] + both[3], faces
+        yield from _placed(objects, there, found.components(), both, depth + 1)
 
 
 def _path_of(part: ElementTree.Element, path: str) -> str:

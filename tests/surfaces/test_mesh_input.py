@@ -8,6 +8,7 @@ import io
 import json
 import struct
 import sys
+import time
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -315,6 +316,30 @@ def test_polygons_over_several_lines_and_colours_behind_faces(tmp_path: Path) ->
         assert len(trimesh.graph.connected_components(read[name].face_adjacency)) == 1
 
 
+COUNTS = ("4 2 5", "4 2", "4\n2\n5", "4\n2 # faces\n\n5", "4 2\n5", "4\n# faces\n2 5", "4\n2")
+
+
+@pytest.mark.parametrize("counts", COUNTS)
+@pytest.mark.parametrize("behind", ["\n", " "])
+def test_the_counts_of_an_off_file_may_stand_on_any_lines(
+    tmp_path: Path, counts: str, behind: str
+) -> None:
+    """Of counts on three lines the second and third were read as vertices."""
+    (tmp_path / "square.off").write_text(f"OFF{behind}{counts}\n{CORNERS}3 0 1 2\n3 1 3 2\n")
+    vertices, faces, _ = read_mesh(tmp_path / "square.off")
+    assert vertices.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.1]]
+    assert faces.tolist() == [[0, 1, 2], [1, 3, 2]]
+
+
+def test_an_off_file_may_go_on_behind_its_counts(tmp_path: Path) -> None:
+    one = "OFF 4 2 5 " + CORNERS.replace("\n", " ") + "3 0 1 2 3 1 3 2"
+    (tmp_path / "square.off").write_text(one)
+    assert read_mesh(tmp_path / "square.off")[1].tolist() == [[0, 1, 2], [1, 3, 2]]
+    (tmp_path / "less.off").write_text("OFF\n4 -2 0\n" + CORNERS)
+    with pytest.raises(TargetError, match="it tells of 4 vertices and -2 faces"):
+        read_mesh(tmp_path / "less.off")
+
+
 def strip_ply(kind: str) -> tuple[bytes, np.ndarray]:
     """A lattice of 7 x 5 vertices, each row of it a strip, in one list as Cyberware writes it."""
     x, y = np.meshgrid(np.arange(7.0), np.arange(5.0))
@@ -444,11 +469,13 @@ def built(resources: str, number: int) -> str:
 
 NO_BUILD = f"<resources>{object_of(1, np.eye(3), np.array([[0, 1, 2]]))}</resources>"
 PACKAGES = {
-    "holds no triangles": built("", 5),
+    "it refers to object '5', which it does not hold": built("", 5),
+    "holds no triangles": built(of_components(1), 1),
+    "two of its objects are called '1'": built(2 * of_components(1), 1),
     "it builds no object": NO_BUILD,
     "its components are nested too deeply": built(of_components(1, 1), 1),
     "it builds more than 100 objects": built(
-        "".join(of_components(k, *[k + 1] * 10) for k in range(1, 9)), 1
+        of_components(9) + "".join(of_components(k, *[k + 1] * 10) for k in range(1, 9)), 1
     ),
 }
 
@@ -463,6 +490,39 @@ def test_a_3mf_package_that_builds_nothing_or_too_much_is_refused(
     path.write_bytes(package("millimeter", {"3D/3dmodel.model": PACKAGES[words]}))
     with pytest.raises(TargetError, match=words):
         mf.design(path)
+
+
+def test_3mf_references_to_nothing_or_to_one_great_mesh_take_no_time(tmp_path: Path) -> None:
+    """Each of a million references looked for its object, or read its mesh anew: minutes."""
+    path = tmp_path / "part.3mf"
+    lost = of_components(1, *[2] * 1000) + of_components(2, *[3] * 1000)
+    path.write_bytes(package("millimeter", {"3D/3dmodel.model": built(lost, 1)}))
+    began = time.process_time()
+    with pytest.raises(TargetError, match="refers to object '3', which it does not hold"):
+        read_mesh(path)
+    mesh = object_of(2, *sheet(_shallow, 26, 26))
+    path.write_bytes(
+        package("millimeter", {"3D/3dmodel.model": built(of_components(1, *[2] * 300) + mesh, 1)})
+    )
+    vertices, faces, _ = read_mesh(path)
+    assert time.process_time() - began < 2
+    assert len(vertices) == 300 * 26**2
+    assert len(faces) == 300 * 2 * 25**2
+
+
+def test_a_3mf_package_of_too_many_triangles_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("miurafab.surfaces.mesh_formats._3MF_TRIANGLES", 100)
+    mesh = object_of(2, *sheet(_shallow, 6, 6))
+    for count, words in ((2, None), (3, "it builds more than 100 triangles; simplify the mesh")):
+        inside = built(of_components(1, *[2] * count) + mesh, 1)
+        (tmp_path / "part.3mf").write_bytes(package("millimeter", {"3D/3dmodel.model": inside}))
+        if words is None:
+            assert len(read_mesh(tmp_path / "part.3mf")[1]) == 100
+        else:
+            with pytest.raises(TargetError, match=words):
+                read_mesh(tmp_path / "part.3mf")
 
 
 def test_what_unpacks_to_too_much_is_refused(
