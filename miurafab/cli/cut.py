@@ -324,7 +324,7 @@ def _wait(console: Console, keys: Keys, request: str) -> None:
 
 def _put_in(prepared: Prepared, number: int) -> str:
     """What to do before sheet ``number``, which is not the first."""
-    from miurafab.workflow.material_change import put_in
+    from miurafab.machine.planning import put_in
 
     return put_in(prepared.jobs[number - 2].name, prepared.jobs[number - 1].name)
 

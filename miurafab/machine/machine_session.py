@@ -32,7 +32,7 @@ from miurafab.machine.known_controller import (
     require_talk,
 )
 from miurafab.machine.owner import Owner, claim, this_owner
-from miurafab.machine.planning import JobPlan
+from miurafab.machine.planning import JobPlan, put_in
 from miurafab.machine.progress import JobAborted, Progress, StreamResult
 from miurafab.machine.resting_beam import RestingBeam
 from miurafab.machine.session import HOMING_S, Session
@@ -298,7 +298,7 @@ class MachineSession:
         return state
 
     def load(self) -> MachineState:
-        """Somebody has put in fresh material; a lid that was opened for that is shut again."""
+        """Somebody has changed the material or turned it over; a lid opened for that is shut."""
         self.known.loaded = None
         status = self.conversation.status
         if status is None or (status.state, status.substate) != ("Door", 0):
@@ -368,8 +368,8 @@ class MachineSession:
         fresh = loaded is None or plan.machine.bed.roll_fed or not self._transport.blocks
         if not fresh and plan.resumption is None:
             raise PersonNeeded(
-                f"{loaded} has burnt on the sheet in the machine; put in fresh material and say "
-                f"so, then start {plan.job.name}"
+                f"{loaded} has burnt on the sheet in the machine; {put_in(loaded, plan.job.name)} "
+                f"and say so, then start {plan.job.name}"
             )
         with self._job():
             return send_job(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 from miurafab.errors import GcodeError, InputError
@@ -141,6 +142,18 @@ def head_at(at: Head | str, box: Box | None, name: str) -> Head:
         )
     (right, back), (x0, y0, x1, y1) = PLACES[at], box
     return x0 + right * (x1 - x0), y0 + back * (y1 - y0)
+
+
+def is_other_side(before: str, name: str) -> bool:
+    """Whether the file ``name`` is for the sheet whose back the file ``before`` was for."""
+    return Path(before).stem == f"{Path(name).stem}-back"
+
+
+def put_in(before: str, name: str) -> str:
+    """What somebody does between the files ``before`` and ``name``."""
+    if is_other_side(before, name):
+        return "turn the sheet over, left to right, and lay it by its three holes"
+    return "put in fresh material"
 
 
 def passed_checks(

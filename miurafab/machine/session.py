@@ -32,6 +32,7 @@ HOMING_S = 180.0
 """The longest time of homing; GRBL answers nothing meanwhile, not even a status query."""
 _RESETS = 3
 _HOLD_S = 1.0  # to come to rest from full speed before the reset that ends a refused job
+_HOLD_POLL_S = 0.1  # GRBL asks for 10 queries a second at most (doc/markdown/interface.md)
 _ASK_AGAIN_S = 1.0  # a status query that noise swallowed is asked again
 _REPORT_INCHES = 13  # GRBL's setting: positions are reported in inches
 _MM_PER_INCH = 25.4
@@ -340,6 +341,8 @@ class Session:
             while not at_rest and self.now() < end:
                 report = self.fresh_status(end - self.now())
                 at_rest = report is not None and _stands(report)
+                if not at_rest:
+                    self.pause(min(_HOLD_POLL_S, end - self.now()))
         except PortError:
             return False
         return self.stop()

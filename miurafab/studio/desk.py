@@ -296,7 +296,7 @@ class Desk:
             homes=seen.get("homes", False),
             waits=seen.get("waits", ""),
             homing=busy == "home",
-            fresh_wanted=seen.get("fresh_wanted", False) and not busy,
+            material_wanted="" if busy else seen.get("material_wanted", ""),
         )
         job = self._prepared
         return (

@@ -65,7 +65,7 @@ def progress_table(operator: Operator) -> dict[str, Any]:
         "next": operator.describe() if operator.prepared is not None else "",
         "progress": None,
         "waits": "",
-        "fresh_wanted": operator.wants_material,
+        "material_wanted": operator.wants_material,
     }
     if progress is not None:
         told = progress.stream.state

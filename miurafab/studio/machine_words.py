@@ -69,12 +69,6 @@ _STATES = {
     "Alarm": StateWords("Alarm", "", "alarm"),
 }
 _OPENING = StateWords(CONNECTING, "The controller is greeted and asked for its settings.", "busy")
-_FRESH = StateWords(
-    "Waiting for you",
-    "A sheet that is burnt lies in the machine. Put in fresh material and press 'Fresh material is "
-    "in'.",
-    "held",
-)
 _STALE = StateWords("No answer", "", "alarm")
 
 _RESET_FIRST = (1, 2)
@@ -98,14 +92,14 @@ def state_words(
     homes: bool,
     waits: str,
     homing: bool,
-    fresh_wanted: bool,
+    material_wanted: str,
 ) -> StateWords:
     """The words for the state ``word`` of a status report, empty before the first.
 
     ``silent_s`` seconds nothing was heard; ``alarm`` is the last alarm's number; ``homes`` says
     that the machine has switches to home to; ``waits`` what a program waits for; ``homing`` that
-    the controller was told to home, and is silent until it has; ``fresh_wanted`` that the next
-    sheet needs fresh material.
+    the controller was told to home, and is silent until it has; ``material_wanted`` what
+    somebody does before the next sheet, if anything.
     """
     name = word.partition(":")[0]
     if homing:
@@ -121,8 +115,13 @@ def state_words(
         return _OPENING
     if waits:
         return StateWords("Waiting for you", f"The program is {waits}. Press Resume.", "held")
-    if name == "Idle" and fresh_wanted:
-        return _FRESH
+    if name == "Idle" and material_wanted:
+        return StateWords(
+            "Waiting for you",
+            "A sheet that is burnt lies in the machine. "
+            f"{material_wanted[0].upper()}{material_wanted[1:]}; then press 'The sheet is in'.",
+            "held",
+        )
     if name == "Alarm":
         return StateWords("Alarm", _alarm_advice(alarm, homes), "alarm")
     return _STATES.get(word) or _STATES.get(name) or StateWords(name)

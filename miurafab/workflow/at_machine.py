@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from miurafab.errors import InputError, MiurafabError, PersonNeeded
 from miurafab.gcode.program import strokes
 from miurafab.machine.known_controller import MachineState
+from miurafab.machine.planning import put_in
 from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.session_process import Heard, Outcome, SessionProcess
 from miurafab.machine.transport import VIRTUAL
@@ -20,7 +21,6 @@ from miurafab.workflow.cut import Prepared
 from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.cut_sheets import frame_plan
 from miurafab.workflow.dry_run import clock_text
-from miurafab.workflow.material_change import put_in
 from miurafab.workflow.sheet_plans import beside, journal_path, plan_sheets
 from miurafab.workflow.timeline import SheetProgress, Timeline
 
@@ -103,11 +103,13 @@ class Operator:
         return 0 if self.prepared is None else len(self.prepared.jobs)
 
     @property
-    def wants_material(self) -> bool:
-        """Whether a person has to put in fresh material before a sheet of the job is started."""
+    def wants_material(self) -> str:
+        """What a person has to do to the material before the next sheet is started, if anything."""
         if self.prepared is None or self.state is None or self.state.loaded is None:
-            return False
-        return not self.prepared.machine.bed.roll_fed and self.state.port != VIRTUAL
+            return ""
+        if self.prepared.machine.bed.roll_fed or self.state.port == VIRTUAL:
+            return ""
+        return put_in(self.state.loaded, self.prepared.jobs[self.number - 1].name)
 
     # What came
 
@@ -182,13 +184,13 @@ class Operator:
         self._process.press(keys)
 
     def load(self) -> None:
-        """Somebody has put in fresh material; raises ``InputError`` while an action is under way,
-        which would burn on it.
+        """Somebody has put in fresh material, or turned the sheet over; raises ``InputError`` while
+        an action is under way, which would burn on it.
         """
         self.armed = False
         self._require_idle()
         self._process.order("load")
-        self.said.append("Fresh material is in.")
+        self.said.append("The sheet is in.")
 
     # The sheets
 
@@ -256,9 +258,9 @@ class Operator:
             word = self.busy or ("" if state is None else state.state)
             raise InputError(f"The machine must be idle before a job is armed; it is in '{word}'.")
         if self.wants_material:
-            what = put_in(state.loaded or "", self._job().jobs[self.number - 1].name)
             raise PersonNeeded(
-                f"{state.loaded} has burnt on the sheet in the machine; {what} and say so first"
+                f"{state.loaded} has burnt on the sheet in the machine; {self.wants_material} and "
+                "say so first"
             )
         self.armed = True
         self.said.append(f"Armed. To burn: {self.describe()}.")

@@ -18,7 +18,7 @@ from miurafab.files import AnyPath
 from miurafab.findings import Finding
 from miurafab.machine.job_process import session_apart
 from miurafab.machine.keys import Keys
-from miurafab.machine.planning import Head, JobPlan, head_at, plan_job
+from miurafab.machine.planning import Head, JobPlan, head_at, plan_job, put_in
 from miurafab.machine.sender import SheetSession, StreamResult, session_here
 from miurafab.machine.trace_box import frame_job
 from miurafab.machine.transport import VIRTUAL, require_port
@@ -36,7 +36,7 @@ from miurafab.profiles import MachineProfile
 from miurafab.workflow.alignment import align
 from miurafab.workflow.cut import Prepared, prepare
 from miurafab.workflow.cut_options import DEFAULT_OPTIONS, CutOptions
-from miurafab.workflow.material_change import at_pause, is_attended, needs_person, put_in
+from miurafab.workflow.material_change import at_pause, is_attended, needs_person
 from miurafab.workflow.sheet_plans import (
     beside,
     journal_path,

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 from miurafab.machine.keys import Keys, NoKeys
 from miurafab.machine.planning import AtPause
@@ -20,18 +19,6 @@ from miurafab.workflow.cut import Prepared
 
 WAITS = "waits for fresh material"
 """Why a sheet was not cut that no person put material in for."""
-
-
-def is_other_side(before: str, name: str) -> bool:
-    """Whether the file ``name`` is for the sheet whose back the file ``before`` was for."""
-    return Path(before).stem == f"{Path(name).stem}-back"
-
-
-def put_in(before: str, name: str) -> str:
-    """What somebody does between the files ``before`` and ``name``."""
-    if is_other_side(before, name):
-        return "turn the sheet over, left to right, and lay it by its three holes"
-    return "put in fresh material"
 
 
 def needs_person(prepared: Prepared, port: str, pause: bool | None) -> bool:

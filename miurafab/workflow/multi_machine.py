@@ -16,14 +16,14 @@ from miurafab.errors import InputError, JobStopped, MiurafabError
 from miurafab.findings import Finding
 from miurafab.machine.job_process import session_apart
 from miurafab.machine.journal import read_journal
-from miurafab.machine.planning import Head, JobPlan
+from miurafab.machine.planning import Head, JobPlan, is_other_side
 from miurafab.machine.sender import SheetSession
 from miurafab.machine.session_process import suspending_signals
 from miurafab.machine.signals import StopSignals
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.cut_sheets import cut_sheet, head_after
-from miurafab.workflow.material_change import WAITS, MaterialChange, is_other_side
+from miurafab.workflow.material_change import WAITS, MaterialChange
 from miurafab.workflow.sheet_plans import journal_path, plan_sheets, start_findings
 
 _LOOK_S = 0.1

@@ -427,11 +427,16 @@ def test_a_sheet_that_is_burnt_takes_no_second_job() -> None:
     here.cut(JOB)
     assert here.state.loaded == "rows.nc"
     burnt = len(wire.device.beam_log)
-    with pytest.raises(PersonNeeded, match=r"rows\.nc has burnt on the sheet in the machine"):
+    fresh = r"rows\.nc has burnt on the sheet in the machine; put in fresh material and say so, then"
+    with pytest.raises(PersonNeeded, match=fresh):
         here.cut(JOB)
     assert len(wire.device.beam_log) == burnt
     here.load()
     assert here.cut(JOB).lines == 15
+    front = replace(JOB, job=replace(JOB.job, name="sheet-01.nc"))
+    here.known.loaded = "sheet-01-back.nc"
+    with pytest.raises(PersonNeeded, match=r"turn the sheet over, left to right, .* and say so"):
+        here.cut(front)
 
 
 @pytest.mark.parametrize("dialect", ["marlin", "hpgl"])

@@ -145,6 +145,8 @@ def test_a_hold_is_waited_for_a_second_at_most_and_then_comes_the_reset(
     assert wire.sent[0][1] == b"!"
     at = next(when for when, data in wire.sent if data == b"\x18")
     assert seconds[0] <= at <= seconds[1]
+    asked = [when for when, data in wire.sent if data == b"?" and when < at]
+    assert all(b - a >= 0.1 for a, b in itertools.pairwise(asked))
 
 
 def test_a_slow_board_has_its_whole_patience_to_come_back() -> None:

@@ -349,7 +349,7 @@ def test_every_request_of_the_machine_needs_key_and_origin(tmp_path, route):
 
 def test_words_for_each_state():
     said = {"silent_s": 0.0, "alarm": None, "homes": True, "waits": "", "homing": False}
-    said["fresh_wanted"] = False
+    said["material_wanted"] = ""
     titles = {
         word: state_words(word, **said).title
         for word in ("", "Idle", "Run", "Jog", "Hold:0", "Hold:1", "Door:1", "Door:3", "Alarm")
@@ -367,6 +367,12 @@ def test_words_for_each_state():
     assert (
         state_words("Hold:0", **(said | {"waits": "waiting at x.nc, line 4 (M0)"})).look == "held"
     )
+    turned = said | {"material_wanted": "turn the sheet over, left to right"}
+    assert state_words("Idle", **turned).advice == (
+        "A sheet that is burnt lies in the machine. Turn the sheet over, left to right; then press "
+        "'The sheet is in'."
+    )
+    assert state_words("Run", **turned).title == "Moving"
     assert plain("Give `home`, or `at`.") == "Give 'Home', or 'Set origin here'."
 
 

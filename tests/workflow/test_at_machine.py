@@ -66,6 +66,7 @@ def test_a_sheet_that_has_burnt_is_turned_over_or_changed(tmp_path, burnt, what)
     with pytest.raises(PersonNeeded, match=f"{burnt} has burnt on the sheet .*; {what}.* say so"):
         operator.arm()
     assert not operator.armed
+    assert operator.wants_material.startswith(what)
 
 
 def test_what_will_burn_is_found_once_a_sheet(tmp_path, monkeypatch):

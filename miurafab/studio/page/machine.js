@@ -186,7 +186,7 @@ function showSettings({ verdict, differ, refused, rows }) {
   if (differ) byId("settings").open = true;
 }
 
-function enable({ busy, reading, words, job, state, loaded, fresh_wanted: wanted }) {
+function enable({ busy, reading, words, job, state, loaded, material_wanted: wanted }) {
   const mine = controls();
   const idle = mine && !busy && state === "Idle";
   const allowed = {

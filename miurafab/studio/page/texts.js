@@ -227,7 +227,7 @@ export const texts = {
     "arm": "Arm…",
     "hold": "Hold",
     "resume": "Resume",
-    "fresh": "Fresh material is in",
+    "fresh": "The sheet is in",
     "armed": "Armed. This will burn:",
     "disarm": "Do not burn",
     "start": "Burn it now",
