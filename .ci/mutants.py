@@ -2,7 +2,8 @@
 
     python .ci/mutants.py [AREA ...] [--module PATH ...] [--sample 200] [--jobs 2]
 
-``[tool.mutants.areas]`` of ``pyproject.toml`` has the modules of each area and its nearest tests.
+``[tool.mutants.areas]`` of ``pyproject.toml`` has the modules of each area and its nearest tests;
+``--deselect=`` before one of them leaves it out, as it is slow.
 Each fault (``.ci/mutations.py``) is run in a process of its own, forked from one that has loaded
 the libraries: the module is loaded with the fault, files stay as they are, and the tests stop at
 the first that fails. The tests that run the faulty line come first, quick ones before slow ones; a
