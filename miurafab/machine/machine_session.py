@@ -365,8 +365,8 @@ class MachineSession:
         job has burnt.
         """
         loaded = self.known.loaded
-        fresh = loaded is None or plan.machine.bed.roll_fed or not self._transport.blocks
-        if not fresh and plan.resumption is None:
+        feeds_itself = plan.machine.bed.roll_fed or not self._transport.blocks
+        if loaded is not None and not feeds_itself and plan.resumption is None:
             raise PersonNeeded(
                 f"{loaded} has burnt on the sheet in the machine; {put_in(loaded, plan.job.name)} "
                 f"and say so, then start {plan.job.name}"

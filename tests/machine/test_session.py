@@ -427,7 +427,7 @@ def test_a_sheet_that_is_burnt_takes_no_second_job() -> None:
     here.cut(JOB)
     assert here.state.loaded == "rows.nc"
     burnt = len(wire.device.beam_log)
-    fresh = r"rows\.nc has burnt on the sheet in the machine; put in fresh material and say so, then"
+    fresh = r"rows\.nc has burnt on the sheet in the machine; put in fresh material and say so"
     with pytest.raises(PersonNeeded, match=fresh):
         here.cut(JOB)
     assert len(wire.device.beam_log) == burnt
