@@ -97,7 +97,7 @@ def judge_program(
     if laser:
         yield from _no_laser_mode(machine)
         yield from armed_at_the_end(job)
-    if machine.dialect != "hpgl" and leaves_air_on(job):
+    if leaves_air_on(job):
         yield Finding("air", f"{job.name} ends with the air on; M9 is sent after it.", job.name)
     yield from _rates(program, machine)
     yield from characters(job)

@@ -7,10 +7,15 @@ from dataclasses import replace
 import pytest
 
 from miurafab.gcode.job import Job
-from miurafab.machine.judge_job import judge_job, longest_line
+from miurafab.machine.judge_job import coordinate, judge_job, longest_line
 from miurafab.profiles import MachineProfile, load_machine
+from miurafab.profiles.machine import ZAxis
 
 LASER, PEN = load_machine("grbl-laser-400"), load_machine("grbl-pen-a4")
+MARLIN, HAL = load_machine("marlin-laser-220"), load_machine("grblhal-laser-600")
+OLD, PLOTTER = load_machine("grbl09-laser-300"), load_machine("hpgl-cutter-a3")
+Z = replace(LASER, z=ZAxis(travel_mm=5.0, max_rate_mm_min=300.0, acceleration_mm_s2=100.0))
+UNEVEN = replace(LASER, motion=replace(LASER.motion, max_rate_y_mm_min=3000.0))
 DARK = replace(LASER, settings={**LASER.settings, 32: 0.0})
 STROKE = "M4 S500\nG1 X10 F600\n"
 
@@ -60,3 +65,240 @@ def test_a_line_fits_to_the_byte() -> None:
     assert len(fits) == limit
     assert codes(f"M4\n{fits}\nM5\n", LASER) == []
     assert codes(f"M4\n{fits.replace('S', 'S0')}\nM5\n", LASER) == ["lines"]
+
+
+@pytest.mark.parametrize(
+    ("machine", "text", "found"),
+    [
+        (LASER, "M4 S5\nG1 X10 F6000.5\nM5\n", []),  # a feed is rounded to a whole number
+        (LASER, "M4 S5\nG1 X10 F6000.6\nM5\n", ["rate"]),
+        (LASER, "M4 S5\nG1 X10 Y10 F8000\nM5\n", []),  # 5657 mm/min along each axis
+        (LASER, "M4 S5\nG1 X10 Y10 F8500\nM5\n", ["rate"]),
+        (UNEVEN, "M4 S5\nG1 X10 F6000\nM5\n", []),
+        (UNEVEN, "M4 S5\nG1 Y10 F3001\nM5\n", ["rate"]),
+        (LASER, "M4 S5\nG1 X10 F600\nG1 X20 S0 F7000\nM5\n", []),  # without the beam
+        (LASER, "M4 S1000.1\nG1 X10 F600\nM5\n", ["power"]),
+        (Z, "M4 S5\nG1 X10 F600\nG0 Z3\nG0 Z-2\nM5\n", []),
+        (Z, "M4 S5\nG1 X10 F600\nG0 Z-5.001\nM5\n", ["bounds"]),
+        (Z, "M4 S5\nG1 Z-3 F9000\nM5\n", []),  # the rates are those of X and Y
+        (Z, "M4\nM5\n", ["nothing-burnt"]),
+        (LASER, "M4 S5\nG1 X10 F600\nG0 Z-500\nM5\n", []),
+        (LASER, "G4 P1\n" + STROKE + "M5\n", []),  # before anything burns
+        (LASER, "M3 S500\nG1 X10 F600\nG0 X20\nG4 P1\nM5\n", ["m3"]),  # dark after a travel
+        (LASER, "M3 S500\nG1 X10 F600\nX20\nM4\nG4 P1\nM5\n", ["m3"]),
+        (LASER, "M3 S500\nG1 X10 F600\nS0\nG4 P1\nM5\n", ["m3"]),
+        (LASER, "M3 S500\nG1 X10 F600\nS0\nG1 X20\nS0.5\nG4 P1\nM5\n", ["dwell", "m3"]),
+        (MARLIN, "M3 S50\nG4 P1\nM5\n", ["dwell", "m3", "nothing-burnt"]),  # not inline
+        (LASER, "M3 S50\nG4 P1\nM5\n", ["m3", "nothing-burnt"]),
+        (OLD, STROKE + "M5\n", []),  # has no laser mode that could be off
+        (PLOTTER, "IN;PU0,0;PD" + 500 * "400,0,400,400," + "0,0;\n", []),  # a line of 6500
+        (PEN, "M3 S500\nG1 X10 F600\n", []),
+        (PEN, STROKE, []),
+    ],
+)
+def test_each_rule_keeps_to_what_it_is_about(
+    machine: MachineProfile, text: str, found: list[str]
+) -> None:
+    assert codes(text, machine) == found
+
+
+ALL_ROUND = "G0 X10 Y10\nG1 X60 S500 F3000\nY60\nX10\nY{}\n"
+INSIDE = "G0 X20 Y20\nG1 X30\nG0 Y25\nG1 X20\nM5\n"
+NAMED = "M4 S0\n(operation cut)\n" + ALL_ROUND
+M3 = (
+    "arms the laser with M3, which keeps the beam on, standing still, if the link to the machine "
+    "is lost; use M4, or allow M3 explicitly and stay beside the machine."
+)
+WAITS = "waits with the beam on at S{}, which burns a hole or starts a fire; switch it off (M5) "
+WAITS += "before the G4."
+
+
+@pytest.mark.parametrize(
+    ("machine", "text", "found"),
+    [
+        (LASER, STROKE, ["armed a.nc: a.nc ends with M4 in force; end it with M5."]),
+        (LASER, "G0 X10\n", ["nothing-burnt a.nc: a.nc burns nothing."]),
+        (
+            LASER,
+            STROKE + "M8\nM5\n",
+            ["air a.nc: a.nc ends with the air on; M9 is sent after it."],
+        ),
+        (
+            LASER,
+            "M4 S1001\nG1 X10 F600\nX20 S1002\nX30 S5\nM5\n",
+            [
+                "power a.nc:2: a.nc, line 2 (the first of 2) asks for S1001, more than the 1000 "
+                "that is full power on grbl-laser-400."
+            ],
+        ),
+        (
+            LASER,
+            STROKE + "G1 X-2.5\nX-3 Y500.12345\nM5\n",
+            [
+                "bounds a.nc:3: a.nc, line 3 (the first of 2) moves to X-2.5 Y0, off the bed of "
+                "grbl-laser-400 (400 x 400 mm)."
+            ],
+        ),
+        (
+            Z,
+            STROKE + "G0 Z-1\nX20 Z-6.25\nZ0\nM5\n",
+            [
+                "bounds a.nc:4: a.nc, line 4 is the farthest of moves over 6.25 mm in Z, more than "
+                "the travel of grbl-laser-400 (5 mm)."
+            ],
+        ),
+        (
+            LASER,
+            "M4 S5\nG1 X10 F600\nX20 F7000\nX0 F8000\nM5\n",
+            [
+                "rate a.nc:3: a.nc, line 3 (the first of 2) asks for F7000, above the largest rate "
+                "of grbl-laser-400, which will hold."
+            ],
+        ),
+        (
+            LASER,
+            "M3 S500\nG1 X10 F600\nX20 S300\nG4 P1\nS200\nG4 P2\nM5\n",
+            [
+                f"m3 a.nc:1: a.nc, line 1 {M3}",
+                f"dwell a.nc:4: a.nc, line 4 (the first of 2) {WAITS.format(300)}",
+            ],
+        ),
+        (
+            MARLIN,
+            "M3 S50\nG4 P1\nG1 X5 F600 S20\nG4 P1\nM5\n",
+            [
+                f"m3 a.nc:1: a.nc, line 1 {M3}",
+                f"dwell a.nc:2: a.nc, line 2 (the first of 2) {WAITS.format(50)}",
+            ],
+        ),
+        (
+            LASER,
+            STROKE + "M0\nM5\nM0\n",
+            [
+                "pauses a.nc:3: a.nc, line 3 (the first of 2) waits for a person (M0); the key r "
+                "goes on."
+            ],
+        ),
+        (
+            LASER,
+            "(a)\n(b !)\nG91\n" + STROKE + "M5\nG91 (?)\n",
+            [
+                "characters a.nc:2: a.nc, line 2 holds '!' in a comment: other senders pass it on, "
+                "and the controller would obey it.",
+                "relative a.nc:3: a.nc, line 3 begins relative moves (G91); they are posted where "
+                "the wire is too slow for absolute moves.",
+            ],
+        ),
+        (
+            HAL,
+            "G21\nM62 P1\nM65 P1\n" + STROKE + "M5\n",
+            [
+                "outputs a.nc:2: a.nc, line 2 switches an output (M62 to M65): if the beam hangs "
+                "on it, no check here sees that beam."
+            ],
+        ),
+        (
+            DARK,
+            STROKE + "M5\n",
+            [
+                "laser-mode grbl-laser-400: Laser mode is off on grbl-laser-400 ($32=0): the beam "
+                "would burn along every travel; set $32=1."
+            ],
+        ),
+        (
+            LASER,
+            "M4 S0\n" + ALL_ROUND.format(10) + INSIDE,
+            [
+                "loose a.nc:8: a.nc, line 8 burns inside the closed stroke of line 3; if that "
+                "stroke cuts through, the piece lies loose by then."
+            ],
+        ),
+        (
+            LASER,
+            NAMED.format(10) + INSIDE,
+            [
+                "islands a.nc:9: a.nc, line 9 burns inside the outline that is cut through from "
+                "line 4 on: that piece lies loose by then and may catch fire; cut outlines last."
+            ],
+        ),
+        (
+            LASER,
+            NAMED.format(11) + ALL_ROUND.replace("10", "110").replace("60", "160").format(112)
+            + "M5\n",
+            [
+                "outlines a.nc:7: a.nc, line 7 ends the outline begun in line 4, 1.00 mm from "
+                "where that began: the piece would hang on by a thread; close it."
+            ],
+        ),
+        (
+            LASER,
+            STROKE + f"G1X5F600S{69 * '0'}5\nG1X6F600S{70 * '0'}5 (b)\nG1X7F600S{71 * '0'}5\nM5\n",
+            [
+                "lines a.nc:4: a.nc, line 4 (the first of 2) has 80 characters without comments "
+                "and blanks, more than the controller's 79; split the line."
+            ],
+        ),
+    ],
+)  # fmt: skip
+def test_a_finding_says_what_it_measured_and_where(
+    machine: MachineProfile, text: str, found: list[str]
+) -> None:
+    judged = judge_job(Job("a.nc", text), machine)
+    assert [f"{each.code} {each.where}: {each.sentence}" for each in judged.findings] == found
+    assert judged.program is not None
+    assert judged.lines == len(judged.program.line_number)
+
+
+def test_the_power_that_a_material_takes_is_a_part_of_the_range_of_the_machine() -> None:
+    """From S100 to S1000 the half is S550; half an S word is rounding."""
+    machine = replace(LASER, tool=replace(LASER.tool, s_min=100))
+    for power, found in (("550.5", []), ("550.6", ["material"])):
+        assert codes(f"M4 S{power}\nG1 X10 F600\nM5\n", machine, most_power=0.5) == found
+    judged = judge_job(Job("a.nc", "M4 S900\nG1 X1 F600\nM5\n"), machine, most_power=0.5)
+    assert [each.sentence for each in judged.findings] == [
+        "a.nc, line 2 asks for S900, more than the S550 that the material takes (its max_power)."
+    ]
+    assert codes("M3 S900\nG1 X10 F600\nM5\n", PEN, most_power=0.5) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "lines", "found"),
+    [
+        ("G99\n\n(b)\nM5 ( ! )\n", 2, ["program a.nc: a.nc, line 1: G99"]),
+        ("G99\nM5\nX5!\n", 2, ["lines a.nc: a.nc, line 3: '!' is", "program a.nc: a.nc, line 1"]),
+        (
+            f"M3 S5\nG1 X5 F600\nG99\nG1{78 * '0'}\nM5\n",
+            3,
+            [
+                "lines a.nc: a.nc, line 4: 80 characters without",
+                "m3 a.nc:1: a.nc, line 1 arms",
+                "program a.nc: a.nc, line 3: G99",
+            ],
+        ),
+    ],
+)  # fmt: skip
+def test_a_job_that_cannot_be_read_is_judged_by_its_lines(
+    text: str, lines: int, found: list[str]
+) -> None:
+    judged = judge_job(Job("a.nc", text), LASER)
+    assert (judged.lines, judged.program) == (lines, None)
+    said = [f"{each.code} {each.where}: {each.sentence}" for each in judged.findings]
+    assert [each[: len(begin)] for each, begin in zip(said, found, strict=True)] == found
+
+
+def test_a_line_for_marlin_leaves_room_for_its_number_and_checksum() -> None:
+    """``N99999999*255`` are 13 characters of the 95."""
+    assert longest_line(MARLIN) == 82
+    assert longest_line(LASER) == 79
+
+
+def test_a_coordinate_is_told_apart_from_a_limit() -> None:
+    shown = {
+        400.0: "400",
+        400.1: "400.1",
+        -0.00001: "0",
+        -0.5: "-0.5",
+        0.12346: "0.1235",
+        1e3: "1000",
+    }
+    assert {value: coordinate(value) for value in shown} == shown
