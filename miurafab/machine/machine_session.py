@@ -32,7 +32,7 @@ from miurafab.machine.known_controller import (
     require_talk,
 )
 from miurafab.machine.owner import Owner, claim, this_owner
-from miurafab.machine.planning import JobPlan, put_in
+from miurafab.machine.planning import JobPlan, feeds_itself, put_in
 from miurafab.machine.progress import JobAborted, Progress, StreamResult
 from miurafab.machine.resting_beam import RestingBeam
 from miurafab.machine.session import HOMING_S, Session
@@ -364,12 +364,12 @@ class MachineSession:
         :class:`~miurafab.errors.PersonNeeded` where a sheet lies in the machine on which another
         job has burnt.
         """
-        loaded = self.known.loaded
-        feeds_itself = plan.machine.bed.roll_fed or not self._transport.blocks
-        if loaded is not None and not feeds_itself and plan.resumption is None:
+        loaded, name = self.known.loaded, plan.job.name
+        stays = plan.resumption is not None or not self._transport.blocks
+        if not (stays or loaded is None or feeds_itself(plan.machine, loaded, name)):
             raise PersonNeeded(
-                f"{loaded} has burnt on the sheet in the machine; {put_in(loaded, plan.job.name)} "
-                f"and say so, then start {plan.job.name}"
+                f"{loaded} has burnt on the sheet in the machine; {put_in(loaded, name)} and say "
+                f"so, then start {name}"
             )
         with self._job():
             return send_job(

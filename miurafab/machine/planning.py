@@ -156,6 +156,11 @@ def put_in(before: str, name: str) -> str:
     return "put in fresh material"
 
 
+def feeds_itself(machine: MachineProfile, before: str, name: str) -> bool:
+    """Whether ``machine`` changes the material between the files ``before`` and ``name`` itself."""
+    return machine.bed.roll_fed and not is_other_side(before, name)
+
+
 def passed_checks(
     options: SendOptions, machine: MachineProfile, program: Program | None
 ) -> frozenset[str]:

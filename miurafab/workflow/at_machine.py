@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from miurafab.errors import InputError, MiurafabError, PersonNeeded
 from miurafab.gcode.program import strokes
 from miurafab.machine.known_controller import MachineState
-from miurafab.machine.planning import put_in
+from miurafab.machine.planning import feeds_itself, put_in
 from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.session_process import Heard, Outcome, SessionProcess
 from miurafab.machine.transport import VIRTUAL
@@ -107,9 +107,10 @@ class Operator:
         """What a person has to do to the material before the next sheet is started, if anything."""
         if self.prepared is None or self.state is None or self.state.loaded is None:
             return ""
-        if self.prepared.machine.bed.roll_fed or self.state.port == VIRTUAL:
+        before, name = self.state.loaded, self.prepared.jobs[self.number - 1].name
+        if self.state.port == VIRTUAL or feeds_itself(self.prepared.machine, before, name):
             return ""
-        return put_in(self.state.loaded, self.prepared.jobs[self.number - 1].name)
+        return put_in(before, name)
 
     # What came
 

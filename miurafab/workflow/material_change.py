@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Sequence
 
 from miurafab.machine.keys import Keys, NoKeys
-from miurafab.machine.planning import AtPause
+from miurafab.machine.planning import AtPause, is_other_side
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VIRTUAL
 from miurafab.workflow.cut import Prepared
@@ -23,8 +23,14 @@ WAITS = "waits for fresh material"
 
 def needs_person(prepared: Prepared, port: str, pause: bool | None) -> bool:
     """Whether a person puts in the material of each further sheet; ``pause`` if that is given."""
-    feeds_itself = prepared.machine.bed.roll_fed and pause is None
+    feeds_itself = prepared.machine.bed.roll_fed and pause is None and not turns_over(prepared)
     return is_attended(port, pause) and not feeds_itself
+
+
+def turns_over(prepared: Prepared) -> bool:
+    """Whether a sheet is worked from both sides; no machine turns one over."""
+    names = [job.name for job in prepared.jobs]
+    return any(map(is_other_side, names, names[1:]))
 
 
 def is_attended(port: str, pause: bool | None) -> bool:

@@ -16,14 +16,14 @@ from miurafab.errors import InputError, JobStopped, MiurafabError
 from miurafab.findings import Finding
 from miurafab.machine.job_process import session_apart
 from miurafab.machine.journal import read_journal
-from miurafab.machine.planning import Head, JobPlan, is_other_side
+from miurafab.machine.planning import Head, JobPlan
 from miurafab.machine.sender import SheetSession
 from miurafab.machine.session_process import suspending_signals
 from miurafab.machine.signals import StopSignals
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.cut_sheets import cut_sheet, head_after
-from miurafab.workflow.material_change import WAITS, MaterialChange
+from miurafab.workflow.material_change import WAITS, MaterialChange, turns_over
 from miurafab.workflow.sheet_plans import journal_path, plan_sheets, start_findings
 
 _LOOK_S = 0.1
@@ -79,8 +79,7 @@ def share_sheets(
             raise InputError(
                 f"`{name}` is said of a sheet that lies at one machine; name its `port` alone."
             )
-    names = [job.name for job in prepared.jobs]
-    if any(map(is_other_side, names, names[1:])):
+    if turns_over(prepared):
         raise InputError(
             f"{prepared.name} works its sheets from both sides, and each is turned over in one "
             "machine; name one `port`."

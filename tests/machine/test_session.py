@@ -433,10 +433,19 @@ def test_a_sheet_that_is_burnt_takes_no_second_job() -> None:
     assert len(wire.device.beam_log) == burnt
     here.load()
     assert here.cut(JOB).lines == 15
-    front = replace(JOB, job=replace(JOB.job, name="sheet-01.nc"))
-    here.known.loaded = "sheet-01-back.nc"
-    with pytest.raises(PersonNeeded, match=r"turn the sheet over, left to right, .* and say so"):
-        here.cut(front)
+
+
+def test_no_machine_turns_a_sheet_over_by_itself() -> None:
+    here, wire = session()
+    wire.blocks = True
+    fed = replace(MACHINE, bed=replace(MACHINE.bed, roll_fed=True))
+    front = replace(JOB, machine=fed, job=replace(JOB.job, name="sheet-01.nc"))
+    for machine in (MACHINE, fed):
+        here.known.loaded = "sheet-01-back.nc"
+        with pytest.raises(PersonNeeded, match=r"turn the sheet over, left to right, .* say so"):
+            here.cut(replace(front, machine=machine))
+    here.known.loaded = "sheet-02-back.nc"
+    assert here.cut(front).lines == 15
 
 
 @pytest.mark.parametrize("dialect", ["marlin", "hpgl"])

@@ -67,6 +67,10 @@ def test_a_sheet_that_has_burnt_is_turned_over_or_changed(tmp_path, burnt, what)
         operator.arm()
     assert not operator.armed
     assert operator.wants_material.startswith(what)
+    machine = operator.prepared.machine
+    bed = replace(machine.bed, roll_fed=True)
+    operator.prepared = replace(operator.prepared, machine=replace(machine, bed=bed))
+    assert bool(operator.wants_material) == what.startswith("turn")  # no machine does that itself
 
 
 def test_what_will_burn_is_found_once_a_sheet(tmp_path, monkeypatch):

@@ -44,6 +44,8 @@ def test_a_person_is_needed_but_for_machines_that_feed_themselves(job):
     bed = dataclasses.replace(job.machine.bed, roll_fed=True)
     fed = dataclasses.replace(job, machine=dataclasses.replace(job.machine, bed=bed))
     assert not needs_person(fed, "/dev/ttyUSB0", None)
+    jobs = [dataclasses.replace(fed.jobs[0], name=f"sheet-01{side}.nc") for side in ("-back", "")]
+    assert needs_person(dataclasses.replace(fed, jobs=tuple(jobs)), "/dev/ttyUSB0", None)
     assert at_pause(False, None) == "go on"
     assert at_pause(True, NoKeys()) == at_pause(True, None) == "stop"
 
