@@ -10,13 +10,19 @@ the bound for all others.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.nearest import tree_of
 
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
 _CHUNK = 50_000
+_FEW = 8
+"""How many centres are looked up at first."""
 
 
 def closest_on_triangle(points: Floats, triangles: Floats) -> Floats:
@@ -51,21 +57,42 @@ def closest_on_triangle(points: Floats, triangles: Floats) -> Floats:
     return np.ascontiguousarray(best.T)
 
 
-def closest_on_mesh(points: Floats, triangles: Floats) -> Floats:
-    """(n, 3) the points of the mesh ``triangles`` (m, 3, 3) nearest to ``points`` (n, 3)."""
-    return closest_triangles(points, triangles)[0]
+@dataclass(frozen=True, eq=False)
+class MeshTrees:
+    """The triangles (m, 3, 3) of a mesh, ready for the search of those nearest to points."""
+
+    triangles: Floats
+    classes: tuple[_SizeClass, ...]
+
+    @classmethod
+    def of(cls, triangles: Floats) -> MeshTrees:
+        """The trees of ``triangles`` (m, 3, 3)."""
+        centres = (triangles.min(axis=1) + triangles.max(axis=1)) / 2
+        radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
+        largest = radii.max(initial=0.0)
+        halvings = np.floor(np.log2(largest / np.maximum(radii, 1e-6 * largest)))
+        members = [np.flatnonzero(halvings == size) for size in np.unique(halvings)]
+        return cls(triangles, tuple(_SizeClass(m, tree_of(centres[m]), radii[m]) for m in members))
+
+    def closest(self, points: Floats) -> tuple[Floats, Ints]:
+        """The points (n, 3) of the mesh nearest to ``points`` (n, 3), and the triangle (n,) that
+        each lies on.
+        """
+        found = _Nearest(points.copy(), np.full(len(points), np.inf), np.zeros(len(points), int))
+        for size in self.classes:
+            _nearer_in_class(points, self.triangles, size, found)
+        return found.feet, found.triangle
 
 
-def closest_triangles(points: Floats, triangles: Floats) -> tuple[Floats, Ints]:
-    """The points (n, 3) of :func:`closest_on_mesh`, and the triangle (n,) that each lies on."""
-    centres = (triangles.min(axis=1) + triangles.max(axis=1)) / 2
-    radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
-    classes = np.floor(np.log2(np.maximum(radii, 1e-6 * radii.max()))).astype(np.int64)
-    found = _Nearest(points.copy(), np.full(len(points), np.inf), np.zeros(len(points), np.int64))
-    for size in np.unique(classes)[::-1].tolist():
-        members = np.flatnonzero(classes == size)
-        _nearer_in_class(points, triangles, members, centres[members], radii[members], found)
-    return found.feet, found.triangle
+@dataclass(frozen=True, eq=False)
+class _SizeClass:
+    """Triangles of about one size: their numbers (k,) in the mesh, the tree of their centres and
+    their ``radii`` (k,).
+    """
+
+    members: Ints
+    tree: cKDTree
+    radii: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,31 +106,27 @@ class _Nearest:
     triangle: Ints
 
 
-def _nearer_in_class(
-    points: Floats,
-    triangles: Floats,
-    members: Ints,
-    centres: Floats,
-    radii: Floats,
-    found: _Nearest,
-) -> None:
-    """Enter in ``found`` what is nearer among the ``members`` of this class."""
-    tree = tree_of(centres)
+def _nearer_in_class(points: Floats, triangles: Floats, size: _SizeClass, found: _Nearest) -> None:
+    """Enter in ``found`` what is nearer among the members of this class."""
+    members, radii = size.members, size.radii
     largest = float(radii.max())
     active = np.arange(len(points))
-    few = 1
+    few = _FEW
     while len(active):
         few = min(few, len(members))
         # All few again, not the new ones alone: the tree may list equal distances in another order.
-        nearest = tree.query(points[active], k=np.arange(1, few + 1))
+        nearest = size.tree.query(points[active], k=np.arange(1, few + 1))
         gaps, near = np.asarray(nearest[0]), np.asarray(nearest[1])
-        promising = gaps - radii[near] < found.distance[active][:, None]
-        row, column = np.nonzero(promising)
-        _keep_nearest(points, triangles, active[row], members[near[row, column]], found)
+        # The nearest centre first: it leaves few of the others worth a look.
+        for columns in (slice(1), slice(1, None)):
+            some = near[:, columns]
+            promising = gaps[:, columns] - radii[some] < found.distance[active][:, None]
+            row, column = np.nonzero(promising)
+            _keep_nearest(points, triangles, active[row], members[some[row, column]], found)
         if few == len(members):
             return
         active = active[gaps[:, -1] - largest < found.distance[active]]
-        few = 4 * few + 6
+        few = 4 * few
 
 
 def _keep_nearest(

@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from miurafab.geometry.arrays import Floats
-from miurafab.geometry.distances import closest_on_triangle, closest_triangles
+from miurafab.geometry.distances import MeshTrees, closest_on_triangle
 from miurafab.geometry.nearest import tree_of
 
 WITHIN = 0.005
@@ -40,9 +40,10 @@ Reach = Callable[[Floats, Floats], Floats]
 
 def farthest_from_mesh(triangles: Floats, mesh: Floats) -> float:
     """The largest distance of a point of ``triangles`` (n, 3, 3) from ``mesh`` (m, 3, 3)."""
+    trees = MeshTrees.of(mesh)
 
     def nearest(points: Floats) -> tuple[Floats, Floats]:
-        feet, triangle = closest_triangles(points, mesh)
+        feet, triangle = trees.closest(points)
         return feet, mesh[triangle]
 
     def reach(points: Floats, witnesses: Floats) -> Floats:

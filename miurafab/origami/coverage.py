@@ -20,21 +20,28 @@ covered either: a sheet on one turn of a spiral does not cover the next.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
-from miurafab.geometry.distances import closest_triangles
+from miurafab.geometry.distances import MeshTrees
 from miurafab.geometry.hausdorff import in_four
 from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.polygons import facet_means, next_corners
 from miurafab.origami.crease_pattern import CreasePattern
 
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
 SAMPLES = 4_000
 """The least number of parts that an area is divided into to be judged."""
 
 MOST_SAMPLES = 40_000
+BORDER_POINTS = 1_000
 FINER_RIM = 16
 """Parts at the border are smaller by this factor: whether they are beyond is decided there."""
 
@@ -42,6 +49,7 @@ WELD = 1e-6
 """Border vertices closer than this part of the mean edge are glued."""
 
 _ON_SIDE = 1e-6
+_CLEAR = 10 * _ON_SIDE
 
 
 @dataclass(frozen=True)
@@ -58,13 +66,9 @@ def coverage(pattern: CreasePattern, tiles: Floats) -> Coverage:
     assert pattern.folded_coords is not None
     target = Shell.of_triangles(tiles)
     sheet, facet, normals = pressed(pattern, target)
-    points, areas = _samples(target)
-    missed = _missed(sheet, points)
-    places, parts = _samples(sheet)
-    beyond = target.on_border(*closest_triangles(places, target.triangles))
     return Coverage(
-        1 - float(areas[missed].sum() / areas.sum()),
-        float(parts[beyond].sum() / parts.sum()),
+        1 - _share(target, _missed, sheet),
+        _share(sheet, _beyond, target),
         _area_of_pieces(pattern, sheet.triangles, facet, normals),
     )
 
@@ -78,10 +82,14 @@ def uncovered(pattern: CreasePattern, tiles: Floats, points: Floats) -> Bools:
 
 def _missed(sheet: Shell, points: Floats) -> Bools:
     """(n,) which of ``points`` (n, 3) of the target the pressed ``sheet`` does not cover."""
-    feet, triangle = closest_triangles(points, sheet.triangles)
-    longest = np.linalg.norm(_sides(sheet.triangles), axis=2).max(axis=1)
+    feet, triangle = sheet.trees.closest(points)
     gap = np.linalg.norm(feet - points, axis=1)
-    return np.asarray(sheet.on_border(feet, triangle) | (gap > longest[triangle]))
+    return np.asarray(sheet.on_border(feet, triangle) | (gap > sheet.longest[triangle]))
+
+
+def _beyond(target: Shell, points: Floats) -> Bools:
+    """(n,) which of ``points`` (n, 3) of the pressed sheet lie beyond the ``target``."""
+    return target.on_border(*target.trees.closest(points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +125,51 @@ class Shell:
         at_border = np.zeros(count, dtype=bool)
         at_border[tails[sides]] = at_border[heads[sides]] = True
         return cls(triangles, sides, (index >= 0) & at_border[index])
+
+    @cached_property
+    def longest(self) -> Floats:
+        """(n,) the longest side of each triangle."""
+        return np.asarray(np.linalg.norm(_sides(self.triangles), axis=2).max(axis=1))
+
+    @cached_property
+    def trees(self) -> MeshTrees:
+        """The search of nearest triangles."""
+        return MeshTrees.of(self.triangles)
+
+    @cached_property
+    def along_border(self) -> tuple[cKDTree, float]:
+        """The tree of points along the border, ends of sides among them, and the largest distance
+        between neighbours. Let d be the distance of a point p to the nearest of them, and h that
+        between neighbours; then p is not nearer to the border than (d^2 - h^2 / 4)^(1/2).
+        """
+        triangle, corner = np.nonzero(self.sides)
+        tails, heads = (self.triangles[triangle, (corner + k) % 3] for k in (0, 1))
+        lengths = np.linalg.norm(heads - tails, axis=1)
+        count = np.ceil(lengths / (lengths.sum() / BORDER_POINTS)).astype(int)
+        side = np.repeat(np.arange(len(count)), count)
+        at = (np.arange(len(side)) - np.repeat(np.cumsum(count) - count, count)) / count[side]
+        points = tails[side] + at[:, None] * (heads - tails)[side]
+        return tree_of(np.concatenate([points, heads])), float((lengths / count).max())
+
+    def surely_covers(self, parts: Floats) -> Bools:
+        """(k,) which of the triangles ``parts`` (k, 3, 3) have no point that is beyond this shell,
+        or farther from it than its shortest triangle is long.
+
+        Let q be the point of the shell nearest to the centre of a part. For each point b of the
+        border, |p - b|^2 - |p - q|^2 is linear in p. So the least of them over all b is concave,
+        and over a part it is least at a corner. Where it is positive at the three corners, each
+        point of the part has q nearer than the border.
+        """
+        feet = np.repeat(self.trees.closest(parts.mean(axis=1))[0], 3, axis=0)
+        corners = parts.reshape(-1, 3)
+        squared = ((corners - feet) ** 2).sum(axis=1)
+        covered = squared < self.longest.min() ** 2
+        if self.sides.any():
+            tree, apart = self.along_border
+            beyond = tree.query(corners)[0]
+            margin = (apart / 2) ** 2 + _CLEAR * self.longest.max() * beyond
+            covered &= beyond**2 - squared > margin
+        return np.asarray(covered.reshape(-1, 3).all(axis=1))
 
     def on_border(self, feet: Floats, triangle: Ints) -> Bools:
         """(n,) whether ``feet`` (n, 3), each on its ``triangle`` (n,), lie on the border."""
@@ -162,7 +215,7 @@ def pressed(pattern: CreasePattern, target: Shell) -> tuple[Shell, Ints, Floats]
 
 def _pressed(points: Floats, target: Shell) -> tuple[Floats, Floats]:
     """``points`` (n, 3) pressed onto ``target``, and the normals (n, 3) there."""
-    feet, triangle = closest_triangles(points, target.triangles)
+    feet, triangle = target.trees.closest(points)
     normal = _area_vectors(target.triangles)[triangle]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     height = np.einsum("nk,nk->n", points - feet, normal)[:, None]
@@ -236,22 +289,32 @@ def _area_of_pieces(
     return float(np.abs(np.bincount(piece, areas)).sum())
 
 
-def _samples(shell: Shell) -> tuple[Floats, Floats]:
-    """Centres (n, 3) of parts of about equal size, smaller at the border, and their areas (n,)."""
+def _share(shell: Shell, judged: Callable[[Shell, Floats], Bools], other: Shell) -> float:
+    """The share of the area of ``shell`` whose points are ``judged`` true of ``other``.
+
+    The shell is divided into parts of about equal size, smaller at the border, each judged by its
+    centre. What ``other`` surely covers is not judged.
+    """
     triangles = shell.triangles
     rim: Bools = np.asarray(shell.corners.any(axis=1))
     areas: Floats = np.asarray(np.linalg.norm(_area_vectors(triangles), axis=1))
     limit = 2 * areas.sum() / SAMPLES
+    covered: Bools = np.zeros(len(triangles), dtype=bool)
     while True:
-        limits: Floats = np.where(rim, limit / FINER_RIM, limit)
-        large: Bools = np.asarray(areas > limits)
+        large: Bools = np.asarray(areas > np.where(rim, limit / FINER_RIM, limit))
         if not large.any():
             break
+        asked = np.flatnonzero(large & ~covered)
+        covered[asked] = other.surely_covers(triangles[asked])
         triangles = np.concatenate([triangles[~large], in_four(triangles[large])])
         areas = np.concatenate([areas[~large], np.tile(areas[large] / 4, 4)])
         rim = np.concatenate([rim[~large], np.tile(rim[large], 4)])
+        covered = np.concatenate([covered[~large], np.tile(covered[large], 4)])
     step = -(-len(triangles) // MOST_SAMPLES)
-    return triangles[::step].mean(axis=1), areas[::step]
+    triangles, areas = triangles[::step], areas[::step]
+    asked = np.flatnonzero(~covered[::step])
+    judged_true = asked[judged(other, triangles[asked].mean(axis=1))]
+    return float(areas[judged_true].sum() / areas.sum())
 
 
 def _sides(triangles: Floats) -> Floats:

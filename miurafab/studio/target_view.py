@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 import miurafab
 from miurafab.findings import findings_json
 from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
-from miurafab.geometry.distances import closest_triangles
+from miurafab.geometry.distances import MeshTrees
 from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.polygons import facet_means
 from miurafab.origami.coverage import uncovered
@@ -166,7 +166,7 @@ def compared(pattern: CreasePattern, surface: TargetSurface) -> dict[str, Any]:
     facets = pattern.faces_vertices[uncut(pattern)]
     means = facet_means(pattern.folded_coords / pattern.scale, facets)
     corners = found.vertices[found.faces]
-    feet, triangle = surface.nearest(means), closest_triangles(means, corners)[1]
+    feet, triangle = surface.nearest(means), MeshTrees.of(corners).closest(means)[1]
     a, b, c = corners[triangle].transpose(1, 0, 2)
     side = np.sign(np.einsum("nk,nk->n", means - feet, vector_product(b - a, c - a)))
     deviation = side * np.linalg.norm(means - feet, axis=1) * pattern.scale

@@ -21,7 +21,7 @@ import numpy as np
 from miurafab.errors import TargetError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.distances import closest_on_mesh
+from miurafab.geometry.distances import MeshTrees
 from miurafab.surfaces.body import BodyChoice, goes_round, round_target
 from miurafab.surfaces.decimation import decimated
 from miurafab.surfaces.mesh_files import read_mesh
@@ -112,10 +112,16 @@ class MeshChart:
         vertices, faces = self.whole
         return vertices[faces]
 
-    @property
-    def filling(self) -> Floats:
-        """(n, 3, 3) the triangles that fill holes."""
-        return self.vertices[self.faces[self.real :]]
+    @cached_property
+    def bare(self) -> MeshTrees:
+        """The mesh as it is, without fillings, for the search of nearest points."""
+        return MeshTrees.of(even_triangles(*self.whole))
+
+    @cached_property
+    def filled(self) -> MeshTrees:
+        """The same with the triangles that fill holes."""
+        filling = self.vertices[self.faces[self.real :]]
+        return MeshTrees.of(np.concatenate([self.bare.triangles, filling]))
 
     def surface(self, placement: GridPlacement, stiffness: float = 0.0) -> MeshSurface:
         """The target over ``placement``; the spline is as stiff as the data ask, or ``stiffness``.
@@ -141,23 +147,16 @@ class MeshChart:
                 f"sheet, and {FEWEST} are needed; subdivide the triangles of the mesh."
             )
         smoothed = smooth(places, points, wide, spans(wide, edge, _SPANS), stiffness)
-        triangles = even_triangles(*self.whole)
-        return MeshSurface(smoothed.spline, domain, triangles, placement, stiffness, self)
+        return MeshSurface(smoothed.spline, domain, placement, stiffness, self)
 
     def _not_covered(self, frame: Floats) -> str:
         best = largest_rectangle(frame, self.faces)
         low, size = frame.min(axis=0), np.ptp(frame, axis=0)
         if best is None:
             return f"{self.name}: no rectangle fits into the mesh at this rotation."
-        parts = ",".join(
-            f"{value:.2f}"
-            for value in (
-                math.ceil(100 * (best.u0 - low[0]) / size[0]) / 100,
-                math.floor(100 * (best.u1 - low[0]) / size[0]) / 100,
-                math.ceil(100 * (best.v0 - low[1]) / size[1]) / 100,
-                math.floor(100 * (best.v1 - low[1]) / size[1]) / 100,
-            )
-        )
+        starts, ends = 100 * (np.array([[best.u0, best.v0], [best.u1, best.v1]]) - low) / size
+        (u0, v0), (u1, v1) = np.ceil(starts).astype(int), np.floor(ends).astype(int)
+        parts = ",".join(f"{value / 100:.2f}" for value in (u0, u1, v0, v1))
         return (
             f"{self.name}: `region` reaches beyond the mesh; the largest rectangle at this "
             f"rotation is `region` {parts}."
@@ -166,13 +165,12 @@ class MeshChart:
 
 @dataclass(frozen=True, eq=False)
 class MeshSurface:
-    """A rectangle of a mesh. ``spline`` maps a little more than ``domain`` to space; ``triangles``
-    (T, 3, 3) are the mesh itself. ``free`` says whether the rectangle may be laid elsewhere.
+    """A rectangle of a mesh. ``spline`` maps a little more than ``domain`` to space. ``free`` says
+    whether the rectangle may be laid elsewhere.
     """
 
     spline: NdBSpline
     domain: Domain
-    triangles: Floats
     placement: GridPlacement
     stiffness: float
     layout: MeshChart = field(repr=False)
@@ -188,16 +186,16 @@ class MeshSurface:
 
     def closest_point(self, points: Floats) -> Floats:
         """The points nearest to ``points`` of the mesh and what fills its holes."""
-        return closest_on_mesh(points, np.concatenate([self.triangles, self.layout.filling]))
+        return self.layout.filled.closest(points)[0]
 
     def nearest(self, points: Floats) -> Floats:
-        return closest_on_mesh(points, self.triangles)
+        return self.layout.bare.closest(points)[0]
 
     def tiles(self) -> Floats:
         return self.layout.triangles
 
     def __repr__(self) -> str:
-        return f"<MeshSurface {self.layout.name}: {len(self.triangles)} triangles>"
+        return f"<MeshSurface {self.layout.name}: {len(self.layout.bare.triangles)} triangles>"
 
     @property
     def description(self) -> dict[str, Any]:

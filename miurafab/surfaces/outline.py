@@ -27,11 +27,9 @@ import numpy as np
 
 from miurafab.errors import TargetError
 from miurafab.geometry.arrays import Bools, Floats, Ints
-from miurafab.geometry.distances import closest_on_mesh
 from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.outline import Outline
 from miurafab.surfaces.mesh import MeshChart, median_edge, spans
-from miurafab.surfaces.mesh_repair import even_triangles
 from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.placement import turned
 from miurafab.surfaces.smoothing import continued, smooth
@@ -61,14 +59,12 @@ _STEPS = 30
 @dataclass(frozen=True, eq=False)
 class WholeMesh:
     """All of a disk mesh. ``outline`` is its border in the layout turned by ``angle``, ``domain`` a
-    rectangle around it. ``spline`` maps the layout, not turned, to space; ``triangles`` (T, 3, 3)
-    are the mesh itself.
+    rectangle around it. ``spline`` maps the layout, not turned, to space.
     """
 
     spline: NdBSpline
     domain: Domain
     outline: Outline
-    triangles: Floats
     angle: float
     stiffness: float
     layout: MeshChart = field(repr=False)
@@ -108,21 +104,20 @@ class WholeMesh:
         of the spline beyond the outline.
         """
         feet = self.feet(points)
-        filled = np.concatenate([self.triangles, self.layout.filling])
-        closest = closest_on_mesh(points, filled)
+        closest = self.layout.filled.closest(points)[0]
         beyond = self.outline.signed_distance(feet) < 0
         on_spline = self.point(feet)
         beyond &= _apart(points, on_spline) < _apart(points, closest)
         return np.where(beyond[:, None], on_spline, closest)
 
     def nearest(self, points: Floats) -> Floats:
-        return closest_on_mesh(points, self.triangles)
+        return self.layout.bare.closest(points)[0]
 
     def tiles(self) -> Floats:
         return self.layout.triangles
 
     def __repr__(self) -> str:
-        return f"<WholeMesh {self.layout.name}: {len(self.triangles)} triangles>"
+        return f"<WholeMesh {self.layout.name}: {len(self.layout.bare.triangles)} triangles>"
 
     def lines(self, columns: int, rows: int) -> tuple[Floats, Floats]:
         """The lines between ``columns`` x ``rows`` cells, along u and along v."""
@@ -206,12 +201,11 @@ def whole_mesh(layout: MeshChart, stiffness: float = 0.0) -> WholeMesh:
     size = high - low
     wide = Domain(*np.stack([low - REACH * size, high + REACH * size], axis=1).ravel().tolist())
     domain = Domain(*np.stack([low, high], axis=1).ravel().tolist())
-    triangles = even_triangles(*layout.whole)
     places, points = layout.flat[: layout.known], layout.vertices[: layout.known]
     count = spans(wide, median_edge(layout.flat, layout.faces), _SPANS)
     for stiff in [stiffness, *(s for s in STIFFER if s > stiffness)]:
         smoothed = smooth(places, points, wide, count, stiff)
-        target = WholeMesh(smoothed.spline, domain, outline, triangles, 0.0, stiff, layout)
+        target = WholeMesh(smoothed.spline, domain, outline, 0.0, stiff, layout)
         if _even_beyond(target):
             break
     return target

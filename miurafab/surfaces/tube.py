@@ -17,13 +17,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints, vector_product
-from miurafab.geometry.distances import closest_on_mesh
+from miurafab.geometry.distances import MeshTrees
 from miurafab.surfaces.harmonic import CylinderMap, cylinder_map
 from miurafab.surfaces.smoothing import continued, smooth
 from miurafab.surfaces.surface import Domain, ParametricSurface, normal_to, tangents
@@ -110,10 +111,14 @@ class TubeSurface:
         return normal_to(*tangents(self, uv))
 
     def closest_point(self, points: Floats) -> Floats:
-        return closest_on_mesh(points, self.triangles)
+        return self.nearest(points)
 
     def nearest(self, points: Floats) -> Floats:
-        return closest_on_mesh(points, self.triangles)
+        return self._trees.closest(points)[0]
+
+    @cached_property
+    def _trees(self) -> MeshTrees:
+        return MeshTrees.of(self.triangles)
 
     def tiles(self) -> Floats:
         return self.triangles

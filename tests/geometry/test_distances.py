@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miurafab.geometry.distances import closest_on_mesh, closest_on_triangle
+from miurafab.geometry.distances import MeshTrees, closest_on_triangle
 
 
 @settings(max_examples=60)
@@ -35,13 +35,14 @@ def test_the_two_triangles_of_a_square_share_their_centre(seed, side):
 
 
 def assert_nearest(points, triangles):
-    nearest = closest_on_mesh(points, triangles)
+    nearest, triangle = MeshTrees.of(triangles).closest(points)
     each = np.stack(
         [closest_on_triangle(points, np.repeat(t[None], len(points), axis=0)) for t in triangles]
     )
     best = np.linalg.norm(each - points, axis=2).min(axis=0)
     gap = np.linalg.norm(nearest - points, axis=1)
     np.testing.assert_allclose(gap, best, rtol=1e-12, atol=1e-12)
+    assert (nearest == closest_on_triangle(points, triangles[triangle])).all()
 
 
 @settings(max_examples=60)

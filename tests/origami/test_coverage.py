@@ -9,7 +9,7 @@ import pytest
 from problems import CELL, fitted
 
 from miurafab.geometry.hausdorff import in_four
-from miurafab.origami.coverage import Coverage, coverage
+from miurafab.origami.coverage import Coverage, Shell, coverage
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.miura import regular_miura
 from miurafab.origami.unfold import unfold
@@ -91,3 +91,34 @@ def test_a_second_turn_of_a_spiral_is_not_covered_by_the_first():
     both = coverage(pattern, surface.tiles()).covered
     assert both > 0.95
     assert coverage(inner, surface.tiles()).covered < 0.6
+
+
+@pytest.mark.parametrize("columns", [8, 5])
+@pytest.mark.parametrize("name", ["plane", "vase", "log-spiral"])
+def test_what_is_surely_covered_need_not_be_judged(name, columns, monkeypatch):
+    """The shares are those of all parts, to the last bit, and some parts are left out."""
+    pattern = part(fitted(name, 8, 8).pattern, slice(columns))
+    known, asked = [], Shell.surely_covers
+    monkeypatch.setattr(Shell, "surely_covers", lambda *of: known.append(asked(*of)) or known[-1])
+    found = of(pattern, name)
+    monkeypatch.setattr(Shell, "surely_covers", lambda shell, parts: np.zeros(len(parts), bool))
+    assert found == of(pattern, name)
+    assert found.overhang > 0 or name == "plane"
+    assert np.concatenate(known).mean() > 0.1
+
+
+@pytest.mark.parametrize("height", [0.0, 0.3])
+def test_parts_that_are_surely_covered_lie_off_the_border(height):
+    """Of a unit square, by closed form: points above it, and none beyond its sides."""
+    square = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], float)
+    shell = Shell.of_triangles(in_four(in_four(in_four(square))))
+    random = np.random.default_rng(5)
+    middles = random.uniform([-0.5, -0.5, height], [1.5, 1.5, height], (2000, 3))
+    middles[:, 2] *= random.random(2000)
+    parts = middles[:, None] + random.normal(scale=0.02, size=(2000, 3, 3))
+    inside = (np.abs(parts[..., :2] - 0.5) < 0.5).all(axis=(1, 2))
+    sure = shell.surely_covers(parts)
+    assert not (sure & ~inside).any()
+    if height == 0:
+        assert sure.sum() > 0.8 * inside.sum()
+    assert not shell.surely_covers(parts + np.array([0, 0, 10])).any()

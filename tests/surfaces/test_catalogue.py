@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from miurafab.errors import TargetError
-from miurafab.geometry.distances import closest_on_mesh
+from miurafab.geometry.distances import MeshTrees
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface, parse_target
 from miurafab.surfaces.profile_files import read_profile
 from miurafab.surfaces.surface import (
@@ -64,7 +64,7 @@ class TestEverySurface:
         for points, sag in ((tiles[::7, 0], 1e-9), (tiles[::7].mean(axis=1), 2 * CHORD)):
             assert np.linalg.norm(surface.nearest(points) - points, axis=1).max() < sag * size
         lattice = surface.point(surface.domain.lattice(7, 7)).reshape(-1, 3)
-        gap = closest_on_mesh(lattice, tiles) - lattice
+        gap = MeshTrees.of(tiles).closest(lattice)[0] - lattice
         assert np.linalg.norm(gap, axis=1).max() < 2 * CHORD * size
 
     def test_it_goes_on_a_little_beyond_its_domain(self, name: str) -> None:
