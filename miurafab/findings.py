@@ -265,6 +265,11 @@ def finding_from_json(values: Mapping[str, Any]) -> Finding:
     return found
 
 
+def counted(count: int, one: str, several: str) -> str:
+    """``count`` before the words for ``one`` thing or for ``several``."""
+    return f"{count} {one if count == 1 else several}"
+
+
 def refusals(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """The findings that stop the work."""
     return tuple(finding for finding in findings if finding.severity == "refusal")

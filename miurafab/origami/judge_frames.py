@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from miurafab.findings import Finding
+from miurafab.findings import Finding, counted
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
@@ -47,17 +47,18 @@ def _stretched(code: str, apart: Mapping[int, Floats], count: int) -> Finding:
     """
     worst = max(apart, key=lambda number: float(apart[number].max()))
     edges = np.flatnonzero(~(apart[worst] <= STRETCH))
-    which, them = f"Frame {worst} is no state of the sheet: {len(edges)} of its edges", "frame"
+    which, them = f"Frame {worst} is no state of the sheet", "frame"
     if len(apart) > 1:
         which = (
-            f"{len(apart)} of {count} frames are no states of the sheet: in frame {worst}, the "
-            f"worst, {len(edges)} edges"
+            f"{len(apart)} of {count} frames are no states of the sheet, and frame {worst} is the "
+            "worst"
         )
         them = "frames"
     return Finding(
         code,
-        f"{which} are up to {apart[worst].max():.1e} mean edges longer or shorter than in the flat "
-        f"pattern; write the file anew, or take the {them} out.",
+        f"{which}: {counted(len(edges), 'of its edges is', 'of its edges are')} up to "
+        f"{apart[worst].max():.1e} mean edges longer or shorter than in the flat pattern; write "
+        f"the file anew, or take the {them} out.",
         tuple(edges.tolist()),
     )
 
@@ -84,9 +85,9 @@ def _judge_layers(pattern: CreasePattern, frame: FurtherFrame, orders: Ints) -> 
         one, other = min(pairs)
         yield Finding(
             "frame",
-            f"Frame {frame.number} has another order of layers than the sheet for {len(pairs)} "
-            f"pairs of facets, the first being {one} and {other}; write the file anew, or take "
-            "the frame out.",
+            f"Frame {frame.number} has another order of layers than the sheet for "
+            + counted(len(pairs), "pair of facets", "pairs of facets")
+            + f", the first being {one} and {other}; write the file anew, or take the frame out.",
             tuple(sorted({facet for pair in pairs for facet in pair})),
         )
 

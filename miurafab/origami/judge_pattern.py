@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from miurafab.findings import Finding
+from miurafab.findings import Finding, counted
 from miurafab.geometry.arrays import Bools, Ints, vector_product
 from miurafab.geometry.polygons import edge_lengths, facet_means, facet_normals
 from miurafab.origami import invariants
@@ -163,15 +163,21 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
             one, other = pairs[lying][0].tolist()
             yield Finding(
                 "not-proven",
-                f"{int(lying.sum())} pairs of facets lie on each other in the folded form, the "
-                f"first being facets {one} and {other}; the order of such layers is not judged.",
+                counted(int(lying.sum()), "pair of facets lies", "pairs of facets lie")
+                + f" on each other in the folded form, the first being facets {one} and {other}; "
+                "the order of such layers is not judged.",
             )
         pairs = pairs[~lying]
     if len(pairs):
+        one, other = pairs[0].tolist()
         yield Finding(
             "self-intersection",
-            f"{len(pairs)} pairs of facets pass through or lie on each other in the folded "
-            f"form, the first being facets {pairs[0][0]} and {pairs[0][1]}.",
+            counted(
+                len(pairs),
+                "pair of facets passes through or lies",
+                "pairs of facets pass through or lie",
+            )
+            + f" on each other in the folded form, the first being facets {one} and {other}.",
             tuple(np.unique(pairs).tolist()),
         )
 
@@ -220,12 +226,9 @@ def proved(
                 {"planarity", "isometry", "developability"},
                 f"The {facets} facets are flat, and the same in both forms{_within(evidence)}.",
             ),
-            *(
-                [({"self-intersection"}, "No facets meet in the folded form.")]
-                if not len(evidence.crossings)
-                else []
-            ),
         ]
+        if not len(evidence.crossings):
+            claims.append((set(), "No facets meet in the folded form."))
     if pattern.seams is not None:
         claims.append(({"seam"}, f"The two edges of each of {len(pattern.seams)} seams fit."))
     return tuple(sentence for codes, sentence in claims if not codes & broken)
@@ -254,9 +257,10 @@ def _unlisted(pattern: CreasePattern) -> Iterator[Finding]:
         one, other = pairs[0].tolist()
         yield Finding(
             "seam",
-            f"{len(pairs)} pairs of border edges meet in the folded form and are not among the "
-            f"{len(pattern.seams)} seams, the first being edges {one} and {other}; name them in "
-            "`miurafab:seams`, or leave that out, and all are found.",
+            counted(len(pairs), "pair of border edges meets", "pairs of border edges meet")
+            + f" in the folded form outside the {len(pattern.seams)} seams, the first being edges "
+            f"{one} and {other}; name them in `miurafab:seams`, or leave that out, and all are "
+            "found.",
             tuple(np.unique(pairs).tolist()),
         )
 
@@ -267,15 +271,15 @@ def _shapes(pattern: CreasePattern) -> Iterator[Finding]:
     if len(crossed):
         yield Finding(
             "bow-tie",
-            f"{_these(crossed, 'facet')} a bow-tie, whose own sides cross: no piece of paper has "
-            "that shape.",
+            f"{_these(crossed, 'facet')} folded over, two sides crossing as in a bow-tie: no piece "
+            "of paper has that shape.",
             tuple(crossed.tolist()),
         )
     dented = invariants.dented_facets(pattern)
     if len(dented):
         yield Finding(
             "dented",
-            f"{_these(dented, 'facet')} not convex, and folds badly.",
+            f"{_these(dented, 'facet')} not convex, which folds badly.",
             tuple(dented.tolist()),
         )
 
@@ -287,13 +291,15 @@ def _overlap(pattern: CreasePattern, pairs: Ints) -> Finding:
     (one, other), *_ = pairs if not len(within) else within
     if len(within):
         sentence = (
-            f"{len(within)} pairs of facets overlap in the flat pattern, the first being facets "
-            f"{one} and {other}: it cannot be cut from one piece."
+            counted(len(within), "pair of facets overlaps", "pairs of facets overlap")
+            + f" in the flat pattern, the first being facets {one} and {other}: it cannot be cut "
+            "from one piece."
         )
     else:
         sentence = (
-            f"Pieces lie on each other in the flat pattern ({len(pairs)} pairs of facets, the "
-            f"first being {one} and {other}): they have to lie apart."
+            "Pieces lie on each other in the flat pattern ("
+            + counted(len(pairs), "pair of facets", "pairs of facets")
+            + f", the first being {one} and {other}): they have to lie apart."
         )
     return Finding("overlap", sentence, tuple(np.unique(pairs).tolist()))
 

@@ -19,7 +19,7 @@ from miurafab.fabrication.knife_tip import overcuts, tip_moves
 from miurafab.fabrication.route.order import HOLE, StrokeSet
 from miurafab.fabrication.strokes import RIM, SLIT, SLOT
 from miurafab.fabrication.toolpath import Toolpath
-from miurafab.findings import Finding
+from miurafab.findings import Finding, counted
 from miurafab.gcode.program import Program
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.nearest import tree_of
@@ -167,23 +167,26 @@ def _compared(
             path.sheet,
         )
     if stray.sum() > _NAMED:
-        yield Finding("stroke", f"{path.sheet}: so do {stray.sum() - _NAMED} more segments.")
+        others = counted(int(stray.sum()) - _NAMED, "more segment does", "more segments do")
+        yield Finding("stroke", f"{path.sheet}: {others} so.", path.sheet)
     due = passes[wanted.operation]
     place = found[right] * passes.shape[1] + level[right]
     times = np.bincount(place, minlength=due.size).reshape(due.shape)
     less, more = (times < due).any(axis=1), (times > due).any(axis=1)
-    for wrong, words in ((less, "is not burnt"), (more, "is burnt too often")):
+    for wrong, words in ((less, "not burnt"), (more, "burnt too often")):
         faulty = np.unique(wanted.stroke[wrong & wanted.sure])
         for stroke in faulty[:_NAMED].tolist():
             x, y = path.starts[stroke].tolist()
             edge = f" on edge {path.edge[stroke]}" if path.edge[stroke] >= 0 else ""
             yield Finding(
                 "stroke",
-                f"{path.sheet}: the {KINDS[kinds[stroke]]}{edge} from X{x:.3f} Y{y:.3f} {words}.",
+                f"{path.sheet}: the {KINDS[kinds[stroke]]}{edge} from X{x:.3f} Y{y:.3f} is "
+                f"{words}.",
                 path.sheet,
             )
         if len(faulty) > _NAMED:
-            yield Finding("stroke", f"{path.sheet}: so of {len(faulty) - _NAMED} more strokes.")
+            others = counted(len(faulty) - _NAMED, "more stroke is", "more strokes are")
+            yield Finding("stroke", f"{path.sheet}: {others} {words}.", path.sheet)
     good = np.ones(len(path), dtype=bool)
     good[wanted.stroke[(less | more) & wanted.sure]] = False
     traced.update(KINDS[kind] for kind in kinds[good].tolist())

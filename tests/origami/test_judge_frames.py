@@ -105,7 +105,9 @@ def test_all_frames_that_stretch_are_told_in_one_sentence(document, tmp_path):
         found["file_frames"].append(frame)
     told = [each for each in judged(found, tmp_path).findings if each.code == "stretched"]
     assert len(told) == 1
-    assert told[0].sentence.startswith("3 of 4 frames are no states of the sheet: in frame 5, the ")
+    assert told[0].sentence.startswith(
+        "3 of 4 frames are no states of the sheet, and frame 5 is the worst: 40 of its edges are "
+    )
     assert "take the frames out" in told[0].sentence
 
 

@@ -145,9 +145,9 @@ def test_five_faults_of_a_kind_are_named_and_the_others_counted() -> None:
     says, traced = found(strokes, text)
     assert [s.partition(" from ")[0] for s in says] == [
         *(f"line {4 + 3 * n} burns a stroke" for n in range(5)),
-        "so do 3 more segments.",
+        "3 more segments do so.",
         *5 * [f"the crease on edge {CREASE}"],
-        "so of 3 more strokes.",
+        "3 more strokes are not burnt.",
     ]
     assert not traced
     says, _ = found(strokes[:5], "".join(text.partition("(operation perforate)\nG0 X60")[:1]))
@@ -190,7 +190,7 @@ def test_a_stray_stroke_is_found_however_finely_it_is_cut_up() -> None:
     stray = [(50 + n / 1000, 50.0) for n in range(300)]
     says, traced = found([dash(10)], burnt("perforate", dash(10)[1]) + burnt("perforate", stray))
     assert says[0].startswith("line 7 burns a stroke from X50.000 Y50.000 that is not of the")
-    assert says[5] == "so do 294 more segments."
+    assert says[5] == "294 more segments do so."
     assert traced == {"crease": 1}
     on = [(10.5 + n / 1000, 10.0) for n in range(300)]  # on a wanted stroke, burnt once already
     assert found([dash(10)], burnt("perforate", dash(10)[1]) + burnt("perforate", on))[0]

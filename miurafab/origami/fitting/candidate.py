@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from miurafab.findings import Finding
+from miurafab.findings import Finding, counted
 from miurafab.geometry.arrays import Floats
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.geometry.quads import QuadCharts
@@ -174,25 +174,27 @@ def _faults(
     if measured.self_intersections:
         yield Finding(
             "self-intersection",
-            f"{measured.self_intersections} pairs of facets pass through each other; ask for more "
-            "`facets` or `pieces`, lower `zigzag` or `amplitude`, or take a smaller part of the "
-            "target.",
+            counted(measured.self_intersections, "pair of facets passes", "pairs of facets pass")
+            + " through each other; ask for more `facets` or `pieces`, lower `zigzag` or "
+            "`amplitude`, or take a smaller part of the target.",
         )
     if measured.overlaps:
-        pairs = f"{measured.overlaps} pairs of facets"
-        yield Finding("overlap", f"{pairs} overlap in the flat pattern; lower `zigzag`.")
+        pairs = counted(measured.overlaps, "pair of facets overlaps", "pairs of facets overlap")
+        yield Finding("overlap", f"{pairs} in the flat pattern; lower `zigzag`.")
     if marks.bow_ties:
         yield Finding(
             "bow-tie",
-            f"{marks.bow_ties} facets are folded over themselves; ask for more `facets` or "
-            "`pieces`.",
+            counted(
+                marks.bow_ties, "facet is folded over itself", "facets are folded over themselves"
+            )
+            + "; ask for more `facets` or `pieces`.",
         )
     unlisted = len(unlisted_seams(pattern))
     if unlisted:
         yield Finding(
             "seam",
-            f"{unlisted} pairs of border edges meet in the folded form and are no seams; ask for "
-            "other `facets` or `pieces`.",
+            counted(unlisted, "pair of border edges meets", "pairs of border edges meet")
+            + " in the folded form without a seam; ask for other `facets` or `pieces`.",
         )
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
     least = request.min_edge_mm or DEGENERATE * mean

@@ -294,7 +294,7 @@ def test_borders_that_meet_and_are_no_seams_are_a_fault(monkeypatch: pytest.Monk
     )
     result = fit(request("hypar", 4, 4, polish="off", amplitude=0.5, zigzag=0.5))
     assert result.status == "infeasible"
-    assert "2 pairs of border edges meet in the folded form and are no seams" in result.advice
+    assert "2 pairs of border edges meet in the folded form without a seam" in result.advice
 
 
 def test_a_cylinder_without_polish_is_answered_by_its_closed_forms_or_by_a_sheet() -> None:
