@@ -38,8 +38,8 @@ from miurafab.studio.form import FIT, LAYOUT, filled
 from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.design import design
 from miurafab.workflow.energy import EnergyOptions
-from miurafab.workflow.fold import FoldOptions
-from miurafab.workflow.tradeoff import TradeoffOptions
+from miurafab.workflow.fold_options import FoldOptions
+from miurafab.workflow.tradeoff_options import TradeoffOptions
 
 COMMANDS = {
     FitOptions: "fit",

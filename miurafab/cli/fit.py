@@ -41,7 +41,7 @@ def fit_options() -> type:
 
 def bed_options() -> type:
     """The class that declares what a size by the bed depends on."""
-    from miurafab.workflow.bed_size import BedOptions
+    from miurafab.workflow.bed_options import BedOptions
 
     return BedOptions
 

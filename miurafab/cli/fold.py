@@ -25,7 +25,7 @@ EXAMPLES = (
 
 
 def _own_options() -> type:
-    from miurafab.workflow.fold import FoldOptions
+    from miurafab.workflow.fold_options import FoldOptions
 
     return FoldOptions
 
@@ -66,8 +66,7 @@ def fold(
     answer says which, and whether the facets could all stay flat.
     """
     from miurafab.origami.formats.panels import PANEL_ENDINGS
-    from miurafab.workflow.fold import ENDINGS, FoldOptions, check_colour
-    from miurafab.workflow.panels import thickness_report
+    from miurafab.workflow.fold_options import ENDINGS, FoldOptions, check_colour
 
     asked = read_options(FoldOptions, given)
     if out is not None:
@@ -80,6 +79,8 @@ def fold(
     if "method" in given and asked.thickness_mm is None:
         raise OptionError("method", "is for panels; add a `thickness` such as 3mm")
     pattern = miurafab.load(file)
+    from miurafab.workflow.panels import thickness_report
+
     with console.progress("folding") as progress:
         folding = miurafab.fold(pattern, asked.steps, on_progress=progress)
         thick = None

@@ -21,7 +21,7 @@ EXAMPLES = (
 
 
 def _own_options() -> type:
-    from miurafab.workflow.tradeoff import TradeoffOptions
+    from miurafab.workflow.tradeoff_options import TradeoffOptions
 
     return TradeoffOptions
 

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.fabrication.partition.boundary import Boundary, boundaries
-from miurafab.fabrication.partition.pieces import components
+from miurafab.fabrication.partition.pieces import facet_components
 from miurafab.fabrication.seams import border_seams, shell_points
 from miurafab.fabrication.sheets import Layout
 from miurafab.geometry.arrays import Bools, Floats, Ints
@@ -67,7 +67,7 @@ class _Assembly:
         for patch in layout.patches:
             self.owner[patch.faces] = patch.id
         seams = border_seams(pattern)
-        label = components(pattern)[seams.faces]
+        label = facet_components(pattern)[seams.faces]
         within = label[:, 0] == label[:, 1]
         self.rings, between = seams.take(within), seams.take(~within)
         self.mate = np.arange(len(pattern.edges_vertices))

@@ -21,8 +21,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import Chosen
@@ -37,6 +35,7 @@ from miurafab.fabrication.tabs import (
     with_base,
 )
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
@@ -75,9 +74,7 @@ def open_borders(pattern: CreasePattern) -> tuple[OpenBorder, ...]:
     if not len(edges) or is_loose(pattern):
         return ()
     ends = shell_points(pattern, seams)[pattern.edges_vertices[edges]]
-    size = int(ends.max()) + 1
-    graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(size, size))
-    chain = connected_components(graph, directed=False)[1][ends[:, 0]]
+    chain = components(int(ends.max()) + 1, *ends.T)[ends[:, 0]]
     length = edge_lengths(pattern.vertices_coords, pattern.edges_vertices[edges])
     chains = [np.flatnonzero(chain == number) for number in np.unique(chain)]
     # Of borders equal up to rounding the one with the lowest edge is first.

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.fabrication.borders import chosen_edges
 from miurafab.fabrication.kit.rim_texts import RimTexts
@@ -17,6 +15,7 @@ from miurafab.fabrication.tabs import MIN_BASE_MM
 from miurafab.fabrication.wording import count, in_order
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Ints
+from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
@@ -115,9 +114,7 @@ def longest_run(pattern: CreasePattern, edges: Ints) -> tuple[float, int]:
     ends = pattern.edges_vertices[edges]
     _, which = np.unique(ends, return_inverse=True)
     pairs = which.reshape(ends.shape)
-    count = int(pairs.max()) + 1
-    joined = sparse.coo_array((np.ones(len(edges)), (pairs[:, 0], pairs[:, 1])), (count, count))
-    chain = connected_components(joined, directed=False)[1][pairs[:, 0]]
+    chain = components(int(pairs.max()) + 1, *pairs.T)[pairs[:, 0]]
     lengths = np.bincount(chain, edge_lengths(pattern.vertices_coords, ends))
     longest = int(lengths.argmax())
     return float(lengths[longest]), int(edges[chain == longest].min())

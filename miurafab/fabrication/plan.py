@@ -37,7 +37,7 @@ from miurafab.fabrication.partition.patch_frame import (
     sheet_space,
 )
 from miurafab.fabrication.partition.patch_outline import outline_split, patch_space
-from miurafab.fabrication.partition.pieces import components
+from miurafab.fabrication.partition.pieces import facet_components
 from miurafab.fabrication.partition.split import split
 from miurafab.fabrication.plan_splits import (
     dissolved,
@@ -171,7 +171,7 @@ class _Planner:
         self.goal = (
             1.0 if single else stock.kinds.least_price(self.copies * self.areas.sum() / _FULL)
         )
-        self.piece = components(pattern)
+        self.piece = facet_components(pattern)
         self.lengths = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
         self.joins = float(self.lengths[border_seams(pattern).edges[:, 0]].sum())
 

@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.meeting_borders import (
     border_angles,
@@ -123,8 +122,6 @@ def shell_points(pattern: CreasePattern, seams: Seams) -> Ints:
 
     Facets run along their seam in opposite directions.
     """
-    vertices = len(pattern.vertices_coords)
     ends = [with_facet_on_the_left(pattern, seams.edges[:, side]) for side in (0, 1)]
     one, other = ends[0].ravel(), ends[1][:, ::-1].ravel()
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(vertices, vertices))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return components(len(pattern.vertices_coords), one, other)

@@ -11,10 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
+from miurafab.geometry.connected import components
 
 
 def filled(faces: Ints) -> Ints:
@@ -49,8 +48,7 @@ def connected_parts(faces: Ints) -> tuple[int, Ints]:
     face, corner = np.nonzero(faces >= 0)
     vertex = faces[face, corner] + len(faces)
     count = len(faces) + int(faces.max(initial=-1)) + 1
-    graph = coo_array((np.ones(len(face)), (face, vertex)), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
+    label = components(count, face, vertex)
     _, first, part = np.unique(label[: len(faces)], return_index=True, return_inverse=True)
     return len(first), np.argsort(np.argsort(first))[part].astype(np.int64)
 

@@ -11,11 +11,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Ints
+from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import connected_parts, next_corners
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -73,9 +72,8 @@ def opened_cuts(pattern: CreasePattern) -> tuple[Finding, ...]:
     if not len(cuts):
         return ()
     joined = pattern.edges_faces[np.setdiff1d(np.flatnonzero(inner), cuts)]
-    count = len(pattern.faces_vertices)
-    graph = coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(count, count))
-    before, after = pattern.pieces_count, connected_components(graph, directed=False)[0]
+    after = int(components(len(pattern.faces_vertices), *joined.T).max()) + 1
+    before = pattern.pieces_count
     parts = f" and falls into {after} pieces" if after > before else ""
     several = f"{len(cuts)} edges within the sheet are cuts"
     says = (
@@ -90,8 +88,7 @@ def _fans(pattern: CreasePattern, one: Ints, other: Ints) -> Ints:
     the same vertex.
     """
     faces = pattern.faces_vertices.ravel()
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(len(faces), len(faces)))
-    _, fan = connected_components(graph, directed=False)
+    fan = components(len(faces), one, other)
     real = np.flatnonzero(faces >= 0)
     _, first, which = np.unique(fan[real], return_index=True, return_inverse=True)
     origin = faces[real][first]

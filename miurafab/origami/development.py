@@ -24,14 +24,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, eye_array
-from scipy.sparse.csgraph import connected_components, dijkstra
 
 from miurafab.geometry.angles import angle_between
 from miurafab.geometry.arrays import Bools, Floats, Ints, run_starts
+from miurafab.geometry.connected import components, shortest_ways
+from miurafab.geometry.evening import evened
 from miurafab.geometry.polygons import reflex_corners
 from miurafab.geometry.quads import QuadCharts
-from miurafab.geometry.sparse import SymmetricSolver
 
 CLOSES = 1e-9
 """In mean sides: the two sides of a cut that lie nearer than this when flat are one crease."""
@@ -40,9 +39,6 @@ EXACT = 1e-12
 """In mean sides: differences of lengths up to this are left as they are."""
 ROUNDING = 1e-6
 """In mean sides: larger differences of lengths are faults of the sheet, and stay where they are."""
-
-_RIDGE = 1e-9
-"""Of the mean stiffness; it holds the three motions of each piece, which no length tells."""
 
 _PAIRS = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 3]])
 _CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -118,17 +114,11 @@ def _after(sides: Ints) -> Ints:
     return np.where(sides % 4 == 3, sides - 3, sides + 1)
 
 
-def _components(one: Ints, other: Ints, count: int) -> tuple[int, Ints]:
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    parts, label = connected_components(graph, directed=False)
-    return int(parts), label.astype(np.int64)
-
-
 def _corners(charts: QuadCharts, joined: Ints) -> Ints:
     """(F, 4) the flat vertex of each corner: the corners at each of the ``joined`` creases meet."""
     a, b = joined.T
     one, other = np.concatenate([a, _after(a)]), np.concatenate([_after(b), b])
-    _, vertex = _components(one, other, charts.faces_vertices.size)
+    vertex = components(charts.faces_vertices.size, one, other)
     return vertex.reshape(-1, 4)
 
 
@@ -150,7 +140,7 @@ class _Tree:
 def _tree(charts: QuadCharts, creases: Ints) -> _Tree:
     count = len(charts.cells)
     facets = creases // 4
-    _, part = _components(facets[:, 0], facets[:, 1], count)
+    part = components(count, *facets.T)
     _, piece = np.unique(np.stack([charts.pieces, part], axis=1), axis=0, return_inverse=True)
     pieces = piece.reshape(count).astype(np.int64)
     roots = _middles(charts.cells, pieces)
@@ -158,13 +148,10 @@ def _tree(charts: QuadCharts, creases: Ints) -> _Tree:
     closing = (middles[creases[:, 0]] != middles[creases[:, 1]]).any(axis=1)
     pairs = np.sort(facets, axis=1)
     weight = np.where(closing, float(count), 1.0)
-    graph = coo_array((weight, (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
-    distance, before, _ = dijkstra(
-        graph, directed=False, indices=roots, return_predecessors=True, min_only=True
-    )
+    distance, before = shortest_ways(count, pairs[:, 0], pairs[:, 1], weight, roots)
     child = np.flatnonzero(distance > 0)
     child = child[np.argsort(distance[child], kind="stable")]
-    parent = before[child].astype(np.int64)
+    parent = before[child]
     key = pairs[:, 0] * count + pairs[:, 1]
     order = np.argsort(key)
     wanted = np.minimum(parent, child) * count + np.maximum(parent, child)
@@ -195,13 +182,13 @@ def _cut(charts: QuadCharts, creases: Ints, used: Bools) -> Bools:
     outer[creases] = False
     border = np.flatnonzero(outer)
     loose = corners[border], corners[_after(border)]
-    count, node = _components(*loose, int(corners.max()) + 1)
-    inside = np.ones(count, dtype=bool)
+    node = components(int(corners.max()) + 1, *loose)
+    inside = np.ones(int(node.max()) + 1, dtype=bool)
     inside[node[loose[0]]] = False
     ends = node[np.stack([corners[creases[:, 0]], corners[_after(creases[:, 0])]], axis=1)]
     left = np.flatnonzero(~used)
     while True:
-        degree = np.bincount(ends[left].ravel(), minlength=count)
+        degree = np.bincount(ends[left].ravel(), minlength=len(inside))
         dangling = ((degree == 1) & inside)[ends[left]].any(axis=1)
         if not dangling.any():
             break
@@ -266,22 +253,11 @@ def _evened(places: Floats, corners: Ints, quads: Floats) -> Floats:
     """
     ends = corners[:, _PAIRS].reshape(-1, 2)
     lengths = np.linalg.norm(np.diff(quads[:, _PAIRS], axis=2)[:, :, 0], axis=2).ravel()
-    gap = np.diff(places[ends], axis=1)[:, 0]
-    found = np.linalg.norm(gap, axis=1)
-    lack = lengths - found
-    worst = float(np.abs(lack).max() / lengths.mean())
+    found = np.linalg.norm(np.diff(places[ends], axis=1)[:, 0], axis=1)
+    worst = float(np.abs(lengths - found).max() / lengths.mean())
     if not EXACT < worst <= ROUNDING or not found.all():
         return places
-    along = gap / found[:, None]
-    row = np.repeat(np.arange(len(ends)), 4)
-    column = (2 * ends[:, :, None] + [0, 1]).reshape(-1)
-    values = np.stack([-along, along], axis=1).reshape(-1)
-    jacobian = coo_array((values, (row, column)), shape=(len(ends), places.size)).tocsr()
-    normal = jacobian.T @ jacobian + _RIDGE * eye_array(places.size)
-    normal = normal.tocsc()
-    normal.sort_indices()
-    moves = SymmetricSolver().factor(normal).solve(jacobian.T @ lack)
-    return places + moves.reshape(-1, 2)
+    return evened(places, ends, lengths)
 
 
 def _gaps(places: Floats, corners: Ints, creases: Ints) -> Floats:

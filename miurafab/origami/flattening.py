@@ -16,12 +16,12 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array, eye_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from miurafab.errors import PatternError
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
+from miurafab.geometry.arrays import Bools, Floats, Ints, run_starts, vector_product
+from miurafab.geometry.connected import components, shortest_ways
+from miurafab.geometry.evening import evened
 from miurafab.geometry.polygons import (
     connected_parts,
     edge_lengths,
@@ -33,7 +33,6 @@ from miurafab.geometry.polygons import (
     sides_and_diagonals,
     smallest_box,
 )
-from miurafab.geometry.sparse import SymmetricSolver
 from miurafab.origami import invariants
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cut_open import cut_open
@@ -45,7 +44,6 @@ ROUGHEST = 1e-3
 _GAP = 1e-2
 """In mean edges: a crease whose two sides lie farther apart when flat does not close."""
 _ROUNDS = 4
-_RIDGE = 1e-9
 
 
 def one_sided(faces: Ints, edges: Ints, cut: Bools, vertices: int) -> Ints:
@@ -80,17 +78,14 @@ def one_sided(faces: Ints, edges: Ints, cut: Bools, vertices: int) -> Ints:
     there = np.concatenate(
         [np.where(against, other + count, other), np.where(against, other, other + count)]
     )
-    graph = coo_array((np.ones(len(here)), (here, there)), shape=(2 * count, 2 * count))
-    label = connected_components(graph, directed=False)[1]
+    label = components(2 * count, here, there)
     twisted = np.flatnonzero(label[:count] == label[count:])
     if len(twisted):
         raise PatternError(
             f"The sheet of facet {twisted[0]} closes on itself with a twist, so it has one side "
             "alone and does not lie flat; cut it across (letter C) where it shall be glued."
         )
-    _, part = connected_components(
-        coo_array((np.ones(len(one)), (one, other)), shape=(count, count)), directed=False
-    )
+    part = components(count, one, other)
     first = np.full(int(part.max()) + 1, count, dtype=np.int64)
     np.minimum.at(first, part, np.arange(count))
     turned = label[:count] != label[first[part]]
@@ -183,27 +178,26 @@ def _laid(pattern: CreasePattern) -> tuple[Floats, Bools]:
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
     pair = pattern.edges_faces[inner]
     count = len(faces)
-    graph = coo_array((inner + 1, (pair[:, 0], pair[:, 1])), shape=(count, count)).tocsr()
     # two facets with several edges in common are joined by one of them
     joint = {(int(a), int(b)): int(e) for e, (a, b) in zip(inner, pair, strict=True)}
     joint |= {(b, a): e for (a, b), e in joint.items()}
     corners = _in_their_planes(points, faces)
     used = np.zeros(len(pattern.edges_vertices), dtype=bool)
-    _, part = connected_components(graph, directed=False)
+    part = components(count, *pair.T)
+    size = np.bincount(part)[:, None]
     middle = points[filled(faces)].mean(axis=1)
-    for number in range(int(part.max()) + 1):
-        own = np.flatnonzero(part == number)
-        away = np.linalg.norm(middle[own] - middle[own].mean(axis=0), axis=1)
-        root = int(own[away.argmin()])
-        order, before = breadth_first_order(graph, root, directed=False)
-        for facet in order[1:].tolist():
-            parent = int(before[facet])
-            edge = joint[parent, facet]
-            used[edge] = True
-            ends = pattern.edges_vertices[edge]
-            goal = np.array([corners[parent][np.argmax(faces[parent] == v)] for v in ends])
-            have = np.array([corners[facet][np.argmax(faces[facet] == v)] for v in ends])
-            corners[facet] = _brought(corners[facet], have, goal)
+    mean = np.stack([np.bincount(part, middle[:, axis]) for axis in range(3)], axis=1) / size
+    away = np.linalg.norm(middle - mean[part], axis=1)
+    roots = np.lexsort((away, part))[run_starts(size[:, 0])]
+    hops, before = shortest_ways(count, pair[:, 0], pair[:, 1], np.ones(len(pair)), roots)
+    for facet in np.argsort(hops, kind="stable")[len(roots) :].tolist():
+        parent = int(before[facet])
+        edge = joint[parent, facet]
+        used[edge] = True
+        ends = pattern.edges_vertices[edge]
+        goal = np.array([corners[parent][np.argmax(faces[parent] == v)] for v in ends])
+        have = np.array([corners[facet][np.argmax(faces[facet] == v)] for v in ends])
+        corners[facet] = _brought(corners[facet], have, goal)
     return corners, used
 
 
@@ -256,9 +250,7 @@ def _paths(pattern: CreasePattern, used: Bools) -> Bools:
     inner = (pattern.edges_faces >= 0).all(axis=1)
     ends = pattern.edges_vertices
     rim = ends[~inner]
-    count = len(pattern.vertices_coords)
-    graph = coo_array((np.ones(len(rim)), (rim[:, 0], rim[:, 1])), shape=(count, count))
-    node = connected_components(graph, directed=False)[1]
+    node = components(len(pattern.vertices_coords), *rim.T)
     free = np.ones(int(node.max()) + 1, dtype=bool)
     free[node[rim.ravel()]] = False
     left = np.flatnonzero(inner & ~used)
@@ -294,22 +286,12 @@ def _evened(pattern: CreasePattern, flat: Floats) -> Floats:
     pairs, goal = pairs[goal > 0], goal[goal > 0]
     best, least = flat, np.inf
     for _ in range(_ROUNDS):
-        along = flat[pairs[:, 1]] - flat[pairs[:, 0]]
-        found = np.linalg.norm(along, axis=1)
-        lack = goal - found
-        worst = float(np.abs(lack).max())
+        found = np.linalg.norm(flat[pairs[:, 1]] - flat[pairs[:, 0]], axis=1)
+        worst = float(np.abs(goal - found).max())
         if not worst < least or not found.all():
             break
         best, least = flat, worst
-        unit = along / found[:, None]
-        row = np.repeat(np.arange(len(pairs)), 4)
-        column = (2 * pairs[:, :, None] + [0, 1]).reshape(-1)
-        values = np.stack([-unit, unit], axis=1).reshape(-1)
-        jacobian = coo_array((values, (row, column)), shape=(len(pairs), flat.size)).tocsr()
-        normal = (jacobian.T @ jacobian + _RIDGE * eye_array(flat.size)).tocsc()
-        normal.sort_indices()
-        moves = SymmetricSolver().factor(normal).solve(jacobian.T @ lack)
-        flat = flat + moves.reshape(-1, 2)
+        flat = evened(flat, pairs, goal)
     return best
 
 

@@ -11,10 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import connected_parts, edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -67,16 +66,13 @@ def _chains(pattern: CreasePattern, parts: Ints) -> Ints:
     """(S,) the line of each seam: seams of one pair of ``parts`` (S, 2) that share a point."""
     vertices = len(pattern.vertices_coords)
     met = pattern.seam_vertices.reshape(-1, 2)
-    graph = coo_array((np.ones(len(met)), (met[:, 0], met[:, 1])), shape=(vertices, vertices))
-    points = connected_components(graph, directed=False)[1]
+    points = components(vertices, *met.T)
     seams, pair = len(parts), np.unique(parts, axis=0, return_inverse=True)[1].ravel()
     ends = points[pattern.seam_vertices[:, :, 0]]
     # A point counts once for each pair of parts that meets there.
     keys = np.unique((pair[:, None] * vertices + ends).ravel(), return_inverse=True)[1]
-    at = np.repeat(np.arange(seams), 2), seams + keys.ravel()
     size = seams + int(keys.max()) + 1
-    linked = coo_array((np.ones(2 * seams), at), shape=(size, size))
-    return connected_components(linked, directed=False)[1][:seams].astype(np.int64)
+    return components(size, np.repeat(np.arange(seams), 2), seams + keys.ravel())[:seams]
 
 
 def _places(pattern: CreasePattern, edges: Ints) -> Floats:

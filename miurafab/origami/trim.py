@@ -16,10 +16,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import edge_lengths, facet_areas, facet_means, next_corners
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.trim_cuts import EdgeCuts, bend, edge_cuts, meeting_vertices
@@ -84,8 +83,8 @@ def _assembled(
     mean = float(edge_lengths(folded, pattern.edges_vertices).mean())
     while True:
         sides = _Sides.of(faces[kept], parents[kept], meeting)
-        holding = sides.links(edge_lengths(folded, sides.ends) >= CREASE * mean)
-        largest = _largest(holding, area[kept])
+        part = sides.linked(edge_lengths(folded, sides.ends) >= CREASE * mean)
+        largest = part == np.bincount(part, area[kept]).argmax()
         if largest.all():
             loose = sides.pinched(faces[kept], area[kept])
             if not len(loose):
@@ -284,17 +283,18 @@ class _Sides:
         seams = np.stack([border[order[two]], border[order[two + 1]]], axis=1)
         return cls(ends, parent, facets, seams)
 
-    def links(self, long: Bools) -> sparse.coo_array:
-        """The facets that share a crease or meet at a seam, over edges that are ``long`` (E,)."""
+    def linked(self, long: Bools) -> Ints:
+        """(F,) the part of each facet: over edges that are ``long`` (E,), facets share a crease or
+        meet at a seam.
+        """
         inner = self.facets[long & (self.facets[:, 1] >= 0)]
         seams = self.facets[self.seams[long[self.seams[:, 0]]], 0]
-        return _graph(np.concatenate([inner, seams]), int(self.facets.max()) + 1)
+        return components(int(self.facets.max()) + 1, *np.concatenate([inner, seams]).T)
 
     def pieces(self) -> Ints:
         """(F,) the piece of each facet: facets that share creases."""
         inner = self.facets[self.facets[:, 1] >= 0]
-        graph = _graph(inner, int(self.facets.max()) + 1)
-        return connected_components(graph, directed=False)[1].astype(np.int64)
+        return components(int(self.facets.max()) + 1, *inner.T)
 
     def pinched(self, faces: Ints, area: Floats) -> Ints:
         """The smallest facet at each vertex around which facets form more than one fan.
@@ -308,17 +308,6 @@ class _Sides:
         several = np.flatnonzero(around - creases > 1)
         having = [np.flatnonzero((faces == vertex).any(axis=1)) for vertex in several.tolist()]
         return np.array([at[area[at].argmin()] for at in having], dtype=np.int64)
-
-
-def _graph(pairs: Ints, count: int) -> sparse.coo_array:
-    ones = np.ones(len(pairs), dtype=bool)
-    return sparse.coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-
-
-def _largest(links: sparse.coo_array, area: Floats) -> Bools:
-    """(F,) the facets of the linked part with the largest area."""
-    part = connected_components(links, directed=False)[1]
-    return np.asarray(part == np.bincount(part, area).argmax())
 
 
 def _pattern(

@@ -11,10 +11,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.origami.crease_pattern import CreasePattern
 
 
@@ -28,10 +27,7 @@ def welded(pattern: CreasePattern, tolerance: float) -> CreasePattern:
     short = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) < tolerance
     if not short.any():
         return pattern
-    vertices = len(pattern.vertices_coords)
-    one, other = pattern.edges_vertices[short].T
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(vertices, vertices))
-    number = connected_components(graph, directed=False)[1].astype(np.int64)
+    number = components(len(pattern.vertices_coords), *pattern.edges_vertices[short].T)
     lines = np.sort(number[pattern.edges_vertices], axis=1)
     _, first = np.unique(lines, axis=0, return_index=True)
     kept = np.sort(first[lines[first, 0] != lines[first, 1]])

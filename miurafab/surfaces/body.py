@@ -20,10 +20,10 @@ from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.surfaces.frame import origin_in
 from miurafab.surfaces.mesh_repair import SMALL_HOLE, Holes, doubled_areas, even_triangles
-from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.poles import HOLE, HeatDistance, open_at, pole_candidates
 from miurafab.surfaces.preparation import PreparedMesh
 from miurafab.surfaces.refine import refine
+from miurafab.surfaces.topology import border_loops
 from miurafab.surfaces.tube import TubeChart, TubeSurface, tube_chart
 from miurafab.surfaces.tube_figures import LIMITS, TubeFigures
 

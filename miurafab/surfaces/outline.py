@@ -30,10 +30,10 @@ from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.outline import Outline
 from miurafab.surfaces.mesh import MeshChart, median_edge, spans
-from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.placement import turned
 from miurafab.surfaces.smoothing import continued, smooth
 from miurafab.surfaces.surface import Domain, gauss_newton, normal_to, unit
+from miurafab.surfaces.topology import border_loops
 
 if TYPE_CHECKING:
     from scipy.interpolate import NdBSpline

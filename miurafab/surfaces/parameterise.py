@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import smallest_box
 from miurafab.geometry.sparse import factor_symmetric
+from miurafab.surfaces.topology import border_loops
 
 Complexes = NDArray[np.complex128]
 
@@ -127,27 +128,6 @@ def tutte(vertices: Floats, faces: Ints) -> Complexes:
     return z
 
 
-def border_loops(faces: Ints) -> list[Ints]:
-    """The border of an oriented mesh as loops of vertices, the loop of most vertices first."""
-    sides = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    count = int(faces.max()) + 1
-    keys = sides.min(axis=1) * count + sides.max(axis=1)
-    order = np.argsort(keys, kind="stable")
-    first = np.flatnonzero(np.diff(keys[order], prepend=-1))
-    alone = np.diff(first, append=len(keys)) == 1
-    open_sides = sides[np.sort(order[first[alone]])]
-    following = dict(open_sides.tolist())
-    loops = []
-    while following:
-        start, at = following.popitem()
-        loop = [start]
-        while at != start:
-            loop.append(at)
-            at = following.pop(at)
-        loops.append(np.array(loop, dtype=np.int64))
-    return sorted(loops, key=lambda loop: (-len(loop), int(loop.min())))
-
-
 def _rigid(z: Complexes, local: Complexes, faces: Ints) -> Complexes:
     """The layout made as rigid as possible: the last in which no triangle is turned over."""
     # side k runs from corner k to the next; its weight is the cotangent of the opposite angle
@@ -189,45 +169,3 @@ def _rigid(z: Complexes, local: Complexes, faces: Ints) -> Complexes:
             break
         energy = float(misfit.sum())
     return best
-
-
-def locate(flat: Floats, faces: Ints, points: Floats) -> tuple[Ints, Floats]:
-    """The triangle (n,) of the layout around each of ``points`` (n, 2), or -1, and the barycentric
-    coordinates (n, 3) in the triangle.
-
-    Each triangle is compared with the points in its bounding box, which are sorted by x.
-    """
-    corners = flat[faces]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    order = np.argsort(points[:, 0])
-    sorted_x = points[order, 0]
-    margin = 1e-12 * (high - low).max()
-    first = np.searchsorted(sorted_x, low[:, 0] - margin)
-    last = np.searchsorted(sorted_x, high[:, 0] + margin, side="right")
-    holder = np.full(len(points), -1, dtype=np.int64)
-    coordinates = np.zeros((len(points), 3))
-    for start in range(0, len(faces), 4096):
-        block = np.arange(start, min(start + 4096, len(faces)))
-        counts = last[block] - first[block]
-        triangle = np.repeat(block, counts)
-        if not len(triangle):
-            continue
-        point = order[first[triangle] + places_in_runs(counts)]
-        y = points[point, 1]
-        close = (y >= low[triangle, 1] - margin) & (y <= high[triangle, 1] + margin)
-        triangle, point = triangle[close], point[close]
-        weights = _barycentric(corners[triangle], points[point])
-        inside = weights.min(axis=1) >= -1e-9
-        holder[point[inside]] = triangle[inside]
-        coordinates[point[inside]] = weights[inside]
-    return holder, coordinates
-
-
-def _barycentric(corners: Floats, points: Floats) -> Floats:
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    ab, ac, ap = b - a, c - a, points - a
-    det = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        s = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / det
-        t = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / det
-    return np.stack([1 - s - t, s, t], axis=1)

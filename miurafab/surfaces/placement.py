@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.errors import UnitError
-from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs
 from miurafab.options.kinds import comma_parts
-from miurafab.surfaces.parameterise import locate
 from miurafab.surfaces.surface import Domain
 from miurafab.units import parse_length
 
@@ -165,3 +164,45 @@ def _largest_block(covered: Bools) -> tuple[int, int, int, int]:
                     best, block = area, (start, i - 1, j - tall + 1, j)
             stack.append((start, height))
     return block
+
+
+def locate(flat: Floats, faces: Ints, points: Floats) -> tuple[Ints, Floats]:
+    """The triangle (n,) of the layout around each of ``points`` (n, 2), or -1, and the barycentric
+    coordinates (n, 3) in the triangle.
+
+    Each triangle is compared with the points in its bounding box, which are sorted by x.
+    """
+    corners = flat[faces]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    order = np.argsort(points[:, 0])
+    sorted_x = points[order, 0]
+    margin = 1e-12 * (high - low).max()
+    first = np.searchsorted(sorted_x, low[:, 0] - margin)
+    last = np.searchsorted(sorted_x, high[:, 0] + margin, side="right")
+    holder = np.full(len(points), -1, dtype=np.int64)
+    coordinates = np.zeros((len(points), 3))
+    for start in range(0, len(faces), 4096):
+        block = np.arange(start, min(start + 4096, len(faces)))
+        counts = last[block] - first[block]
+        triangle = np.repeat(block, counts)
+        if not len(triangle):
+            continue
+        point = order[first[triangle] + places_in_runs(counts)]
+        y = points[point, 1]
+        close = (y >= low[triangle, 1] - margin) & (y <= high[triangle, 1] + margin)
+        triangle, point = triangle[close], point[close]
+        weights = _barycentric(corners[triangle], points[point])
+        inside = weights.min(axis=1) >= -1e-9
+        holder[point[inside]] = triangle[inside]
+        coordinates[point[inside]] = weights[inside]
+    return holder, coordinates
+
+
+def _barycentric(corners: Floats, points: Floats) -> Floats:
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    ab, ac, ap = b - a, c - a, points - a
+    det = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        s = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / det
+        t = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / det
+    return np.stack([1 - s - t, s, t], axis=1)

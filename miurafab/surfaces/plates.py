@@ -18,10 +18,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Bools, Floats, Ints, vector_product
+from miurafab.geometry.connected import components
 from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.rays import first_hits
 from miurafab.surfaces.topology import classify, neighbours, one_sheet, used_alone
@@ -138,10 +137,7 @@ def _thickness(vertices: Floats, faces: Ints, normal: Floats) -> tuple[Floats, I
 def _two_largest(skin: Bools, first: Ints, second: Ints, area: Floats) -> tuple[Ints, Ints]:
     """The triangles of the two largest connected parts of ``skin``, the larger first."""
     joined = skin[first] & skin[second]
-    graph = sparse.coo_array(
-        (np.ones(int(joined.sum())), (first[joined], second[joined])), (len(skin), len(skin))
-    )
-    label = connected_components(graph, directed=False)[1]
+    label = components(len(skin), first[joined], second[joined])
     sums = np.bincount(label[skin], area[skin], minlength=int(label.max()) + 1)
     # areas that are equal to a thousandth are in the order of their first triangle
     best = np.argsort(-sums, kind="stable")[:2].tolist()

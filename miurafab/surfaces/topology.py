@@ -14,12 +14,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from miurafab.errors import TargetError
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.surfaces.parameterise import border_loops
+from miurafab.geometry.connected import components, shortest_ways
 
 MeshKind = Literal["disk", "tube", "holes", "sphere", "handles"]
 """``disk``: one border. ``tube``: two. ``holes``: more. ``sphere``: none. ``handles``: a torus, or
@@ -79,7 +77,7 @@ def one_sheet(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
     # the corners of two neighbours at each end of their side are one vertex
     a, b = corner.ravel()[first], np.roll(corner, -1, axis=1).ravel()[first]
     d, c = corner.ravel()[second], np.roll(corner, -1, axis=1).ravel()[second]
-    label = _components(np.concatenate([a, b]), np.concatenate([c, d]), corner.size)
+    label = components(corner.size, np.concatenate([a, b]), np.concatenate([c, d]))
     _, place = np.unique(label, return_index=True)
     source = faces.ravel()[place]
     order = np.argsort(source, kind="stable")
@@ -91,7 +89,7 @@ def one_sheet(vertices: Floats, faces: Ints, name: str) -> tuple[Floats, Ints]:
 def pieces_of(faces: Ints) -> Ints:
     """(F,) the piece of each triangle, numbered from 0."""
     first, second = _shared_sides(faces)
-    return _components(first // 3, second // 3, len(faces))
+    return components(len(faces), first // 3, second // 3)
 
 
 def edges_of(faces: Ints) -> tuple[Ints, Ints]:
@@ -139,10 +137,8 @@ def _oriented(faces: Ints, name: str) -> Ints:
         return faces
     count = len(faces)
     f, g = first // 3, second // 3
-    graph = sparse.coo_array(
-        (np.ones(2 * len(f)), (np.concatenate([f, g]), np.concatenate([g, f]))), (count, count)
-    ).tocsr()
-    order, before = breadth_first_order(graph, 0)
+    hops, before = shortest_ways(count, f, g, np.ones(len(f)), np.array([0]))
+    order = np.argsort(hops, kind="stable")[: np.isfinite(hops).sum()]
     key = np.minimum(f, g) * count + np.maximum(f, g)
     sorting = np.argsort(key)
     way = np.minimum(order[1:], before[order[1:]]) * count + np.maximum(
@@ -160,7 +156,22 @@ def _oriented(faces: Ints, name: str) -> Ints:
     return np.where(turned[:, None], faces[:, ::-1], faces)
 
 
-def _components(first: Ints, second: Ints, count: int) -> Ints:
-    graph = sparse.coo_array((np.ones(len(first)), (first, second)), (count, count))
-    labels: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
-    return labels
+def border_loops(faces: Ints) -> list[Ints]:
+    """The border of an oriented mesh as loops of vertices, the loop of most vertices first."""
+    sides = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    count = int(faces.max()) + 1
+    keys = sides.min(axis=1) * count + sides.max(axis=1)
+    order = np.argsort(keys, kind="stable")
+    first = np.flatnonzero(np.diff(keys[order], prepend=-1))
+    alone = np.diff(first, append=len(keys)) == 1
+    open_sides = sides[np.sort(order[first[alone]])]
+    following = dict(open_sides.tolist())
+    loops = []
+    while following:
+        start, at = following.popitem()
+        loop = [start]
+        while at != start:
+            loop.append(at)
+            at = following.pop(at)
+        loops.append(np.array(loop, dtype=np.int64))
+    return sorted(loops, key=lambda loop: (-len(loop), int(loop.min())))

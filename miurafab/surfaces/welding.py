@@ -14,10 +14,9 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.geometry.nearest import tree_of
 from miurafab.surfaces.topology import edges_of
 
@@ -63,9 +62,7 @@ def _joined(vertices: Floats, faces: Ints, reach: float) -> tuple[Floats, Ints, 
     a, b, gap = a[close], b[close], gap[close]
     if not len(a):
         return vertices, faces, 0, 0.0
-    count = len(vertices)
-    graph = sparse.coo_array((np.ones(len(a)), (a, b)), (count, count))
-    groups, label = connected_components(graph, directed=False)
+    label = components(len(vertices), a, b)
     members = np.bincount(label)
     middle = np.stack([np.bincount(label, vertices[:, k]) for k in range(3)], axis=1)
     _, first = np.unique(label, return_index=True)
@@ -73,7 +70,7 @@ def _joined(vertices: Floats, faces: Ints, reach: float) -> tuple[Floats, Ints, 
     points = np.where(alone[:, None], vertices[first], middle / members[:, None])
     faces = label.astype(np.int64)[faces]
     faces = faces[(np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)]
-    return points, faces, count - groups, float(gap.max())
+    return points, faces, len(vertices) - len(members), float(gap.max())
 
 
 def _split(vertices: Floats, faces: Ints, reach: float) -> tuple[Ints, int, float]:

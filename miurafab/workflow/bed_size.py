@@ -9,45 +9,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
-from miurafab.display import Shown
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
 from miurafab.files import AnyPath
-from miurafab.options import File, Whole, check_options, option
 from miurafab.origami.fitting.fit import fit as fit_request
 from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitRequest
 from miurafab.origami.fitting.result import FitResult
 from miurafab.profiles import MachineProfile, Material, read_machine, read_material
+from miurafab.workflow.bed_options import BedOptions
 
 _FITS = 4
 """So many fits are made at most."""
 
 _DIGITS = 2
 """Sizes are rounded down to so many decimals of mm."""
-
-
-@dataclass(frozen=True, repr=False)
-class BedOptions(Shown):
-    """What a size by the bed depends on, besides the machine and the material."""
-
-    sheets: int | None = option(
-        Whole(1, 1000),
-        "With `size` bed: as large as so many sheets allow; on one sheet nothing is cut apart.",
-        group="Bed",
-        default_text="1",
-    )
-    stock: Path | None = option(
-        File(),
-        "With `size` bed: a TOML file with the sheets to use.",
-        group="Bed",
-        default_text="sheets of the bed's size",
-    )
-
-    def __post_init__(self) -> None:
-        check_options(self)
 
 
 def with_stock(layout: LayoutOptions | None, wanted: BedOptions) -> LayoutOptions:

@@ -155,7 +155,8 @@ def _from_value(
     from miurafab.origami.crease_pattern import CreasePattern
     from miurafab.origami.fitting.request import BED
     from miurafab.origami.fitting.result import FitResult
-    from miurafab.workflow.bed_size import BedOptions, with_stock
+    from miurafab.workflow.bed_options import BedOptions
+    from miurafab.workflow.bed_size import with_stock
     from miurafab.workflow.design import Design, design
     from miurafab.workflow.fit import fit
     from miurafab.workflow.job_directory import JobDirectory

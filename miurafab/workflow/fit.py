@@ -18,7 +18,8 @@ from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.judge_pattern import judge_quality
 from miurafab.origami.verify import Measurements
 from miurafab.profiles import MachineProfile, Material
-from miurafab.workflow.bed_size import BedOptions, fit_to_bed
+from miurafab.workflow.bed_options import BedOptions
+from miurafab.workflow.bed_size import fit_to_bed
 from miurafab.workflow.design import design
 
 

@@ -11,24 +11,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from miurafab.display import Shown
-from miurafab.errors import OptionError
 from miurafab.files import AnyPath, new_file, write_bytes, write_text
 from miurafab.findings import Finding, findings_json
 from miurafab.geometry.arrays import Floats
-from miurafab.options import Choice, Whole, length, option, read_options
+from miurafab.options import read_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
 from miurafab.origami.folding.certificate import RigidCertificate
 from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.folding.facet_energy import facet_energies
-from miurafab.origami.folding.judge_motion import median_fold, motion_findings
+from miurafab.origami.folding.judge_motion import median_fold, motion_findings, target_frame
 from miurafab.origami.folding.kinematics import (
     CLOSED_FORM,
     FROM_FLAT,
@@ -41,54 +39,19 @@ from miurafab.origami.folding.motion import FoundMotion, find_motion
 from miurafab.origami.folding.ramp_motion import RampVerdict
 from miurafab.origami.formats.fold import write_fold
 from miurafab.origami.formats.mesh import glb_bytes
-from miurafab.workflow.fold_gif import target_frame, write_gif
+from miurafab.workflow.fold_options import ENDINGS, FoldOptions, check_colour
 from miurafab.workflow.layers import layer_facts, layer_findings
-from miurafab.workflow.page import Curve, Slider, write_page
-from miurafab.workflow.panels import METHODS
 from miurafab.workflow.patterns import PatternLike, movable_pattern
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ENDINGS = (".fold", ".gif", ".glb", ".html")
-"""What a motion can be written as."""
-
-COLOURED = (".gif", ".html")
-"""Those with colours that change as the sheet moves."""
+    from miurafab.workflow.page import Curve
 
 Progress = Callable[[float, str], None]
 
 _NO_STRAIN, _NO_ENERGY = 1e-9, 1e-12
 """Strains, and energies in k_f times the mean edge, that are rounding."""
-
-
-@dataclass(frozen=True)
-class FoldOptions:
-    """The options of a motion: of its steps, its picture and its panels."""
-
-    steps: int = option(Whole(2, 1000), "The number of steps of the motion.", default=40)
-    colour: str = option(
-        Choice(("side", "strain")),
-        "Colour the facets by side or by strain, in a .gif or .html file.",
-        default="side",
-    )
-    thickness_mm: float | None = option(
-        length(above=True),
-        "Also say how to make panels of this thickness; exit 1 if such panels cannot fold.",
-    )
-    method: str = option(
-        Choice(METHODS),
-        "How panels make room: cut back beside creases, or plates on shifted hinges.",
-        default="tapered",
-    )
-
-
-def check_colour(path: Path, *, by_strain: bool) -> None:
-    """Raise :class:`~miurafab.errors.OptionError` where ``path`` cannot have colours by strain."""
-    if by_strain and path.suffix.lower() not in COLOURED:
-        raise OptionError(
-            "colour", f"is for a .gif or .html file; {path.name} has no colours by strain"
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -162,8 +125,12 @@ class Folding(Shown):
         elif ending == ".glb":
             write_bytes(file, _glb(motion, shifts))
         elif ending == ".gif":
+            from miurafab.workflow.fold_gif import write_gif
+
             write_gif(file, motion, _strain(motion) if by_strain else None, on_progress, shifts)
         else:
+            from miurafab.workflow.page import Slider, write_page
+
             slider = Slider(
                 names=_names(motion),
                 start=target_frame(motion),
@@ -339,6 +306,8 @@ def _energy(motion: FoldingMotion) -> Curve | None:
     energies = facet_energies(motion)
     if energies is None or not energies.max() > _NO_ENERGY:
         return None
+    from miurafab.workflow.page import Curve
+
     return Curve(
         "Bending energy of the facets, in k_f times the mean edge",
         energies,

@@ -16,6 +16,7 @@ from PIL import Image, ImageDraw
 
 from miurafab.files import write_bytes
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.origami.folding.judge_motion import target_frame
 from miurafab.origami.folding.kinematics import FoldingMotion
 from miurafab.origami.folding.layers_apart import CLOSED, split_facets
 from miurafab.origami.picture import BACK, FRONT, axes, project
@@ -107,11 +108,6 @@ def picture(
         draw.polygon(polygon, fill=colour, outline=line)
     _bar(draw, motion, frame)
     return image.resize((WIDTH, HEIGHT), Image.Resampling.BOX)
-
-
-def target_frame(motion: FoldingMotion) -> int:
-    """The frame nearest to the folded form."""
-    return int(np.argmin(np.abs(np.where(np.isfinite(motion.states), motion.states, 1e9) - 1.0)))
 
 
 def _apart(points: Floats, faces: Ints, shifts: Floats) -> tuple[Floats, Ints]:

@@ -19,9 +19,9 @@ from miurafab.origami.folding.plates import ThickPlates, thick_plates
 from miurafab.origami.folding.thick_panels import ThickPanels
 from miurafab.origami.folding.thick_panels import thick_panels as make_panels
 from miurafab.origami.formats.panel_parts import panel_parts
+from miurafab.workflow.fold_options import METHODS
 from miurafab.workflow.patterns import PatternLike, consistent_pattern
 
-METHODS = ("tapered", "bennett")
 """How panels make room for their thickness."""
 
 

@@ -34,7 +34,6 @@ from miurafab.profiles import (
     read_toml,
 )
 from miurafab.profiles.shipped import Kind
-from miurafab.workflow.design import read_layout_table
 from miurafab.workflow.drawings import drawings, guides, read_formats
 from miurafab.workflow.dry_run import SheetPreview, clock_text, dry_run
 from miurafab.workflow.job_directory import JobDirectory
@@ -366,6 +365,8 @@ def layout_options(
     table = Table(read_toml(file, InputError), file.name, InputError)
     if not table.has("layout"):
         raise InputError(f"{file} has no [layout], so there is nothing to take from it.")
+    from miurafab.workflow.design import read_layout_table
+
     return read_layout_table(table.table("layout"), file.parent, given)
 
 

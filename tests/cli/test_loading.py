@@ -27,7 +27,9 @@ LIBRARIES = [
     "http.client",
 ]
 NOTHING = set()
-PATTERN = {"numpy", "scipy.sparse", "scipy.linalg", "shapely"}
+SHAPES = {"numpy", "shapely"}
+"""What a file is read with."""
+PATTERN = SHAPES | {"scipy.sparse", "scipy.linalg"}
 """What a pattern is computed with."""
 
 STARTS = {
@@ -38,17 +40,20 @@ STARTS = {
     "machine status --port gone": NOTHING,
     "profiles show gone": NOTHING,
     "use --machine gone": NOTHING,
-    "fit --help": PATTERN,
-    "cut --help": PATTERN,
+    "fold --help": NOTHING,
+    "fit --help": SHAPES,
+    "cut --help": SHAPES,
+    "sheets --help": SHAPES,
+    "tradeoff --help": SHAPES,
     "fit gone.toml -o x.fold": PATTERN,
     "check gone.fold": PATTERN,
     "layers gone.fold": PATTERN,
     "energy gone.fold": PATTERN,
     "convert gone.fold x.svg": PATTERN,
     "sheets gone.fold -o x": PATTERN,
-    "preview gone": PATTERN,
+    "preview gone": SHAPES,
     "cut gone --port virtual": PATTERN,
-    "fold gone.fold": PATTERN | {"PIL"},
+    "fold gone.fold": PATTERN,
 }
 STARTED = """
 import sys

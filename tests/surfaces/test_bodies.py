@@ -13,9 +13,9 @@ from miurafab.errors import OptionError, TargetError
 from miurafab.origami.fitting.fit import fit
 from miurafab.surfaces.body import Body, body_surface, described
 from miurafab.surfaces.description import described_surface
-from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.poles import HeatDistance, open_at, pole_candidates
 from miurafab.surfaces.surface import tangents
+from miurafab.surfaces.topology import border_loops
 from miurafab.workflow.design import design
 
 

@@ -8,8 +8,7 @@ import pytest
 from miurafab.surfaces import mesh
 from miurafab.surfaces.decimation import decimated
 from miurafab.surfaces.mesh_repair import doubled_areas
-from miurafab.surfaces.parameterise import border_loops
-from miurafab.surfaces.topology import classify, edges_of
+from miurafab.surfaces.topology import border_loops, classify, edges_of
 
 
 def sheet(side, hole=False, noise=0.0):

@@ -9,8 +9,8 @@ from mesh_shapes import ball, mesh, ring
 from miurafab.errors import TargetError
 from miurafab.surfaces.harmonic import CylinderMap, cylinder_map
 from miurafab.surfaces.intrinsic import intrinsic_mesh
-from miurafab.surfaces.parameterise import border_loops
 from miurafab.surfaces.refine import refine
+from miurafab.surfaces.topology import border_loops
 
 
 def mapped(vertices, faces, height):

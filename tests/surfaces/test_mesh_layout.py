@@ -11,10 +11,8 @@ from scipy.spatial import Delaunay
 from test_mesh import dome, square
 
 from miurafab.surfaces.parameterise import (
-    border_loops,
     conformal,
     flatten,
-    locate,
     turned_over,
     tutte,
 )
@@ -22,11 +20,13 @@ from miurafab.surfaces.placement import (
     _largest_block,
     covered,
     largest_rectangle,
+    locate,
     placements,
     turned,
 )
 from miurafab.surfaces.smoothing import smooth
 from miurafab.surfaces.surface import Domain
+from miurafab.surfaces.topology import border_loops
 
 
 def stretches(vertices, flat, faces):

@@ -20,6 +20,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.angles_csv import angles_csv, contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.contact import self_intersections
+from miurafab.origami.folding.judge_motion import target_frame
 from miurafab.origami.folding.kinematics import (
     FoldingMotion,
     facet_strain,
@@ -33,7 +34,7 @@ from miurafab.origami.folding.thick_panels import thick_panels
 from miurafab.origami.formats.files import load
 from miurafab.origami.formats.fold import read_fold
 from miurafab.workflow.fold import fold
-from miurafab.workflow.fold_gif import picture, target_frame
+from miurafab.workflow.fold_gif import picture
 from miurafab.workflow.panels import thickness_report
 
 DATA = Path(__file__).parent.parent / "data"

@@ -22,8 +22,6 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-import scipy.sparse
-from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from miurafab.fabrication.partition.cover import excess, rectangle_around
 from miurafab.fabrication.partition.fit_box import TOLERANCE
@@ -31,6 +29,7 @@ from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.seams import all_seams, inner_seams
 from miurafab.fabrication.tabs import TabRegions, tab_regions
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.connected import minimum_cut
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import Material
 
@@ -239,23 +238,12 @@ class Recut:
         tail = np.concatenate([row, np.full(nodes, source), np.arange(nodes)])
         head = np.concatenate([to[row, column], np.arange(nodes), np.full(nodes, sink)])
         cost = np.concatenate([apart[row, column], if_b, if_a])
-        graph = scipy.sparse.csr_array(
-            (cost.astype(np.int32), (tail, head)), shape=(nodes + 2, nodes + 2)
-        )
-        flow = maximum_flow(graph, source, sink)
-        rest = scipy.sparse.coo_array(graph - flow.flow)
-        more = rest.data > 0
-        ahead = scipy.sparse.csr_array(
-            (rest.data[more], (rest.row[more], rest.col[more])), shape=graph.shape
-        )
-        reached = breadth_first_order(ahead, source, return_predecessors=False)
-        is_a = np.zeros(nodes + 2, dtype=bool)
-        is_a[reached] = True
+        least, is_a = minimum_cut(nodes + 2, tail, head, cost.astype(np.int32), source, sink)
         before = self.patch[zone]
         in_a = before == one
         cut = in_a[row] & ~in_a[to[row, column]]
         was = if_a[in_a].sum() + if_b[~in_a].sum() + apart[row, column][cut].sum()
-        if flow.flow_value >= was:
+        if least >= was:
             return False
         sound = [self._is_disk(patch) for patch in (one, other)]
         self.patch[zone] = np.where(is_a[:nodes], one, other)

@@ -13,11 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.fabrication.tabs import TabRegions
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.piece import Piece, piece_of, pieces_of
 
@@ -50,7 +49,7 @@ def hanging_together(pattern: CreasePattern) -> list[Piece]:
     """The pieces in the order of their numbers, then of their lowest facets. Their cells are those
     of the lattice of the whole pattern.
     """
-    label = components(pattern)
+    label = facet_components(pattern)
     numbers = label if pattern.pieces is None else pattern.pieces
     first = np.unique(label, return_index=True)[1]
     order = first[np.lexsort((first, numbers[first]))]
@@ -60,12 +59,10 @@ def hanging_together(pattern: CreasePattern) -> list[Piece]:
     return [piece_of(whole, np.flatnonzero(label == label[facet])) for facet in order.tolist()]
 
 
-def components(pattern: CreasePattern) -> Ints:
+def facet_components(pattern: CreasePattern) -> Ints:
     """(F,) what hangs together in the flat pattern, numbered by its lowest facet."""
-    count = len(pattern.faces_vertices)
     pairs = pattern.edges_faces[(pattern.edges_faces >= 0).all(axis=1)]
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return components(len(pattern.faces_vertices), *pairs.T)
 
 
 def lattice_cells(pattern: CreasePattern) -> Ints | None:

@@ -25,11 +25,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.fabrication.route.tour import closed_tour
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.connected import components
 
 _ASSIGNED = 1200
 """The number of odd nodes assigned at once; more nodes are halved along the longer side."""
@@ -229,9 +228,7 @@ def _begun(used: Ints, legs: Ints, start: int, positions: Floats) -> Ints:
 
 def _components(a: Ints, b: Ints, legs: Ints, nodes: int) -> tuple[Ints, Ints]:
     """The used nodes, and (N,) the component of each node, from 0; -1 for unused nodes."""
-    tails, heads = np.concatenate([a, legs[:, 0]]), np.concatenate([b, legs[:, 1]])
-    graph = scipy.sparse.coo_array((np.ones(len(tails)), (tails, heads)), shape=(nodes, nodes))
-    _, raw = connected_components(graph, directed=False)
+    raw = components(nodes, np.concatenate([a, legs[:, 0]]), np.concatenate([b, legs[:, 1]]))
     used = np.unique(np.concatenate([a, b]))
     label = np.full(nodes, -1, dtype=np.int64)
     label[used] = np.unique(raw[used], return_inverse=True)[1]

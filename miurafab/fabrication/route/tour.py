@@ -21,10 +21,9 @@ Half-edge h of M edges leaves its node along edge h % M: the tail for h < M, the
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.connected import components
 
 
 def closed_tour(tails: Ints, heads: Ints, ends: Floats, corner: float) -> Ints:
@@ -106,8 +105,7 @@ def _trails(partner: Ints, count: int) -> Ints:
     half = np.arange(2 * count)
     rows = np.concatenate([half, half])
     columns = np.concatenate([(half + count) % (2 * count), partner])
-    graph = scipy.sparse.coo_array((np.ones(len(rows)), (rows, columns)), shape=(2 * count,) * 2)
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return components(2 * count, rows, columns)
 
 
 def _join(partner: Ints, trail: Ints, at: Ints, prices: _Prices) -> None:

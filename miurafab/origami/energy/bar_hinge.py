@@ -27,11 +27,10 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints, vector_product
+from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import UNCREASED, CreasePattern
 from miurafab.origami.energy.hinges import hinge_angles
@@ -302,8 +301,6 @@ def _mechanisms(pattern: CreasePattern, creases: Ints) -> Ints:
     inside = np.zeros(len(pattern.vertices_coords), dtype=bool)
     inside[interior_vertices(pattern)] = True
     crease, end = np.nonzero(inside[creases[:, :2]])
-    count = len(creases) + len(inside)
-    pairs = (crease, len(creases) + creases[crease, end])
-    graph = coo_array((np.ones(len(crease)), pairs), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
+    vertex = len(creases) + creases[crease, end]
+    label = components(len(creases) + len(inside), crease, vertex)
     return np.unique(label[: len(creases)], return_inverse=True)[1].astype(np.int64)

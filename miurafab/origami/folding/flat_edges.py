@@ -10,10 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import UNCREASED, CreasePattern, restricted
 from miurafab.origami.energy.ruled import rulings_among
@@ -78,9 +77,7 @@ def without_flat_edges(pattern: CreasePattern) -> Dissolved:
 def _parts(pattern: CreasePattern) -> Ints:
     """(F,) the part of each facet; flat edges join the facets of a part."""
     one, other = pattern.edges_faces[_flat_edges(pattern)].T
-    count = len(pattern.faces_vertices)
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    return components(len(pattern.faces_vertices), one, other)
 
 
 def _flat_edges(pattern: CreasePattern) -> Bools:

@@ -99,3 +99,8 @@ def _of_ramp(verdict: RampVerdict, last: float) -> Iterator[Finding]:
             f"Creases stay {math.degrees(verdict.angle_error):.0f} degrees away, in the mean, from "
             "the fold angles asked for: these do not go together.",
         )
+
+
+def target_frame(motion: FoldingMotion) -> int:
+    """The frame nearest to the folded form."""
+    return int(np.argmin(np.abs(np.where(np.isfinite(motion.states), motion.states, 1e9) - 1.0)))

@@ -17,12 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
 from miurafab.display import Shown
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints, run_starts
+from miurafab.geometry.connected import shortest_ways
 from miurafab.geometry.polygons import edge_lengths, facet_means, sides_and_diagonals
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.laying import laid_on_each_other
@@ -265,23 +264,14 @@ def facet_tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
     lengths = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
     joined = joined[lengths[joined] > _POINT * lengths.mean()]
     left, right = pattern.edges_faces[joined].T
-    graph = coo_array((np.ones(len(joined)), (left, right)), shape=(facets, facets)).tocsr()
-    distance, before, _ = dijkstra(
-        graph,
-        directed=False,
-        unweighted=True,
-        indices=_middles(pattern),
-        return_predecessors=True,
-        min_only=True,
-    )
+    distance, previous = shortest_ways(facets, left, right, np.ones(len(joined)), _middles(pattern))
     if np.isinf(distance).any():
         loose = int(np.isinf(distance).sum())
         raise PatternError(
             f"{loose} of {facets} facets are joined to the rest by no crease, so the pattern "
             "cannot be folded as one sheet."
         )
-    previous = np.asarray(before, dtype=np.int64).reshape(facets)
-    depth = np.asarray(distance, dtype=np.int64).reshape(facets)
+    depth = distance.astype(np.int64)
     keys = np.minimum(left, right) * facets + np.maximum(left, right)
     order = np.argsort(keys, kind="stable")
     own = np.arange(facets)

@@ -16,12 +16,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.sparse import factor_symmetric
+from miurafab.geometry.connected import components
 from miurafab.origami.crease_pattern import UNCREASED, CreasePattern
 from miurafab.origami.invariants import corner_ring, interior_vertices
 
@@ -110,12 +108,16 @@ def _vertices_of(pattern: CreasePattern, degree: int) -> _Vertices:
 
 def _potential(count: int, more: Ints, less: Ints, step: Floats) -> Floats:
     """(count,) w with w[more] - w[less] = step by least squares, of mean zero in each part."""
+    from scipy.sparse import coo_array
+
+    from miurafab.geometry.sparse import factor_symmetric
+
     rows = np.tile(np.arange(len(more)), 2)
     ends = np.concatenate([more, less])
     signs = np.repeat([1.0, -1.0], len(more))
     difference = coo_array((signs, (rows, ends)), shape=(len(more), count)).tocsc()
     laplacian = difference.T @ difference
-    _, part = connected_components(laplacian, directed=False)
+    part = components(count, more, less)
     # the first of each part is anchored at 0; the mean is removed at the end
     anchored = np.zeros(count)
     anchored[np.unique(part, return_index=True)[1]] = 1.0
