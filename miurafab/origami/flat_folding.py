@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from miurafab.findings import Finding
+from miurafab.findings import Finding, counted
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import CornerRing, corner_ring, interior_vertices
@@ -167,8 +167,8 @@ def judge_flat_folding(pattern: CreasePattern) -> Iterator[Finding]:
     if left_out:
         yield Finding(
             "not-proven",
-            f"{left_out} interior vertices are not judged: a crease there is unassigned (U), or "
-            "the sheet is cut there.",
+            counted(left_out, "interior vertex is", "interior vertices are")
+            + " not judged: a crease there is unassigned (U), or the sheet is cut there.",
         )
     if not folds:
         return

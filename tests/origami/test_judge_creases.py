@@ -207,6 +207,7 @@ def test_flat_folding_is_a_note_where_folds_are_not_stated_as_180_degrees():
     assert {each.code for each in judge_flat_folding(assumed)} == {"not-flat-foldable"}
     (said,) = judge_flat_folding(star("MUMV", [90] * 4))
     assert said.code == "not-proven"
+    assert said.sentence.startswith("1 interior vertex is not judged: a crease there is unassigned")
 
 
 def test_the_rotations_around_each_vertex_of_a_folded_sheet_close():
