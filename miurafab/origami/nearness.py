@@ -45,15 +45,24 @@ def nearness(pattern: CreasePattern, surface: TargetSurface, tiles: Floats) -> N
     scale, folded = pattern.scale, pattern.folded_coords / pattern.scale
     triangles, _ = triangulate(pattern.faces_vertices, pattern.vertices_coords)
     sheet = folded[triangles]
-    means = facet_means(folded, pattern.faces_vertices[uncut(pattern)])
-    off = np.linalg.norm(surface.nearest(means) - means, axis=1).max()
     diagonal = np.linalg.norm(np.ptp(pattern.folded_coords, axis=0))
     return Nearness(
         scale * farthest_from_map(sheet, surface.nearest),
         scale * farthest_from_mesh(tiles, sheet),
-        scale * float(off),
+        means_to_target(pattern, surface),
         float(diagonal),
     )
+
+
+def means_to_target(pattern: CreasePattern, surface: TargetSurface) -> float:
+    """The largest distance in mm of the mean of a whole facet of the folded ``pattern`` from
+    ``surface``.
+    """
+    assert pattern.folded_coords is not None
+    folded = pattern.folded_coords / pattern.scale
+    means = facet_means(folded, pattern.faces_vertices[uncut(pattern)])
+    off = np.linalg.norm(surface.nearest(means) - means, axis=1).max()
+    return pattern.scale * float(off)
 
 
 def uncut(pattern: CreasePattern) -> Bools:

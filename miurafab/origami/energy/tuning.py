@@ -30,7 +30,15 @@ from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.result import INTERRUPTED, FitResult
 from miurafab.origami.fitting.scaling import scaled_residuals, worst_residual
-from miurafab.origami.verify import DEGENERATE, EXACT, Measurements, measure, with_distances
+from miurafab.origami.nearness import means_to_target
+from miurafab.origami.verify import (
+    DEGENERATE,
+    EXACT,
+    Measurements,
+    measure,
+    with_distances,
+    with_nearness,
+)
 
 CLOSE = 0.01
 """A barrier is what was asked within this part."""
@@ -62,8 +70,9 @@ def tuned(
     on_progress: Callable[[float, str], None] | None = None,
 ) -> FitResult:
     """``result`` brought to the barrier of ``request``, in k_f L; or ``infeasible``, with the
-    nearest sheet and how far the barrier goes. ``fit`` makes the sheet of another request. Ctrl-C
-    ends the search: the result is the nearest sheet up to then, ``interrupted``.
+    nearest sheet and how far the barrier goes. ``fit`` makes the sheet of another request, whose
+    distances are not asked for. Ctrl-C ends the search: the result is the nearest sheet up to then,
+    ``interrupted``.
 
     Raises :class:`~miurafab.errors.OptionError` for a sheet that is not one full grid.
     """
@@ -107,10 +116,11 @@ def tuned(
             raise
     if not found:
         return _missed(result, "The way to flat of the fitted sheet was lost.")
-    held = [_placed(sheet, request) for sheet in found if _miss(sheet, asked) <= CLOSE]
-    best = _placed(min(found, key=lambda sheet: _miss(sheet, asked)), request)
-    best = min(held, key=_distance, default=best)
-    measured = best.measurements
+    held = [sheet for sheet in found if _miss(sheet, asked) <= CLOSE]
+    best = min(found, key=lambda sheet: _miss(sheet, asked))
+    if held:
+        best = min(held, key=lambda sheet: means_to_target(sheet.pattern, request.surface))
+    measured = with_distances(best.measurements, best.pattern, request.surface)
     answer = replace(
         result,
         pattern=best.pattern,
@@ -213,7 +223,7 @@ def _tried(request: FitRequest, fitted: CreasePattern, factor: float) -> Tried |
     if measured.self_intersections or measured.overlaps:
         return None
     if request.max_deviation_mm is not None or request.max_distance_mm is not None:
-        measured = with_distances(measured, pattern, request.surface)
+        measured = with_nearness(measured, pattern, request.surface)
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
     near = Closeness.of(request, measured, measured.hausdorff_midsurface_mm)
     short = measured.min_edge_mm < (request.min_edge_mm or DEGENERATE * mean)
@@ -224,17 +234,6 @@ def _tried(request: FitRequest, fitted: CreasePattern, factor: float) -> Tried |
     except PatternError:  # no balance is found at its folded form
         return None
     return Tried(factor, pattern, measured, curve.barrier) if curve.converged else None
-
-
-def _placed(sheet: Tried, request: FitRequest) -> Tried:
-    """``sheet`` with its distances from the target."""
-    found = with_distances(sheet.measurements, sheet.pattern, request.surface)
-    return sheet._replace(measurements=found)
-
-
-def _distance(sheet: Tried) -> float:
-    away = sheet.measurements.hausdorff_midsurface_mm
-    return math.inf if away is None else away
 
 
 def _missed(result: FitResult, sentence: str) -> FitResult:

@@ -75,19 +75,27 @@ def fit(
         raise OptionError(
             "size", "is bed, which only `fit` and `cut` know, with a machine; give mm"
         )
-    if request.search:
-
-        def at(size: FitRequest) -> FitResult:
-            return _FitSearch(size, None, ends_at=ENOUGH).result()
-
-        result = coarsest(request, at, on_progress)
-    else:
-        result = _FitSearch(request, on_progress).result()
+    result = _fitted(request, on_progress, _FitSearch)
     if request.barrier is None:
         return result
     from miurafab.origami.energy.tuning import tuned
 
-    return tuned(request, result, fit, on_progress)
+    return tuned(request, result, lambda other: _fitted(other, None, _SheetAlone), on_progress)
+
+
+def _fitted(
+    request: FitRequest,
+    on_progress: Callable[[float, str], None] | None,
+    search: type[_FitSearch],
+) -> FitResult:
+    """The sheet of ``request``, whatever its barrier; one ``search`` where the size is known."""
+    if not request.search:
+        return search(request, on_progress).result()
+
+    def at(size: FitRequest) -> FitResult:
+        return _FitSearch(size, None, ends_at=ENOUGH).result()
+
+    return coarsest(request, at, on_progress)
 
 
 def coarse(
@@ -328,15 +336,19 @@ class _FitSearch:
         )
 
 
-class _Glance(_FitSearch):
-    """The search of a coarse fit: few starts, and no distances."""
+class _SheetAlone(_FitSearch):
+    """The search of a sheet whose distances nobody asks for."""
+
+    def _measured(self, best: Candidate) -> Measurements:
+        return best.measurements
+
+
+class _Glance(_SheetAlone):
+    """The search of a coarse fit: few starts."""
 
     def _settled(self) -> bool:
         best = self.best
         return (best is not None and best.rank[0] == 0) or len(self.made) >= GLANCES
-
-    def _measured(self, best: Candidate) -> Measurements:
-        return best.measurements
 
 
 def _no_sheet(attempts: tuple[Attempt, ...], ended: Finding | None) -> Finding:

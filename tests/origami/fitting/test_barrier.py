@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from miurafab.errors import OptionError
+from miurafab.origami import coverage
 from miurafab.origami.energy import tuning
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.fitting.fit import fit as fit_sheet
@@ -18,8 +19,36 @@ from miurafab.workflow.fit import fit
 
 
 @cache
-def asked(barrier, target="hypar", **options):
-    return fit(target, facets=(6, 6), size=120, barrier=barrier, **options)
+def sheet(target, fairness=1.0, flat_foldable=None):
+    request = design(target, facets=(6, 6), size=120).request
+    return fit_sheet(replace(request, fairness=fairness, flat_foldable=flat_foldable))
+
+
+def asked(barrier, target="hypar"):
+    """What a fit does with a barrier; the sheets that it tunes are fitted once for all tests."""
+    return tuned(barrier, target, tuning.FAIRNESS, tuning.LIMITS)
+
+
+@cache
+def tuned(barrier, target, _fairness, _limits):
+    request = design(target, facets=(6, 6), size=120, barrier=barrier).request
+    assert request.fairness == 1.0
+    return tuning.tuned(
+        request, sheet(target), lambda other: sheet(target, other.fairness, other.flat_foldable)
+    )
+
+
+def test_a_fit_with_a_barrier_tunes_its_sheets_and_measures_one(monkeypatch):
+    """The distances of the first sheet and of the answer are measured, of no sheet on the way."""
+    measured, cover = [], coverage.coverage
+    monkeypatch.setattr(
+        "miurafab.origami.verify.coverage", lambda *of: measured.append(of) or cover(*of)
+    )
+    whole = fit("hypar", facets=(6, 6), size=120, barrier=1e-6)
+    assert len(measured) == 2
+    same = asked(1e-6)
+    assert (whole.pattern.vertices_coords == same.pattern.vertices_coords).all()
+    assert whole.measurements == same.measurements
 
 
 @pytest.mark.parametrize("barrier", [1e-6, 5e-3])
@@ -42,12 +71,14 @@ def test_a_higher_barrier_takes_a_larger_residual(monkeypatch):
     """Of the scaled sheets of one fit; a fit within a limit may have less residual and more."""
     monkeypatch.setattr(tuning, "LIMITS", ())
     monkeypatch.setattr(tuning, "FAIRNESS", ())
-    sheets = [asked.__wrapped__(barrier) for barrier in (1e-6, 5e-3)]
+    sheets = [asked(barrier) for barrier in (1e-6, 5e-3)]
     worst = [sheet.measurements.max_flat_foldability for sheet in sheets]
     assert worst == sorted(worst)
 
 
-def test_a_barrier_out_of_reach_is_told_with_what_there_is():
+def test_a_barrier_out_of_reach_is_told_with_what_there_is(monkeypatch):
+    monkeypatch.setattr(tuning, "LIMITS", (0.2,))
+    monkeypatch.setattr(tuning, "FAIRNESS", (10.0,))
     result = asked(10.0)
     assert result.status == "infeasible"
     assert "barrier" in [finding.code for finding in result.findings]
@@ -207,9 +238,9 @@ def test_what_does_not_go_with_a_barrier_is_said(options, part):
 
 def test_fairness_gives_a_closer_sheet_with_the_same_barrier(monkeypatch):
     monkeypatch.setattr(tuning, "LIMITS", ())
-    found = asked.__wrapped__(1e-3, "sphere")
+    found = asked(1e-3, "sphere")
     monkeypatch.setattr(tuning, "FAIRNESS", ())
-    scaled = asked.__wrapped__(1e-3, "sphere")
+    scaled = asked(1e-3, "sphere")
     assert (found.status, scaled.status) == ("converged", "converged")
     assert found.barrier == pytest.approx(scaled.barrier, rel=0.02)
     assert found.deviation_mm < 0.9 * scaled.deviation_mm
@@ -218,9 +249,9 @@ def test_fairness_gives_a_closer_sheet_with_the_same_barrier(monkeypatch):
 def test_limits_on_the_residual_give_a_closer_sheet_with_the_same_barrier(monkeypatch):
     """eps_ff is tuned: from rougher residuals a high barrier is nearer to the target."""
     monkeypatch.setattr(tuning, "FAIRNESS", ())
-    found = asked.__wrapped__(1e-3)
+    found = asked(1e-3)
     monkeypatch.setattr(tuning, "LIMITS", ())
-    without = asked.__wrapped__(1e-3)
+    without = asked(1e-3)
     assert (found.status, without.status) == ("converged", "converged")
     assert found.barrier == pytest.approx(1e-3, rel=0.01)
     assert found.barrier == pytest.approx(without.barrier, rel=0.02)
