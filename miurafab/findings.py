@@ -64,6 +64,7 @@ RULES = {
     "curved-lines": Rule("note", "curved lines of a drawing, which are straight lines here"),
     "joined-ends": Rule("note", "a drawing whose lines were joined over gaps"),
     "lost-lines": Rule("warning", "lines of a drawing that are not in the pattern"),
+    "loose-parts": Rule("note", "parts of a drawing that lie loose inside a facet"),
     "holes": Rule("note", "parts of a drawing without paper, bounded by borders alone"),
     "unfolded": Rule("note", "a flat pattern that is computed from the folded form of its file"),
     "rounded": Rule("note", "a file of few digits, whose two forms differ by their rounding"),

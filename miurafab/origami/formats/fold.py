@@ -29,11 +29,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
 from miurafab.files import Reading, parse_json, read_text, write_text
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Ints
+from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.polygons import (
     connected_parts,
 )
@@ -69,6 +70,7 @@ from miurafab.origami.formats.folded_only import (
     unfolded_pattern,
 )
 from miurafab.origami.formats.line_crossings import lines_cross
+from miurafab.origami.formats.loose_parts import LoosePartsError
 from miurafab.origami.formats.planar_graph import enclosed_facets, oriented, pattern_from_lines
 from miurafab.origami.formats.target_frame import (
     exact_frames,
@@ -201,6 +203,19 @@ def read_further_frames(path: Path) -> tuple[FurtherFrame, ...]:
         return further_frames(exact_frames(document, text) if type(document) is dict else document)
 
 
+def _are_lines(flat: Floats, edges: Ints, assignment: NDArray[np.str_]) -> bool:
+    """Whether the ``edges`` of a file without facets are lines of a drawing, of which facets are
+    yet to be made: they cross, or some lie loose inside a facet.
+    """
+    if lines_cross(flat, edges):
+        return True
+    try:
+        enclosed_facets(flat, edges, assignment)
+    except LoosePartsError:
+        return True
+    return False
+
+
 def parse_fold(document: Any) -> CreasePattern:
     """The pattern in a parsed FOLD document. Raises ``PatternError`` naming the key at fault."""
     if not isinstance(document, dict):
@@ -215,7 +230,7 @@ def parse_fold(document: Any) -> CreasePattern:
     edges = edges_in(key)
     assignment = assignments_in(key, len(edges))
     given = "faces_vertices" in key
-    if not given and len(frames) == 1 and lines_cross(flat, edges):
+    if not given and len(frames) == 1 and _are_lines(flat, edges, assignment):
         angles = fold_angles_in(key, assignment, np.nan)
         return pattern_from_lines(CreaseLines(flat[edges], assignment, angles))
     faces = faces_in(key) if given else enclosed_facets(flat, edges, assignment)

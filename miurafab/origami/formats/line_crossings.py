@@ -11,12 +11,13 @@ from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.boxes import meeting_pairs
 from miurafab.geometry.nearest import tree_of
 from miurafab.origami.formats.crease_lines import CreaseLines
+from miurafab.origami.formats.settled_parts import DrawnSides
 
 _SAMPLE, _MEETINGS, _FEW_MEETINGS = 200, 20, 1_000_000
 
 
-def split_lines(lines: CreaseLines, near: float) -> tuple[Floats, Ints, Ints]:
-    """Vertices (V, 2), sides (m, 2) between them, and the line (m,) that each side is part of."""
+def split_lines(lines: CreaseLines, near: float) -> DrawnSides:
+    """``lines`` cut where they meet; ends and crossings within ``near`` of each other are one."""
     ends = lines.ends
     width = np.full(len(ends), near)
     if lines.curve is not None:
@@ -58,7 +59,8 @@ def split_lines(lines: CreaseLines, near: float) -> tuple[Floats, Ints, Ints]:
     order = np.lexsort((place, owners))
     owners, cuts = owners[order], cuts[order]
     joined = (owners[1:] == owners[:-1]) & (cuts[1:] != cuts[:-1])
-    return points, np.stack([cuts[:-1], cuts[1:]], axis=1)[joined], owners[1:][joined]
+    sides = np.stack([cuts[:-1], cuts[1:]], axis=1)[joined]
+    return DrawnSides(points, sides, owners[1:][joined], end)
 
 
 def _refuse_tangle(low: Floats, high: Floats) -> None:

@@ -18,7 +18,6 @@ from scipy.sparse.csgraph import connected_components
 from miurafab.errors import PatternError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Bools, Floats, Ints
-from miurafab.geometry.boxes import meeting_pairs
 from miurafab.geometry.polygons import (
     connected_parts,
     edge_lengths,
@@ -36,25 +35,29 @@ from miurafab.origami.formats.crease_lines import (
     with_flat_lines,
 )
 from miurafab.origami.formats.line_crossings import split_lines
+from miurafab.origami.formats.loose_parts import LoosePartsError, refuse_loose_parts
 from miurafab.origami.formats.rulings import rulings
+from miurafab.origami.formats.settled_parts import DrawnSides, SettledParts
 from miurafab.origami.formats.told import (
     lost_lines,
     told_of_joining,
     told_of_lines,
+    told_of_loose_parts,
     told_of_rulings,
+    torn_lines,
 )
 
 TOLERANCES = (1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 """The distances within which ends meet, as parts of the median line. The first is the usual one;
 of a drawing of few digits, whose lines would not quite meet, that which leaves the fewest lines out
 and the fewest edges short."""
+ROUNDED = 1e-2
+"""Parts of a drawing that are whole are joined within this part of the median line, no farther."""
 SHORT = 1e-3
 """Shorter edges, as parts of the median line, may be left where lines were to meet."""
 SHORT_CURVED = 0.25
 """The same as a part of the tolerance of curves."""
 
-_AT_ONCE = 1_000_000
-"""Corners of facets that are compared with a point in one step."""
 _MOST_CORNERS = 20_000_000
 """Of all facets, were each as large as the largest: 160 MB."""
 # Of two lines on each other, the line of the higher rank is kept.
@@ -69,25 +72,32 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
     :data:`TOLERANCES` with which the fewest lines are left out. A mountain or valley of unknown
     angle is folded flat. Lines that bound no facet are left out, which
     :attr:`CreasePattern.told` tells. The parts of a drawing that lie apart are the pieces of the
-    pattern.
+    pattern; one that lies loose inside a facet is joined to the lines around by two flat lines.
 
     Raises :class:`~miurafab.errors.PatternError` if the lines enclose no facet, or if a part of
-    the drawing lies loose inside a facet of another.
+    the drawing lies loose inside a part that does so itself.
     """
     if not len(lines.ends):
         raise PatternError("The drawing holds no line.")
     if not (np.abs(lines.ends) < FARTHEST).all():
         raise too_far()
     lines = corners_at_ends(lines)
-    near, told = tolerance, tuple[Finding, ...]()
-    if near is None:
-        near, told = _nearness(lines)
-    drawn = _joined(lines, near)
+    try:
+        near, told = (tolerance, ()) if tolerance is not None else _nearness(lines)
+        drawn = _joined(lines, split_lines(lines, near))
+    except LoosePartsError as fault:
+        if not len(fault.bridges):
+            raise
+        lines = with_flat_lines(lines, fault.bridges)
+        near, told = (tolerance, ()) if tolerance is not None else _nearness(lines)
+        drawn = _joined(lines, split_lines(lines, near))
+        told += (told_of_loose_parts(fault.parts),)
     if lines.curve is None:
         return replace(drawn.pattern, told=drawn.pattern.told + told)
     bent = rulings(drawn.pattern, lines.curve[drawn.source] >= 0)
     if len(bent):
-        ruled = _joined(with_flat_lines(lines, bent + drawn.origin), near).pattern
+        with_rulings = with_flat_lines(lines, bent + drawn.origin)
+        ruled = _joined(with_rulings, split_lines(with_rulings, near)).pattern
         told += (told_of_rulings(len(bent)),)
         drawn = replace(drawn, pattern=replace(ruled, told=drawn.pattern.told))
     return replace(drawn.pattern, told=drawn.pattern.told + told)
@@ -97,10 +107,16 @@ def _nearness(lines: CreaseLines) -> tuple[float, tuple[Finding, ...]]:
     """The distance within which ends meet, mm, and what is told of it."""
     median = float(np.median(_lengths(lines)))
     short = max(SHORT * median, SHORT_CURVED * lines.curve_tolerance)
+    first = split_lines(lines, TOLERANCES[0] * median)
+    parts = SettledParts.of(first, short, ROUNDED * median)
     chosen, least, refused = None, len(lines.ends) + 1, None
     for share in TOLERANCES:
+        near = share * median
+        sides = first if share == TOLERANCES[0] else split_lines(lines, near)
+        if parts.are_merged(sides):
+            break
         try:
-            drawn = _joined(lines, share * median)
+            drawn = _joined(lines, sides)
         except PatternError as fault:
             refused = refused or fault
             continue
@@ -133,9 +149,9 @@ class _Joined:
         return edge_lengths(self.pattern.vertices_coords, self.pattern.edges_vertices)
 
 
-def _joined(lines: CreaseLines, near: float) -> _Joined:
-    """The pattern that ``lines`` draw with ends within ``near`` joined."""
-    points, every, line = split_lines(lines, near)
+def _joined(lines: CreaseLines, drawn: DrawnSides) -> _Joined:
+    """The pattern of the sides that ``lines`` were cut into."""
+    points, every, line = drawn.points, drawn.sides, drawn.line
     stands_for = _without_doubles(every, line, lines.assignment)
     points, sides, rows = _without_loose_ends(points, every, np.unique(stands_for))
     if not len(sides):
@@ -147,7 +163,7 @@ def _joined(lines: CreaseLines, near: float) -> _Joined:
     holes = int((~whole).sum())
     faces, piece = faces[whole], piece[whole]
     if pieces > 1:
-        _refuse_loose(points, faces, piece)
+        refuse_loose_parts(points, sides, faces, piece)
     count = _sides_of_faces(faces, sides, len(points))
     keep = count > 0
     sides, rows, letter, count = sides[keep], rows[keep], letter[keep], count[keep]
@@ -161,6 +177,7 @@ def _joined(lines: CreaseLines, near: float) -> _Joined:
     angle = lines.fold_angle[source]
     angle = np.where(np.isnan(angle) | (count == 1), flat_folded, angle)
     stands_for = np.where(np.isin(stands_for, rows), stands_for, -1)
+    lengths = edge_lengths(drawn.points, every)
     pattern = CreasePattern(
         vertices_coords=points[used] - origin,
         edges_vertices=renumber[sides],
@@ -171,9 +188,10 @@ def _joined(lines: CreaseLines, near: float) -> _Joined:
         angles_assumed=bool(
             (np.isnan(lines.fold_angle[source]) & np.isin(letter, ("M", "V"))).any()
         ),
-        told=told_of_lines(lines, line, stands_for, holes),
+        told=told_of_lines(lines, line, stands_for, lengths, holes),
     )
     lost = int(lost_lines(lines, line, stands_for).sum())
+    lost += int(torn_lines(lines, line, stands_for, lengths).sum())
     return _Joined(pattern, source, origin, lost)
 
 
@@ -224,13 +242,18 @@ def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
 def enclosed_facets(flat: Floats, edges: Ints, assignment: NDArray[np.str_]) -> Ints:
     """The facets that ``edges`` enclose, for a file without facets; what only borders enclose in a
     creased sheet is a hole.
+
+    Raises :class:`~miurafab.errors.PatternError`, also where a part lies loose inside a facet.
     """
     if edges.max() >= len(flat):
         raise PatternError("'edges_vertices' refers to a vertex that does not exist.")
     faces = faces_of_plane_graph(flat, edges)
     if not len(faces):
         raise PatternError("'faces_vertices' is missing and 'edges_vertices' encloses no facet.")
-    return faces[without_holes(faces, connected_parts(faces)[1], edges, assignment, len(flat))]
+    piece = connected_parts(faces)[1]
+    whole = without_holes(faces, piece, edges, assignment, len(flat))
+    refuse_loose_parts(flat, edges, faces[whole], piece[whole])
+    return faces[whole]
 
 
 def oriented(flat: Floats, faces: Ints) -> Ints:
@@ -299,36 +322,6 @@ def without_holes(
     creased = np.bincount(face, ~cut, minlength=len(faces)) > 0
     bare = np.bincount(piece, creased) == 0
     return np.asarray(creased | bare[piece])
-
-
-def _refuse_loose(points: Floats, faces: Ints, piece: Ints) -> None:
-    """Refuse a piece that lies inside a facet of another: its first corner shows it."""
-    start = points[filled(faces)]
-    end = np.roll(start, -1, axis=1)
-    corner = points[faces[np.unique(piece, return_index=True)[1], 0]]
-    low, high = (
-        np.pad(np.concatenate([ends, corner]), ((0, 0), (0, 1)))
-        for ends in (start.min(axis=1), start.max(axis=1))
-    )
-    facet, other = meeting_pairs(low, high)
-    other = other - len(faces)
-    near = (facet < len(faces)) & (other >= 0)
-    near[near] = piece[facet[near]] != other[near]
-    facet, other = facet[near], other[near]
-    for at in np.array_split(np.arange(len(facet)), 1 + facet.size * faces.shape[1] // _AT_ONCE):
-        a, b = start[facet[at]], end[facet[at]]
-        x, y = corner[other[at], 0, None], corner[other[at], 1, None]
-        over = (a[..., 1] > y) != (b[..., 1] > y)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            part = (y - a[..., 1]) / (b[..., 1] - a[..., 1])
-            right = over & (a[..., 0] + part * (b[..., 0] - a[..., 0]) > x)
-        inside = np.flatnonzero(right.sum(axis=1) % 2 == 1)
-        if len(inside):
-            x, y = corner[other[at][inside[0]]]
-            raise PatternError(
-                f"A part of the drawing, at ({x:.6g}, {y:.6g}), lies loose inside a facet of "
-                "another; join them by a crease, or give a larger `tolerance`."
-            )
 
 
 def _sides_of_faces(faces: Ints, sides: Ints, vertices: int) -> Ints:

@@ -7,21 +7,26 @@ from collections.abc import Iterator
 import numpy as np
 
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Bools, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.formats.crease_lines import CreaseLines
+
+_OVERSHOOT = 0.05
+"""Of a line, so much may reach over the last line that it crosses, and is not told."""
 
 
 def told_of_lines(
-    lines: CreaseLines, source: Ints, stands_for: Ints, holes: int
+    lines: CreaseLines, source: Ints, stands_for: Ints, lengths: Floats, holes: int
 ) -> tuple[Finding, ...]:
     """What became of ``lines``, of which m sides were made: ``source`` (m,) is the line of each
-    side, ``stands_for`` (m,) the side of the pattern in its place, -1 for none, and ``holes`` the
-    number of holes.
+    side, ``stands_for`` (m,) the side of the pattern in its place, -1 for none, ``lengths`` (m,)
+    how long it is, and ``holes`` the number of holes.
     """
-    return tuple(_told(lines, source, stands_for, holes))
+    return tuple(_told(lines, source, stands_for, lengths, holes))
 
 
-def _told(lines: CreaseLines, source: Ints, stands_for: Ints, holes: int) -> Iterator[Finding]:
+def _told(
+    lines: CreaseLines, source: Ints, stands_for: Ints, lengths: Floats, holes: int
+) -> Iterator[Finding]:
     if lines.curve is not None:
         count = int((lines.curve >= 0).sum())
         yield Finding(
@@ -51,6 +56,17 @@ def _told(lines: CreaseLines, source: Ints, stands_for: Ints, holes: int) -> Ite
             f"facet, the first {lines.assignment[first]} at {_at(lines, first)}.",
             tuple(np.flatnonzero(away).tolist()),
         )
+    left = np.bincount(source, lengths * (stands_for < 0), minlength=len(lines.ends))
+    torn = torn_lines(lines, source, stands_for, lengths)
+    if torn.any():
+        first, count = int(np.argmax(torn)), int(torn.sum())
+        yield Finding(
+            "lost-lines",
+            f"{_many(count, 'line')} of the drawing {_are(count)} left out in part, where no facet "
+            f"is beside, by up to {left[torn].max():.3g} mm, the first {lines.assignment[first]} "
+            f"at {_at(lines, first)}.",
+            tuple(np.flatnonzero(torn).tolist()),
+        )
     if lines.left_out:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(lines.left_out.items()))
         yield Finding("lost-lines", f"Parts of the drawing are not read: {kinds}.")
@@ -69,12 +85,31 @@ def lost_lines(lines: CreaseLines, source: Ints, stands_for: Ints) -> Bools:
     return away
 
 
+def torn_lines(lines: CreaseLines, source: Ints, stands_for: Ints, lengths: Floats) -> Bools:
+    """(n,) the ``lines`` of which a part is in the pattern and more than an overshoot is not."""
+    whole, left = (
+        np.bincount(source, lengths * part, minlength=len(lines.ends))
+        for part in (1.0, stands_for < 0)
+    )
+    return np.asarray((left > _OVERSHOOT * whole) & ~lost_lines(lines, source, stands_for))
+
+
 def told_of_joining(near: float) -> Finding:
     """What is told of a drawing whose ends are joined farther than usual."""
     return Finding(
         "joined-ends",
         f"Lines of the drawing do not quite meet: ends within {near:.2g} mm of each other are "
         "joined; 'miurafab convert' takes another `tolerance`.",
+    )
+
+
+def told_of_loose_parts(count: int) -> Finding:
+    """What is told of the flat lines that join parts which lie loose inside a facet."""
+    lies, them = ("lies", "it") if count == 1 else ("lie", "each")
+    return Finding(
+        "loose-parts",
+        f"{_many(count, 'part')} of the drawing {lies} loose inside a facet: two flat lines (F) "
+        f"join {them} to the lines around.",
     )
 
 

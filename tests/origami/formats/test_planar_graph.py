@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +11,9 @@ from hypothesis import strategies as st
 from problems import regular
 
 from miurafab.errors import PatternError
+from miurafab.geometry.polygons import filled, signed_areas
 from miurafab.origami.formats.crease_lines import CreaseLines, lines_of
+from miurafab.origami.formats.fold import parse_fold
 from miurafab.origami.formats.line_crossings import lines_cross
 from miurafab.origami.formats.planar_graph import (
     enclosed_facets,
@@ -91,9 +95,94 @@ def test_what_is_no_pattern_is_refused() -> None:
         pattern_from_lines(drawn())
     with pytest.raises(PatternError, match="enclose no facet"):
         pattern_from_lines(drawn(("M", 0, 0, 1, 0)))
-    loose = [(letter, *(0.5 + 0.25 * at for at in ends)) for letter, *ends in SQUARE]
-    with pytest.raises(PatternError, match=r"at \(0.5, 0.5\), lies loose inside a facet"):
-        pattern_from_lines(drawn(*SQUARE, *loose))
+    nested = [ring(letter, 1, 1, 0.8 - 0.3 * at, 4) for at, letter in enumerate("MV")]
+    with pytest.raises(PatternError, match=r"at \(1.5, 1\), lies loose inside a loose part"):
+        pattern_from_lines(drawn(*SQUARE, *nested[0], *nested[1]))
+
+
+def ring(letter: str, x: float, y: float, radius: float, sides: int) -> list:
+    """A closed line around (x, y)."""
+    turn = 2 * np.pi * np.arange(sides + 1) / sides
+    corners = np.stack([x + radius * np.cos(turn), y + radius * np.sin(turn)], axis=1)
+    return [(letter, *a, *b) for a, b in pairwise(corners)]
+
+
+def area_of(pattern) -> float:
+    return float(signed_areas(pattern.vertices_coords[filled(pattern.faces_vertices)]).sum())
+
+
+@pytest.mark.parametrize("stray", [(), (("V", 0.1, 0.1, 0.2, 0.2),), (("V", 1.6, 1, 1.7, 1),)])
+@pytest.mark.parametrize(("letter", "radius"), [("M", 0.6), ("B", 0.6), ("M", 0.96), ("B", 0.01)])
+def test_a_closed_line_inside_a_facet_stays_as_it_is_drawn(letter, radius, stray) -> None:
+    """A wide tolerance made one point of its ends, or led it through the border beside it."""
+    closed = ring(letter, 1, 1, radius, 38)
+    found = pattern_from_lines(drawn(*SQUARE, *closed, *stray))
+    hole = letter == "B"
+    assert len(found.faces_vertices) == (2 if hole else 3)
+    letters = found.edges_assignment == letter
+    corners = found.vertices_coords[np.unique(found.edges_vertices[letters])]
+    away = np.linalg.norm(corners - 1, axis=1)
+    assert (np.abs(away - radius) < 1e-9).sum() == 38
+    inner = 38 / 2 * radius**2 * np.sin(2 * np.pi / 38)
+    assert area_of(found) == pytest.approx(4 - inner * hole)
+    codes = [finding.code for finding in found.told]
+    assert "joined-ends" not in codes
+    assert "loose-parts" in codes
+    assert ("holes" in codes) == hole
+
+
+def test_ends_are_joined_beside_a_closed_line_that_stays() -> None:
+    """A crease that ends short of the border, and a window beside it."""
+    short = ("V", 0.5, 0.01, 0.5, 1.99)
+    found = pattern_from_lines(drawn(*SQUARE, *ring("B", 1.4, 1, 0.3, 8), short))
+    assert len(found.faces_vertices) == 4  # a flat line from the window crosses the crease
+    assert len(edge_set(found, "V")) == 2
+    assert area_of(found) == pytest.approx(4 - 4 * 0.09 * np.sin(np.pi / 4), abs=0.03)
+    assert {finding.code for finding in found.told} == {"joined-ends", "loose-parts", "holes"}
+
+
+def test_windows_side_by_side_leave_polygons() -> None:
+    windows = [line for x in (0.4, 1.0, 1.6) for line in ring("B", x, 1, 0.2, 12)]
+    found = pattern_from_lines(drawn(*SQUARE, *windows))
+    assert len(found.faces_vertices) == 2
+    assert area_of(found) == pytest.approx(4 - 3 * 6 * 0.04 * np.sin(np.pi / 6))
+    assert found.pieces is None
+    assert "3 parts of the drawing lie loose" in found.told[-1].sentence
+
+
+def test_lines_that_are_lost_in_part_are_told_and_joined_if_they_can_be() -> None:
+    """A crease that ends 0.02 before the border had a half that nobody missed."""
+    cross = (("M", 0, 1, 2, 1), ("V", 1, 0, 1, 1.98))
+    found = pattern_from_lines(drawn(*SQUARE, *cross))
+    assert len(found.faces_vertices) == 4
+    assert [finding.code for finding in found.told] == ["joined-ends"]
+    torn = pattern_from_lines(drawn(*SQUARE, cross[0], ("V", 1, 0, 1, 1.5)))
+    assert len(torn.faces_vertices) == 3
+    assert [finding.sentence for finding in torn.told] == [
+        "1 line of the drawing is left out in part, where no facet is beside, by up to 0.5 mm, the "
+        "first V at (1, 0.75)."
+    ]
+    over = pattern_from_lines(drawn(*SQUARE, cross[0], ("V", 1, 0, 1, 2.05)))
+    assert over.told == ()
+
+
+def test_edges_of_a_file_with_a_window_are_lines_of_a_drawing() -> None:
+    """They were two facets on each other, of which a check said that they overlap."""
+    closed = ring("B", 1, 1, 0.5, 8)
+    ends = np.array([line[1:] for line in (*SQUARE, *closed)]).reshape(-1, 2)
+    points, edges = np.unique(ends.round(9), axis=0, return_inverse=True)
+    document = {
+        "file_spec": 1.1,
+        "vertices_coords": points.tolist(),
+        "edges_vertices": edges.reshape(-1, 2).tolist(),
+        "edges_assignment": ["B"] * 12,
+    }
+    found = parse_fold(document)
+    assert area_of(found) == pytest.approx(4 - 4 * 0.25 * np.sin(np.pi / 4))
+    assert [finding.code for finding in found.told] == ["holes", "loose-parts"]
+    frames = {**document, "file_frames": [{"frame_classes": ["foldedForm"], **document}]}
+    with pytest.raises(PatternError, match="lies loose inside a facet of another"):
+        parse_fold({"frame_classes": ["creasePattern"], **frames})
 
 
 def test_edges_of_a_file_that_enclose_nothing_or_too_much_are_refused(
