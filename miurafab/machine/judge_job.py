@@ -20,7 +20,7 @@ import numpy as np
 from miurafab.errors import GcodeError
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import BEAM_M3, DWELL, PAUSE, Program
+from miurafab.gcode.program import BEAM_M3, PAUSE, Program
 from miurafab.gcode.reading import has_laser_mode, read_program
 from miurafab.geometry.arrays import Bools
 from miurafab.machine.judge_words import (
@@ -169,7 +169,7 @@ def _off_the_bed(program: Program, machine: MachineProfile) -> Iterator[Finding]
     if machine.z is not None and len(program):
         extent, travel = z_extent(program), machine.z.travel_mm
         if extent > travel + TOLERANCE_MM:
-            at = int(np.argmax(np.abs(program.end[:, 2] - program.start[0, 2])))
+            at = int(np.argmax(np.abs(program.end[:, 2])))  # it begins at 0
             yield at_line(
                 "bounds",
                 program.name,
@@ -234,21 +234,20 @@ def _burning_dwells(program: Program) -> list[tuple[int, float]]:
     """
     at, power = 0, 0.0
     burning = []
-    for move, kind, seconds, new, line in zip(
-        program.event_move.tolist(),
-        program.event_kind.tolist(),
-        program.event_seconds.tolist(),
-        program.event_power.tolist(),
-        program.event_line.tolist(),
-        strict=True,
-    ):
+    columns = (
+        program.event_move,
+        program.event_seconds,
+        program.event_power,
+        program.event_line,
+    )
+    for move, seconds, new, line in zip(*(each.tolist() for each in columns), strict=True):
         if move > at:
             at = move
             still = program.spindle[move - 1] == BEAM_M3
             power = float(program.power[move - 1]) if still else 0.0
         if new == new:  # NaN: as before
             power = new
-        if kind == DWELL and power > 0 and seconds > 0:
+        if power > 0 and seconds > 0:  # a dwell; no other event lasts
             burning.append((line, power))
     return burning
 

@@ -90,6 +90,10 @@ def test_a_line_fits_to_the_byte() -> None:
         (LASER, "M3 S500\nG1 X10 F600\nS0\nG1 X20\nS0.5\nG4 P1\nM5\n", ["dwell", "m3"]),
         (MARLIN, "M3 S50\nG4 P1\nM5\n", ["dwell", "m3", "nothing-burnt"]),  # not inline
         (LASER, "M3 S50\nG4 P1\nM5\n", ["m3", "nothing-burnt"]),
+        (LASER, "M3 S500\nG1 X10 F600\nM4\nX20\nG4 P1\nM5\n", ["m3"]),
+        (LASER, "M4 S500\nG1 X10 F600\nM3\nX20\nG4 P1\nM5\n", ["dwell", "m3"]),
+        (LASER, "M4 S5\nG0 X100\nG1 X110 Y10 F8000\nM5\n", []),  # wherever it is
+        (LASER, "M4 S5\nG1 X0.5 F6001\nM5\n", ["rate"]),  # however short
         (OLD, STROKE + "M5\n", []),  # has no laser mode that could be off
         (PLOTTER, "IN;PU0,0;PD" + 500 * "400,0,400,400," + "0,0;\n", []),  # a line of 6500
         (PEN, "M3 S500\nG1 X10 F600\n", []),
@@ -103,6 +107,7 @@ def test_each_rule_keeps_to_what_it_is_about(
 
 
 ALL_ROUND = "G0 X10 Y10\nG1 X60 S500 F3000\nY60\nX10\nY{}\n"
+AWAY = ALL_ROUND.replace("10", "110").replace("60", "160").format(110)
 INSIDE = "G0 X20 Y20\nG1 X30\nG0 Y25\nG1 X20\nM5\n"
 NAMED = "M4 S0\n(operation cut)\n" + ALL_ROUND
 M3 = (
@@ -129,6 +134,14 @@ WAITS += "before the G4."
             [
                 "power a.nc:2: a.nc, line 2 (the first of 2) asks for S1001, more than the 1000 "
                 "that is full power on grbl-laser-400."
+            ],
+        ),
+        (
+            PEN,
+            "M3 S500\nG1 X10 F600\nX301\n",
+            [
+                "bounds a.nc:3: a.nc, line 3 moves to X301 Y0, off the bed of grbl-pen-a4 (300 x "
+                "210 mm)."
             ],
         ),
         (
@@ -218,6 +231,14 @@ WAITS += "before the G4."
             NAMED.format(10) + INSIDE,
             [
                 "islands a.nc:9: a.nc, line 9 burns inside the outline that is cut through from "
+                "line 4 on: that piece lies loose by then and may catch fire; cut outlines last."
+            ],
+        ),
+        (
+            LASER,
+            NAMED.format(10) + AWAY + "G0 X120 Y120\nG1 X130\n" + INSIDE,
+            [
+                "islands a.nc:16: a.nc, line 16 burns inside the outline that is cut through from "
                 "line 4 on: that piece lies loose by then and may catch fire; cut outlines last."
             ],
         ),
