@@ -73,6 +73,7 @@ def found(
     listed = list(findings)
     assert {each.code for each in listed} <= {"stroke"}
     assert {each.severity for each in listed} <= {"refusal"}
+    assert {each.where for each in listed} <= {"sheet-01"}
     return [each.sentence.removeprefix("sheet-01: ") for each in listed], +traced
 
 
