@@ -55,6 +55,8 @@ def test_a_line_ends_in_each_of_three_ways(end: str) -> None:
     assert (found.code, found.where) == ("relative", "a.nc:3")
     (found,) = relative_moves(job(f"G21{end}G0{end}X1 G091"))  # the last line has no end
     assert found.where == "a.nc:3"
+    (found,) = relative_moves(job(f"{end}G91"))
+    assert found.where == "a.nc:2"
     (found,) = relative_moves(job("G91"))
     assert found.where == "a.nc:1"
 
@@ -171,6 +173,7 @@ def test_the_first_mist_is_found(text: str, line: int | None) -> None:
         ("M3 S5\nG40\nG4.1\nX4\n", []),
         ("S5\nG4 P1\nM3\n", []),
         ("S5\nG4 P1\n", []),
+        ("M3\nG4 P1\n", []),
     ],
 )
 def test_a_dwell_after_m3_burns_by_the_words_alone(

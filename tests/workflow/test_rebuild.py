@@ -62,6 +62,71 @@ def test_facets_that_the_border_has_cut_are_left_out_as_in_check(tmp_path):
     assert found.target_mm < 0.05
 
 
+SCORED = """
+title = "Scored"
+thickness = "0.3mm"
+kerf = "0.15mm"
+[perforation]
+cut = "1.2mm"
+gap = "0.8mm"
+end_bridge = "0.6mm"
+min_end = "0.5mm"
+[creases.valley]
+mode = "score"
+[tabs]
+height = "7mm"
+[beams.diode]
+wavelength = 450
+lasers = ["5W", "10W"]
+operations.score = { power = "2.5W", feed = "2400mm/min" }
+operations.perforate = { power = "7W", feed = "1500mm/min" }
+operations.cut = { power = "8W", feed = "900mm/min" }
+operations.engrave = { power = "1.5W", feed = "3000mm/min" }
+"""
+
+
+def test_what_is_scored_on_the_back_is_folded_and_glued_too(tmp_path):
+    """The back lies turned over about the vertical axis of the sheet."""
+    material = tmp_path / "scored.toml"
+    material.write_text(SCORED)
+    mf.sheets(regular(5, 5), material=material, two_sided=True).write(tmp_path / "job")
+    assert (tmp_path / "job" / "sheet-01-back.nc").is_file()
+    found = mf.rebuild(tmp_path / "job")
+    assert (found.corners, found.measured) == (25, 25)
+    assert found.worst_mm < 0.05
+    assert repr(found) == f"<Rebuilt 25 of 25 corners, within {found.worst_mm:.3g} mm>"
+
+
+def test_distances_from_the_target_are_in_millimetres_of_the_shell(tmp_path):
+    """The shell stands over a plane; its target is half as large."""
+    target = {"surface": "plane", "parameters": {"width": 100.0, "depth": 100.0}}
+    pattern = replace(regular(5, 5), scale=2.0, target=target)
+    raised = replace(pattern, folded_coords=pattern.folded_coords + np.array([0.0, 0.0, 5.0]))
+    mf.sheets(raised).write(tmp_path)
+    found = mf.rebuild(tmp_path)
+    height = facet_means(raised.folded_coords, raised.faces_vertices)[:, 2].max()
+    assert found.folded_target_mm == pytest.approx(height, abs=1e-6)
+    assert found.target_mm == pytest.approx(height, abs=0.05)
+    assert found.target_mm != found.folded_target_mm
+    report = found.report()
+    assert report == {
+        "corners": 25,
+        "measured": 25,
+        "worst_mm": found.worst_mm,
+        "target_mm": found.target_mm,
+        "folded_target_mm": found.folded_target_mm,
+        "seconds": found.seconds,
+    }
+    assert 0 < found.seconds < 60
+
+
+def test_a_shell_without_a_target_has_no_distance_from_one(tmp_path):
+    mf.sheets(regular(4, 4)).write(tmp_path)
+    found = mf.rebuild(tmp_path)
+    assert (found.target_mm, found.folded_target_mm) == (None, None)
+    assert 0 < found.worst_mm < 0.02
+
+
 def uncut_by_circle(pattern):
     sides = pattern.faces_edges
     border = pattern.edges_assignment == "B"
