@@ -15,6 +15,7 @@ import trimesh
 import miurafab as mf
 from miurafab.errors import MiurafabError
 from miurafab.options import declared
+from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.surfaces.catalogue import CATALOGUE
 
 mpl.use("Agg")
@@ -154,6 +155,23 @@ def test_everything_is_plotted(sheet, job):
     assert sheet.pattern.plot("flat").collections
     assert mf.fold(sheet, 4).plot().collections
     assert job.plot()[0].collections
+
+
+@pytest.mark.parametrize("letter", ["F", "U", "J"])
+def test_a_plot_names_the_lines_of_every_letter(letter: str) -> None:
+    """Those of J were left out."""
+    points = np.array([[0, 0], [2, 0], [2, 1], [0, 1.0]])
+    pattern = CreasePattern(
+        vertices_coords=points,
+        edges_vertices=np.array([[0, 1], [1, 2], [2, 3], [3, 0], [0, 2]]),
+        edges_assignment=np.array([*"BBBB", letter]),
+        edges_fold_angle=np.zeros(5),
+        faces_vertices=np.array([[0, 1, 2], [0, 2, 3]]),
+    )
+    drawn = {lines.get_label(): len(lines.get_segments()) for lines in pattern.plot().collections}
+    name = {"F": "flat", "U": "unassigned", "J": "join"}[letter]
+    assert drawn == {"border": 4, name: 1}
+    assert pattern._repr_mimebundle_()["image/svg+xml"].count("stroke-dasharray") == 1
 
 
 WRONG = {

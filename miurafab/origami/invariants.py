@@ -106,13 +106,9 @@ def corner_ring(pattern: CreasePattern, points: Floats) -> CornerRing:
     """The corners of ``pattern`` with their angles in ``points`` (V, 3)."""
     faces = pattern.faces_vertices
     count, k = faces.shape
-    after, before = next_corners(faces), previous_corners(faces)
+    before = previous_corners(faces)
     real = faces >= 0
-    here = points[faces]
-    to_next = points[np.take_along_axis(faces, after, axis=1)] - here
-    to_previous = points[np.take_along_axis(faces, before, axis=1)] - here
-    angle = np.where(real, angle_between(to_next, to_previous), 0.0)
-    angle = np.where(reflex_corners(points, faces), 2 * np.pi - angle, angle)
+    angle = corner_angles(points, faces)
 
     # the corner that starts each directed side: sides[e, 0] along the edge, sides[e, 1] against it
     sides = np.full((len(pattern.edges_vertices), 2), -1, dtype=np.int64)
@@ -128,6 +124,21 @@ def corner_ring(pattern: CreasePattern, points: Floats) -> CornerRing:
     following[face * k + corner] = sides[incoming, leaves_against]
     edge = np.where(real, np.take_along_axis(edges, before, axis=1), -1).reshape(-1)
     return CornerRing(faces.reshape(-1), angle.reshape(-1), following, edge)
+
+
+def corner_angles(points: Floats, faces: Ints) -> Floats:
+    """(F, k) the angles at the corners of ``faces`` (F, k) in ``points`` (V, 2 or 3), radians, more
+    than pi where a facet is not convex; 0 where it has fewer corners.
+    """
+    if points.shape[1] == 2:
+        points = np.pad(points, ((0, 0), (0, 1)))
+    here = points[faces]
+    to_next, to_previous = (
+        points[np.take_along_axis(faces, beside, axis=1)] - here
+        for beside in (next_corners(faces), previous_corners(faces))
+    )
+    angle = np.where(faces >= 0, angle_between(to_next, to_previous), 0.0)
+    return np.asarray(np.where(reflex_corners(points, faces), 2 * np.pi - angle, angle))
 
 
 def interior_vertices(pattern: CreasePattern) -> Ints:

@@ -26,7 +26,7 @@ from miurafab.geometry.polygons import (
     signed_areas,
 )
 from miurafab.geometry.quads import QuadGrid
-from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.crease_pattern import UNCREASED, CreasePattern
 from miurafab.origami.invariants import EXACT, Residuals
 from miurafab.origami.unfold import FLAT_ANGLE
 
@@ -140,7 +140,7 @@ def _edges(pattern: CreasePattern) -> Iterator[Finding]:
     }
     if twice:
         yield _finding("double-edge", twice, "edge")
-    bare = np.flatnonzero((pattern.edges_faces < 0).all(axis=1) & (letters != "F"))
+    bare = np.flatnonzero((pattern.edges_faces < 0).all(axis=1) & ~np.isin(letters, UNCREASED))
     alone = {
         edge: f"Edge {edge} ({letters[edge]}) is a side of no facet: a facet is missing, or the "
         "edge is one too many."

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _NAMES = {"M": "mountain", "V": "valley", "F": "flat", "U": "unassigned", "B": "border", "C": "cut"}
+_NAMES["J"] = "join"
 
 
 def draw_flat(pattern: CreasePattern, axes: Axes) -> None:

@@ -25,7 +25,9 @@ FRONT, BACK = np.array([242.0, 230.0, 207.0]), np.array([157.0, 181.0, 161.0])
 """Colours of the two sides of the paper, 0 to 255."""
 INK = "#1d2329"
 CREASES = {"M": "#c8372d", "V": "#2a5fb0", "F": "#9aa4af", "U": "#9aa4af", "B": INK, "C": INK}
+CREASES["J"] = CREASES["F"]
 DASHES = {"M": (5.0, 1.5, 0.8, 1.5), "V": (2.5, 1.5), "F": (0.8, 1.5), "U": (0.8, 1.5)}
+DASHES["J"] = DASHES["F"]
 """Mountains dash-dot and valleys dashed, as is usual in origami, in parts of the unit of the
 picture. Colour is never the only difference."""
 

@@ -197,7 +197,7 @@ def _measured(
         max_flat_foldability=float(found.flat_foldability.max(initial=0.0)),
         max_isometry=float(found.isometry.max()),
         self_intersections=len(evidence.crossings),
-        quality=quality(pattern, found.ring),
+        quality=quality(pattern),
     )
     return measured if surface is None else with_distances(measured, pattern, surface)
 

@@ -90,7 +90,38 @@ def test_edges_that_do_not_fold_are_no_creases_of_a_vertex(letter: str) -> None:
     whole = audit(regular()).measurements
     cut = audit(with_diagonals(regular(), letter)).measurements
     assert cut.max_flat_foldability < 1e-12
-    assert cut.quality.fold_angles == pytest.approx(whole.quality.fold_angles)
+    for name, measured in vars(whole.quality).items():
+        assert getattr(cut.quality, name) == pytest.approx(measured), name
+
+
+@pytest.mark.parametrize("letter", ["F", "J"])
+def test_a_line_that_nobody_folds_leaves_a_facet_its_sides(letter: str) -> None:
+    """It ends in the middle of a crease and of a border: no corner of 180 degrees is there."""
+    folded = np.array([[0, 0, 0], [9, 0, 0], [9, 4, 0], [0, 4, 0], [0, 4, 4], [9, 4, 4.0]])
+    flat = np.array([[0, 0], [9, 0], [9, 4], [0, 4], [0, 8], [9, 8.0]])
+    edges = [(0, 1), (1, 2), (2, 3), (3, 0), (2, 5), (5, 4), (4, 3)]
+    whole = CreasePattern(
+        vertices_coords=flat,
+        edges_vertices=np.array(edges),
+        edges_assignment=np.array(list("BBVBBBB")),
+        edges_fold_angle=np.where(np.arange(7) == 2, np.pi / 2, 0.0),
+        faces_vertices=np.array([[0, 1, 2, 3], [3, 2, 5, 4]]),
+        folded_coords=folded,
+    )
+    split = [(0, 6), (6, 1), (1, 2), (2, 7), (7, 3), (3, 0), (2, 5), (5, 4), (4, 3), (6, 7)]
+    cut = replace(
+        whole,
+        vertices_coords=np.append(flat, [[1, 0], [1, 4.0]], axis=0),
+        folded_coords=np.append(folded, [[1, 0, 0], [1, 4, 0.0]], axis=0),
+        edges_vertices=np.array(split),
+        edges_assignment=np.array([*"BBBVVBBBB", letter]),
+        edges_fold_angle=np.where(np.isin(np.arange(10), (3, 4)), np.pi / 2, 0.0),
+        faces_vertices=np.array([[0, 6, 7, 3, -1], [6, 1, 2, 7, -1], [3, 7, 2, 5, 4]]),
+    )
+    shape = audit(cut).measurements.quality
+    assert shape == audit(whole).measurements.quality
+    assert (shape.edge_mm, shape.facet_aspect) == ((4.0, 4.0), 2.25)
+    assert np.degrees(shape.sector_angles) == pytest.approx([90, 90])
 
 
 def test_an_unassigned_edge_may_fold_and_counts_as_a_crease() -> None:
